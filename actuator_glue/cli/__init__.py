@@ -1,0 +1,1 @@
+"""The command line `actuator-glue`, one file per command; needs no ROS."""

@@ -1,0 +1,1 @@
+"""Likelihoods, DREAM(ZS), convergence, moments and bands."""

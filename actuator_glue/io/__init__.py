@@ -1,0 +1,1 @@
+"""MCAP bags and laboratory files."""

@@ -1,0 +1,1 @@
+"""The plant: parameters, Eq. (2), the effect catalogue and its compiled kernels."""

@@ -1,0 +1,1 @@
+"""ROS 2 nodes: each converts, hands on, publishes."""

@@ -1,0 +1,1 @@
+"""Sliding windows and the estimator as a pure state machine (no clock, no ROS)."""

@@ -1,0 +1,170 @@
+"""Records: uniformly sampled command and measured displacement of one test."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from actuator_glue.errors import InputError
+
+Array: TypeAlias = NDArray[np.float64]
+Hold: TypeAlias = Literal['zoh', 'linear']
+
+# No servo-hydraulic actuator of a structural laboratory has more stroke than this.
+MAX_DISPLACEMENT = 10.0  # m
+MAX_FORCE = 1e9  # N
+MAX_STIFFNESS = 1e12  # N/m
+
+
+def _column(values: ArrayLike, name: str, unit: str, limit: float, source: str) -> Array:
+    where = f'{source}: ' if source else ''
+    try:
+        column = np.array(values, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError(f'{where}{name} is not a list of numbers ({error})') from error
+    if column.ndim != 1:
+        raise InputError(f'{where}{name} must be one-dimensional, got shape {column.shape}')
+    bad = ~np.isfinite(column)
+    if bad.any():
+        raise InputError(
+            f'{where}{name} has {int(bad.sum())} NaN or infinite samples, the first at sample '
+            f'{int(bad.argmax())}; cut or repair the record before that sample'
+        )
+    if column.size and float(np.abs(column).max()) > limit:
+        at = int(np.abs(column).argmax())
+        raise InputError(
+            f'{where}{name} reaches {column[at]:g} {unit} at sample {at}, beyond {limit:g} {unit}; '
+            'check the unit of this channel'
+        )
+    column.flags.writeable = False
+    return column
+
+
+def check_stiffness(stiffness: float, source: str = '') -> float:
+    """Return a specimen stiffness [N/m] that can be used.
+
+    Raises:
+        InputError: negative, not finite or above 1e12 N/m.
+    """
+    where = f'{source}: ' if source else ''
+    try:
+        value = float(stiffness)
+    except (TypeError, ValueError) as error:
+        raise InputError(f'{where}specimen stiffness is not a number ({error})') from error
+    if not 0.0 <= value <= MAX_STIFFNESS:
+        raise InputError(
+            f'{where}specimen stiffness {value:g} N/m is outside [0, {MAX_STIFFNESS:g}] N/m; '
+            'give it in N/m (250 kN/m is 250e3), 0 for a free actuator'
+        )
+    return value
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Record:
+    """One uniformly sampled test, SI units, arrays read-only.
+
+    Attributes:
+        command: commanded displacement u, shape (n,) [m].
+        measured: measured displacement of the actuator, shape (n,) [m].
+        period: sample period [s].
+        stiffness: specimen stiffness k [N/m]; None where it is not known.
+        force: measured actuator force, shape (n,) [N], or None.
+        start_ns: acquisition time of the first sample [ns].
+        first_index: running index of the first sample in its stream.
+        hold: how the command runs between its samples.
+        actuator: name of the actuator.
+        source: file, bag or topic the record came from, for messages.
+
+    Raises:
+        InputError: fewer than two samples, unequal lengths, NaN, absurd values or period.
+    """
+
+    command: Array
+    measured: Array
+    period: float
+    stiffness: float | None = None
+    force: Array | None = None
+    start_ns: int = 0
+    first_index: int = 0
+    hold: Hold = 'zoh'
+    actuator: str = 'actuator'
+    source: str = ''
+
+    def __post_init__(self) -> None:
+        where = f'{self.source}: ' if self.source else ''
+        put = object.__setattr__
+        put(self, 'command', _column(self.command, 'command', 'm', MAX_DISPLACEMENT, self.source))
+        put(
+            self,
+            'measured',
+            _column(self.measured, 'measured', 'm', MAX_DISPLACEMENT, self.source),
+        )
+        if self.force is not None:
+            put(self, 'force', _column(self.force, 'force', 'N', MAX_FORCE, self.source))
+        lengths = [len(c) for c in (self.command, self.measured, self.force) if c is not None]
+        if len(set(lengths)) != 1:
+            raise InputError(f'{where}channels have different lengths {lengths}')
+        if lengths[0] < 2:
+            raise InputError(f'{where}{lengths[0]} sample(s); at least two are needed')
+        if not (np.isfinite(self.period) and 1e-6 <= self.period <= 10.0):
+            raise InputError(
+                f'{where}sample period {self.period:g} s is outside [1e-6, 10] s; time is in seconds'
+            )
+        if self.hold not in ('zoh', 'linear'):
+            raise InputError(f"{where}hold {self.hold!r} is unknown; use 'zoh' or 'linear'")
+        if self.stiffness is not None:
+            put(self, 'stiffness', check_stiffness(self.stiffness, self.source))
+
+    def __len__(self) -> int:
+        return len(self.command)
+
+    @property
+    def rate(self) -> float:
+        """Sample rate [Hz]."""
+        return 1.0 / self.period
+
+    @property
+    def duration(self) -> float:
+        """Length of the record, samples times period [s]."""
+        return len(self) * self.period
+
+    @property
+    def time(self) -> Array:
+        """Time of each sample since the first, shape (n,) [s]."""
+        return np.arange(len(self)) * self.period
+
+    def stamp_ns(self, sample: int) -> int:
+        """Acquisition time of one sample [ns]."""
+        return self.start_ns + round(sample * self.period * 1e9)
+
+    def slice(self, start: int, stop: int) -> Record:
+        """Return samples start:stop as a record of its own (same stream index and clock).
+
+        Raises:
+            InputError: fewer than two samples remain.
+        """
+        start, stop, _ = slice(start, stop).indices(len(self))
+        return replace(
+            self,
+            command=self.command[start:stop],
+            measured=self.measured[start:stop],
+            force=None if self.force is None else self.force[start:stop],
+            start_ns=self.stamp_ns(start),
+            first_index=self.first_index + start,
+        )
+
+    def known_stiffness(self) -> float:
+        """Specimen stiffness [N/m].
+
+        Raises:
+            InputError: the record does not say.
+        """
+        if self.stiffness is None:
+            where = f'{self.source}: ' if self.source else ''
+            raise InputError(
+                f'{where}specimen stiffness is not known; give it with --stiffness N/m'
+            )
+        return self.stiffness

@@ -1,0 +1,1 @@
+"""Detect, attribute, augment, verify: from a residual to the effect the model lacks."""
