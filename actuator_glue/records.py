@@ -36,8 +36,8 @@ def _column(values: ArrayLike, name: str, unit: str, limit: float, source: str) 
     if column.size and float(np.abs(column).max()) > limit:
         at = int(np.abs(column).argmax())
         raise InputError(
-            f'{where}{name} reaches {column[at]:g} {unit} at sample {at}, beyond {limit:g} {unit}; '
-            'check the unit of this channel'
+            f'{where}{name} reaches {column[at]:g} {unit} at sample {at}, beyond '
+            f'{limit:g} {unit}; check the unit of this channel'
         )
     column.flags.writeable = False
     return column
@@ -96,12 +96,9 @@ class Record:
     def __post_init__(self) -> None:
         where = f'{self.source}: ' if self.source else ''
         put = object.__setattr__
-        put(self, 'command', _column(self.command, 'command', 'm', MAX_DISPLACEMENT, self.source))
-        put(
-            self,
-            'measured',
-            _column(self.measured, 'measured', 'm', MAX_DISPLACEMENT, self.source),
-        )
+        for name in ('command', 'measured'):
+            column = _column(getattr(self, name), name, 'm', MAX_DISPLACEMENT, self.source)
+            put(self, name, column)
         if self.force is not None:
             put(self, 'force', _column(self.force, 'force', 'N', MAX_FORCE, self.source))
         lengths = [len(c) for c in (self.command, self.measured, self.force) if c is not None]
@@ -111,7 +108,8 @@ class Record:
             raise InputError(f'{where}{lengths[0]} sample(s); at least two are needed')
         if not (np.isfinite(self.period) and 1e-6 <= self.period <= 10.0):
             raise InputError(
-                f'{where}sample period {self.period:g} s is outside [1e-6, 10] s; time is in seconds'
+                f'{where}sample period {self.period:g} s is outside [1e-6, 10] s; '
+                'time is in seconds'
             )
         if self.hold not in ('zoh', 'linear'):
             raise InputError(f"{where}hold {self.hold!r} is unknown; use 'zoh' or 'linear'")
@@ -134,7 +132,7 @@ class Record:
     @property
     def time(self) -> Array:
         """Time of each sample since the first, shape (n,) [s]."""
-        return np.arange(len(self)) * self.period
+        return np.arange(len(self), dtype=np.float64) * self.period
 
     def stamp_ns(self, sample: int) -> int:
         """Acquisition time of one sample [ns]."""
