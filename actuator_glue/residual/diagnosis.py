@@ -1,0 +1,292 @@
+"""What a diagnosis says, and its JSON form `actuator_glue.diagnosis/1`."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any, Literal, TypeAlias
+
+from actuator_glue.records import Array
+
+SCHEMA = 'actuator_glue.diagnosis/1'
+
+Verdict: TypeAlias = Literal['none', 'missing-effect', 'unexplained']
+Json: TypeAlias = dict[str, Any]
+
+
+def number(value: float) -> float | None:
+    """Return a number that JSON can carry: None for NaN and infinity."""
+    return float(value) if math.isfinite(value) else None
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """Posterior of one parameter.
+
+    Attributes:
+        mean: posterior mean [unit].
+        stddev: posterior standard deviation [unit].
+        lower: 2.5 % quantile [unit].
+        upper: 97.5 % quantile [unit].
+        unit: SI unit.
+        neutral: value that switches the effect off [unit]; None for parameters of Eq. (2).
+    """
+
+    mean: float
+    stddev: float
+    lower: float
+    upper: float
+    unit: str
+    neutral: float | None = None
+
+    def to_json(self) -> Json:
+        """Return the JSON object of one parameter."""
+        return {
+            'mean': number(self.mean),
+            'stddev': number(self.stddev),
+            'lower': number(self.lower),
+            'upper': number(self.upper),
+            'unit': self.unit,
+            'neutral': self.neutral,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One effect that the records show and the model lacks.
+
+    Attributes:
+        name: best name in the catalogue.
+        alternatives: names that these data cannot tell from it (without `name` itself).
+        probability: probability of `name` among all single candidates at its turn.
+        place: where in the loop it acts.
+        parameters: posterior of the effect's parameters.
+        error_without: fit error of the structure without any of the set [m].
+        error_with: fit error with `name` in it [m].
+        evidence: out-of-sample log score gained, in nats of effectively independent samples.
+        plausible: its interval excludes the neutral value and the blocks agree about its sign.
+    """
+
+    name: str
+    alternatives: tuple[str, ...]
+    probability: float
+    place: str
+    parameters: dict[str, Estimate]
+    error_without: float
+    error_with: float
+    evidence: float
+    plausible: bool = True
+
+    def to_json(self) -> Json:
+        """Return the JSON object of one finding."""
+        return {
+            'name': self.name,
+            'alternatives': list(self.alternatives),
+            'probability': number(self.probability),
+            'place': self.place,
+            'parameters': {name: p.to_json() for name, p in self.parameters.items()},
+            'error_without': number(self.error_without),
+            'error_with': number(self.error_with),
+            'evidence': number(self.evidence),
+            'plausible': self.plausible,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """One effect tried at the first turn (base + effect refitted together).
+
+    Attributes:
+        name: name in the catalogue.
+        score: out-of-sample log score against Eq. (2) alone, effective nats.
+        error: free-run rms error of base + effect, refitted [m].
+        probability: probability among the candidates.
+    """
+
+    name: str
+    score: float
+    error: float
+    probability: float
+
+    def to_json(self) -> Json:
+        """Return the JSON object of one candidate."""
+        return {
+            'name': self.name,
+            'score': number(self.score),
+            'error': number(self.error),
+            'probability': number(self.probability),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class HeldOutError:
+    """Free-run simulation error on data that decided nothing, one look [m].
+
+    Attributes:
+        before: rms error of Eq. (2), refitted to the fitting part.
+        before_ci: 95 % block-bootstrap interval of `before`.
+        after: rms error with the found effects, everything refitted.
+        after_ci: 95 % block-bootstrap interval of `after`.
+        noise_floor: rms of what no function of the command can explain.
+        removable_removed: share of (before^2 - floor^2) removed, 1 is all.
+        sham: rms error with a sham effect of equal parameter count, as control.
+        records: rms error before and after of each held-out record.
+        split: 'held-out' where data were set aside.
+    """
+
+    before: float
+    before_ci: tuple[float, float]
+    after: float
+    after_ci: tuple[float, float]
+    noise_floor: float
+    removable_removed: float
+    sham: float
+    records: tuple[tuple[str, float, float], ...] = ()
+    split: str = 'held-out'
+
+    def to_json(self) -> Json:
+        """Return the JSON object of the held-out error."""
+        return {
+            'unit': 'm',
+            'split': self.split,
+            'before': number(self.before),
+            'before_ci': [number(v) for v in self.before_ci],
+            'after': number(self.after),
+            'after_ci': [number(v) for v in self.after_ci],
+            'noise_floor': number(self.noise_floor),
+            'removable_removed': number(self.removable_removed),
+            'sham': number(self.sham),
+            'records': [
+                {'source': s, 'before': number(b), 'after': number(a)} for s, b, a in self.records
+            ],
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Alarm:
+    """Why (or why not) the model of Eq. (2) is not enough.
+
+    Attributes:
+        raised: significant and material.
+        structured: rms of the part of the residual that is a function of the command [m].
+        threshold: materiality threshold for it [m].
+        noise: rms of the rest [m].
+        p_value: of the structure under the fitted base model with its own coloured noise.
+        tests: further statistics shown to people (whiteness, harmonics, drift, ...).
+    """
+
+    raised: bool
+    structured: float
+    threshold: float
+    noise: float
+    p_value: float
+    tests: dict[str, float] = field(default_factory=dict)
+
+    def to_json(self) -> Json:
+        """Return the JSON object of the alarm."""
+        return {
+            'raised': self.raised,
+            'structured': number(self.structured),
+            'threshold': number(self.threshold),
+            'noise': number(self.noise),
+            'p_value': number(self.p_value),
+            'tests': {k: number(v) for k, v in self.tests.items()},
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """Curves of one record for pictures: command, measurement and simulations (n,) [m].
+
+    `lower_*` and `upper_*` are the 95 % predictive band before and after.
+    """
+
+    source: str
+    held_out: bool
+    period: float
+    stiffness: float
+    command: Array
+    measured: Array
+    before: Array
+    after: Array
+    lower_before: Array
+    upper_before: Array
+    lower_after: Array
+    upper_after: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """Verdict, evidence and the augmented model.
+
+    Attributes:
+        verdict: 'none' (the model is enough), 'missing-effect' or 'unexplained'.
+        effects: findings in the order of their evidence; empty unless 'missing-effect'.
+        error: held-out error before and after.
+        candidates: all effects tried first, best first.
+        coverage: share of held-out samples in the 95 % band, before and after.
+        alarm: detection statistics.
+        advice: what to do next, for people.
+        base: posterior of the base parameters in the augmented model.
+        structure: effect names of the augmented model (input of `Structure`).
+        names: parameter names of the columns of `posterior`.
+        posterior: draws of base and effect parameters, shape (m, p).
+        best: best-fit parameters, shape (p,).
+        traces: curves for the report.
+        remaining: where in loop, frequency, amplitude and time the unexplained rest sits.
+        seconds: wall time.
+    """
+
+    verdict: Verdict
+    effects: tuple[Finding, ...]
+    error: HeldOutError
+    candidates: tuple[Candidate, ...]
+    coverage: tuple[float, float]
+    alarm: Alarm
+    advice: tuple[str, ...]
+    base: dict[str, Estimate]
+    structure: tuple[str, ...]
+    names: tuple[str, ...]
+    posterior: Array
+    best: Array
+    traces: tuple[Trace, ...]
+    remaining: Json
+    seconds: float
+
+    def to_json(self) -> Json:
+        """Return the object of schema `actuator_glue.diagnosis/1` (curves and draws left out)."""
+        return {
+            'schema': SCHEMA,
+            'verdict': self.verdict,
+            'summary': self.summary(),
+            'effects': [e.to_json() for e in self.effects],
+            'error': self.error.to_json(),
+            'candidates': [c.to_json() for c in self.candidates],
+            'coverage': {'before': number(self.coverage[0]), 'after': number(self.coverage[1])},
+            'alarm': self.alarm.to_json(),
+            'base': {name: p.to_json() for name, p in self.base.items()},
+            'structure': list(self.structure),
+            'remaining': self.remaining,
+            'advice': list(self.advice),
+            'seconds': number(self.seconds),
+        }
+
+    def summary(self) -> str:
+        """Return the verdict in one line."""
+        before, after = 1e6 * self.error.before, 1e6 * self.error.after
+        floor = 1e6 * self.error.noise_floor
+        if self.verdict == 'none':
+            return f'the model is enough: held-out error {before:.1f} um, noise {floor:.1f} um'
+        if self.verdict == 'unexplained':
+            return (
+                f'the model is not enough and no catalogued effect explains why: '
+                f'held-out error {before:.1f} um, noise {floor:.1f} um'
+            )
+        sets = ', '.join(
+            e.name + (f' (or {", ".join(e.alternatives)})' if e.alternatives else '')
+            for e in self.effects
+        )
+        return (
+            f'missing: {sets}; held-out error {before:.1f} -> {after:.1f} um, '
+            f'noise {floor:.1f} um'
+        )
