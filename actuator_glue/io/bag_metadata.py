@@ -1,0 +1,156 @@
+"""metadata.yaml of a rosbag2 bag, version 9, as `ros2 bag record` writes it."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from actuator_glue.errors import InputError
+
+NAME = 'metadata.yaml'
+_FOREVER = {'sec': 9223372036, 'nsec': 854775807}
+
+
+@dataclass(frozen=True, slots=True)
+class Qos:
+    """Quality of service a topic was offered with; names as ROS 2 prints them."""
+
+    reliability: str = 'reliable'
+    durability: str = 'volatile'
+    history: str = 'unknown'
+    depth: int = 0
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the nine entries that rosbag2 stores."""
+        return {
+            'history': self.history,
+            'depth': self.depth,
+            'reliability': self.reliability,
+            'durability': self.durability,
+            'deadline': dict(_FOREVER),
+            'lifespan': dict(_FOREVER),
+            'liveliness': 'automatic',
+            'liveliness_lease_duration': dict(_FOREVER),
+            'avoid_ros_namespace_conventions': False,
+        }
+
+
+LATCHED = Qos(durability='transient_local')
+
+
+@dataclass(slots=True)
+class Topic:
+    """One topic of a bag."""
+
+    name: str
+    type: str
+    rihs01: str
+    qos: list[dict[str, Any]]
+    count: int = 0
+
+
+@dataclass(slots=True)
+class Part:
+    """One file of a bag: name, first and last log time [ns], number of messages."""
+
+    name: str
+    start: int = 0
+    stop: int = 0
+    count: int = 0
+
+    def add(self, log_time: int) -> None:
+        """Count one message."""
+        self.start = min(self.start, log_time) if self.count else log_time
+        self.stop = max(self.stop, log_time)
+        self.count += 1
+
+
+@dataclass(slots=True)
+class Metadata:
+    """What metadata.yaml says."""
+
+    topics: list[Topic] = field(default_factory=list)
+    parts: list[Part] = field(default_factory=list)
+    custom: dict[str, str] = field(default_factory=dict)
+    ros_distro: str = 'jazzy'
+
+    def information(self) -> dict[str, Any]:
+        """Return the mapping below `rosbag2_bagfile_information`."""
+        filled = [p for p in self.parts if p.count]
+        start = min((p.start for p in filled), default=0)
+        stop = max((p.stop for p in filled), default=0)
+        return {
+            'version': 9,
+            'storage_identifier': 'mcap',
+            'duration': {'nanoseconds': stop - start},
+            'starting_time': {'nanoseconds_since_epoch': start},
+            'message_count': sum(p.count for p in self.parts),
+            'topics_with_message_count': [
+                {
+                    'topic_metadata': {
+                        'name': t.name,
+                        'type': t.type,
+                        'serialization_format': 'cdr',
+                        'offered_qos_profiles': t.qos,
+                        'type_description_hash': t.rihs01,
+                    },
+                    'message_count': t.count,
+                }
+                for t in self.topics
+            ],
+            'compression_format': '',
+            'compression_mode': '',
+            'relative_file_paths': [p.name for p in self.parts],
+            'files': [
+                {
+                    'path': p.name,
+                    'starting_time': {'nanoseconds_since_epoch': p.start},
+                    'duration': {'nanoseconds': p.stop - p.start},
+                    'message_count': p.count,
+                }
+                for p in self.parts
+            ],
+            'custom_data': self.custom or None,
+            'ros_distro': self.ros_distro,
+        }
+
+    def serialized(self) -> str:
+        """Return the text that rosbag2 also keeps inside the .mcap."""
+        return str(yaml.safe_dump(self.information(), sort_keys=False))
+
+    def write(self, bag: Path) -> None:
+        """Write metadata.yaml in one step; its presence says that the bag is finished."""
+        content = {'rosbag2_bagfile_information': self.information()}
+        temporary = bag / (NAME + '.tmp')
+        with temporary.open('w', encoding='utf-8') as file:
+            yaml.safe_dump(content, file, sort_keys=False)
+            file.flush()
+            os.fsync(file.fileno())
+        temporary.replace(bag / NAME)
+
+
+def read(bag: Path) -> dict[str, Any] | None:
+    """Return what metadata.yaml of a bag says, None where the bag has none.
+
+    Raises:
+        InputError: the file is there but is no metadata of a rosbag2 bag.
+    """
+    path = bag / NAME
+    if not path.is_file():
+        return None
+    try:
+        content = yaml.safe_load(path.read_text('utf-8'))
+        information: dict[str, Any] = content['rosbag2_bagfile_information']
+        information['relative_file_paths'] = [
+            str(name) for name in information['relative_file_paths']
+        ]
+    except (OSError, UnicodeDecodeError, yaml.YAMLError, KeyError, TypeError) as error:
+        raise InputError(
+            f'{path}: this is not the metadata of a rosbag2 bag ({type(error).__name__}); '
+            f'`actuator-glue recover {bag}` writes it anew from the data'
+        ) from error
+    return information

@@ -1,0 +1,143 @@
+"""Wire types without ROS: message definitions, their hashes, and CDR to and from bytes.
+
+The text of `msg_defs/msg/*.msg` is the only source; standard ROS types come from rosbags.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from rosbags.serde import SerdeError
+from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
+
+from actuator_glue.errors import InputError
+
+PACKAGE = 'actuator_glue_msgs'
+_RULE = '=' * 80
+
+
+@dataclass(frozen=True, slots=True)
+class MessageType:
+    """What a bag must hold of a type.
+
+    Attributes:
+        name: full name, `package/msg/Name`.
+        definition: ros2msg text, the type's own and those it uses, as rosbag2 embeds it.
+        rihs01: type hash, as rosbag2 prints it.
+    """
+
+    name: str
+    definition: str
+    rihs01: str
+
+
+def _definition_folders() -> Iterator[Path]:
+    """Places where the .msg files lie: checkout, installed share, sourced workspaces."""
+    package = Path(__file__).resolve().parent.parent
+    for parent in package.parents:
+        yield parent / 'msg_defs' / 'msg'
+        for share in (parent / 'share', parent / PACKAGE / 'share'):
+            yield share / PACKAGE / 'msg'
+            yield share / 'actuator_glue' / 'msg'
+    for prefix in filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)):
+        yield Path(prefix) / 'share' / PACKAGE / 'msg'
+
+
+@cache
+def definition_folder() -> Path:
+    """Return the folder that holds SampleBlock.msg.
+
+    Raises:
+        InputError: this installation has none.
+    """
+    for folder in _definition_folders():
+        if (folder / 'SampleBlock.msg').is_file():
+            return folder
+    raise InputError(
+        f'the message definitions of {PACKAGE} are not installed; run `make setup`, or source '
+        'the workspace that holds them'
+    )
+
+
+@cache
+def typestore() -> Any:
+    """Return rosbags' type store with ROS 2 Jazzy's types and ours."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    types = {}
+    for path in sorted(definition_folder().glob('*.msg')):
+        types.update(get_types_from_msg(path.read_text('utf-8'), full_name(path.stem)))
+    store.register(types)
+    return store
+
+
+def full_name(name: str) -> str:
+    """Return `actuator_glue_msgs/msg/Name` for `Name`; a full name is returned as it is."""
+    return name if '/' in name else f'{PACKAGE}/msg/{name}'
+
+
+def _own_text(name: str) -> str | None:
+    package, _, stem = name.replace('/msg/', '/').partition('/')
+    return (definition_folder() / f'{stem}.msg').read_text('utf-8') if package == PACKAGE else None
+
+
+@cache
+def message_type(name: str) -> MessageType:
+    """Return definition and hash of a type; ours keep their comments, which carry the units.
+
+    Raises:
+        InputError: the type is unknown.
+    """
+    name = full_name(name)
+    store = typestore()
+    try:
+        text, _ = store.generate_msgdef(name, ros_version=2)
+        rihs01 = store.hash_rihs01(name)
+    except TypesysError as error:
+        raise InputError(f'message type {name} is unknown ({error})') from error
+    own, *used = text.split(f'{_RULE}\nMSG: ')
+    parts = [_own_text(name) or own]
+    for part in used:
+        title, body = part.split('\n', 1)
+        parts.append(f'MSG: {title}\n{_own_text(title) or body}')
+    definition = f'{_RULE}\n'.join(p if p.endswith('\n') else p + '\n' for p in parts)
+    return MessageType(name, definition, rihs01)
+
+
+def message(name: str, **fields: Any) -> Any:
+    """Return a message object of a type, for `serialize`."""
+    return typestore().types[full_name(name)](**fields)
+
+
+def header(stamp_ns: int, frame_id: str) -> Any:
+    """Return a std_msgs/Header."""
+    sec, nanosec = divmod(int(stamp_ns), 1_000_000_000)
+    types = typestore().types
+    stamp = types['builtin_interfaces/msg/Time'](sec=sec, nanosec=nanosec)
+    return types['std_msgs/msg/Header'](stamp=stamp, frame_id=frame_id)
+
+
+def stamp_ns(head: Any) -> int:
+    """Return the stamp of a std_msgs/Header [ns]."""
+    return int(head.stamp.sec) * 1_000_000_000 + int(head.stamp.nanosec)
+
+
+def serialize(name: str, content: Any) -> bytes:
+    """Return a message as CDR bytes."""
+    return bytes(typestore().serialize_cdr(content, full_name(name)))
+
+
+def deserialize(name: str, data: bytes) -> Any:
+    """Return the message that CDR bytes hold.
+
+    Raises:
+        InputError: the bytes are no message of that type.
+    """
+    try:
+        return typestore().deserialize_cdr(data, full_name(name))
+    except (SerdeError, KeyError, AssertionError, IndexError, OverflowError) as error:
+        raise InputError(f'{len(data)} bytes are not a {full_name(name)} ({error})') from error
