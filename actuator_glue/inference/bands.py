@@ -1,0 +1,123 @@
+"""Quantile bands of simulated responses, one draw of the parameters per row."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from actuator_glue.errors import InputError
+from actuator_glue.records import Array
+
+# Quantiles sort a copy of the draws; columns are taken in blocks so that a whole test at 1 kHz
+# does not need its copy in memory.
+COLUMNS_AT_ONCE = 4096
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Band:
+    """Central bands around a median, one row per level.
+
+    Attributes:
+        levels: nominal share of the distribution inside each band, shape (L,), in (0, 1).
+        lower: lower limits, shape (L, n), in the unit of the draws.
+        median: median, shape (n,).
+        upper: upper limits, shape (L, n).
+    """
+
+    levels: Array
+    lower: Array
+    median: Array
+    upper: Array
+
+    def __len__(self) -> int:
+        return len(self.median)
+
+    def at(self, level: float) -> tuple[Array, Array]:
+        """Return lower and upper limit of one level, each of shape (n,).
+
+        Raises:
+            InputError: the band has no such level.
+        """
+        found = np.flatnonzero(np.isclose(self.levels, level, rtol=0.0, atol=1e-9))
+        if not found.size:
+            raise InputError(f'band has levels {self.levels.tolist()}, not {level:g}')
+        return self.lower[found[0]], self.upper[found[0]]
+
+    def slice(self, start: int, stop: int) -> Band:
+        """Return samples start:stop."""
+        part = slice(start, stop)
+        return Band(self.levels, self.lower[:, part], self.median[part], self.upper[:, part])
+
+
+def check_levels(levels: ArrayLike) -> Array:
+    """Return band levels as an array of shape (L,).
+
+    Raises:
+        InputError: a level is not between 0 and 1.
+    """
+    checked = np.atleast_1d(np.asarray(levels, dtype=np.float64))
+    if checked.ndim != 1 or not checked.size or not ((checked > 0) & (checked < 1)).all():
+        raise InputError(f'band levels must lie between 0 and 1, got {levels!r}')
+    return checked
+
+
+def check_draws(draws: Array, weights: Array | None) -> tuple[Array, Array | None]:
+    """Return draws of shape (m, n) and weights of shape (m,) that sum to one.
+
+    Raises:
+        InputError: fewer than two draws, values that are not finite, weights that are negative,
+            not finite, all zero or of another length.
+    """
+    draws = np.asarray(draws, dtype=np.float64)
+    if draws.ndim != 2 or len(draws) < 2:
+        raise InputError(f'bands need at least two draws as rows (m, n), got shape {draws.shape}')
+    if not np.isfinite(draws).all():
+        row = int((~np.isfinite(draws)).any(axis=1).argmax())
+        raise InputError(
+            f'simulated draw {row} is not finite; drop diverging draws before taking a band'
+        )
+    if weights is None:
+        return draws, None
+    weights = np.asarray(weights, dtype=np.float64)
+    if weights.shape != (len(draws),):
+        raise InputError(f'{len(draws)} draws but weights of shape {weights.shape}')
+    if not np.isfinite(weights).all() or (weights < 0).any() or not weights.sum() > 0:
+        raise InputError('weights must be finite, not negative and not all zero')
+    return draws, weights / weights.sum()
+
+
+def band(
+    draws: Array, levels: Sequence[float] | Array = (0.95,), weights: Array | None = None
+) -> Band:
+    """Return central quantile bands of draws (m, n), column by column.
+
+    Without weights the quantile of level q is the order statistic at q (m + 1) (Weibull's
+    plotting position), interpolated: the band then covers a further draw from the same
+    distribution with exactly its level, also for few draws (up to (m - 1)/(m + 1)). With
+    weights it is the inverse of the weighted empirical distribution, as GLUE takes it.
+
+    Args:
+        draws: one simulated response per row, shape (m, n), any unit.
+        levels: nominal share inside each band, shape (L,).
+        weights: weight of each draw, shape (m,), any positive scale.
+
+    Raises:
+        InputError: see `check_draws`, `check_levels`.
+    """
+    draws, weights = check_draws(draws, weights)
+    levels = check_levels(levels)
+    wanted = np.concatenate([(1.0 - levels) / 2.0, [0.5], (1.0 + levels) / 2.0])
+    quantiles = np.empty((len(wanted), draws.shape[1]))
+    for start in range(0, draws.shape[1], COLUMNS_AT_ONCE):
+        part = slice(start, start + COLUMNS_AT_ONCE)
+        if weights is None:
+            quantiles[:, part] = np.quantile(draws[:, part], wanted, axis=0, method='weibull')
+        else:
+            quantiles[:, part] = np.quantile(
+                draws[:, part], wanted, axis=0, method='inverted_cdf', weights=weights
+            )
+    count = len(levels)
+    return Band(levels, quantiles[:count], quantiles[count], quantiles[count + 1 :])
