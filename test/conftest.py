@@ -1,6 +1,7 @@
 """Fixtures of every test."""
 
 import os
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -16,3 +17,45 @@ def rng_seed(request: pytest.FixtureRequest) -> int:
     seed = int(given) if given else int(np.random.SeedSequence().generate_state(1)[0])
     print(f'ACTUATOR_GLUE_TEST_SEED={seed}  # repeats {request.node.nodeid}')
     return seed
+
+
+@pytest.fixture
+def overlapping_texts() -> Callable[..., list[tuple[str, str]]]:
+    """Return a function: pairs of texts of a figure that are printed over each other."""
+    import matplotlib as mpl
+    from matplotlib.text import Text
+
+    from actuator_glue.report import style
+
+    def unseen(axis) -> set[int]:
+        # Tick labels outside the view exist but are not drawn.
+        low, high = sorted(axis.get_view_interval())
+        ticks = [*axis.get_major_ticks(), *axis.get_minor_ticks()]
+        slack = 1e-9 * (high - low)
+        outside = [t for t in ticks if not low - slack <= t.get_loc() <= high + slack]
+        return {id(label) for t in outside for label in (t.label1, t.label2)}
+
+    def overlapping(figure) -> list[tuple[str, str]]:
+        with mpl.style.context(str(style.STYLE_FILE)):
+            figure.draw_without_rendering()
+            hidden = {
+                i
+                for axes in figure.axes
+                for axis in (axes.xaxis, axes.yaxis)
+                for i in unseen(axis)
+            }
+            boxes = [
+                (t.get_text(), t.get_window_extent())
+                for t in figure.findobj(Text)
+                if t.get_visible() and t.get_text().strip() and id(t) not in hidden
+            ]
+        # A text box has slack around its letters; a tenth of its height is no collision.
+        boxes = [(s, b.padded(-0.1 * b.height)) for s, b in boxes]
+        return [
+            (one, other)
+            for i, (one, a) in enumerate(boxes)
+            for other, b in boxes[i + 1 :]
+            if a.overlaps(b)
+        ]
+
+    return overlapping

@@ -1,0 +1,103 @@
+"""One-file HTML reports: text, tables and figures in order, images embedded, no outside links."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from matplotlib.figure import Figure
+
+from actuator_glue import __version__
+from actuator_glue.report.style import data_uri
+
+TEMPLATES = Path(__file__).with_name('templates')
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A paragraph; plain strings are escaped, `markupsafe.Markup` is kept."""
+
+    text: str
+    kind: str = field(default='text', init=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Note:
+    """A finding set apart from the running text."""
+
+    text: str
+    kind: str = field(default='note', init=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A table with a caption; every row as long as the header; prose for columns of text."""
+
+    header: Sequence[str]
+    rows: Sequence[Sequence[object]]
+    caption: str
+    prose: bool = False
+    kind: str = field(default='table', init=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A figure with a caption; the image is rendered when the block is made."""
+
+    uri: str
+    caption: str
+    kind: str = field(default='picture', init=False)
+
+    @classmethod
+    def of(cls, figure: Figure, caption: str) -> Picture:
+        """Render a matplotlib figure."""
+        return cls(data_uri(figure), caption)
+
+
+Block = Text | Note | Table | Picture
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A numbered section of a report."""
+
+    title: str
+    blocks: Sequence[Block]
+
+
+def render(title: str, lead: str, sections: Sequence[Section], *, made: str = '') -> str:
+    """Return the whole page as HTML.
+
+    Args:
+        title: title of the report.
+        lead: one paragraph that says what was done and what came out.
+        sections: numbered in this order; tables and figures are numbered through.
+        made: one line on how and when it was made (the caller's clock and arguments).
+
+    Raises:
+        ValueError: a table row with another length than its header.
+    """
+    for section in sections:
+        for block in section.blocks:
+            if isinstance(block, Table) and any(len(r) != len(block.header) for r in block.rows):
+                raise ValueError(f'table {block.caption!r}: a row is not as long as the header')
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    page = environment.get_template('report.html.j2')
+    return page.render(title=title, lead=lead, sections=sections, made=made, version=__version__)
+
+
+def write(
+    path: Path, title: str, lead: str, sections: Sequence[Section], *, made: str = ''
+) -> Path:
+    """Write the page to a file and return its path; arguments and errors as `render`."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(render(title, lead, sections, made=made), encoding='utf-8')
+    return path

@@ -1,0 +1,79 @@
+"""The look of every figure: style file, colours by role, and how a figure becomes a file."""
+
+from __future__ import annotations
+
+import base64
+import io
+from collections.abc import Callable
+from functools import wraps
+from pathlib import Path
+from typing import ParamSpec, TypeVar
+
+import matplotlib.style
+from matplotlib.figure import Figure
+
+P = ParamSpec('P')
+R = TypeVar('R')
+
+STYLE_FILE = Path(__file__).with_name('actuator_glue.mplstyle')
+WIDTH = 7.2  # in, the text width of an A4 page
+
+# Colour by role, the same in every figure (Okabe & Ito); print keeps them apart by lightness.
+COMMAND = '#777777'
+MEASURED = '#000000'
+DETERMINISTIC = '#D55E00'
+BAND = '#0072B2'
+TOTAL = '#56B4E9'
+TRUTH = '#009E73'
+WARNING = '#CC79A7'
+PUBLISHED = '#E69F00'
+
+# How symbols are written in figures.
+SYMBOL = {
+    'beta_1': r'$\beta_1$',
+    'alpha_1_beta_0': r'$\alpha_1\beta_0$',
+    'alpha_2': r'$\alpha_2$',
+    'alpha_3': r'$\alpha_3$',
+}
+UNIT = {'N/(m s^2)': r'N/(m s$^2$)', '1': '-'}
+
+
+def label(name: str, unit: str) -> str:
+    """Return an axis label: symbol and unit."""
+    return f'{SYMBOL.get(name, name.replace("_", " "))} [{UNIT.get(unit, unit)}]'
+
+
+def styled(draw: Callable[P, R]) -> Callable[P, R]:
+    """Make a drawing function use the style file without touching global matplotlib state."""
+
+    @wraps(draw)
+    def within(*args: P.args, **kwargs: P.kwargs) -> R:
+        with matplotlib.style.context(str(STYLE_FILE)):
+            return draw(*args, **kwargs)
+
+    return within
+
+
+def new_figure(height: float, width: float = WIDTH) -> Figure:
+    """Return an empty figure [in]; call it from a `styled` function."""
+    return Figure(figsize=(width, height), layout='constrained')
+
+
+@styled
+def save(figure: Figure, path: Path) -> Path:
+    """Write a figure to a file, its format taken from the suffix (png, svg, pdf); return the path.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    figure.savefig(path)
+    return path
+
+
+@styled
+def data_uri(figure: Figure) -> str:
+    """Return a figure as a PNG data URI, for an HTML page that needs no other file."""
+    buffer = io.BytesIO()
+    figure.savefig(buffer, format='png')
+    return 'data:image/png;base64,' + base64.b64encode(buffer.getvalue()).decode('ascii')

@@ -1,0 +1,50 @@
+"""The one-file HTML report."""
+
+import re
+from html.parser import HTMLParser
+
+import pytest
+from markupsafe import Markup
+from matplotlib.figure import Figure
+
+from actuator_glue.report.html import Note, Picture, Section, Table, Text, render, write
+
+
+class Checker(HTMLParser):
+    """Collects references, and fails on tags that do not close."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.references: list[str] = []
+
+    def handle_starttag(self, tag, attrs) -> None:
+        if tag not in ('meta', 'img', 'br'):
+            self.open.append(tag)
+        self.references += [v for k, v in attrs if k in ('src', 'href')]
+
+    def handle_endtag(self, tag) -> None:
+        assert self.open.pop() == tag
+
+
+def test_page_is_whole_numbered_and_self_contained(tmp_path) -> None:
+    picture = Picture.of(Figure(figsize=(1, 1)), 'A figure')
+    sections = [
+        Section('First', [Text('a < b & c'), Table(('x', 'y'), [(1, 'two')], 'A table'), picture]),
+        Section('Second', [Note('found'), Text(Markup('<b>bold</b>')), picture]),
+    ]
+    path = write(tmp_path / 'deep' / 'report.html', 'Title', 'Lead', sections, made='seed 3')
+    page = path.read_text(encoding='utf-8')
+    checker = Checker()
+    checker.feed(page)
+    assert not checker.open
+    assert all(r.startswith(('data:image/png;base64,', '#')) for r in checker.references)
+    assert not re.search(r'https?://|<script|@import', page)
+    assert 'a &lt; b &amp; c' in page
+    assert '<b>bold</b>' in page
+    assert 'Figure 2.' in page and 'Table 1.' in page and 'seed 3' in page
+
+
+def test_ragged_table_is_refused() -> None:
+    with pytest.raises(ValueError, match='as long as the header'):
+        render('T', 'L', [Section('S', [Table(('a', 'b'), [(1,)], 'c')])])
