@@ -1,0 +1,54 @@
+# Each target does its own set-up; stamps keep the second run quick.
+SHELL := bash
+.SHELLFLAGS := -eu -o pipefail -c
+
+BIN := .venv/bin
+VENV_STAMP := .venv/stamp
+ROS_STAMP := install/stamp
+# Nodes and rclpy need the message libraries on the loader's path before Python starts.
+ROS := . install/setup.bash &&
+
+.DEFAULT_GOAL := help
+.PHONY: help setup demo test test-slow lint bench reproduce clean
+
+help: ## show this list
+	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 20
+
+setup: $(ROS_STAMP) ## make .venv, build the interface package, install the nodes
+
+$(VENV_STAMP): requirements.txt requirements-build.txt requirements-dev.txt requirements-ros.txt \
+		setup.py setup.cfg scripts/find_python.sh scripts/make_venv.sh scripts/mend_ros_wheels.py
+	@scripts/make_venv.sh
+	@touch $@
+
+$(ROS_STAMP): $(VENV_STAMP) scripts/build_ros.sh setup.py setup.cfg package.xml \
+		$(wildcard msg_defs/* msg_defs/*/* launch/* config/* config/*/*)
+	@scripts/build_ros.sh
+	@touch $@
+
+# make demo DATA=record.csv CHANNELS=map.yaml STIFFNESS=250e3 runs on a laboratory file instead of the simulator.
+demo: $(ROS_STAMP) ## about a minute of real nodes; results in out/demo
+	@$(ROS) $(BIN)/actuator-glue demo --out out/demo \
+		$(if $(DATA),--data '$(DATA)') $(if $(CHANNELS),--channels '$(CHANNELS)') \
+		$(if $(STIFFNESS),--stiffness '$(STIFFNESS)') $(DEMO_ARGS)
+
+test: $(ROS_STAMP) ## all tests but the slow ones
+	@$(ROS) $(BIN)/python -m pytest -n 2 --dist loadfile --durations 10 $(PYTEST_ARGS)
+
+test-slow: $(ROS_STAMP) ## the long statistical tests
+	@$(ROS) $(BIN)/python -m pytest -m slow -n 2 --durations 10 $(PYTEST_ARGS)
+
+lint: $(VENV_STAMP) ## ruff and mypy --strict
+	@$(BIN)/ruff check .
+	@$(BIN)/ruff format --check .
+	@$(BIN)/mypy
+
+bench: $(ROS_STAMP) ## speed, side by side with peers; results in out/bench
+	@$(ROS) $(BIN)/python -m benchmarks --out out/bench $(BENCH_ARGS)
+
+reproduce: $(VENV_STAMP) ## the paper beside our numbers; report in out/reproduce
+	@$(BIN)/actuator-glue reproduce --out out/reproduce $(REPRODUCE_ARGS)
+
+clean: ## remove everything that make has made
+	rm -rf .venv build install log out *.egg-info
+	find . -name __pycache__ -not -path './.git/*' -prune -exec rm -rf {} +

