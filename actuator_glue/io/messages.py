@@ -37,13 +37,10 @@ class MessageType:
 
 
 def _definition_folders() -> Iterator[Path]:
-    """Places where the .msg files lie: checkout, installed share, sourced workspaces."""
+    """Places where the .msg files lie: this package, the checkout, sourced workspaces."""
     package = Path(__file__).resolve().parent.parent
-    for parent in package.parents:
-        yield parent / 'msg_defs' / 'msg'
-        for share in (parent / 'share', parent / PACKAGE / 'share'):
-            yield share / PACKAGE / 'msg'
-            yield share / 'actuator_glue' / 'msg'
+    yield package / 'interfaces' / 'msg'
+    yield package.parent / 'msg_defs' / 'msg'
     for prefix in filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)):
         yield Path(prefix) / 'share' / PACKAGE / 'msg'
 

@@ -1,0 +1,187 @@
+"""Read bags: ours, those of `ros2 bag record -s mcap`, and lone .mcap files, cut ones too."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple, NoReturn
+
+import yaml
+
+from actuator_glue.errors import InputError
+from actuator_glue.io import bag_metadata
+from actuator_glue.io.bag_metadata import Part, Topic
+from actuator_glue.io.mcap_scan import Scan
+
+Note = Callable[[str], None]
+
+
+class BagMessage(NamedTuple):
+    """One serialized message of a bag; times in ns."""
+
+    topic: str
+    type: str
+    data: bytes
+    log_time: int
+    publish_time: int
+
+
+@dataclass(slots=True)
+class Summary:
+    """What a bag holds, counted from its data.
+
+    Attributes:
+        topics: by name, in order of appearance.
+        definitions: ros2msg text by type.
+        parts: one per file.
+        finished: the bag has all its files, each with its end, and metadata.yaml where it is
+            a folder.
+        damage: one line per damage.
+    """
+
+    topics: dict[str, Topic] = field(default_factory=dict)
+    definitions: dict[str, str] = field(default_factory=dict)
+    parts: list[Part] = field(default_factory=list)
+    finished: bool = True
+    damage: list[str] = field(default_factory=list)
+
+
+def refuse(message: str) -> NoReturn:
+    """Raise what was noted: how damage is met where nobody asked to pass over it."""
+    raise InputError(message)
+
+
+def is_bag(path: Path | str) -> bool:
+    """Return whether a path is a bag folder or a lone .mcap."""
+    path = Path(path)
+    if path.is_dir():
+        return (path / bag_metadata.NAME).exists() or any(path.glob('*.mcap'))
+    return path.suffix == '.mcap'
+
+
+def bag_files(path: Path | str, note: Note = refuse) -> list[Path]:
+    """Return the .mcap files of a bag in the order they were recorded.
+
+    Args:
+        path: bag folder or lone .mcap.
+        note: called with one line per missing file.
+
+    Raises:
+        InputError: no such bag, or not in MCAP format.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise InputError(f'{path}: there is no such bag')
+    if not path.is_dir():
+        return [path]
+    information: dict[str, object] | None = None
+    try:
+        information = bag_metadata.read(path)
+    except InputError as error:
+        note(str(error))
+    present = sorted(path.glob('*.mcap'), key=_by_number)
+    if information is None:
+        if not present:
+            others = ', '.join(sorted(p.name for p in path.iterdir())[:5]) or 'nothing'
+            raise InputError(
+                f'{path}: this folder is no bag in MCAP format (it holds {others}); record with '
+                '`ros2 bag record -s mcap`, or convert a sqlite3 bag with `ros2 bag convert`'
+            )
+        return present
+    names = information['relative_file_paths']
+    assert isinstance(names, list)
+    files = [path / Path(name).name for name in names]
+    foreign = [f.name for f in files if f.suffix != '.mcap']
+    if foreign:
+        raise InputError(
+            f'{path}: {foreign[0]} is not an uncompressed MCAP file; convert the bag with '
+            '`ros2 bag convert` to storage_id mcap without file compression'
+        )
+    for file in files:
+        if not file.exists():
+            note(f'{path}: {file.name} of metadata.yaml is missing')
+    return [f for f in files if f.exists()]
+
+
+def _by_number(path: Path) -> tuple[int, str]:
+    number = re.search(r'(\d+)$', path.stem)
+    return (int(number.group(1)) if number else -1, path.name)
+
+
+def messages(
+    path: Path | str,
+    *,
+    types: Collection[str] | None = None,
+    topics: Collection[str] | None = None,
+    note: Note = refuse,
+    summary: Summary | None = None,
+) -> Iterator[BagMessage]:
+    """Yield the messages of a bag in the order they were recorded; memory does not grow.
+
+    Args:
+        path: bag folder or lone .mcap.
+        types: full names of the types wanted, all where None.
+        topics: topics wanted, all where None.
+        note: called with one line per damage (cut off, damaged chunk, missing file); the default
+            raises it once everything before has been yielded.
+        summary: filled while reading, whatever the filters.
+
+    Raises:
+        InputError: no bag, or damage and nobody to note it.
+    """
+    for file in bag_files(path, note):
+        scan = Scan(file, note)
+        part = Part(file.name)
+        if summary is not None:
+            summary.parts.append(part)
+        for schema, channel, message in scan.messages():
+            if summary is not None:
+                if channel.topic not in summary.topics:
+                    summary.topics[channel.topic] = Topic(
+                        channel.topic,
+                        schema.name,
+                        channel.metadata.get('topic_type_hash', ''),
+                        _qos(channel.metadata.get('offered_qos_profiles', '')),
+                    )
+                    summary.definitions[schema.name] = schema.data.decode('utf-8', 'replace')
+                summary.topics[channel.topic].count += 1
+                part.add(message.log_time)
+            if (types is None or schema.name in types) and (
+                topics is None or channel.topic in topics
+            ):
+                yield BagMessage(
+                    channel.topic,
+                    schema.name,
+                    message.data,
+                    message.log_time,
+                    message.publish_time,
+                )
+        if summary is not None and not scan.finished:
+            summary.finished = False
+
+
+def summarise(path: Path | str) -> Summary:
+    """Return what a bag holds; damage is noted, never raised.
+
+    Raises:
+        InputError: no bag at all.
+    """
+    summary = Summary()
+    for _ in messages(path, types=(), note=summary.damage.append, summary=summary):
+        pass
+    path = Path(path)
+    if path.is_dir() and not (path / bag_metadata.NAME).exists():
+        summary.finished = False
+        if not summary.damage:
+            summary.damage.append(f'{path}: {bag_metadata.NAME} is missing')
+    return summary
+
+
+def _qos(text: str) -> list[dict[str, object]]:
+    try:
+        loaded = yaml.safe_load(text)
+    except yaml.YAMLError:
+        return []
+    return [q for q in loaded if isinstance(q, dict)] if isinstance(loaded, list) else []

@@ -1,0 +1,310 @@
+"""Records in bags: SampleBlock and TestSetup messages to `Record` and back."""
+
+from __future__ import annotations
+
+from array import array
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from actuator_glue.errors import InputError
+from actuator_glue.io.bag_metadata import LATCHED
+from actuator_glue.io.bag_reader import BagMessage, Note, messages, refuse, summarise
+from actuator_glue.io.bag_writer import BagWriter
+from actuator_glue.io.messages import deserialize, full_name, header, message, stamp_ns
+from actuator_glue.records import Array, Hold, Record
+
+SAMPLE_BLOCK = full_name('SampleBlock')
+TEST_SETUP = full_name('TestSetup')
+BLOCK = 64  # samples per message where nobody says otherwise
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Samples:
+    """One SampleBlock: SI units, arrays of shape (n,)."""
+
+    topic: str
+    actuator: str
+    stamp_ns: int
+    period: float
+    index: int
+    command: Array
+    measured: Array
+    force: Array | None
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """One TestSetup; `stiffness` [N/m] is None where the message says NaN."""
+
+    topic: str
+    actuator: str
+    stamp_ns: int
+    index: int
+    stiffness: float | None
+    hold: Hold
+    rate: float
+    source: str
+
+
+def samples_and_setups(path: Path | str, note: Note = refuse) -> Iterator[Samples | Setup]:
+    """Yield the sample blocks and set-ups of a bag in the order they were recorded.
+
+    Raises:
+        InputError: no bag, damage and nobody to note it, or a message that cannot be decoded.
+    """
+    for found in messages(path, types=(SAMPLE_BLOCK, TEST_SETUP), note=note):
+        yield _decode(found, path)
+
+
+def _decode(found: BagMessage, path: Path | str) -> Samples | Setup:
+    try:
+        content = deserialize(found.type, found.data)
+    except InputError as error:
+        raise InputError(
+            f'{path}: topic {found.topic}: {error}; was it recorded with another version of the '
+            'messages?'
+        ) from error
+    head = content.header
+    if found.type == SAMPLE_BLOCK:
+        return Samples(
+            found.topic,
+            head.frame_id,
+            stamp_ns(head),
+            float(content.period),
+            int(content.index),
+            content.command,
+            content.measured,
+            content.force if len(content.force) else None,
+        )
+    stiffness = float(content.specimen_stiffness)
+    return Setup(
+        found.topic,
+        content.actuator or head.frame_id,
+        stamp_ns(head),
+        int(content.index),
+        None if np.isnan(stiffness) else stiffness,
+        content.hold,
+        float(content.rate),
+        content.source,
+    )
+
+
+@dataclass(slots=True)
+class _Segment:
+    """Blocks that follow each other without a gap, under one set-up."""
+
+    first: Samples
+    setup: Setup | None
+    command: array[float] = field(default_factory=lambda: array('d'))
+    measured: array[float] = field(default_factory=lambda: array('d'))
+    force: array[float] = field(default_factory=lambda: array('d'))
+
+    @property
+    def next_index(self) -> int:
+        return self.first.index + len(self.command)
+
+    def append(self, block: Samples) -> None:
+        self.command.frombytes(block.command.tobytes())
+        self.measured.frombytes(block.measured.tobytes())
+        if block.force is not None:
+            self.force.frombytes(block.force.tobytes())
+
+    def break_before(self, block: Samples, setup: Setup | None) -> str | None:
+        """Return why a block cannot go on with this segment, None where it can."""
+        at = f'at sample {block.index}'
+        if block.index > self.next_index:
+            missing = block.index - self.next_index
+            return f'{missing} samples ({missing * block.period:.3g} s) are missing before {at}'
+        if block.index < self.next_index:
+            return f'the stream begins again {at} after sample {self.next_index - 1}'
+        if block.period != self.first.period:
+            return f'the period changes from {self.first.period:g} to {block.period:g} s {at}'
+        if (block.force is None) != (self.first.force is None):
+            return f'the force channel comes or goes {at}'
+        if _test(setup) != _test(self.setup):
+            return f'the test set-up changes {at}'
+        return None
+
+    def record(self, source: str) -> Record:
+        setup = self.setup
+        return Record(
+            command=np.array(self.command),
+            measured=np.array(self.measured),
+            force=np.array(self.force) if self.first.force is not None else None,
+            period=self.first.period,
+            stiffness=setup.stiffness if setup else None,
+            hold=setup.hold if setup else 'zoh',
+            actuator=self.first.actuator or (setup.actuator if setup else '') or 'actuator',
+            start_ns=self.first.stamp_ns,
+            first_index=self.first.index,
+            source=source,
+        )
+
+
+def _test(setup: Setup | None) -> tuple[object, ...]:
+    return (setup.stiffness, setup.hold, setup.actuator) if setup else ()
+
+
+def read_records(
+    path: Path | str, *, note: Note = refuse, gap: Note | None = None
+) -> list[Record]:
+    """Return the records of a bag, one per topic and stretch without a gap.
+
+    Args:
+        path: bag folder or lone .mcap.
+        note: called with one line per damage; the default raises it.
+        gap: called with one line where a stream is split (samples missing, stream begun again,
+            set-up changed); the default raises for missing samples and says nothing of the rest.
+
+    Raises:
+        InputError: no bag, no samples, damage, NaN or absurd samples, missing samples and nobody
+            to be told.
+    """
+    setups = _setups(path, note)
+    open_segments: dict[str, _Segment] = {}
+    done: list[_Segment] = []
+    items = samples_and_setups(path, note=lambda _: None)
+    for position, item in enumerate(items, start=1):
+        if isinstance(item, Setup):
+            continue
+        if len(item.command) != len(item.measured) or (
+            item.force is not None and len(item.force) != len(item.command)
+        ):
+            raise InputError(
+                f'{path}: topic {item.topic}: block at sample {item.index} has channels of '
+                'different lengths'
+            )
+        setup = _setup_of(item, setups, position)
+        segment = open_segments.get(item.topic)
+        if segment is not None:
+            reason = segment.break_before(item, setup)
+            if reason is not None:
+                _tell(f'{path}: topic {item.topic}: {reason}', gap, 'missing' in reason)
+                done.append(segment)
+                segment = None
+        if segment is None:
+            segment = open_segments[item.topic] = _Segment(item, setup)
+        segment.append(item)
+    done.extend(open_segments.values())
+    records = [
+        segment.record(_source(path, segment.first.topic, len(open_segments)))
+        for segment in done
+        if len(segment.command) >= 2
+    ]
+    if not records:
+        raise InputError(_nothing(path))
+    return records
+
+
+def _tell(text: str, gap: Note | None, is_gap: bool) -> None:
+    if gap is not None:
+        gap(f'{text}; the stretches are taken as records of their own')
+    elif is_gap:
+        raise InputError(f'{text}; cut the bag there, or use the stretches one by one')
+
+
+def _source(path: Path | str, topic: str, topics: int) -> str:
+    return f'{path}:{topic}' if topics > 1 else str(path)
+
+
+def _nothing(path: Path | str) -> str:
+    held = [f'{t.name} ({t.type}, {t.count})' for t in summarise(path).topics.values()]
+    return (
+        f'{path}: no two samples of {SAMPLE_BLOCK} in this bag; it holds '
+        f'{", ".join(held) or "no message"}'
+    )
+
+
+def _setups(path: Path | str, note: Note) -> list[tuple[int, Setup]]:
+    """Return the set-ups with their place among blocks and set-ups; checks the whole bag."""
+    found: list[tuple[int, Setup]] = []
+    wanted = messages(path, types=(SAMPLE_BLOCK, TEST_SETUP), note=note)
+    for position, raw in enumerate(wanted, start=1):
+        if raw.type == TEST_SETUP:
+            setup = _decode(raw, path)
+            assert isinstance(setup, Setup)
+            if setup.hold not in ('zoh', 'linear'):
+                raise InputError(f'{path}: topic {raw.topic}: hold {setup.hold!r} is unknown')
+            found.append((position, setup))
+    return found
+
+
+def _setup_of(block: Samples, setups: list[tuple[int, Setup]], position: int) -> Setup | None:
+    """Return the set-up that holds for a block.
+
+    Set-ups and blocks are topics of their own, so a set-up may be recorded a little after the
+    first blocks it holds for; its stamp says from when on it does.
+    """
+    namespace = block.topic.rpartition('/')[0]
+    near = [s for s in setups if s[1].topic.rpartition('/')[0] == namespace] or setups
+    tolerance = round(block.period * 5e8)
+    chosen: Setup | None = None
+    for place, setup in near:
+        begins = setup.stamp_ns <= block.stamp_ns + tolerance
+        if place < position:
+            if begins or chosen is None:
+                chosen = setup
+        elif begins and (chosen is None or setup.stamp_ns > chosen.stamp_ns):
+            chosen = setup
+    return chosen or (near[0][1] if near else None)
+
+
+def write_record(
+    writer: BagWriter,
+    record: Record,
+    *,
+    namespace: str = '',
+    block: int = BLOCK,
+    progress: Callable[[int], None] | None = None,
+) -> None:
+    """Write one record as TestSetup and SampleBlocks under `NAMESPACE/samples`.
+
+    Args:
+        writer: an open bag.
+        record: what to write; log times are its own stamps.
+        namespace: put before the topics, `` or `/name`.
+        block: samples per message.
+        progress: called with the number of samples written since the last call.
+
+    Raises:
+        InputError: disk full, or a block of less than one sample.
+    """
+    if block < 1:
+        raise InputError(f'a block of {block} samples is impossible; use at least 1')
+    samples, setup = f'{namespace}/samples', f'{namespace}/test_setup'
+    writer.add_topic(setup, TEST_SETUP, qos=(LATCHED,))
+    writer.add_topic(samples, SAMPLE_BLOCK)
+    writer.write(setup, _setup_message(record), record.start_ns)
+    empty = np.empty(0)
+    for start in range(0, len(record), block):
+        stop = min(start + block, len(record))
+        content = message(
+            'SampleBlock',
+            header=header(record.stamp_ns(start), record.actuator),
+            period=record.period,
+            index=record.first_index + start,
+            command=record.command[start:stop],
+            measured=record.measured[start:stop],
+            force=empty if record.force is None else record.force[start:stop],
+        )
+        # A block is complete, and can be logged, when its last sample has been acquired.
+        writer.write(samples, content, record.stamp_ns(stop))
+        if progress is not None:
+            progress(stop - start)
+
+
+def _setup_message(record: Record) -> Any:
+    return message(
+        'TestSetup',
+        header=header(record.start_ns, record.actuator),
+        actuator=record.actuator,
+        specimen_stiffness=float('nan') if record.stiffness is None else record.stiffness,
+        rate=record.rate,
+        hold=record.hold,
+        index=record.first_index,
+        source=record.source,
+    )

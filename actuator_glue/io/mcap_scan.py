@@ -1,0 +1,171 @@
+"""Scan one .mcap front to back, whether finished, cut off or damaged.
+
+mcap's own readers either need the index at the end of a file or hand over half a message at a
+cut. Here every record is checked for being whole, and messages of a cut chunk are salvaged.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from io import BytesIO
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from mcap.data_stream import ReadDataStream
+from mcap.exceptions import McapError
+from mcap.opcode import Opcode
+from mcap.records import Channel, Chunk, Message, Schema
+
+from actuator_glue.errors import InputError
+
+_MAGIC = b'\x89MCAP0\r\n'
+_HEAD = struct.Struct('<BQ')
+_MAX_CHUNK = 1 << 29  # bytes; a chunk that claims more is damaged or hostile
+_UNREADABLE = (McapError, struct.error, ValueError, RuntimeError, OverflowError, MemoryError)
+
+
+@dataclass(slots=True)
+class Scan:
+    """State of a scan.
+
+    Attributes:
+        path: the file.
+        note: called with one line per damage; raises where damage must not be passed over.
+        schemas: schemas seen so far, by id.
+        channels: channels seen so far, by id.
+        finished: the file has its footer.
+    """
+
+    path: Path
+    note: Callable[[str], None]
+    schemas: dict[int, Schema] = field(default_factory=dict)
+    channels: dict[int, Channel] = field(default_factory=dict)
+    finished: bool = False
+
+    def messages(self) -> Iterator[tuple[Schema, Channel, Message]]:
+        """Yield schema, channel and message in file order.
+
+        Raises:
+            InputError: the file cannot be opened or is no MCAP file.
+        """
+        try:
+            size = self.path.stat().st_size
+            with self.path.open('rb') as file:
+                yield from self._file(file, size)
+        except OSError as error:
+            raise InputError(f'{self.path}: cannot be read ({error.strerror})') from error
+
+    def _file(self, file: BinaryIO, size: int) -> Iterator[tuple[Schema, Channel, Message]]:
+        if not _MAGIC.startswith(file.read(len(_MAGIC))):
+            raise InputError(f'{self.path}: this is not an MCAP file')
+        while not self.finished:
+            at = file.tell()
+            head = file.read(_HEAD.size)
+            opcode, length = _HEAD.unpack(head) if len(head) == _HEAD.size else (0, size)
+            body = b''
+            whole = at + _HEAD.size + length <= size
+            if opcode == Opcode.FOOTER and whole:
+                self.finished = True
+            elif opcode == Opcode.CHUNK or (opcode in _PARSED and whole):
+                body = file.read(min(length, _MAX_CHUNK))
+            elif whole:
+                file.seek(length, 1)
+            if body and opcode == Opcode.CHUNK:
+                yield from self._chunk(body, at, whole)
+            elif body:
+                yield from self._record(opcode, body, at)
+            if not whole:
+                self.note(
+                    f'{self.path}: cut off after {at} of its bytes (a killed recorder, a full '
+                    f'disk or an incomplete copy); `actuator-glue recover` mends it'
+                )
+                return
+
+    def _record(
+        self, opcode: int, body: bytes, at: int
+    ) -> Iterator[tuple[Schema, Channel, Message]]:
+        stream = ReadDataStream(BytesIO(body))
+        try:
+            if opcode == Opcode.SCHEMA:
+                schema = Schema.read(stream)
+                self.schemas[schema.id] = schema
+            elif opcode == Opcode.CHANNEL:
+                channel = Channel.read(stream)
+                self.channels[channel.id] = channel
+            elif opcode == Opcode.MESSAGE:
+                message = Message.read(stream, len(body))
+                channel = self.channels[message.channel_id]
+                yield self.schemas[channel.schema_id], channel, message
+        except KeyError:
+            self.note(f'{self.path}: message at byte {at} belongs to no known topic')
+        except _UNREADABLE as error:
+            self.note(f'{self.path}: damaged record at byte {at} ({error})')
+
+    def _chunk(
+        self, body: bytes, at: int, whole: bool
+    ) -> Iterator[tuple[Schema, Channel, Message]]:
+        try:
+            data = _chunk_data(body, whole)
+        except _UNREADABLE as error:
+            if whole:
+                self.note(f'{self.path}: damaged chunk at byte {at} ({error}); left out')
+            return
+        position = 0
+        while position + _HEAD.size <= len(data):
+            opcode, length = _HEAD.unpack_from(data, position)
+            start = position + _HEAD.size
+            position = start + length
+            if position > len(data):
+                if whole:
+                    self.note(f'{self.path}: damaged chunk at byte {at}')
+                return
+            if opcode in _PARSED:
+                yield from self._record(opcode, data[start:position], at)
+
+
+_PARSED = frozenset((Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE))
+
+
+def _chunk_data(body: bytes, whole: bool) -> bytes:
+    """Return the records of a chunk; of a cut uncompressed one, those that are there."""
+    stream = ReadDataStream(BytesIO(body))
+    if not whole:
+        # An uncompressed chunk's records follow its 40-byte head; a compressed one is lost.
+        (compression_length,) = struct.unpack_from('<I', body, 28)
+        if compression_length:
+            raise ValueError('compressed')
+        return body[40:]
+    chunk = Chunk.read(stream)
+    if chunk.uncompressed_size > _MAX_CHUNK:
+        raise ValueError(f'claims {chunk.uncompressed_size} bytes')
+    data = _decompress(chunk)
+    if len(data) != chunk.uncompressed_size:
+        raise ValueError(f'{len(data)} bytes instead of {chunk.uncompressed_size}')
+    if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
+        raise ValueError('checksum does not agree')
+    return data
+
+
+def _decompress(chunk: Chunk) -> bytes:
+    if chunk.compression == '':
+        return bytes(chunk.data)
+    decompressed: Any
+    if chunk.compression == 'zstd':
+        import zstandard
+
+        try:
+            with zstandard.ZstdDecompressor().stream_reader(chunk.data) as reader:
+                decompressed = reader.read(chunk.uncompressed_size)
+        except zstandard.ZstdError as error:
+            raise ValueError(str(error)) from error
+    elif chunk.compression == 'lz4':
+        import lz4.frame  # type: ignore[import-untyped]
+
+        with lz4.frame.LZ4FrameDecompressor() as decompressor:
+            decompressed = decompressor.decompress(chunk.data, chunk.uncompressed_size)
+    else:
+        raise ValueError(f'compression {chunk.compression!r} is unknown')
+    return bytes(decompressed)
