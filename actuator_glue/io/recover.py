@@ -1,0 +1,128 @@
+"""Mend bags that were cut off: a killed recorder, a full disk, an incomplete copy."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from actuator_glue.errors import InputError
+from actuator_glue.io import bag_metadata
+from actuator_glue.io.bag_metadata import Metadata, Topic
+from actuator_glue.io.bag_reader import Summary, bag_files, messages
+from actuator_glue.io.mcap_file import McapFile, disk_error, in_use
+
+KEPT = '.cut'  # suffix of the original of a file that was written anew
+
+
+@dataclass(slots=True)
+class Recovery:
+    """What recovering a bag did.
+
+    Attributes:
+        messages: messages in the mended bag.
+        seconds: from the first to the last message [s].
+        rewritten: files written anew; the original of each stays beside it as `NAME.mcap.cut`.
+        notes: what was wrong, one line each.
+    """
+
+    messages: int = 0
+    seconds: float = 0.0
+    rewritten: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+
+def recover(path: Path | str) -> Recovery:
+    """Write cut or damaged files of a bag anew from what is whole in them, and its metadata.yaml.
+
+    Each file is written beside the old one and renamed into its place when it is on the disk;
+    the original stays as `NAME.mcap.cut`. A bag that is whole is left as it is.
+
+    Args:
+        path: bag folder or lone .mcap.
+
+    Raises:
+        InputError: no bag, one that is being recorded, not one whole message, or no room.
+    """
+    path = Path(path)
+    for file in bag_files(path, lambda _: None):
+        if in_use(file):
+            raise InputError(f'{file} is being recorded; stop the recorder first')
+    recovery = Recovery()
+    metadata = Metadata()
+    topics: dict[str, Topic] = {}
+    for file in bag_files(path, recovery.notes.append):
+        _mend(file, path, recovery, metadata, topics)
+    metadata.topics = list(topics.values())
+    metadata.parts = [part for part in metadata.parts if part.count]
+    if not metadata.parts:
+        detail = f' ({recovery.notes[0]})' if recovery.notes else ''
+        raise InputError(f'{path}: not one whole message can be recovered{detail}')
+    recovery.messages = sum(part.count for part in metadata.parts)
+    start = min(part.start for part in metadata.parts)
+    recovery.seconds = (max(part.stop for part in metadata.parts) - start) * 1e-9
+    if path.is_dir() and (recovery.notes or not (path / bag_metadata.NAME).exists()):
+        if not (path / bag_metadata.NAME).exists():
+            recovery.notes.append(f'{path}: {bag_metadata.NAME} was missing')
+        try:
+            metadata.write(path)
+        except OSError as error:
+            raise disk_error(path, error) from error
+    return recovery
+
+
+def _mend(
+    file: Path, bag: Path, recovery: Recovery, metadata: Metadata, topics: dict[str, Topic]
+) -> None:
+    summary = Summary()
+    damage: list[str] = []
+    for _ in messages(file, types=(), note=damage.append, summary=summary):
+        pass
+    recovery.notes.extend(damage)
+    part = summary.parts[0]
+    for topic in summary.topics.values():
+        known = topics.setdefault(
+            topic.name, Topic(topic.name, topic.type, topic.rihs01, topic.qos)
+        )
+        known.count += topic.count
+    if part.count:
+        metadata.parts.append(part)
+        if damage or not summary.finished:
+            own = Metadata(list(summary.topics.values()), [part])
+            _rewrite(file, bag, summary, own)
+            recovery.rewritten.append(file.name)
+
+
+def _rewrite(file: Path, bag: Path, summary: Summary, own: Metadata) -> None:
+    """Write a file anew from its whole messages and put it in the old one's place."""
+    temporary = file.with_name(file.name + '.tmp')
+    with suppress(FileNotFoundError):
+        temporary.unlink()
+    serialized = own.serialized()
+    new = McapFile(temporary, bag)
+    topics = {t.name: Topic(t.name, t.type, t.rihs01, t.qos) for t in own.topics}
+    for topic in topics.values():
+        new.add_topic(topic, summary.definitions[topic.type])
+    for found in messages(file, note=lambda _: None):
+        new.write(topics[found.topic], found.data, found.log_time, found.publish_time)
+    new.finish(serialized)
+    try:
+        # A second name first, so that there is no moment without the file.
+        _unused(file).hardlink_to(file)
+        temporary.replace(file)
+    except OSError as error:
+        raise disk_error(bag, error) from error
+
+
+def _unused(file: Path) -> Path:
+    """Return a name for the original that no earlier recovery has taken."""
+
+    def names() -> Iterator[Path]:
+        yield file.with_name(file.name + KEPT)
+        number = 2
+        while True:
+            yield file.with_name(f'{file.name}{KEPT}{number}')
+            number += 1
+
+    return next(name for name in names() if not name.exists())
