@@ -287,6 +287,5 @@ class Diagnosis:
             for e in self.effects
         )
         return (
-            f'missing: {sets}; held-out error {before:.1f} -> {after:.1f} um, '
-            f'noise {floor:.1f} um'
+            f'missing: {sets}; held-out error {before:.1f} -> {after:.1f} um, noise {floor:.1f} um'
         )
