@@ -17,6 +17,7 @@ setup(
             'interfaces/msg/*.msg',
             'interfaces/srv/*.srv',
             'interfaces/action/*.action',
+            'report/*.mplstyle',
             'report/templates/*',
             'py.typed',
         ],
