@@ -1,0 +1,77 @@
+"""What a run of the sampler leaves: draws and what can be said about them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from actuator_glue.inference.convergence import ess_bulk, rhat
+from actuator_glue.records import Array
+
+# Points handed to the next run: enough for a covariance of any model here, light enough to pickle.
+_ARCHIVE = 1000
+
+
+@dataclass(frozen=True)
+class Chains:
+    """Draws of all chains in the order they were made.
+
+    Attributes:
+        draws: (generations, chains, p) [physical units], burn-in included.
+        log_density: log likelihood of each draw, (generations, chains).
+        evaluations: likelihood evaluations of the whole run, the start included.
+        start_evaluations: evaluations before the first generation.
+        burn: first generations that adapted the proposals; not draws of the posterior.
+        annealed: False if the budget ended before the start had reached the posterior.
+    """
+
+    draws: Array
+    log_density: Array
+    evaluations: int
+    start_evaluations: int
+    burn: int
+    annealed: bool = True
+
+    @property
+    def kept(self) -> Array:
+        """Draws after burn-in, (generations - burn, chains, p)."""
+        return self.draws[self.burn :]
+
+    def posterior(self, burn: int | None = None) -> Array:
+        """Draws (m, p) of all chains after `burn` generations (default: the adaptation)."""
+        kept = self.draws[self.burn if burn is None else burn :]
+        return kept.reshape(-1, kept.shape[2])
+
+    def posterior_log_density(self, burn: int | None = None) -> Array:
+        """Log likelihoods (m,) of `posterior(burn)`."""
+        return self.log_density[self.burn if burn is None else burn :].reshape(-1)
+
+    def evaluations_at(self, generation: int) -> int:
+        """Likelihood evaluations made when the given generation (from 0) was complete."""
+        return self.start_evaluations + (generation + 1) * self.draws.shape[1]
+
+    @cached_property
+    def rhat(self) -> Array:
+        """Rank-normalised split R-hat of each parameter after burn-in, (p,)."""
+        return rhat(self.kept)
+
+    @cached_property
+    def ess(self) -> Array:
+        """Bulk effective sample size of each parameter after burn-in, (p,)."""
+        return ess_bulk(self.kept)
+
+    @cached_property
+    def best(self) -> Array:
+        """Point (p,) of the largest log likelihood visited."""
+        at = int(self.log_density.argmax())
+        flat: Array = self.draws.reshape(-1, self.draws.shape[2])
+        return flat[at]
+
+    @property
+    def archive(self) -> Array:
+        """At most 1000 points (m, p) spread over the posterior draws, for a warm start."""
+        points = self.posterior()
+        chosen = np.linspace(0, len(points) - 1, min(_ARCHIVE, len(points))).astype(np.intp)
+        return points[chosen]

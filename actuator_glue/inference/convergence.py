@@ -1,0 +1,120 @@
+"""Convergence of chains: R-hat, the paper's Gelman-Rubin, effective sample size.
+
+arviz shows these to users; here they are needed after every window, hundreds of times as fast.
+test/inference/test_convergence.py holds them to arviz.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.fft import irfft, next_fast_len, rfft
+from scipy.special import ndtri
+from scipy.stats import rankdata
+
+from actuator_glue.records import Array
+
+
+def gelman_rubin(draws: Array) -> Array:
+    """Gelman-Rubin diagnostic of each parameter from the last half of each chain.
+
+    The paper's R-hat (Gelman and Rubin 1992; Vrugt 2016, Eq. 27), threshold 1.2.
+
+    Args:
+        draws: (generations, chains, p).
+
+    Returns:
+        (p,); nan where fewer than two draws or chains remain or nothing moves.
+    """
+    half = draws[len(draws) // 2 :]
+    return _potential_reduction(np.moveaxis(half, 2, 0))
+
+
+def rhat(draws: Array) -> Array:
+    """Rank-normalised split R-hat of each parameter (Vehtari et al. 2021, Eqs. 3 and 14).
+
+    The larger of the bulk value and the value of the folded draws.
+
+    Args:
+        draws: (generations, chains, p).
+
+    Returns:
+        (p,); nan for fewer than 4 generations or constant draws.
+    """
+    split = _split(draws)
+    if split.shape[1] < 2:
+        return np.full(draws.shape[2], np.nan)
+    folded = np.abs(split - np.median(split, axis=(1, 2), keepdims=True))
+    return np.asarray(
+        np.maximum(_potential_reduction(_normal(split)), _potential_reduction(_normal(folded)))
+    )
+
+
+def ess_bulk(draws: Array) -> Array:
+    """Bulk effective sample size of each parameter (Vehtari et al. 2021, section 4.2).
+
+    Args:
+        draws: (generations, chains, p).
+
+    Returns:
+        (p,); nan for fewer than 4 generations or constant draws.
+    """
+    split = _split(draws)
+    if split.shape[1] < 2:
+        return np.full(draws.shape[2], np.nan)
+    return np.array([_effective(one) for one in _normal(split)])
+
+
+def _split(draws: Array) -> Array:
+    """(p, generations // 2, 2 chains): each chain's first and last half, the middle dropped."""
+    half = len(draws) // 2
+    parts = (draws[:half], draws[len(draws) - half :])
+    return np.ascontiguousarray(np.moveaxis(np.concatenate(parts, axis=1), 2, 0))
+
+
+def _normal(values: Array) -> Array:
+    """Normal scores of the ranks over all chains, shape kept."""
+    flat = values.reshape(len(values), -1)
+    rank = rankdata(flat, axis=1)
+    return np.asarray(ndtri((rank - 0.375) / (flat.shape[1] + 0.25))).reshape(values.shape)
+
+
+def _potential_reduction(values: Array) -> Array:
+    """sqrt(((n - 1)/n W + B/n) / W) for values (p, n, chains)."""
+    n, chains = values.shape[1:]
+    if n < 2 or chains < 2:
+        return np.full(len(values), np.nan)
+    within = values.var(axis=1, ddof=1).mean(axis=1)
+    between = values.mean(axis=1).var(axis=1, ddof=1)
+    with np.errstate(divide='ignore', invalid='ignore'):
+        return np.asarray(np.sqrt((n - 1) / n + between / within))
+
+
+def _effective(values: Array) -> float:
+    """Effective sample size of (n, chains) by Geyer's initial monotone sequence."""
+    n, chains = values.shape
+    centred = values - values.mean(axis=0)
+    length = next_fast_len(2 * n, real=True)
+    spectrum = rfft(centred, length, axis=0)
+    power = (spectrum.real**2 + spectrum.imag**2).sum(axis=1)
+    covariance = irfft(power, length)[:n] / (n * chains)
+    within = covariance[0] * n / (n - 1)
+    if not within > 0.0:
+        return float('nan')
+    total = covariance[0] + (values.mean(axis=0).var(ddof=1) if chains > 1 else 0.0)
+    rho = 1.0 - (within - covariance * n / (n - 1)) / total
+    rho[0] = 1.0
+    return _geyer(rho, n * chains)
+
+
+def _geyer(rho: Array, size: int) -> float:
+    """Sum autocorrelations in pairs while positive, made monotone; return the sample size."""
+    n = len(rho)
+    pairs = rho[: n - n % 2].reshape(-1, 2).sum(axis=1)
+    stop = 1
+    while stop < len(pairs) - 1 and pairs[stop] > 0.0:
+        stop += 1
+    monotone = np.minimum.accumulate(pairs[:stop])
+    # As in Stan and arviz: the even term after the last pair sharpens antithetic chains.
+    extra = max(float(rho[2 * stop]), 0.0) if 2 * stop < n else 0.0
+    tau = max(-1.0 + 2.0 * float(monotone.sum()) + extra, 1.0 / np.log10(size))
+    return float(size / tau)

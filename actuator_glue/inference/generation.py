@@ -1,0 +1,123 @@
+"""One generation of all chains in two compiled halves: propose, then accept.
+
+Between the halves the caller evaluates the likelihood of all candidates in one batch, so no
+function is handed to compiled code.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from actuator_glue.inference.coordinates import bounded
+from actuator_glue.inference.moves import (
+    INDEPENDENCE,
+    PARALLEL,
+    SNOOKER,
+    U_ACCEPT,
+    U_MOVE,
+    independence,
+    parallel,
+    snooker,
+)
+from actuator_glue.inference.moves.draw import choose
+from actuator_glue.jit import njit
+
+
+@njit
+def propose(  # type: ignore[no-untyped-def]
+    z,
+    uniforms,
+    rows,
+    size,
+    lower,
+    width,
+    move_cdf,
+    crossover_cdf,
+    scale,
+    centre,
+    factor,
+    pairs,
+    unit_jump,
+    jitter,
+    noise,
+):
+    """Return candidates of all chains.
+
+    Returns candidate (n, p) in unbounded coordinates, x (n, p) in physical units, log_jacobian
+    (n,), correction (n,) = log Hastings correction, label (n, 2) = move and crossover class.
+    """
+    n, d = z.shape
+    candidate = np.empty((n, d))
+    x = np.empty((n, d))
+    log_jacobian = np.empty(n)
+    correction = np.empty(n)
+    label = np.empty((n, 2), np.int64)
+    for i in range(n):
+        row = uniforms[i]
+        move = choose(row[U_MOVE], move_cdf)
+        label[i, 0] = move
+        label[i, 1] = -1
+        correction[i] = 0.0
+        if move == PARALLEL:
+            label[i, 1] = parallel.propose(
+                z[i],
+                row,
+                rows,
+                size,
+                scale,
+                crossover_cdf,
+                pairs,
+                unit_jump,
+                jitter,
+                noise,
+                candidate[i],
+            )
+        elif move == SNOOKER:
+            correction[i] = snooker.propose(z[i], row, rows, size, scale, candidate[i])
+        elif move == INDEPENDENCE:
+            correction[i] = independence.propose(z[i], row, centre, factor, candidate[i])
+        log_jacobian[i] = bounded(candidate[i], lower, width, x[i])
+    return candidate, x, log_jacobian, correction, label
+
+
+@njit
+def accept(  # type: ignore[no-untyped-def]
+    z, x, log_density, target, new_z, new_x, new_log_density, new_target, correction, uniforms
+):
+    """Metropolis-Hastings: overwrite the new_ arrays with the current state where rejected.
+
+    A target that is not a number is rejected. Returns accepted (n,) bool.
+    """
+    n = z.shape[0]
+    accepted = np.empty(n, np.bool_)
+    for i in range(n):
+        log_ratio = new_target[i] - target[i] + correction[i]
+        accepted[i] = math.log1p(-uniforms[i, U_ACCEPT]) < log_ratio
+        if not accepted[i]:
+            new_z[i] = z[i]
+            new_x[i] = x[i]
+            new_log_density[i] = log_density[i]
+            new_target[i] = target[i]
+    return accepted
+
+
+@njit
+def tally(z, candidate, accepted, label, scale, counts):  # type: ignore[no-untyped-def]
+    """Add uses, acceptances and normalised squared jumps to counts (moves + crossovers, 3).
+
+    Rows 0-2 are the moves, the rest the crossover classes (Vrugt 2016, section 3.2.1).
+    """
+    for i in range(z.shape[0]):
+        jump2 = 0.0
+        if accepted[i]:
+            for j in range(z.shape[1]):
+                step = (candidate[i, j] - z[i, j]) / scale[j]
+                jump2 += step * step
+        for side in range(2):
+            row = label[i, side] + 3 * side
+            if row >= 3 * side:
+                counts[row, 0] += 1.0
+                counts[row, 1] += accepted[i]
+                counts[row, 2] += jump2

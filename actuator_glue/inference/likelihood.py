@@ -1,0 +1,175 @@
+"""Log likelihoods of simulation errors: GLUE's informal one and two formal ones.
+
+All are callables (m, p) -> (m,) as the sampler wants them. Constants that do not depend on theta are
+left out except where a docstring says so.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_glue.errors import InputError
+from actuator_glue.jit import njit
+from actuator_glue.model.parameters import Parameter
+from actuator_glue.records import Array
+
+# Lag-one autocorrelation of the errors, estimated with the model's parameters by Ar1Likelihood.
+PHI = Parameter('phi', '1', 0.0, 1.0, 'lag-one autocorrelation of the errors')
+
+
+class Errors(Protocol):
+    """Error sums of a model over R records (model.exact.ExactErrors and its kin)."""
+
+    @property
+    def sizes(self) -> NDArray[np.int64]:
+        """Counted samples of every record, (R,)."""
+        ...
+
+    def __call__(self, theta: Array, /) -> Array:
+        """Return (sum e, sum e^2) of every theta (m, p) and record, (m, R, 2) [m, m^2]."""
+        ...
+
+
+class RawErrors(Protocol):
+    """Errors sample by sample, for likelihoods that need their order."""
+
+    @property
+    def sizes(self) -> NDArray[np.int64]:
+        """Counted samples of every record, (R,)."""
+        ...
+
+    def residuals(self, theta: Array, /) -> Sequence[Array]:
+        """Return the counted errors e [m] of every record, each (m, n_r), for theta (m, p)."""
+        ...
+
+
+@njit
+def _variance_likelihood(sums, size, shaping):  # type: ignore[no-untyped-def]
+    """-shaping ln Var of errors given their sums (m, R, 2) over `size` samples in all."""
+    values = np.empty(sums.shape[0])
+    for i in range(sums.shape[0]):
+        mean = 0.0
+        square = 0.0
+        for r in range(sums.shape[1]):
+            mean += sums[i, r, 0]
+            square += sums[i, r, 1]
+        mean /= size
+        values[i] = -shaping * math.log(square / size - mean * mean)
+    return values
+
+
+@njit
+def _gaussian_likelihood(sums, size, sigma):  # type: ignore[no-untyped-def]
+    values = np.empty(sums.shape[0])
+    for i in range(sums.shape[0]):
+        square = 0.0
+        for r in range(sums.shape[1]):
+            square += sums[i, r, 1]
+        if sigma > 0.0:
+            values[i] = -0.5 * square / (sigma * sigma)
+        else:
+            values[i] = -0.5 * size * math.log(square)
+    return values
+
+
+class GlueLikelihood:
+    """Eq. (4): L = -G ln Var[E(theta)], E the errors of all records one after another [m].
+
+    The mean is removed over all records together; Var divides by the number of samples. With E in
+    mm instead, as in the paper, L is larger by G ln 1e-6: it shapes nothing.
+
+    Args:
+        errors: error sums of the model.
+        shaping_factor: G > 0.
+
+    Raises:
+        InputError: the shaping factor is not a positive number.
+    """
+
+    def __init__(self, errors: Errors, shaping_factor: float = 256.0) -> None:
+        if not (math.isfinite(shaping_factor) and shaping_factor > 0.0):
+            raise InputError(f'shaping factor G must be positive, got {shaping_factor:g}')
+        self.errors = errors
+        self.shaping_factor = float(shaping_factor)
+        self._size = float(np.sum(errors.sizes))
+
+    def __call__(self, theta: Array) -> Array:
+        """Return L (m,) of theta (m, p)."""
+        values: Array = _variance_likelihood(self.errors(theta), self._size, self.shaping_factor)
+        return values
+
+
+class GaussianLikelihood:
+    """Independent Gaussian errors of zero mean: -(sum e^2)/(2 sigma^2), or sigma integrated out.
+
+    Without sigma, Jeffreys' prior 1/sigma is integrated out: -(n/2) ln sum e^2, which is Eq. (4)
+    with G = n/2 but for the mean (Box and Tiao 1973).
+
+    Args:
+        errors: error sums of the model.
+        sigma: standard deviation of the errors [m], or None to integrate it out.
+
+    Raises:
+        InputError: sigma is not a positive number.
+    """
+
+    def __init__(self, errors: Errors, sigma: float | None = None) -> None:
+        if sigma is not None and not (math.isfinite(sigma) and sigma > 0.0):
+            raise InputError(f'error standard deviation must be positive, got {sigma:g} m')
+        self.errors = errors
+        self.sigma = sigma
+        self._size = float(np.sum(errors.sizes))
+
+    def __call__(self, theta: Array) -> Array:
+        """Return the log likelihood (m,) of theta (m, p)."""
+        sums = self.errors(theta)
+        values: Array = _gaussian_likelihood(sums, self._size, self.sigma or 0.0)
+        return values
+
+
+class Ar1Likelihood:
+    """Gaussian errors with lag-one autocorrelation phi, their variance integrated out.
+
+    Every record starts from the stationary distribution: S = sum_r [(1 - phi^2) e_0^2 +
+    sum_t (e_t - phi e_(t-1))^2], L = -(n/2) ln S + (R/2) ln(1 - phi^2) (Box, Jenkins and Reinsel
+    2008, appendix A7.4, with Jeffreys' prior of the innovation variance).
+
+    Args:
+        errors: errors sample by sample.
+        phi: the autocorrelation; None: it is the last column of theta (bounds in `PHI`).
+
+    Raises:
+        InputError: phi is not inside (-1, 1).
+    """
+
+    def __init__(self, errors: RawErrors, phi: float | None = None) -> None:
+        if phi is not None and not -1.0 < phi < 1.0:
+            raise InputError(f'autocorrelation phi must lie inside (-1, 1), got {phi:g}')
+        self.errors = errors
+        self.phi = phi
+        self._size = float(np.sum(errors.sizes))
+
+    def __call__(self, theta: Array) -> Array:
+        """Return the log likelihood (m,) of theta (m, p), or (m, p + 1) where phi is estimated."""
+        if self.phi is None:
+            phi = theta[:, -1]
+            theta = np.ascontiguousarray(theta[:, :-1])
+        else:
+            phi = np.full(len(theta), self.phi)
+        total = np.zeros(len(theta))
+        count = 0
+        for e in self.errors.residuals(theta):
+            first, last = e[:, 0] ** 2, e[:, -1] ** 2
+            square = (e * e).sum(axis=1)
+            lagged = (e[:, 1:] * e[:, :-1]).sum(axis=1)
+            total += square - 2.0 * phi * lagged + phi**2 * (square - first - last)
+            count += 1
+        with np.errstate(divide='ignore', invalid='ignore'):
+            return np.asarray(
+                -0.5 * self._size * np.log(total) + 0.5 * count * np.log1p(-(phi**2))
+            )

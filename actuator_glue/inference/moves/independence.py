@@ -1,0 +1,87 @@
+"""Independence move: a Student-t distribution fitted to the archive, and its density.
+
+An addition to Vrugt (2016): where the posterior is near a single hill the fitted density proposes
+almost independent draws; elsewhere its share falls by itself (see adaptation.py). Heavy tails (5
+degrees of freedom) keep the density ratio bounded for any posterior with Gaussian tails.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from actuator_glue.inference.moves import U_FREE
+from actuator_glue.inference.moves.draw import normal_pair
+from actuator_glue.jit import njit
+from actuator_glue.records import Array
+
+DEGREES = 5.0
+
+
+def fit(points: Array) -> tuple[Array, Array]:
+    """Return centre (p,) and lower Cholesky factor (p, p) of the covariance of points (m, p).
+
+    The covariance is shrunk towards its diagonal as far as few points need it.
+    """
+    m, d = points.shape
+    centre = points.mean(axis=0)
+    spread = points - centre
+    covariance = spread.T @ spread / max(m - 1, 1)
+    # Never singular: points all equal in a coordinate get the spread of rounding.
+    variance = np.maximum(np.diag(covariance), 1e-16 * (1.0 + centre**2))
+    share = (d + 1.0) / (m + d + 1.0)
+    covariance *= 1.0 - share
+    covariance[np.diag_indices(d)] = variance * (1.0 + 1e-9)
+    return centre, np.ascontiguousarray(np.linalg.cholesky(covariance))
+
+
+@njit
+def log_density(z, centre, factor, residual):  # type: ignore[no-untyped-def]
+    """Log density of the fitted Student t at z, less a constant; residual is scratch (p,)."""
+    distance2 = 0.0
+    for j in range(z.size):
+        value = z[j] - centre[j]
+        for k in range(j):
+            value -= factor[j, k] * residual[k]
+        residual[j] = value / factor[j, j]
+        distance2 += residual[j] * residual[j]
+    return -0.5 * (DEGREES + z.size) * math.log1p(distance2 / DEGREES)
+
+
+@njit
+def log_density_all(z, centre, factor):  # type: ignore[no-untyped-def]
+    """Log density (m,) of the fitted Student t at points z (m, p), less a constant."""
+    values = np.empty(z.shape[0])
+    residual = np.empty(z.shape[1])
+    for i in range(z.shape[0]):
+        values[i] = log_density(z[i], centre, factor, residual)
+    return values
+
+
+@njit
+def draw(uniforms, centre, factor, candidate):  # type: ignore[no-untyped-def]
+    """Write one draw of the fitted Student t into candidate, from p + 5 uniforms."""
+    d = centre.size
+    # Chi-squared with five degrees of freedom: two exponentials and one squared normal.
+    normal, _ = normal_pair(uniforms[2], uniforms[3])
+    chi2 = normal * normal - 2.0 * (math.log1p(-uniforms[0]) + math.log1p(-uniforms[1]))
+    stretch = math.sqrt(DEGREES / chi2)
+    for j in range(d):
+        candidate[j] = centre[j]
+    for k in range(0, d, 2):
+        one, two = normal_pair(uniforms[4 + k], uniforms[5 + k])
+        for j in range(k, d):
+            candidate[j] += stretch * factor[j, k] * one
+        for j in range(k + 1, d):
+            candidate[j] += stretch * factor[j, k + 1] * two
+
+
+@njit
+def propose(z, uniforms, centre, factor, candidate):  # type: ignore[no-untyped-def]
+    """Write a candidate that does not depend on z, return the log Hastings correction."""
+    draw(uniforms[U_FREE:], centre, factor, candidate)
+    residual = np.empty(z.size)
+    return log_density(z, centre, factor, residual) - log_density(
+        candidate, centre, factor, residual
+    )
