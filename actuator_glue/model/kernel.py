@@ -107,24 +107,36 @@ def start_increment(c: Array, x0: float, v0: float, u0: float, u1: float) -> flo
     return d
 
 
-@njit
-def step_through(c: Array, padded: Array, x0: float, v0: float, out: Array) -> None:
-    """Write the response of one system to a command into `out`, shape (n,) [m].
+# State of `stream`: samples seen (0, 1, 2 = more), y, d (velocity until the second sample), and
+# the last two commands.
+STREAM = 5
+
+
+@njit(fastmath=False)  # strict order of operations: results must not depend on how a block is cut
+def stream(c: Array, state: Array, command: Array, out: Array) -> None:
+    """Step one system through a block of commands, going on from `state`.
 
     Args:
         c: one row of `discretise`.
-        padded: command with two samples appended, shape (n + 2,) [m].
-        x0: position at the first sample [m].
-        v0: velocity there [m/s].
-        out: receives the displacement at the command's samples.
+        state: shape (STREAM,), updated; (0, x0, v0, 0, 0) starts anew.
+        command: shape (n,) [m].
+        out: receives the displacement at the command's samples, shape (n,) [m].
     """
-    decay, pull, g0, g1, g2 = c[DECAY], c[PULL], c[G0], c[G1], c[G2]
-    y = x0
-    d = start_increment(c, x0, v0, padded[0], padded[1])
-    for n in range(len(out)):
+    seen, y, d, u1, u2 = state[0], state[1], state[2], state[3], state[4]
+    for n in range(len(command)):
+        u = command[n]
+        if seen == 1.0:
+            d = start_increment(c, y, d, u1, u)
+            y += d
+            seen = 2.0
+        elif seen == 0.0:
+            seen = 1.0
+        else:
+            d = c[DECAY] * d - c[PULL] * y + c[G0] * u + c[G1] * u1 + c[G2] * u2
+            y += d
         out[n] = y
-        y += d
-        d = decay * d - pull * y + g0 * padded[n + 2] + g1 * padded[n + 1] + g2 * padded[n]
+        u2, u1 = u1, u
+    state[0], state[1], state[2], state[3], state[4] = seen, y, d, u1, u2
 
 
 @njit

@@ -139,15 +139,38 @@ def simulate(
     Raises:
         InputError: wrong shapes, or a stiffness that cannot be used.
     """
+    out = respond(systems(theta, stiffness), command, period=period, hold=hold, initial=initial)
+    return out.reshape(*np.shape(theta)[:-1], out.shape[-1])
+
+
+def respond(
+    system: ArrayLike,
+    command: ArrayLike,
+    *,
+    period: float,
+    hold: Hold = 'zoh',
+    initial: tuple[float, float] = (0.0, 0.0),
+) -> Array:
+    """Return the response of x'' + a1 x' + a0 x = b0 u, shape (m, n) [m].
+
+    Args:
+        system: a1 [1/s], a0 [1/s^2], b0 [1/s^2], shape (m, 3).
+        command: u, shape (n,) [m].
+        period: sample period [s].
+        hold: how the command runs between its samples.
+        initial: position [m] and velocity [m/s] at the first sample.
+
+    Raises:
+        InputError: the command is not one row of samples.
+    """
     u = np.asarray(command, dtype=np.float64)
     if u.ndim != 1 or u.size == 0:
         raise InputError(f'command has shape {u.shape}; one row of samples is needed')
-    rows = table(theta, stiffness, period, hold)
+    rows = kernel.discretise(np.ascontiguousarray(system), period, hold == 'linear')
     out = np.empty((len(rows), len(u)))
-    wide = padded(u)
     for row, c in zip(out, rows, strict=True):
-        kernel.step_through(c, wide, float(initial[0]), float(initial[1]), row)
-    return out.reshape(*np.shape(theta)[:-1], len(u))
+        kernel.stream(c, np.array([0.0, initial[0], initial[1], 0.0, 0.0]), u, row)
+    return out
 
 
 def initial_state(record: Record) -> tuple[float, float]:
