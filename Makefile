@@ -9,7 +9,7 @@ ROS_STAMP := install/stamp
 ROS := . install/setup.bash &&
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-slow lint bench reproduce clean
+.PHONY: help setup demo test test-slow lint bench reproduce docs clean
 
 help: ## show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 20
@@ -48,6 +48,9 @@ bench: $(ROS_STAMP) ## speed, side by side with peers; results in out/bench
 
 reproduce: $(VENV_STAMP) ## the paper beside our numbers; report in out/reproduce
 	@$(BIN)/actuator-glue reproduce --out out/reproduce $(REPRODUCE_ARGS)
+
+docs: $(VENV_STAMP) ## renew docs/messages.md from the interface texts
+	@$(BIN)/python scripts/write_message_reference.py
 
 clean: ## remove everything that make has made
 	rm -rf .venv build install log out *.egg-info

@@ -1,7 +1,7 @@
 """Make the CMake files of the ROS 2 wheels name this machine's Python headers.
 
-The wheels were built with a Python under /opt/python and their exported targets say so. Each file is
-replaced, not edited: an installer may have hard-linked it to its cache.
+The wheels were built with a Python under /opt/python and their exported targets say so. Each file
+is replaced, not edited: an installer may have hard-linked it to its cache.
 """
 
 import os
@@ -29,7 +29,9 @@ def main() -> int:
         before = path.read_text(encoding='utf-8')
         after = mend(before)
         if '/opt/python' in after:
-            print(f'{path} still names the machine it was built on; wheels changed?', file=sys.stderr)
+            print(
+                f'{path} still names the machine it was built on; wheels changed?', file=sys.stderr
+            )
             return 1
         if after != before:
             handle, temporary = tempfile.mkstemp(dir=path.parent)

@@ -1,0 +1,131 @@
+"""Who may import whom, and what the core may not touch."""
+
+import ast
+import re
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import actuator_glue
+
+ROOT = Path(actuator_glue.__file__).resolve().parent
+SOURCES = sorted(p for p in ROOT.rglob('*.py'))
+
+BOTTOM = {'errors', 'records', 'jit'}
+CORE = BOTTOM | {'model', 'inference'}
+EVERYTHING = CORE | {'online', 'residual', 'report', 'io', 'reproduction', 'interfaces'}
+# Each folder or top module, and what it may import besides itself.
+ARROWS = {
+    '__init__': set(),
+    'errors': set(),
+    'records': {'errors'},
+    'jit': set(),
+    'model': BOTTOM,
+    'inference': BOTTOM | {'model'},
+    'online': CORE,
+    'residual': CORE,
+    'report': CORE | {'online', 'residual'},
+    'io': {'records', 'errors', 'interfaces'},
+    'reproduction': CORE | {'residual', 'report', 'io'},
+    'nodes': EVERYTHING,
+    'demo': EVERYTHING,
+    'cli': EVERYTHING | {'demo'},
+}
+PURE = ('errors', 'records', 'jit', 'model', 'inference', 'online', 'residual')
+ROS = ('rclpy', 'launch', 'ament_index_python')
+HEAVY = ('numba', 'scipy', 'matplotlib', 'arviz', 'control', 'statsmodels', 'rosbags', 'rclpy')
+
+# Modules and calls through which print, clock, file or global random state would come in.
+IMPURE_MODULES = {'time', 'datetime', 'random', 'logging', 'pathlib', 'tempfile', 'shutil', 'glob'}
+IMPURE_CALLS = {'print', 'open', 'input'}
+SEEDED = {'Generator', 'PCG64', 'Philox', 'SeedSequence', 'BitGenerator', 'default_rng'}
+
+
+def folder_of(path: Path) -> str:
+    """Return the folder or top module a source belongs to."""
+    return path.relative_to(ROOT).parts[0].removesuffix('.py')
+
+
+def imports(path: Path) -> Iterator[tuple[str, int]]:
+    """Yield each imported module with its line, relative imports resolved."""
+    package = ('actuator_glue', *path.relative_to(ROOT).parent.parts)
+    for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
+        if isinstance(node, ast.Import):
+            yield from ((alias.name, node.lineno) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = '.'.join(package[: len(package) - node.level + 1]) if node.level else ''
+            module = '.'.join(filter(None, (base, node.module)))
+            if module == 'actuator_glue':
+                yield from ((f'{module}.{alias.name}', node.lineno) for alias in node.names)
+            else:
+                yield module, node.lineno
+
+
+def identifier(path: Path) -> str:
+    """Name a source in a test's id."""
+    return str(path.relative_to(ROOT))
+
+
+def test_every_folder_has_its_arrows() -> None:
+    """A new folder says here what it may import."""
+    assert {folder_of(p) for p in SOURCES} <= set(ARROWS)
+
+
+@pytest.mark.parametrize('path', SOURCES, ids=identifier)
+def test_imports_follow_the_arrows(path: Path) -> None:
+    """No import against the direction in which data flows."""
+    folder = folder_of(path)
+    allowed = ARROWS[folder] | {folder, '__version__'}
+    for module, line in imports(path):
+        parts = module.split('.')
+        if parts[0] == 'actuator_glue' and len(parts) > 1:
+            assert parts[1] in allowed, f'{identifier(path)}:{line} imports {module}'
+
+
+@pytest.mark.parametrize('path', SOURCES, ids=identifier)
+def test_ros_is_imported_in_nodes_only(path: Path) -> None:
+    """Everything else works on a machine without ROS."""
+    if folder_of(path) == 'nodes':
+        return
+    for module, line in imports(path):
+        top = module.split('.')[0]
+        assert top not in ROS and not top.endswith(('_msgs', '_srvs', '_interfaces')), (
+            f'{identifier(path)}:{line} imports {module}'
+        )
+
+
+@pytest.mark.parametrize('path', [p for p in SOURCES if folder_of(p) in PURE], ids=identifier)
+def test_core_is_pure(path: Path) -> None:
+    """No print, clock, file or global random state below io."""
+    for module, line in imports(path):
+        assert module.split('.')[0] not in IMPURE_MODULES, f'{identifier(path)}:{line} {module}'
+    for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
+        if not isinstance(node, ast.Call):
+            continue
+        name = ast.unparse(node.func)
+        where = f'{identifier(path)}:{node.lineno} calls {name}'
+        assert name not in IMPURE_CALLS, where
+        if name.startswith(('np.random.', 'numpy.random.')):
+            assert re.split(r'[.(]', name)[2] in SEEDED, where
+        if name.endswith(('default_rng', 'SeedSequence')):
+            assert node.args or node.keywords, f'{where} without a seed'
+
+
+@pytest.mark.parametrize('path', SOURCES, ids=identifier)
+def test_files_stay_small(path: Path) -> None:
+    """One idea per file."""
+    assert len(path.read_text(encoding='utf-8').splitlines()) <= 350
+
+
+def test_command_line_imports_nothing_heavy() -> None:
+    """`actuator-glue --help` answers at once: commands import what they need when they run."""
+    commands = [f'actuator_glue.cli.{p.stem}' for p in (ROOT / 'cli').glob('[!_]*.py')]
+    code = (
+        f'import importlib, sys\nfor name in {commands!r}: importlib.import_module(name)\n'
+        f'print(sorted(set(sys.modules) & set({HEAVY!r})))'
+    )
+    done = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == '[]'

@@ -1,0 +1,166 @@
+"""What other tools read of this repository: package.xml, setup.py, CMakeLists, message texts."""
+
+import ast
+import re
+import subprocess
+import sys
+import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+
+import pytest
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+import actuator_glue
+
+ROOT = Path(__file__).resolve().parent.parent
+MANIFESTS = [ROOT / 'package.xml', ROOT / 'msg_defs' / 'package.xml']
+INTERFACES = sorted(
+    p for p in (ROOT / 'msg_defs').glob('*/*') if p.suffix in ('.msg', '.srv', '.action')
+)
+MESSAGES = [p for p in INTERFACES if p.suffix == '.msg']
+# Parts of Diagnosis, never published alone.
+PARTS = {'Effect', 'Candidate'}
+NODES = ('actuator_sim', 'estimator', 'recorder', 'replay', 'lab_bridge', 'diagnoser')
+
+FIELD = re.compile(r'^(?P<type>[a-zA-Z][\w/]*)(?P<array>\[[^]]*\])?\s+(?P<name>[a-z][a-z0-9_]*)\b')
+CONSTANT = re.compile(r'^\w+\s+[A-Z][A-Z0-9_]*\s*=')
+
+
+def fields(path: Path) -> list[tuple[str, re.Match[str]]]:
+    """Return the field lines of an interface text."""
+    lines = []
+    for line in path.read_text(encoding='utf-8').splitlines():
+        if line and not line.startswith(('#', '---')) and not CONSTANT.match(line):
+            match = FIELD.match(line)
+            assert match, f'{path.name}: {line}'
+            lines.append((line, match))
+    return lines
+
+
+@pytest.mark.parametrize('path', MANIFESTS, ids=lambda p: p.parent.name)
+def test_manifest(path: Path) -> None:
+    """package.xml is format 3 and says who, what and under which licence."""
+    root = ElementTree.parse(path).getroot()
+    assert root.get('format') == '3'
+    assert root.findtext('license') == 'Apache-2.0'
+    assert re.fullmatch(r'\S+@\S+\.\w+', root.find('maintainer').get('email'))
+    assert len(root.findtext('description')) > 20
+    assert root.findtext('version') == actuator_glue.__version__
+    build_type = 'ament_python' if path.parent == ROOT else 'ament_cmake'
+    assert root.find('export').findtext('build_type') == build_type
+
+
+def test_versions_agree() -> None:
+    """One version everywhere."""
+    version = actuator_glue.__version__
+    assert f"version='{version}'" in (ROOT / 'setup.py').read_text(encoding='utf-8')
+    changelog = (ROOT / 'CHANGELOG.rst').read_text(encoding='utf-8')
+    assert re.search(rf'^{re.escape(version)}( \(|$)', changelog, re.MULTILINE)
+    assert 'Apache License' in (ROOT / 'LICENSE').read_text(encoding='utf-8')
+
+
+def test_imported_ros_packages_are_declared() -> None:
+    """package.xml names every ROS package that a node imports."""
+    manifest = ElementTree.parse(ROOT / 'package.xml').getroot()
+    declared = {e.text for e in manifest if e.tag.endswith('depend')}
+    for path in (ROOT / 'actuator_glue' / 'nodes').glob('*.py'):
+        for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
+            modules = []
+            if isinstance(node, ast.ImportFrom) and node.module:
+                modules = [node.module]
+            elif isinstance(node, ast.Import):
+                modules = [alias.name for alias in node.names]
+            for top in (m.split('.')[0] for m in modules):
+                if top == 'rclpy' or top.endswith(('_msgs', '_srvs', '_interfaces')):
+                    assert top in declared, f'{path.name} imports {top}'
+
+
+@pytest.mark.parametrize('node', NODES)
+def test_entry_point_exists(node: str) -> None:
+    """Each console script of setup.py leads to a main function."""
+    assert node in (ROOT / 'setup.py').read_text(encoding='utf-8')
+    source = ROOT / 'actuator_glue' / 'nodes' / f'{node}.py'
+    tree = ast.parse(source.read_text(encoding='utf-8'))
+    assert 'main' in {n.name for n in tree.body if isinstance(n, ast.FunctionDef)}
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize('node', NODES)
+def test_installed_where_ros2_run_looks(node: str) -> None:
+    """`ros2 run actuator_glue NODE` starts install/actuator_glue/lib/actuator_glue/NODE."""
+    prefix = ROOT / 'install' / 'actuator_glue'
+    if not prefix.exists():
+        pytest.skip('not built: run `make setup`')
+    executable = prefix / 'lib' / 'actuator_glue' / node
+    assert executable.is_file() and executable.stat().st_mode & 0o111
+    marker = prefix / 'share/ament_index/resource_index/packages/actuator_glue'
+    assert marker.exists()
+    assert (prefix / 'share/actuator_glue/launch/demo.launch.py').exists()
+
+
+def test_build_lists_every_interface() -> None:
+    """No interface text is forgotten in CMakeLists.txt."""
+    text = (ROOT / 'msg_defs' / 'CMakeLists.txt').read_text(encoding='utf-8')
+    listed = set(re.findall(r'"((?:msg|srv|action)/\w+\.\w+)"', text))
+    assert listed == {str(p.relative_to(ROOT / 'msg_defs')) for p in INTERFACES}
+
+
+@pytest.mark.parametrize('path', INTERFACES, ids=lambda p: p.stem)
+def test_every_field_says_unit_and_meaning(path: Path) -> None:
+    """`# [unit] meaning` after each field; a nested message carries its own units."""
+    assert path.read_text(encoding='utf-8').startswith('# ')
+    for line, field in fields(path):
+        comment = line.partition('#')[2].strip()
+        if field['type'] == 'std_msgs/Header':
+            assert comment.startswith('stamp: '), f'{path.name}: {line}'
+        else:
+            assert re.match(r'\[[^]]+\] \w.{5,}', comment), f'{path.name}: {line}'
+
+
+@pytest.mark.parametrize('path', INTERFACES, ids=lambda p: p.stem)
+def test_no_bounded_sequences(path: Path) -> None:
+    """PlotJuggler cannot read them."""
+    for line, field in fields(path):
+        assert field['array'] in (None, '[]'), f'{path.name}: {line}'
+
+
+@pytest.mark.parametrize('path', MESSAGES, ids=lambda p: p.stem)
+def test_header_comes_first(path: Path) -> None:
+    """What is published has a Header as its first field."""
+    if path.stem in PARTS:
+        return
+    assert fields(path)[0][1]['type'] == 'std_msgs/Header'
+
+
+@pytest.mark.parametrize('path', MESSAGES, ids=lambda p: p.stem)
+def test_texts_parse_without_ros(path: Path) -> None:
+    """The texts that bags embed are understood by another reader."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    name = f'actuator_glue_msgs/msg/{path.stem}'
+    types = get_types_from_msg(path.read_text(encoding='utf-8'), name)
+    store.register(types)
+    assert name in store.fielddefs
+
+
+def test_message_reference_is_up_to_date() -> None:
+    """docs/messages.md is what the texts say; `make docs` renews it."""
+    script = str(ROOT / 'scripts' / 'write_message_reference.py')
+    assert subprocess.run([sys.executable, script, '--check'], check=False).returncode == 0
+
+
+def test_nothing_of_one_machine_is_committed() -> None:
+    """No home folder, temporary folder of a person or package mirror in a tracked file."""
+    listed = subprocess.run(
+        ['git', 'ls-files', '-z'], cwd=ROOT, capture_output=True, text=True, check=False
+    )
+    if listed.returncode != 0:
+        pytest.skip('not a git checkout')
+    machine = re.compile(r'(?<![\w.])/(?:home|Users|root|work)/\w|index-url|extra-index')
+    for name in filter(None, listed.stdout.split('\0')):
+        path = ROOT / name
+        if path.suffix in ('.mcap', '.png', '.gz', '.npz', '.mat') or not path.is_file():
+            continue
+        if path == Path(__file__).resolve():
+            continue
+        found = machine.search(path.read_text(encoding='utf-8'))
+        assert found is None, f'{name}: {found.group()}'
