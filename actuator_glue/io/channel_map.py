@@ -1,0 +1,188 @@
+"""Channel maps: YAML that says where in a laboratory file command and measurement are."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, fields
+from pathlib import Path
+from typing import Any, Literal
+
+import yaml
+
+from actuator_glue.errors import InputError
+from actuator_glue.io.units import ROLES, factor
+from actuator_glue.records import check_stiffness
+
+Column = str | int
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """One channel of a file.
+
+    Attributes:
+        column: name, or number counted from 1; for .mat the variable, `struct.field` included.
+        unit: unit of the values after scaling.
+        scale: factor from the file's values to `unit`, e.g. mm per V.
+        offset: value in `unit` added after scaling.
+        remove_rest_offset: subtract the mean of the first `rest_samples` samples.
+    """
+
+    column: Column
+    unit: str
+    scale: float = 1.0
+    offset: float = 0.0
+    remove_rest_offset: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class ChannelMap:
+    """What a channel map says; everything but command and measured may be left out.
+
+    Attributes:
+        command: commanded displacement.
+        measured: measured displacement.
+        force: measured force.
+        time: times of the samples; needed where there is no rate.
+        rate: sample rate [Hz].
+        sample_number: column that counts the samples, so that gaps are found.
+        header_lines: lines before the first sample; the last of them names the columns.
+        delimiter: text between columns; found by itself where left out.
+        decimal: decimal sign, '.' or ','.
+        rest_samples: samples at rest at the start, for `remove_rest_offset`.
+        hold: how the command runs between its samples, zoh or linear.
+        stiffness: specimen stiffness [N/m].
+        actuator: name of the actuator.
+        source: the map's file, for messages.
+    """
+
+    command: Channel
+    measured: Channel
+    force: Channel | None = None
+    time: Channel | None = None
+    rate: float | None = None
+    sample_number: Column | None = None
+    header_lines: int | None = None
+    delimiter: str | None = None
+    decimal: Literal['.', ','] = '.'
+    rest_samples: int = 0
+    hold: Literal['zoh', 'linear'] | None = None
+    stiffness: float | None = None
+    actuator: str = 'actuator'
+    source: str = ''
+
+
+def read_channel_map(path: Path | str) -> ChannelMap:
+    """Return the channel map of a YAML file.
+
+    Raises:
+        InputError: no such file, no YAML, unknown or missing entries, wrong kinds or units.
+    """
+    path = Path(path)
+    try:
+        content = yaml.safe_load(path.read_text('utf-8'))
+    except OSError as error:
+        raise InputError(f'{path}: channel map cannot be read ({error.strerror})') from error
+    except (yaml.YAMLError, UnicodeDecodeError) as error:
+        detail = ' '.join(str(error).split())
+        raise InputError(f'{path}: channel map is not YAML ({detail})') from error
+    return parse_channel_map(content, str(path))
+
+
+def parse_channel_map(content: object, source: str) -> ChannelMap:
+    """Return the channel map that a mapping describes.
+
+    Raises:
+        InputError: unknown or missing entries, wrong kinds or units.
+    """
+    where = f'{source}: channel map'
+    values = _mapping(content, ChannelMap, where, hidden=('source',))
+    for role in ROLES:
+        if values.get(role) is not None:
+            values[role] = _channel(values[role], role, f'{where}: {role}')
+    _number(values, 'rate', where, lower=0.1, upper=1e6)
+    _number(values, 'stiffness', where)
+    for name in ('header_lines', 'rest_samples'):
+        _whole(values, name, where)
+    for name, allowed in (('decimal', ('.', ',')), ('hold', ('zoh', 'linear'))):
+        if values.get(name) is not None and values[name] not in allowed:
+            raise InputError(f'{where}: {name} is {values[name]!r}; use one of {allowed}')
+    for name in ('delimiter', 'actuator'):
+        if values.get(name) is not None and not isinstance(values[name], str):
+            raise InputError(f'{where}: {name} must be text, not {values[name]!r}')
+    if values.get('sample_number') is not None:
+        _column(values['sample_number'], f'{where}: sample_number')
+    if values.get('stiffness') is not None:
+        values['stiffness'] = check_stiffness(values['stiffness'], where)
+    made = ChannelMap(**{k: v for k, v in values.items() if v is not None}, source=source)
+    if made.time is None and made.rate is None:
+        raise InputError(f'{where}: give `rate` in Hz, or a `time` channel')
+    wants_rest = [c for c in (made.command, made.measured, made.force) if c is not None]
+    if any(c.remove_rest_offset for c in wants_rest) and made.rest_samples < 1:
+        raise InputError(f'{where}: remove_rest_offset needs rest_samples')
+    return made
+
+
+def _channel(content: object, role: str, where: str) -> Channel:
+    values = _mapping(content, Channel, where)
+    _column(values['column'], where)
+    factor(role, str(values['unit']) if values['unit'] else None, where)
+    _number(values, 'scale', where)
+    _number(values, 'offset', where)
+    if not isinstance(values.get('remove_rest_offset', False), bool):
+        raise InputError(f'{where}: remove_rest_offset must be true or false')
+    return Channel(**values)
+
+
+def _mapping(
+    content: object, kind: type, where: str, hidden: tuple[str, ...] = ()
+) -> dict[str, Any]:
+    if not isinstance(content, Mapping):
+        raise InputError(f'{where} must be a mapping of names to values, not {content!r}')
+    known = [f.name for f in fields(kind) if f.name not in hidden]
+    for name in content:
+        if name not in known:
+            near = difflib.get_close_matches(str(name), known, 1)
+            hint = f'did you mean {near[0]}?' if near else f'known are {", ".join(known)}'
+            raise InputError(f'{where}: unknown entry {name!r}; {hint}')
+    for entry in fields(kind):
+        if entry.default is MISSING and content.get(entry.name) is None:
+            raise InputError(f'{where}: {entry.name} is missing')
+    return dict(content)
+
+
+def _column(value: object, where: str) -> None:
+    if isinstance(value, bool) or not isinstance(value, (str, int)):
+        raise InputError(f'{where}: column must be a name or a number, not {value!r}')
+    if isinstance(value, int) and value < 1:
+        raise InputError(f'{where}: columns are counted from 1, got {value}')
+
+
+def _number(
+    values: dict[str, Any],
+    name: str,
+    where: str,
+    lower: float = -1e15,
+    upper: float = 1e15,
+) -> None:
+    value = values.get(name)
+    if value is None:
+        return
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise InputError(f'{where}: {name} must be a number, not {value!r}')
+    try:
+        # YAML 1.1 reads 1e6 without a point as text.
+        values[name] = float(value)
+    except ValueError as error:
+        raise InputError(f'{where}: {name} must be a number, not {value!r}') from error
+    if not lower <= values[name] <= upper:
+        raise InputError(f'{where}: {name} = {value} is outside [{lower:g}, {upper:g}]')
+
+
+def _whole(values: dict[str, Any], name: str, where: str) -> None:
+    value = values.get(name)
+    if value is None:
+        return
+    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= 10**9:
+        raise InputError(f'{where}: {name} must be a whole number of at least 0, not {value!r}')

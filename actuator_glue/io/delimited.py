@@ -1,0 +1,126 @@
+"""Columns of numbers out of delimited text."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+
+from actuator_glue.errors import InputError
+from actuator_glue.records import Array
+
+_DELIMITERS = (',', ';', '\t')
+
+
+@dataclass(frozen=True, slots=True)
+class Head:
+    """What the lines before the samples say.
+
+    Attributes:
+        names: column names; empty where there are none.
+        lines: lines before the first sample.
+        delimiter: text between columns, None for blanks.
+        notes: `# name = value` lines.
+    """
+
+    names: list[str]
+    lines: int
+    delimiter: str | None
+    notes: dict[str, str]
+
+
+def read_head(path: Path, header_lines: int | None = None, delimiter: str | None = None) -> Head:
+    """Return the head of a file.
+
+    Args:
+        path: the file.
+        header_lines: lines before the first sample, the last naming the columns; None where
+            `#` lines and one line of names are all there is.
+        delimiter: text between columns, found by itself where None.
+
+    Raises:
+        InputError: the file cannot be read or is empty.
+    """
+    try:
+        with path.open(encoding='utf-8-sig', errors='replace') as file:
+            top = [line.rstrip('\r\n') for line in islice(file, (header_lines or 100) + 1)]
+    except OSError as error:
+        raise InputError(f'{path}: cannot be read ({error.strerror})') from error
+    if not any(line.strip() for line in top):
+        raise InputError(f'{path}: the file is empty')
+    notes: dict[str, str] = {}
+    if header_lines is None:
+        header_lines = 0
+        while header_lines < len(top) and top[header_lines].lstrip().startswith('#'):
+            name, sign, value = top[header_lines].lstrip('# ').partition('=')
+            if sign:
+                notes[name.strip()] = value.strip()
+            header_lines += 1
+        header_lines += 1
+    if len(top) < header_lines:
+        raise InputError(f'{path}: {len(top)} lines, but {header_lines} header lines expected')
+    line = top[header_lines - 1] if header_lines else ''
+    if delimiter is None:
+        sample = top[header_lines] if len(top) > header_lines else line
+        delimiter = next((d for d in _DELIMITERS if d in sample), None)
+    names = [n.strip().strip('"') for n in line.split(delimiter)] if line.strip() else []
+    return Head(names, header_lines, delimiter, notes)
+
+
+def position(column: str | int, names: list[str], where: str) -> int:
+    """Return the position from 0 of a column given by name or by number from 1.
+
+    Raises:
+        InputError: no column, or more than one, has that name.
+    """
+    if isinstance(column, int):
+        return column - 1
+    hits = [i for i, name in enumerate(names) if name == column]
+    if len(hits) != 1:
+        problem = 'no column is' if not hits else f'{len(hits)} columns are'
+        listed = ', '.join(repr(n) for n in names[:20]) or 'without names'
+        raise InputError(f'{where}: {problem} called {column!r}; the columns are {listed}')
+    return hits[0]
+
+
+def read_columns(path: Path, head: Head, positions: list[int], decimal: str = '.') -> Array:
+    """Return columns of numbers, shape (n, number of columns).
+
+    Raises:
+        InputError: a value is no number, a row is short, or there is no row.
+    """
+    convert = None
+    if decimal == ',':
+
+        def convert(text: str) -> float:
+            return float(text.replace(',', '.'))
+
+    try:
+        with warnings.catch_warnings():
+            # numpy warns of a file without samples; that is told below.
+            warnings.simplefilter('ignore', UserWarning)
+            columns: Array = np.loadtxt(
+                path,
+                delimiter=head.delimiter,
+                skiprows=head.lines,
+                usecols=positions,
+                ndmin=2,
+                encoding='utf-8-sig',
+                converters=convert,
+            )
+    except UnicodeDecodeError as error:
+        raise InputError(
+            f'{path}: not plain text in UTF-8 (byte {error.start}); save it as such'
+        ) from error
+    except (ValueError, IndexError) as error:
+        detail = ' '.join(str(error).split()).removesuffix('.')
+        raise InputError(
+            f'{path}: cannot read the samples: {detail} (rows are counted after the '
+            f'{head.lines} header lines)'
+        ) from error
+    if not len(columns):
+        raise InputError(f'{path}: no samples after the {head.lines} header lines')
+    return columns

@@ -1,0 +1,70 @@
+"""One entry for any file or bag."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from actuator_glue.errors import InputError
+from actuator_glue.io import laboratory
+from actuator_glue.io.bag_reader import Note, is_bag, refuse
+from actuator_glue.io.bag_records import read_records
+from actuator_glue.io.channel_map import ChannelMap, read_channel_map
+from actuator_glue.records import Hold, Record, check_stiffness
+
+
+def load_records(
+    paths: Sequence[Path | str] | Path | str,
+    *,
+    stiffness: Sequence[float] | float | None = None,
+    channels: ChannelMap | Path | str | None = None,
+    hold: Hold | None = None,
+    note: Note = refuse,
+    gap: Note | None = None,
+) -> list[Record]:
+    """Return the records of bags and laboratory files, in the order given.
+
+    Args:
+        paths: bag folders, .mcap, .mat or delimited text; one bag may hold several records.
+        stiffness: specimen stiffness [N/m]: one for all, or one per path, or one per record;
+            None for what the files say. What is given wins over what the files say.
+        channels: channel map for the laboratory files.
+        hold: how the command runs between its samples; None for what the files say.
+        note: called with one line per damage of a bag; the default raises it.
+        gap: called with one line where a bag is split into records; the default raises for
+            missing samples.
+
+    Raises:
+        InputError: a path cannot be used, or the number of stiffnesses does not fit.
+    """
+    if isinstance(paths, (str, Path)):
+        paths = [paths]
+    if not paths:
+        raise InputError('no record given')
+    if isinstance(channels, (str, Path)):
+        channels = read_channel_map(channels)
+    groups: list[list[Record]] = []
+    for path in paths:
+        if is_bag(path):
+            groups.append(read_records(path, note=note, gap=gap))
+        else:
+            groups.append([laboratory.read(path, channels=channels, hold=hold)])
+    records = [record for group in groups for record in group]
+    if hold is not None:
+        records = [replace(record, hold=hold) for record in records]
+    if stiffness is None:
+        return records
+    given = [stiffness] if isinstance(stiffness, (int, float)) else list(stiffness)
+    given = [check_stiffness(k) for k in given]
+    if len(given) == 1:
+        given = given * len(records)
+    elif len(given) == len(paths):
+        given = [k for k, group in zip(given, groups, strict=True) for _ in group]
+    if len(given) != len(records):
+        found = f'{len(paths)} path(s) with {len(records)} record(s)'
+        raise InputError(
+            f'{len(given)} stiffnesses for {found}; give one for all, one per path or one per '
+            'record, in the same order'
+        )
+    return [replace(r, stiffness=k) for r, k in zip(records, given, strict=True)]

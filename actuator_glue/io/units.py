@@ -1,0 +1,86 @@
+"""Units of laboratory files: the unit is part of a column's name."""
+
+from __future__ import annotations
+
+import re
+
+from actuator_glue.errors import InputError
+
+_LENGTH = {'m': 1.0, 'cm': 1e-2, 'mm': 1e-3, 'um': 1e-6, 'µm': 1e-6, 'μm': 1e-6, 'in': 0.0254}
+_FORCE = {'N': 1.0, 'kN': 1e3, 'MN': 1e6, 'lbf': 4.4482216152605, 'kip': 4448.2216152605}
+_TIME = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9}
+
+# What a column can be, and factors to SI by unit.
+ROLES: dict[str, dict[str, float]] = {
+    'time': _TIME,
+    'command': _LENGTH,
+    'measured': _LENGTH,
+    'force': _FORCE,
+}
+EXAMPLE = 'time_s,command_mm,measured_mm,force_N'
+
+_NAME = re.compile(
+    r'^\s*(?P<role>time|command|measured|force)(?:[\s_]*[\[(]?\s*(?P<unit>[^\]\)\s]*)\s*[\])]?)?\s*$',
+    re.IGNORECASE,
+)
+
+
+def factor(role: str, unit: str | None, where: str) -> float:
+    """Return the factor from a unit to SI for a role.
+
+    Raises:
+        InputError: no unit, or one that is not understood.
+    """
+    known = ROLES[role]
+    if not unit:
+        examples = [u for u in ('m', 'mm', 'N', 'kN', 's') if u in known]
+        raise InputError(
+            f'{where} has no unit; put it into the name, e.g. '
+            f'{" or ".join(f"{role}_{u}" for u in examples)}'
+        )
+    if unit not in known:
+        raise InputError(
+            f'{where} has unit {unit!r}, which is not understood; use one of '
+            f'{", ".join(u for u in known if u.isascii())} (upper and lower case matter)'
+        )
+    return known[unit]
+
+
+def recognise(name: str) -> tuple[str, str] | None:
+    """Return role and unit of a column name such as `command_mm` or `Force [kN]`.
+
+    The unit is empty where the name has none; None where the name is no role.
+    """
+    match = _NAME.match(name)
+    if match is None:
+        return None
+    return match['role'].lower(), match['unit'] or ''
+
+
+def choose(names: list[str], where: str) -> dict[str, tuple[int, float]]:
+    """Return position and factor to SI of every column that has a role.
+
+    Args:
+        names: column names, unit included.
+        where: file, for messages.
+
+    Raises:
+        InputError: a unit is missing or unknown, a role is there twice or a needed one not.
+    """
+    found: dict[str, tuple[int, float]] = {}
+    for position, name in enumerate(names):
+        recognised = recognise(name)
+        if recognised is None:
+            continue
+        role, unit = recognised
+        if role in found:
+            raise InputError(f'{where}: two columns are called {role}; keep one')
+        found[role] = (position, factor(role, unit, f'{where}: column {name.strip()!r}'))
+    for role in ('time', 'command', 'measured'):
+        if role not in found:
+            raise InputError(
+                f'{where}: no column for {role}; the columns are '
+                f'{", ".join(n.strip() for n in names)}. Name them as in {EXAMPLE}, or describe '
+                'the file with --channels MAP.yaml'
+            )
+    return found
