@@ -37,6 +37,7 @@ class Scan:
         schemas: schemas seen so far, by id.
         channels: channels seen so far, by id.
         finished: the file has its footer.
+        position: first byte that is not read yet.
     """
 
     path: Path
@@ -44,9 +45,13 @@ class Scan:
     schemas: dict[int, Schema] = field(default_factory=dict)
     channels: dict[int, Channel] = field(default_factory=dict)
     finished: bool = False
+    position: int = 0
 
-    def messages(self) -> Iterator[tuple[Schema, Channel, Message]]:
+    def messages(self, follow: bool = False) -> Iterator[tuple[Schema, Channel, Message]]:
         """Yield schema, channel and message in file order.
+
+        Args:
+            follow: the file is still being written: yield what is whole since the last call.
 
         Raises:
             InputError: the file cannot be opened or is no MCAP file.
@@ -54,19 +59,24 @@ class Scan:
         try:
             size = self.path.stat().st_size
             with self.path.open('rb') as file:
-                yield from self._file(file, size)
+                yield from self._file(file, size, follow)
         except OSError as error:
             raise InputError(f'{self.path}: cannot be read ({error.strerror})') from error
 
-    def _file(self, file: BinaryIO, size: int) -> Iterator[tuple[Schema, Channel, Message]]:
+    def _file(
+        self, file: BinaryIO, size: int, follow: bool
+    ) -> Iterator[tuple[Schema, Channel, Message]]:
         if not _MAGIC.startswith(file.read(len(_MAGIC))):
             raise InputError(f'{self.path}: this is not an MCAP file')
+        file.seek(max(self.position, len(_MAGIC)))
         while not self.finished:
             at = file.tell()
             head = file.read(_HEAD.size)
             opcode, length = _HEAD.unpack(head) if len(head) == _HEAD.size else (0, size)
             body = b''
             whole = at + _HEAD.size + length <= size
+            if follow and not whole:
+                return
             if opcode == Opcode.FOOTER and whole:
                 self.finished = True
             elif opcode == Opcode.CHUNK or (opcode in _PARSED and whole):
@@ -77,6 +87,7 @@ class Scan:
                 yield from self._chunk(body, at, whole)
             elif body:
                 yield from self._record(opcode, body, at)
+            self.position = file.tell()
             if not whole:
                 self.note(
                     f'{self.path}: cut off after {at} of its bytes (a killed recorder, a full '
