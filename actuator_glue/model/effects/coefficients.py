@@ -1,0 +1,157 @@
+"""From physical parameters to the kernel's coefficient table (docs/effects.md, 'Scheme')."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from actuator_glue.model.effects import kernel as k
+from actuator_glue.records import Array
+
+# A limit at or above this velocity is no limit: the neutral value of flow-saturation.
+NO_LIMIT = 2.0  # m/s
+# Rise of dry friction follows a change of velocity with this delay (frictional memory): it makes
+# velocity-weakening friction on a massless specimen a well-posed equation.
+FRICTION_MEMORY = 2e-3  # s
+
+_TERMS = 14  # Taylor terms for arguments below 1/4: 0.25^14/14! is below rounding
+
+
+def _exact(a1: Array, a0: Array, step: float) -> tuple[Array, Array]:
+    """Return position after a unit step of acceleration, and its derivative, for every system.
+
+    x'' + a1 x' + a0 x = 1 from rest at time `step`; Taylor series of the scaled system, then
+    doubled back (the transition matrix follows from both).
+    """
+    size = np.maximum(np.abs(a1) * step, np.sqrt(np.abs(a0)) * step)
+    with np.errstate(divide='ignore', invalid='ignore'):
+        doublings = np.clip(np.ceil(np.log2(size / 0.25)), 0, 60)
+    doublings = np.where(np.isfinite(doublings), doublings, 0)
+    t = step / 2.0**doublings
+    e1, e2 = -a1 * t, a0 * t * t
+    h_old, h = np.zeros_like(t), np.ones_like(t)
+    factorial = 1.0
+    s1, s2 = np.zeros_like(t), np.zeros_like(t)
+    for n in range(_TERMS):
+        factorial *= n + 1
+        s1 = s1 + h / factorial
+        s2 = s2 + h / (factorial * (n + 2))
+        h_old, h = h, e1 * h - e2 * h_old
+    velocity, position = t * s1, t * t * s2
+    for n in range(int(doublings.max(initial=0.0))):
+        more = n < doublings
+        f11 = 1.0 - a0 * position
+        f22 = f11 - a1 * velocity
+        position, velocity = (
+            np.where(more, position + f11 * position + velocity * velocity, position),
+            np.where(more, velocity * (f11 + f22), velocity),
+        )
+    return position, velocity
+
+
+def build(values: Mapping[str, Array], stiffness: float, step: float, period: float) -> Array:
+    """Return the coefficient table of every parameter set, shape (kernel.COEFFICIENTS, m).
+
+    Args:
+        values: every base and effect parameter of the compiled stages by name, each (m,).
+        stiffness: specimen stiffness k [N/m].
+        step: sub-step [s].
+        period: sample period [s].
+    """
+    v = values
+    b1, n0, a2, a3 = v['beta_1'], v['alpha_1_beta_0'], v['alpha_2'], v['alpha_3']
+    c = np.zeros((k.COEFFICIENTS, len(b1)))
+    half = 0.5 * step
+
+    c[k.GAIN] = v['gain']
+    c[k.LAG_SAMPLES] = v['delay'] / period
+    c[k.SKEW] = v['clock_skew']
+    c[k.NULL] = v['null_offset']
+    c[k.DEADBAND] = v['deadband']
+
+    # Valve T q'' + q' + beta_1 q = n0 e by the trapezoidal rule: mean flow over the step.
+    lag = v['valve_lag']
+    below = 1.0 + b1 * half + 2.0 * lag / step
+    c[k.VALVE_E] = half * n0 / below
+    c[k.VALVE_Q] = 1.0 - half * b1 / below
+    c[k.VALVE_D] = lag / below
+
+    limit = v['saturation_velocity']
+    c[k.SATURATION] = np.where(limit >= NO_LIMIT, np.inf, limit * a2)
+    c[k.ASYMMETRY] = v['asymmetry']
+    c[k.INVERSE_STALL] = v['inverse_stall_force']
+    c[k.DROOP] = v['droop']
+    c[k.DROOP_HALF] = half / (v['droop_time'] + half)
+    c[k.GAIN_DRIFT] = v['gain_drift']
+    with np.errstate(divide='ignore', invalid='ignore'):
+        c[k.INVERSE_ALPHA_2] = 1.0 / a2
+
+    c[k.FORCE_F] = (1.0 - half * a3) / (1.0 + half * a3)
+    c[k.FORCE_Q] = step / (1.0 + half * a3)
+    c[k.FORCE_X] = a2 / (1.0 + half * a3)
+
+    c[k.STIFFNESS] = stiffness
+    c[k.DAMPING_2] = 2.0 * v['damping'] / step
+    c[k.MASS_4] = 4.0 * v['mass'] / step**2
+    c[k.MASS_4V] = 4.0 * v['mass'] / step
+
+    c[k.COULOMB] = v['coulomb_force'] + v['sliding_force']
+    c[k.STRIBECK_EXTRA] = v['sliding_force'] * (v['breakaway_ratio'] - 1.0)
+    with np.errstate(divide='ignore'):
+        c[k.STRIBECK_RATE] = 1.0 / (step * v['stribeck_velocity'])
+    c[k.STRIBECK_LAG] = np.exp(-step / FRICTION_MEMORY)
+
+    c[k.GAP] = v['gap']
+    c[k.HARDENING] = v['hardening']
+    with np.errstate(divide='ignore'):
+        # Past the peak of a softening spring (3 |kappa| x^2 = 1) the secant stays.
+        c[k.HARDENING_CAP] = np.where(
+            v['hardening'] < 0.0, 1.0 / (3.0 * np.abs(v['hardening'])), np.inf
+        )
+        c[k.INVERSE_YIELD] = 1.0 / v['yield_displacement']
+    c[k.YIELD] = v['yield_displacement']
+    c[k.YIELD_RATIO] = v['post_yield_ratio']
+    c[k.SHARP_1 : k.SHARP_16 + 1] = np.maximum(
+        0.0, 1.0 - np.abs(v['yield_sharpness'] - np.arange(5.0)[:, None])
+    )
+
+    c[k.BACKLASH] = v['backlash']
+    c[k.SENSOR_LAG] = v['sensor_lag'] / step
+    with np.errstate(divide='ignore'):
+        c[k.SENSOR_DECAY] = np.exp(-step / v['sensor_lag'])
+
+    _linear(c, b1, n0, a2, a3, stiffness, step)
+    return c
+
+
+def _linear(
+    c: Array, b1: Array, n0: Array, a2: Array, a3: Array, stiffness: float, step: float
+) -> None:
+    """Write both linear chains: Eq. (2) exactly in (x, v), and by the scheme in (x, q)."""
+    d2 = stiffness + a2
+    with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
+        a1 = (a3 * stiffness + b1 * d2) / d2
+        a0 = (b1 * a3 * stiffness + n0) / d2
+        position, velocity = _exact(a1, a0, step)
+        c[k.EXACT_XX] = 1.0 - a0 * position
+        c[k.EXACT_XV] = velocity
+        c[k.EXACT_XU] = n0 / d2 * position
+        c[k.EXACT_VX] = -a0 * velocity
+        c[k.EXACT_VV] = c[k.EXACT_XX] - a1 * velocity
+        c[k.EXACT_VU] = n0 / d2 * velocity
+
+        below = 1.0 + 0.5 * step * b1
+        from_e = 0.5 * step * n0 / below
+        from_q = 1.0 - 0.5 * step * b1 / below
+        force_f, force_q = c[k.FORCE_F], c[k.FORCE_Q]
+        stiff = c[k.FORCE_X] + stiffness + 0.5 * force_q * from_e
+        dx_x = ((force_f - 1.0) * stiffness - force_q * from_e) / stiff
+        dx_q = force_q * from_q / stiff
+        dx_u = force_q * from_e / stiff
+        c[k.TRAP_XX] = 1.0 + dx_x
+        c[k.TRAP_XQ] = dx_q
+        c[k.TRAP_XU] = dx_u
+        c[k.TRAP_QX] = -2.0 * from_e * (1.0 + 0.5 * dx_x)
+        c[k.TRAP_QQ] = 2.0 * from_q - 1.0 - from_e * dx_q
+        c[k.TRAP_QU] = 2.0 * from_e * (1.0 - 0.5 * dx_u)

@@ -1,0 +1,317 @@
+"""One compiled step of the servo-hydraulic loop with every effect, many parameter sets at once.
+
+Derivation in docs/effects.md. Per sub-step one scalar equation is solved for the displacement
+increment: trapezoidal rule in the valve, the oil and the specimen, one Newton step from the last
+increment, and a return mapping for dry friction (unconditionally stable, no branch per lane).
+Each stage is a loop over lanes that the compiler turns into vector code; a stage whose effects
+are off is skipped, so that the cost follows the number of effects switched on.
+
+The scheme's own error on the linear model is removed at every step: the exact solution of Eq. (2)
+and the scheme's solution of Eq. (2) run along and their difference is added to the displacement.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from actuator_glue.jit import njit
+
+LANES = 32
+
+# Rows of the coefficient table, one column per parameter set (filled by coefficients.py).
+(
+    GAIN, LAG_SAMPLES, SKEW, NULL, DEADBAND,
+    VALVE_E, VALVE_Q, VALVE_D,
+    SATURATION, ASYMMETRY, INVERSE_STALL, DROOP, DROOP_HALF, GAIN_DRIFT, INVERSE_ALPHA_2,
+    FORCE_F, FORCE_Q, FORCE_X,
+    STIFFNESS, DAMPING_2, MASS_4, MASS_4V,
+    COULOMB, STRIBECK_EXTRA, STRIBECK_RATE, STRIBECK_LAG,
+    GAP, HARDENING, HARDENING_CAP, YIELD, INVERSE_YIELD, YIELD_RATIO,
+    SHARP_1, SHARP_2, SHARP_4, SHARP_8, SHARP_16,
+    BACKLASH, SENSOR_LAG, SENSOR_DECAY,
+    EXACT_XX, EXACT_XV, EXACT_XU, EXACT_VX, EXACT_VV, EXACT_VU,
+    TRAP_XX, TRAP_XQ, TRAP_XU, TRAP_QX, TRAP_QQ, TRAP_QU,
+) = range(52)  # fmt: skip
+COEFFICIENTS = 52
+
+# Rows of the state table.
+(
+    X, Q, QD, F, R, V, DX, DF, Z, ENVELOPE, LEVEL, PLAY, SENSED,
+    X_EXACT, V_EXACT, X_TRAP, Q_TRAP,
+) = range(17)  # fmt: skip
+STATES = 17
+
+# Switches: one flag per stage that can be skipped.
+(
+    ON_LAG, ON_DEADBAND, ON_SATURATION, ON_ASYMMETRY, ON_PRESSURE, ON_DROOP, ON_DRIFT,
+    ON_STRIBECK, ON_GAP, ON_HARDENING, ON_YIELD, ON_BACKLASH, ON_SENSOR_LAG, ON_CORRECTION,
+) = range(14)  # fmt: skip
+SWITCHES = 14
+
+# Rows of scratch behind coefficients and states in the kernel's own table.
+_S = COEFFICIENTS
+_W = COEFFICIENTS + STATES
+_U, _E, _ES, _QM, _QG, _FQ, _FS, _SP, _SS, _D0, _D1, _DS, _H, _XC, _XP = range(_W, _W + 15)
+_ROWS = _W + 15
+_X, _Q, _QD, _F, _R, _V, _DX, _DF, _Z = (
+    _S + X, _S + Q, _S + QD, _S + F, _S + R, _S + V, _S + DX, _S + DF, _S + Z,
+)  # fmt: skip
+_ENV, _LEVEL, _PLAY, _SENSED = _S + ENVELOPE, _S + LEVEL, _S + PLAY, _S + SENSED
+_XE, _VE, _XT, _QT = _S + X_EXACT, _S + V_EXACT, _S + X_TRAP, _S + Q_TRAP
+
+
+@njit(inline='always')
+def _held(u: Any, at: int) -> float:
+    """Command sample `at`, held constant before the first and after the last one."""
+    return u[min(max(at, 0), u.shape[0] - 1)]
+
+
+@njit(inline='always')
+def _mean_command(u: Any, start: float, stop: float, linear: bool) -> float:
+    """Mean of the held command over [start, stop] samples (at most one sample long).
+
+    The mean over each sub-step keeps the command's integral for any fractional shift.
+    """
+    i, k = int(math.floor(start)), int(math.floor(stop))
+    left, right = _held(u, i), _held(u, k)
+    share = (stop - k) / (stop - start)
+    if not linear:
+        return left if k == i else left + (right - left) * share
+    first = left + (start - i) * (_held(u, i + 1) - left)
+    last = right + (stop - k) * (_held(u, k + 1) - right)
+    if k == i:
+        return 0.5 * (first + last)
+    return 0.5 * ((first + right) * (1.0 - share) + (right + last) * share)
+
+
+@njit(nogil=True)
+def advance(
+    coefficients: Any,
+    state: Any,
+    on: Any,
+    u: Any,
+    offset: int,
+    begin: int,
+    substeps: int,
+    period: float,
+    linear: bool,
+    displacement: Any,
+    force: Any,
+) -> None:
+    """Write the sensed displacement at samples begin, begin+1, ... and carry the state on.
+
+    Args:
+        coefficients: (COEFFICIENTS, LANES), from coefficients.py.
+        state: (STATES, LANES), read and updated; it stands at sample begin - 1, or at sample 0
+            where begin is 0.
+        on: (SWITCHES,) which stages act.
+        u: command samples [m]; u[0] is sample `offset` of the stream.
+        offset: stream index of u[0].
+        begin: stream index of the first sample written.
+        substeps: sub-steps per sample.
+        period: sample period [s].
+        linear: whether the command runs linearly between samples (else zero-order hold).
+        displacement: (n, LANES) output, recorded displacement before sensor post-steps [m].
+        force: (n, LANES) output, actuator force [N]; (0, LANES) where it is not wanted.
+    """
+    w = np.empty((_ROWS, LANES))
+    w[:COEFFICIENTS] = coefficients
+    w[_S : _S + STATES] = state
+    w[_W:] = 0.0
+    w[_ES] = -0.5
+    step = period / substeps
+    inverse = 1.0 / substeps
+    want_force = force.shape[0] > 0
+    solid = on[ON_GAP] or on[ON_HARDENING] or on[ON_YIELD]
+    flow = on[ON_SATURATION] or on[ON_ASYMMETRY] or on[ON_PRESSURE] or on[ON_DROOP] or on[ON_DRIFT]
+    for i in range(displacement.shape[0]):
+        at = begin + i - 1  # the interval from sample `at` to the sample written now
+        for j in range(substeps if at >= 0 else 0):
+            # --- command
+            if on[ON_LAG]:
+                for n in range(LANES):
+                    rate = 1.0 - w[SKEW, n]
+                    start = (at + j * inverse) * rate - w[LAG_SAMPLES, n] - offset
+                    stop = start + rate * inverse
+                    w[_U, n] = w[GAIN, n] * _mean_command(u, start, stop, linear)
+            else:
+                start = at - offset + j * inverse
+                mean = _held(u, at - offset)
+                if linear:
+                    mean = _mean_command(u, start, start + inverse, True)
+                for n in range(LANES):
+                    w[_U, n] = w[GAIN, n] * mean
+            # --- valve
+            for n in range(LANES):
+                w[_E, n] = w[_U, n] + w[NULL, n] - w[_X, n] - 0.5 * w[_DX, n]
+            if on[ON_DEADBAND]:
+                for n in range(LANES):
+                    error, band = w[_E, n], w[DEADBAND, n]
+                    left = error - min(max(error, -band), band)
+                    w[_E, n] = left
+                    w[_ES, n] = 0.0 if left == 0.0 else -0.5
+            for n in range(LANES):
+                mean_flow = (
+                    w[VALVE_E, n] * w[_E, n] + w[VALVE_Q, n] * w[_Q, n] + w[VALVE_D, n] * w[_QD, n]
+                )
+                w[_QM, n] = mean_flow
+                w[_FQ, n] = mean_flow
+                w[_FS, n] = w[VALVE_E, n] * w[_ES, n]
+            # --- flow: gain of the orifice, then its limit
+            if flow:
+                for n in range(LANES):
+                    w[_QG, n] = 1.0
+                if on[ON_DRIFT]:
+                    middle = (at + (j + 0.5) * inverse) * period
+                    for n in range(LANES):
+                        w[_QG, n] = max(1.0 + w[GAIN_DRIFT, n] * middle, 0.0)
+                if on[ON_ASYMMETRY]:
+                    for n in range(LANES):
+                        a = w[ASYMMETRY, n]
+                        w[_QG, n] *= 1.0 + (a if w[_QM, n] > 0.0 else -a)
+                if on[ON_PRESSURE]:
+                    for n in range(LANES):
+                        load = (w[_F, n] + 0.5 * w[_DF, n]) * w[INVERSE_STALL, n]
+                        drop = 1.0 - (load if w[_QM, n] > 0.0 else -load)
+                        w[_QG, n] *= math.sqrt(max(drop, 0.0))
+                if on[ON_DROOP]:
+                    for n in range(LANES):
+                        before = w[_ENV, n]
+                        speed = abs(w[_QM, n]) * w[INVERSE_ALPHA_2, n]
+                        middle_envelope = before + w[DROOP_HALF, n] * (speed - before)
+                        w[_QG, n] *= math.sqrt(max(1.0 - w[DROOP, n] * middle_envelope, 0.0))
+                        w[_ENV, n] = 2.0 * middle_envelope - before
+                for n in range(LANES):
+                    through = w[_QM, n] * w[_QG, n]
+                    limit = w[SATURATION, n]
+                    clipped = min(max(through, -limit), limit)
+                    w[_FQ, n] = clipped
+                    w[_FS, n] = w[_FS, n] * w[_QG, n] if clipped == through else 0.0
+            # --- specimen force at the expected end of the step, and its tangent
+            if solid:
+                for n in range(LANES):
+                    here, there = w[_X, n], w[_X, n] + w[_DX, n]
+                    g = w[GAP, n]
+                    after = there - min(max(there, -g), g)
+                    w[_D0, n] = here - min(max(here, -g), g)
+                    w[_D1, n] = after
+                    w[_DS, n] = 0.0 if (after == 0.0 and g > 0.0) else 1.0
+                    square = min(after * after, w[HARDENING_CAP, n])
+                    inside = 3.0 if after * after <= w[HARDENING_CAP, n] else 1.0
+                    w[_SP, n] = after * (w[YIELD_RATIO, n] + w[HARDENING, n] * square)
+                    w[_SS, n] = w[YIELD_RATIO, n] + w[HARDENING, n] * inside * square
+                if on[ON_YIELD]:
+                    for n in range(LANES):
+                        share = _yielding(w, n, w[_D1, n] - w[_D0, n])
+                        rest = 1.0 - w[YIELD_RATIO, n]
+                        end = w[_Z, n] + (w[_D1, n] - w[_D0, n]) * share
+                        w[_SP, n] += rest * min(max(end, -w[YIELD, n]), w[YIELD, n])
+                        w[_SS, n] += rest * share
+                for n in range(LANES):
+                    w[_SP, n] *= w[STIFFNESS, n]
+                    w[_SS, n] *= w[STIFFNESS, n] * w[_DS, n]
+            else:
+                for n in range(LANES):
+                    w[_SP, n] = w[STIFFNESS, n] * (w[_X, n] + w[_DX, n])
+                    w[_SS, n] = w[STIFFNESS, n]
+            # --- balance of forces: trial without slip, friction takes what it can, rest moves
+            for n in range(LANES):
+                guess = w[_DX, n]
+                slope = w[FORCE_Q, n] * w[_FS, n]
+                static = w[_SP, n] - w[_SS, n] * guess
+                oil = w[FORCE_F, n] * w[_F, n] + w[FORCE_Q, n] * w[_FQ, n] - slope * guess
+                trial = w[_F, n] + oil - w[_R, n] - static + w[MASS_4V, n] * w[_V, n]
+                stiff = w[FORCE_X, n] - slope + w[_SS, n] + w[DAMPING_2, n] + w[MASS_4, n]
+                dry = w[COULOMB, n] + w[_LEVEL, n]
+                friction = min(max(trial, -dry), dry)
+                dx = (trial - friction) / stiff
+                end = oil + (slope - w[FORCE_X, n]) * dx
+                w[_DF, n] = end - w[_F, n]
+                w[_F, n] = end
+                w[_R, n] = static + w[_SS, n] * dx + friction
+                w[_V, n] = 0.0 if dx == 0.0 else (2.0 / step) * dx - w[_V, n]
+                mean_flow = w[_QM, n] + w[VALVE_E, n] * w[_ES, n] * (dx - guess)
+                w[_QD, n] = (4.0 / step) * (mean_flow - w[_Q, n]) - w[_QD, n]
+                w[_Q, n] = 2.0 * mean_flow - w[_Q, n]
+                w[_X, n] += dx
+                w[_DX, n] = dx
+            if on[ON_YIELD]:
+                for n in range(LANES):
+                    g = w[GAP, n]
+                    after = w[_X, n] - min(max(w[_X, n], -g), g)
+                    moved = after - w[_D0, n]
+                    end = w[_Z, n] + moved * _yielding(w, n, moved)
+                    w[_Z, n] = min(max(end, -w[YIELD, n]), w[YIELD, n])
+            if on[ON_STRIBECK]:
+                for n in range(LANES):
+                    ratio = w[_DX, n] * w[STRIBECK_RATE, n]
+                    wish = w[STRIBECK_EXTRA, n] * _exp_minus(ratio * ratio)
+                    w[_LEVEL, n] = wish + (w[_LEVEL, n] - wish) * w[STRIBECK_LAG, n]
+            # --- what the scheme does wrong on the linear model
+            if on[ON_CORRECTION]:
+                for n in range(LANES):
+                    xe, ve, xt, qt, c = w[_XE, n], w[_VE, n], w[_XT, n], w[_QT, n], w[_U, n]
+                    w[_XE, n] = w[EXACT_XX, n] * xe + w[EXACT_XV, n] * ve + w[EXACT_XU, n] * c
+                    w[_VE, n] = w[EXACT_VX, n] * xe + w[EXACT_VV, n] * ve + w[EXACT_VU, n] * c
+                    w[_XT, n] = w[TRAP_XX, n] * xt + w[TRAP_XQ, n] * qt + w[TRAP_XU, n] * c
+                    w[_QT, n] = w[TRAP_QX, n] * xt + w[TRAP_QQ, n] * qt + w[TRAP_QU, n] * c
+            # --- transducer
+            if on[ON_BACKLASH] or on[ON_SENSOR_LAG]:
+                for n in range(LANES):
+                    corrected = w[_X, n] + w[_XE, n] - w[_XT, n]
+                    half = w[BACKLASH, n]
+                    before = w[_PLAY, n]
+                    w[_PLAY, n] = min(max(before, corrected - half), corrected + half)
+                    ramp = (w[_PLAY, n] - before) * w[SENSOR_LAG, n]
+                    w[_SENSED, n] = (
+                        w[_PLAY, n] - ramp + w[SENSOR_DECAY, n] * (w[_SENSED, n] - before + ramp)
+                    )
+        if on[ON_BACKLASH] or on[ON_SENSOR_LAG]:
+            for n in range(LANES):
+                displacement[i, n] = w[_SENSED, n]
+        else:
+            for n in range(LANES):
+                displacement[i, n] = w[_X, n] + w[_XE, n] - w[_XT, n]
+        if want_force:
+            for n in range(LANES):
+                force[i, n] = w[_F, n]
+    state[:] = w[_S : _S + STATES]
+
+
+@njit(inline='always')
+def _exp_minus(z: float) -> float:
+    """exp(-z) for z >= 0 by a Pade quotient to the 16th power (vector code, error < 1e-6)."""
+    s = min(z, 40.0) * 0.0625
+    r = (1.0 - 0.5 * s + s * s / 12.0) / (1.0 + 0.5 * s + s * s / 12.0)
+    r = r * r
+    r = r * r
+    r = r * r
+    return r * r
+
+
+@njit(inline='always')
+def _hardness(w: Any, n: int, z: float) -> float:
+    """|z/x_y|^n, interpolated between the powers 1, 2, 4, 8 and 16."""
+    r = min(abs(z) * w[INVERSE_YIELD, n], 1.0)
+    r2 = r * r
+    r4 = r2 * r2
+    r8 = r4 * r4
+    return (
+        w[SHARP_1, n] * r
+        + w[SHARP_2, n] * r2
+        + w[SHARP_4, n] * r4
+        + w[SHARP_8, n] * r8
+        + w[SHARP_16, n] * r8 * r8
+    )
+
+
+@njit(inline='always')
+def _yielding(w: Any, n: int, moved: float) -> float:
+    """Mean dz/dx of the Bouc-Wen model over a step `moved` (midpoint rule)."""
+    z = w[_Z, n]
+    first = 1.0 - (_hardness(w, n, z) if z * moved > 0.0 else 0.0)
+    middle = z + 0.5 * moved * first
+    return 1.0 - (_hardness(w, n, middle) if middle * moved > 0.0 else 0.0)

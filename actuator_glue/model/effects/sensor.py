@@ -1,0 +1,134 @@
+"""Effects between the transducer and the record; none of them is fed back to the valve."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from actuator_glue.model.effects import kernel
+from actuator_glue.model.effects.effect import Effect
+from actuator_glue.model.parameters import Parameter
+from actuator_glue.records import Array
+
+
+def _bias(p: Array, time: Array, y: Array) -> Array:
+    return y + p[:, :1]
+
+
+def _drift(p: Array, time: Array, y: Array) -> Array:
+    return y + p[:, :1] * time
+
+
+def _hum(p: Array, time: Array, y: Array) -> Array:
+    angle = 2.0 * np.pi * p[:, 2:3] * time
+    return np.asarray(y + p[:, :1] * np.cos(angle) + p[:, 1:2] * np.sin(angle))
+
+
+def _quantisation(p: Array, velocity: Array) -> Array:
+    return np.broadcast_to(p[:, :1] ** 2 / 12.0, velocity.shape)
+
+
+def _jitter(p: Array, velocity: Array) -> Array:
+    return np.asarray((p[:, :1] * velocity) ** 2)
+
+
+LAG = Effect(
+    name='sensor-lag',
+    place='sensor',
+    equation="T y' + y = x",
+    parameters=(
+        Parameter('sensor_lag', 's', 0.0, 0.03, 'time constant of conditioner or filter', 0.0),
+    ),
+    group='lag',
+    signature='linear; as a delay with a slight roll-off',
+    source='Jelali & Kroll 2003, ch. 4 (transducers)',
+    starts=lambda s: ((0.0005,), (0.002,), (0.008,)),
+    switches=(kernel.ON_SENSOR_LAG,),
+)
+
+BIAS = Effect(
+    name='bias',
+    place='sensor',
+    equation='y = x + b',
+    parameters=(Parameter('bias', 'm', -2e-3, 2e-3, 'offset of the transducer', 0.0),),
+    group='offset',
+    signature='constant offset',
+    source='IEEE Std 1057-2017 (offset error)',
+    starts=lambda s: ((0.02 * s.stroke,), (-0.02 * s.stroke,)),
+    output=_bias,
+)
+
+DRIFT = Effect(
+    name='drift',
+    place='sensor',
+    equation='y = x + d t, t from the start of the record',
+    parameters=(Parameter('drift', 'm/s', -5e-5, 5e-5, 'drift of the transducer offset', 0.0),),
+    group='drift',
+    signature='linear trend',
+    source='IEEE Std 1057-2017 (drift)',
+    starts=lambda s: ((0.02 * s.stroke / s.duration,), (-0.02 * s.stroke / s.duration,)),
+    output=_drift,
+)
+
+HUM = Effect(
+    name='hum',
+    place='sensor',
+    equation='y = x + a cos(2 pi f t) + b sin(2 pi f t)',
+    parameters=(
+        Parameter('hum_cosine', 'm', -1e-3, 1e-3, 'cosine amplitude of the line', 0.0),
+        Parameter('hum_sine', 'm', -1e-3, 1e-3, 'sine amplitude of the line', 0.0),
+        Parameter('hum_frequency', 'Hz', 1.0, 1000.0, 'frequency of the line', 50.0),
+    ),
+    group='hum',
+    signature='spectral line incoherent with the command',
+    source='IEEE Std 1057-2017 (sine fit)',
+    starts=lambda s: (
+        tuple(
+            (0.001 * s.stroke, 0.001 * s.stroke, hz)
+            for hz in (50.0, 60.0)
+            if 2.0 * hz * s.period < 1
+        )
+        or ((0.001 * s.stroke, 0.001 * s.stroke, 0.2 / s.period),)
+    ),
+    output=_hum,
+)
+
+QUANTISATION = Effect(
+    name='quantisation',
+    place='sensor',
+    equation='y = d round(x/d); adds the variance d^2/12',
+    parameters=(Parameter('quantum', 'm', 0.0, 1e-3, 'step of the converter', 0.0),),
+    group='quantisation',
+    signature='values on a grid',
+    source='Bennett 1948, Bell Syst. Tech. J. 27:446-472; Widrow & Kollar 2008, '
+    'Quantization Noise',
+    starts=lambda s: ((1e-6,), (1e-5,), (5e-5,)),
+    variance=_quantisation,
+)
+
+SKEW = Effect(
+    name='clock-skew',
+    place='sensor',
+    equation='u_c(t) = u(t - eps t): the record lags more and more (eps > 0) behind the command',
+    parameters=(
+        Parameter('clock_skew', '1', -1e-3, 1e-3, 'relative rate error of the two clocks', 0.0),
+    ),
+    group='skew',
+    signature='lag grows with time',
+    source='Mills 1991, IEEE Trans. Commun. 39:1482-1493 (frequency error of clocks)',
+    starts=lambda s: ((5e-5,), (-5e-5,), (3e-4,), (-3e-4,)),
+    switches=(kernel.ON_LAG,),
+)
+
+JITTER = Effect(
+    name='timing-jitter',
+    place='sensor',
+    equation='y_i = x(t_i + d_i), d_i ~ N(0, s^2); adds the variance (s v)^2',
+    parameters=(Parameter('jitter', 's', 0.0, 5e-3, 'standard deviation of sample times', 0.0),),
+    group='jitter',
+    signature='variance proportional to velocity squared, no mean',
+    source='Souders, Flach, Hagwood & Yang 1990, IEEE Trans. Instrum. Meas. 39:80-85',
+    starts=lambda s: ((1e-4,), (5e-4,)),
+    variance=_jitter,
+)
+
+EFFECTS = (LAG, BIAS, DRIFT, HUM, QUANTISATION, SKEW, JITTER)

@@ -1,0 +1,340 @@
+"""A model structure: Eq. (2) plus any set of effects, simulated for many parameter sets."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from actuator_glue.errors import InputError
+from actuator_glue.model import linear
+from actuator_glue.model.effects import CATALOGUE, Effect, Scale, kernel, run
+from actuator_glue.model.exact import ExactErrors, Initial, settle_samples
+from actuator_glue.model.parameters import BASE, Parameter
+from actuator_glue.records import Array, Record
+
+# Effects that Eq. (2)'s exact kernel serves: they scale the command or act on the record.
+_OUTSIDE = frozenset(
+    {'gain'} | {n for n, e in CATALOGUE.items() if e.output is not None or e.variance is not None}
+)
+_DEFAULTS = {p.name: p.neutral for e in CATALOGUE.values() for p in e.parameters}
+
+
+class Structure:
+    """Eq. (2) with a set of effects switched on.
+
+    Args:
+        effects: names from the catalogue; their order is that of their parameters.
+
+    Attributes:
+        effects: names of the effects.
+        parameters: base parameters, then those of every effect.
+        names: their names.
+
+    Raises:
+        InputError: unknown or repeated effect.
+    """
+
+    def __init__(self, effects: Iterable[str] = ()) -> None:
+        self.effects = tuple(effects)
+        for name in self.effects:
+            if name not in CATALOGUE:
+                raise InputError(
+                    f'effect {name!r} is not in the catalogue; known: {", ".join(CATALOGUE)}'
+                )
+        if len(set(self.effects)) != len(self.effects):
+            raise InputError(f'an effect is named twice in {", ".join(self.effects)}')
+        self.entries: tuple[Effect, ...] = tuple(CATALOGUE[name] for name in self.effects)
+        self.parameters: tuple[Parameter, ...] = BASE + tuple(
+            p for effect in self.entries for p in effect.parameters
+        )
+        self.names: tuple[str, ...] = tuple(p.name for p in self.parameters)
+        self._columns: dict[str, slice] = {}
+        first = len(BASE)
+        for effect in self.entries:
+            self._columns[effect.name] = slice(first, first + len(effect.parameters))
+            first += len(effect.parameters)
+        self._on = np.zeros(kernel.SWITCHES, dtype=np.bool_)
+        self._on[[s for effect in self.entries for s in effect.switches]] = True
+        self._on[kernel.ON_CORRECTION] = True
+        self._linear = _OUTSIDE.issuperset(self.effects)
+
+    def __repr__(self) -> str:
+        return f'Structure({self.effects!r})'
+
+    def bounds(self) -> tuple[Array, Array]:
+        """Return lower and upper prior bounds, each of shape (p,)."""
+        return (
+            np.array([p.lower for p in self.parameters]),
+            np.array([p.upper for p in self.parameters]),
+        )
+
+    def columns(self, effect: str) -> slice:
+        """Return which columns of theta hold an effect's parameters.
+
+        Raises:
+            InputError: the structure does not have the effect.
+        """
+        if effect not in self._columns:
+            raise InputError(f'{self!r} does not have the effect {effect!r}')
+        return self._columns[effect]
+
+    def neutral(self, theta_base: ArrayLike) -> Array:
+        """Return theta with every effect switched off, shape (p,) or (m, p), from (4,) or (m, 4).
+
+        Raises:
+            InputError: theta_base has another shape.
+        """
+        base = linear.thetas(theta_base)
+        off = [float(p.neutral or 0.0) for p in self.parameters[len(BASE) :]]
+        table = np.hstack([base, np.broadcast_to(off, (len(base), len(off)))])
+        return np.asarray(table.reshape(*np.shape(theta_base)[:-1], len(self.parameters)))
+
+    def starts(self, theta_base: ArrayLike, scale: Scale) -> Array:
+        """Return typical sizes of the last effect, all others neutral, shape (s, p).
+
+        Args:
+            theta_base: base parameters, shape (4,).
+            scale: from effects.scale(records, theta_base).
+        """
+        lower, upper = self.bounds()
+        if not self.effects:
+            return self.neutral(theta_base)[np.newaxis]
+        sizes = np.array(self.entries[-1].starts(scale), dtype=np.float64)
+        table = np.repeat(self.neutral(theta_base)[np.newaxis], len(sizes), axis=0)
+        table[:, self._columns[self.effects[-1]]] = sizes
+        table[:, len(BASE) :] = np.clip(
+            table[:, len(BASE) :], lower[len(BASE) :], upper[len(BASE) :]
+        )
+        return table
+
+    def simulate(
+        self,
+        theta: ArrayLike,
+        record: Record,
+        *,
+        initial: Initial = 'rest',
+        rate: int = 1,
+    ) -> Array:
+        """Return the recorded displacement the model expects (free run), (n,) or (m, n) [m].
+
+        Args:
+            theta: shape (p,) or (m, p), in the order of `parameters`.
+            record: command, period, hold and known stiffness are used.
+            initial: 'rest' at zero, or 'measured': state from the first measured samples.
+            rate: how many times finer than usual the integration steps are.
+
+        Raises:
+            InputError: wrong shape of theta, or the specimen stiffness is not known.
+        """
+        table = self._table(theta)
+        start = linear.initial_state(record) if initial == 'measured' else (0.0, 0.0)
+        out = np.empty((len(table), len(record)))
+        for which, part in self._parts(table, record, start, rate):
+            out[which] = part
+        return out.reshape(*np.shape(theta)[:-1], len(record))
+
+    def errors(
+        self,
+        records: Sequence[Record],
+        settle: Sequence[int] | int = 0,
+        initial: Initial = 'rest',
+    ) -> StructureErrors:
+        """Return the error sums of this structure over records, as ExactErrors for (m, p).
+
+        Raises:
+            InputError: no record, unknown stiffness or initial, settle too long.
+        """
+        return StructureErrors(self, records, settle, initial)
+
+    def jacobian(
+        self,
+        theta: ArrayLike,
+        record: Record,
+        *,
+        scale: Scale,
+        initial: Initial = 'rest',
+    ) -> Array:
+        """Return d(displacement)/d(theta) by finite differences in one batch, shape (p, n).
+
+        Central differences inside the bounds, one-sided at a bound. Steps are 2 % of an effect's
+        smallest typical size and 0.1 % of a base parameter: not smaller, since the response to
+        nonsmooth effects has kinks.
+
+        Args:
+            theta: shape (p,).
+            record: the test.
+            scale: from effects.scale(records, theta[:4]).
+            initial: as in simulate.
+
+        Raises:
+            InputError: wrong shape of theta, or the specimen stiffness is not known.
+        """
+        at = self._table(theta)[0]
+        lower, upper = self.bounds()
+        step = self.steps(at, scale)
+        high = np.minimum(at + step, np.maximum(upper, at))
+        low = np.maximum(at - step, np.minimum(lower, at))
+        batch = np.repeat(at[np.newaxis], 2 * len(at), axis=0)
+        np.fill_diagonal(batch[: len(at)], high)
+        np.fill_diagonal(batch[len(at) :], low)
+        y = self.simulate(batch, record, initial=initial)
+        return (y[: len(at)] - y[len(at) :]) / (high - low)[:, np.newaxis]
+
+    def steps(self, theta: Array, scale: Scale) -> Array:
+        """Return the parameter changes that count as small for derivatives, shape (p,)."""
+        step = np.maximum(1e-3 * np.abs(theta), 1e-6)
+        step[3] = max(step[3], 1e-3)  # leakage lies at or near zero
+        for effect in self.entries:
+            columns = self._columns[effect.name]
+            off = np.array([float(p.neutral or 0.0) for p in effect.parameters])
+            sizes = np.abs(np.array(effect.starts(scale)) - off)
+            typical = np.where(sizes > 0.0, sizes, np.inf).min(axis=0)
+            typical = np.where(np.isfinite(typical), typical, np.abs(off) + 1e-9)
+            step[columns] = np.maximum(0.02 * typical, 1e-3 * np.abs(theta[columns]))
+        return step
+
+    def variance(self, theta: ArrayLike, record: Record, displacement: Array) -> Array:
+        """Return the variance that noise-like effects add to the measurement, (m, n) [m^2].
+
+        quantisation and timing-jitter leave the mean of the record: they enter a likelihood
+        through this variance, added to that of the noise. Zero where none is switched on.
+
+        Args:
+            theta: shape (p,) or (m, p).
+            record: gives the period.
+            displacement: simulated displacement, shape (n,) or (m, n) [m].
+        """
+        table = self._table(theta)
+        y = np.atleast_2d(displacement)
+        out = np.zeros((len(table), y.shape[1]))
+        for effect in self.entries:
+            if effect.variance is not None:
+                velocity = np.gradient(y, record.period, axis=1)
+                out += effect.variance(table[:, self._columns[effect.name]], velocity)
+        return out.reshape(*np.shape(theta)[:-1], y.shape[1])
+
+    def values(self, table: Array) -> dict[str, Array]:
+        """Return every catalogue parameter by name, each (m,), neutral where it is not in theta."""
+        m = len(table)
+        known = {name: np.full(m, value) for name, value in _DEFAULTS.items()}
+        known.update({name: table[:, i] for i, name in enumerate(self.names)})
+        return known
+
+    @property
+    def switches(self) -> NDArray[np.bool_]:
+        """Which stages of the kernel act, shape (kernel.SWITCHES,)."""
+        return self._on.copy()
+
+    def sensed(self, table: Array, time: Array, displacement: Array) -> Array:
+        """Return the displacement (m, n) after the sensor's post-steps (bias, drift, hum)."""
+        for effect in self.entries:
+            if effect.output is not None:
+                part = table[:, self._columns[effect.name]]
+                displacement = effect.output(part, time, displacement)
+        return displacement
+
+    def _table(self, theta: ArrayLike) -> Array:
+        table = np.ascontiguousarray(theta, dtype=np.float64)
+        p = len(self.parameters)
+        if table.ndim not in (1, 2) or table.shape[-1] != p:
+            raise InputError(
+                f'theta has shape {table.shape}; {self!r} takes ({p},) or (m, {p}): '
+                f'{", ".join(self.names)}'
+            )
+        return table.reshape(-1, p)
+
+    def _parts(
+        self, table: Array, record: Record, start: tuple[float, float], rate: int = 1
+    ) -> Iterable[tuple[Array, Array]]:
+        """Yield which parameter sets (c,) and what they are expected to record (c, n)."""
+        if self._linear:
+            base = table[:, : len(BASE)]
+            x = linear.simulate(
+                base,
+                record.command,
+                stiffness=record.known_stiffness(),
+                period=record.period,
+                hold=record.hold,
+                initial=start,
+            )
+            if 'gain' in self._columns:
+                free = linear.simulate(
+                    base,
+                    np.zeros(len(record)),
+                    stiffness=record.known_stiffness(),
+                    period=record.period,
+                    initial=start,
+                )
+                x = free + table[:, self._columns['gain']] * (x - free)
+            yield np.arange(len(table)), self.sensed(table, record.time, x)
+            return
+        for which, x in run.blocks(self.values(table), self._on, record, start, rate):
+            yield which, self.sensed(table[which], record.time, x)
+
+
+class StructureErrors:
+    """Errors e = measured - simulated of a structure over records; as model.exact.ExactErrors.
+
+    Args:
+        structure: the model.
+        records: tests fitted jointly, each with a known specimen stiffness.
+        settle: samples at each record's beginning that are simulated but not counted.
+        initial: state at the first sample: 'rest', or 'measured' from the first samples.
+
+    Raises:
+        InputError: no record, unknown stiffness or initial, settle too long.
+    """
+
+    def __init__(
+        self,
+        structure: Structure,
+        records: Sequence[Record],
+        settle: Sequence[int] | int = 0,
+        initial: Initial = 'rest',
+    ) -> None:
+        self.structure = structure
+        self._exact = ExactErrors(records, settle, initial)
+        self.records = self._exact.records
+        self.settle = settle_samples(self.records, settle)
+        self.initial = initial
+        self._starts = tuple((float(x), float(v)) for x, v in self._exact.starts)
+
+    @property
+    def sizes(self) -> NDArray[np.int64]:
+        """Counted samples of every record, shape (R,)."""
+        return self._exact.sizes
+
+    def __call__(self, theta: ArrayLike) -> Array:
+        """Return (sum of e, sum of e^2) per theta and record, (R, 2) or (m, R, 2) [m, m^2].
+
+        Thetas whose response does not exist or diverges give NaN or infinity.
+
+        Raises:
+            InputError: theta has the wrong shape.
+        """
+        if not self.structure.effects:
+            return self._exact(theta)
+        table = self.structure._table(theta)
+        out = np.empty((len(table), len(self.records), 2))
+        for r, record in enumerate(self.records):
+            counted = record.measured[self.settle[r] :]
+            for which, y in self.structure._parts(table, record, self._starts[r]):
+                error = counted - y[:, self.settle[r] :]
+                out[which, r, 0] = error.sum(axis=1)
+                out[which, r, 1] = np.einsum('ij,ij->i', error, error)
+        return out.reshape(*np.shape(theta)[:-1], len(self.records), 2)
+
+    def residuals(self, theta: ArrayLike) -> list[Array]:
+        """Return the counted errors of every record, shape (n_r,) or (m, n_r) each [m].
+
+        Raises:
+            InputError: theta has the wrong shape.
+        """
+        return [
+            (record.measured - self.structure.simulate(theta, record, initial=self.initial))[
+                ..., self.settle[r] :
+            ]
+            for r, record in enumerate(self.records)
+        ]
