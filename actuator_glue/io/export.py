@@ -81,8 +81,7 @@ def write_mat(path: Path | str, record: Record, *, unit: str = 'mm') -> None:
         content['stiffness_N_per_m'] = record.stiffness
     temporary = path.with_name(path.name + '.tmp')
     try:
-        with temporary.open('wb') as file:
-            savemat(file, content, do_compression=True)
+        savemat(str(temporary), content, appendmat=False, do_compression=True)
         temporary.replace(path)
     except OSError as error:
         raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error

@@ -101,12 +101,12 @@ def _numeric(names: list[str]) -> bool:
 
 
 def _mat_by_name(path: Path) -> tuple[dict[str, Array], dict[str, str]]:
-    vectors = read_variables(path)
+    vectors, texts = read_variables(path)
     names = list(vectors)
     # `test.command_mm` is command_mm of the struct `test`.
     columns = choose([name.rpartition('.')[2] for name in names], str(path))
     values = {role: vectors[names[at]] * scale for role, (at, scale) in columns.items()}
-    notes = {}
+    notes = {name.rpartition('.')[2]: text for name, text in texts.items()}
     for name, vector in vectors.items():
         if name.rpartition('.')[2] == 'stiffness_N_per_m' and len(vector) == 1:
             notes['stiffness_N_per_m'] = repr(float(vector[0]))
@@ -150,7 +150,7 @@ def _raw_text(
 def _raw_mat(
     path: Path, channels: ChannelMap, roles: dict[str, Channel]
 ) -> tuple[dict[str, Array], Array | None]:
-    vectors = read_variables(path)
+    vectors, _ = read_variables(path)
 
     def vector(column: str | int, role: str) -> Array:
         name = list(vectors)[position(column, list(vectors), f'{path}: {role}')]

@@ -11,8 +11,8 @@ from actuator_glue.errors import InputError
 from actuator_glue.records import Array
 
 
-def read_variables(path: Path) -> dict[str, Array]:
-    """Return every numeric vector of a file by name; fields of structs as `struct.field`.
+def read_variables(path: Path) -> tuple[dict[str, Array], dict[str, str]]:
+    """Return numeric vectors and texts of a file by name; fields of structs as `struct.field`.
 
     Raises:
         InputError: no MAT-file, version 7.3, or no vector in it.
@@ -34,18 +34,22 @@ def read_variables(path: Path) -> dict[str, Array]:
     except Exception as error:  # zlib.error and others, by the file's bytes
         raise InputError(f'{path}: damaged MAT-file ({error})') from error
     vectors: dict[str, Array] = {}
+    texts: dict[str, str] = {}
     for name, value in content.items():
         if not name.startswith('__'):
-            _collect(name, value, vectors)
+            _collect(name, value, vectors, texts)
     if not vectors:
         raise InputError(f'{path}: no numeric vector in this file')
-    return vectors
+    return vectors, texts
 
 
-def _collect(name: str, value: Any, vectors: dict[str, Array]) -> None:
+def _collect(name: str, value: Any, vectors: dict[str, Array], texts: dict[str, str]) -> None:
     if hasattr(value, '_fieldnames'):
         for entry in value._fieldnames:
-            _collect(f'{name}.{entry}', getattr(value, entry), vectors)
+            _collect(f'{name}.{entry}', getattr(value, entry), vectors, texts)
+        return
+    if isinstance(value, str):
+        texts[name] = value
         return
     array = np.asarray(value)
     if array.dtype.kind in 'fiu' and array.ndim <= 1:

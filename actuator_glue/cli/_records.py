@@ -1,0 +1,70 @@
+"""Options that say which records, and loading them."""
+
+from __future__ import annotations
+
+import argparse
+
+from actuator_glue.cli._output import note
+from actuator_glue.io.load import load_records
+from actuator_glue.records import Record
+
+
+def add_records(parser: argparse.ArgumentParser) -> None:
+    """Add RECORD..., --stiffness, --channels and --hold."""
+    parser.add_argument(
+        'records',
+        nargs='+',
+        metavar='RECORD',
+        help='bag folder, .mcap, .csv, .mat, or other text with --channels',
+    )
+    add_reading(parser)
+
+
+def add_reading(parser: argparse.ArgumentParser) -> None:
+    """Add --stiffness, --channels and --hold."""
+    parser.add_argument(
+        '--stiffness',
+        nargs='+',
+        action='extend',
+        type=number,
+        metavar='N/m',
+        help='specimen stiffness: one for all records or one per record (250 kN/m is 250e3, 0 is '
+        'a free actuator); wins over what a file says',
+    )
+    parser.add_argument(
+        '--channels', metavar='MAP.yaml', help='channel map for laboratory text or .mat'
+    )
+    parser.add_argument(
+        '--hold',
+        choices=('zoh', 'linear'),
+        help='how the command runs between its samples; wins over what a file says '
+        '(a wrong one is a delay of half a sample)',
+    )
+
+
+def number(text: str) -> float:
+    """Return a finite number."""
+    import math
+
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f'{text!r} is not a number') from None
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f'{text!r} is not finite')
+    return value
+
+
+def load(args: argparse.Namespace) -> list[Record]:
+    """Return the records that the options name; gaps in bags are told on standard error.
+
+    Raises:
+        InputError: a record cannot be used.
+    """
+    return load_records(
+        args.records,
+        stiffness=args.stiffness,
+        channels=args.channels,
+        hold=args.hold,
+        gap=note,
+    )

@@ -1,0 +1,120 @@
+"""Say what a bag or laboratory file holds: topics, records, rates, ranges, damage."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any
+
+from actuator_glue.cli._output import add_json, note, say, table, write_json
+from actuator_glue.cli._records import add_records
+from actuator_glue.errors import InputError
+from actuator_glue.records import Record
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add_records(parser)
+    add_json(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print what each path holds; 2 where one is damaged or holds no record.
+
+    Raises:
+        InputError: a path cannot be read at all.
+    """
+    from actuator_glue.io.bag_reader import is_bag
+    from actuator_glue.io.load import load_records
+
+    code, files = 0, []
+    for path in args.records:
+        content: dict[str, Any] = {'path': str(path), 'damage': []}
+        if is_bag(path):
+            content |= _bag(path, args)
+        records: list[Record] = []
+        try:
+            records = load_records(
+                path,
+                stiffness=args.stiffness,
+                channels=args.channels,
+                hold=args.hold,
+                note=lambda _: None,
+                gap=note,
+            )
+        except InputError as error:
+            content['damage'].append(str(error))
+        for line in content['damage']:
+            print(f'actuator-glue: {line}', file=sys.stderr)
+            code = 2
+        for record in records:
+            _show(record, args)
+        content['records'] = [_describe(r) for r in records]
+        files.append(content)
+    write_json({'schema': 'actuator_glue.info/1', 'files': files}, args.json)
+    return code
+
+
+def _bag(path: str, args: argparse.Namespace) -> dict[str, Any]:
+    from actuator_glue.io.bag_reader import summarise
+
+    summary = summarise(path)
+    filled = [p for p in summary.parts if p.count]
+    start = min((p.start for p in filled), default=0)
+    seconds = (max((p.stop for p in filled), default=0) - start) * 1e-9
+    size = sum(p.stat().st_size for p in Path(path).glob('*.mcap')) if Path(path).is_dir() else 0
+    size = size or Path(path).stat().st_size
+    total = sum(p.count for p in summary.parts)
+    say(
+        f'{path}: {len(summary.parts)} file(s), {size / 1e6:.2f} MB, {total} messages, '
+        f'{seconds:.3f} s, {"finished" if summary.finished else "not finished"}',
+        args,
+    )
+    topics = list(summary.topics.values())
+    rows = [(t.name, t.type, str(t.count)) for t in topics]
+    table('', ('topic', 'type', 'messages'), rows, args)
+    return {
+        'finished': summary.finished,
+        'messages': total,
+        'start_ns': start,
+        'seconds': seconds,
+        'topics': [
+            {'name': t.name, 'type': t.type, 'messages': t.count, 'type_hash': t.rihs01}
+            for t in topics
+        ],
+        'damage': list(summary.damage),
+    }
+
+
+def _show(record: Record, args: argparse.Namespace) -> None:
+    k = record.stiffness
+    stiffness = 'specimen stiffness not known' if k is None else f'stiffness {k / 1e3:.6g} kN/m'
+    say(
+        f'record {record.source}: {len(record)} samples at {record.rate:.6g} Hz, '
+        f'{record.duration:.6g} s; {record.actuator}, {stiffness}, hold {record.hold}',
+        args,
+    )
+    channels = [('command', record.command * 1e3, 'mm'), ('measured', record.measured * 1e3, 'mm')]
+    if record.force is not None:
+        channels.append(('force', record.force * 1e-3, 'kN'))
+    for name, values, unit in channels:
+        say(f'  {name:9} {values.min():10.4f} .. {values.max():10.4f} {unit}', args)
+
+
+def _describe(record: Record) -> dict[str, Any]:
+    force = record.force
+    return {
+        'source': record.source,
+        'actuator': record.actuator,
+        'samples': len(record),
+        'rate_hz': record.rate,
+        'duration_s': record.duration,
+        'start_ns': record.start_ns,
+        'first_index': record.first_index,
+        'stiffness_n_per_m': record.stiffness,
+        'hold': record.hold,
+        'command_m': [record.command.min(), record.command.max()],
+        'measured_m': [record.measured.min(), record.measured.max()],
+        'force_n': None if force is None else [force.min(), force.max()],
+    }

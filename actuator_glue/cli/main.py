@@ -1,0 +1,114 @@
+"""Entry point of `actuator-glue`: finds the commands beside this file and runs one.
+
+Every `cli/COMMAND.py` has `add_arguments(parser)` and `run(args) -> int`; the first line of its
+docstring is its help. Only the command that runs is imported, and heavy libraries only inside it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import ast
+import importlib
+import os
+import sys
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+
+from actuator_glue import cli
+from actuator_glue.errors import InputError
+
+EPILOG = (
+    'Exit codes: 0 done; 1 the answer is no, where a command asks a question; 2 the input '
+    'cannot be used; 3 a fault of this program.'
+)
+
+
+def commands() -> dict[str, Path]:
+    """Return file by command name, sorted."""
+    folder = Path(next(iter(cli.__path__)))
+    files = sorted(folder.glob('[a-z]*.py'))
+    return {file.stem.replace('_', '-'): file for file in files if file.stem != 'main'}
+
+
+def summary(file: Path) -> str:
+    """Return the first line of a command's docstring without importing it."""
+    text = ast.get_docstring(ast.parse(file.read_text('utf-8'))) or ''
+    return text.split('\n', 1)[0]
+
+
+def build_parser(chosen: str | None) -> argparse.ArgumentParser:
+    """Return the parser; only the chosen command knows its arguments."""
+    parser = argparse.ArgumentParser(
+        prog='actuator-glue',
+        description='Bayesian calibration and diagnosis of servo-hydraulic actuators.',
+        epilog=EPILOG,
+    )
+    parser.add_argument('--version', action='store_true', help='print the version and exit')
+    parser.add_argument('--debug', action='store_true', help='show where a fault came from')
+    subparsers = parser.add_subparsers(dest='command', metavar='COMMAND')
+    for name, file in commands().items():
+        line = summary(file)
+        # % would be read as a format by argparse.
+        sub = subparsers.add_parser(name, help=line.replace('%', '%%'), description=line)
+        if name == chosen:
+            module = importlib.import_module(f'actuator_glue.cli.{file.stem}')
+            module.add_arguments(sub)
+            sub.set_defaults(run=module.run)
+    return parser
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run one command and return its exit code."""
+    argv = list(sys.argv[1:] if argv is None else argv)
+    chosen = next((a for a in argv if not a.startswith('-')), None)
+    debug = '--debug' in argv
+    if not debug:
+        # Deprecations inside libraries are nothing a user can act on.
+        warnings.simplefilter('ignore')
+    try:
+        parser = build_parser(chosen)
+        args = parser.parse_args(argv)
+        if args.version:
+            print(f'actuator-glue {_version()}')
+            return 0
+        if args.command is None:
+            parser.print_help()
+            return 2
+        return int(args.run(args))
+    except InputError as error:
+        return _fail(str(error), 2, debug)
+    except KeyboardInterrupt:
+        return _fail('interrupted', 130, debug=False)
+    except BrokenPipeError:
+        # The reader of our output has gone (`| head`): nothing to tell, nobody to tell it to.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except MemoryError:
+        return _fail('not enough memory for this; use shorter records or fewer samples', 2, debug)
+    except OSError as error:
+        return _fail(f'{error.filename or "file"}: {error.strerror or error}', 2, debug)
+    except Exception as error:
+        text = f'fault in actuator-glue: {type(error).__name__}: {error}'
+        return _fail(f'{text} (run with --debug for details, and report it)', 3, debug)
+
+
+def _fail(message: str, code: int, debug: bool) -> int:
+    """Tell the exception that is being handled, or raise it again where it is looked for."""
+    if debug:
+        raise
+    print(f'actuator-glue: {message}', file=sys.stderr)
+    return code
+
+
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version('actuator_glue')
+    except PackageNotFoundError:
+        return 'not installed (source checkout)'
+
+
+if __name__ == '__main__':
+    sys.exit(main())
