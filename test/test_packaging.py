@@ -1,6 +1,7 @@
 """What other tools read of this repository: package.xml, setup.py, CMakeLists, message texts."""
 
 import ast
+import json
 import re
 import subprocess
 import sys
@@ -146,6 +147,47 @@ def test_message_reference_is_up_to_date() -> None:
     """docs/messages.md is what the texts say; `make docs` renews it."""
     script = str(ROOT / 'scripts' / 'write_message_reference.py')
     assert subprocess.run([sys.executable, script, '--check'], check=False).returncode == 0
+
+
+TOPICS = {
+    'samples': 'SampleBlock',
+    'posterior': 'PosteriorMoments',
+    'prediction_band': 'PredictionBand',
+    'frequency_response': 'FrequencyResponseBand',
+    'diagnosis': 'Diagnosis',
+}
+
+
+def check_curve(topic: str, field: str) -> None:
+    """Fail unless a topic has a field."""
+    names = {f['name'] for _, f in fields(ROOT / 'msg_defs' / 'msg' / f'{TOPICS[topic]}.msg')}
+    assert re.sub(r'\[\d+\]$', '', field) in names, f'{topic} has no {field}'
+
+
+def test_plotjuggler_layout_draws_what_exists() -> None:
+    """Each curve of the layout is a field of a message."""
+    layout = ElementTree.parse(ROOT / 'docs' / 'layouts' / 'actuator_glue.plotjuggler.xml')
+    curves = [curve.get('name') for curve in layout.iter('curve')]
+    assert curves
+    for curve in curves:
+        _, topic, field = curve.split('/')
+        check_curve(topic, field)
+
+
+def test_foxglove_layout_draws_what_exists() -> None:
+    """Each path of the layout is a field of a message, each panel is placed."""
+    text = (ROOT / 'docs' / 'layouts' / 'actuator_glue.foxglove.json').read_text(encoding='utf-8')
+    layout = json.loads(text)
+    paths = [p['value'] for c in layout['configById'].values() for p in c.get('paths', ())]
+    assert paths
+    for path in paths:
+        topic, condition, field = re.fullmatch(r'/(\w+)(?:{(\w+)==.*})?\.(.+)', path).groups()
+        check_curve(topic, field)
+        if condition:
+            check_curve(topic, condition)
+    assert all(
+        json.dumps(layout['layout']).count(f'"{panel}"') == 1 for panel in layout['configById']
+    )
 
 
 def test_nothing_of_one_machine_is_committed() -> None:
