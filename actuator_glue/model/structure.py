@@ -180,7 +180,7 @@ class Structure:
         np.fill_diagonal(batch[: len(at)], high)
         np.fill_diagonal(batch[len(at) :], low)
         y = self.simulate(batch, record, initial=initial)
-        return (y[: len(at)] - y[len(at) :]) / (high - low)[:, np.newaxis]
+        return np.asarray((y[: len(at)] - y[len(at) :]) / (high - low)[:, np.newaxis])
 
     def steps(self, theta: Array, scale: Scale) -> Array:
         """Return the parameter changes that count as small for derivatives, shape (p,)."""
@@ -216,7 +216,7 @@ class Structure:
         return out.reshape(*np.shape(theta)[:-1], y.shape[1])
 
     def values(self, table: Array) -> dict[str, Array]:
-        """Return every catalogue parameter by name, each (m,), neutral where it is not in theta."""
+        """Return every catalogue parameter by name, each (m,), neutral if not in theta."""
         m = len(table)
         known = {name: np.full(m, value) for name, value in _DEFAULTS.items()}
         known.update({name: table[:, i] for i, name in enumerate(self.names)})
@@ -247,7 +247,7 @@ class Structure:
 
     def _parts(
         self, table: Array, record: Record, start: tuple[float, float], rate: int = 1
-    ) -> Iterable[tuple[Array, Array]]:
+    ) -> Iterable[tuple[NDArray[np.intp], Array]]:
         """Yield which parameter sets (c,) and what they are expected to record (c, n)."""
         if self._linear:
             base = table[:, : len(BASE)]

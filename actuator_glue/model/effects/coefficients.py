@@ -11,15 +11,18 @@ from actuator_glue.records import Array
 
 # A limit at or above this velocity is no limit: the neutral value of flow-saturation.
 NO_LIMIT = 2.0  # m/s
-# Rise of dry friction follows a change of velocity with this delay (frictional memory): it makes
-# velocity-weakening friction on a massless specimen a well-posed equation.
+# The rise of dry friction follows a change of velocity with this time constant (frictional
+# memory), or with MEMORY_MARGIN rise / ((k + alpha_2) v_s) where that is longer: the steepest
+# fall of the Stribeck curve is 0.86 rise / v_s, and a massless specimen has one velocity only
+# where the memory is longer than 0.86 rise / ((k + alpha_2) v_s).
 FRICTION_MEMORY = 2e-3  # s
+MEMORY_MARGIN = 1.72
 
 _TERMS = 14  # Taylor terms for arguments below 1/4: 0.25^14/14! is below rounding
 
 
-def _exact(a1: Array, a0: Array, step: float) -> tuple[Array, Array]:
-    """Return position after a unit step of acceleration, and its derivative, for every system.
+def _exact(a1: Array, a0: Array, step: float) -> tuple[Array, Array, Array]:
+    """Return position after a unit step of acceleration, its derivative and its integral.
 
     x'' + a1 x' + a0 x = 1 from rest at time `step`; Taylor series of the scaled system, then
     doubled back (the transition matrix follows from both).
@@ -32,22 +35,25 @@ def _exact(a1: Array, a0: Array, step: float) -> tuple[Array, Array]:
     e1, e2 = -a1 * t, a0 * t * t
     h_old, h = np.zeros_like(t), np.ones_like(t)
     factorial = 1.0
-    s1, s2 = np.zeros_like(t), np.zeros_like(t)
+    s1, s2, s3 = np.zeros_like(t), np.zeros_like(t), np.zeros_like(t)
     for n in range(_TERMS):
         factorial *= n + 1
         s1 = s1 + h / factorial
         s2 = s2 + h / (factorial * (n + 2))
+        s3 = s3 + h / (factorial * (n + 2) * (n + 3))
         h_old, h = h, e1 * h - e2 * h_old
-    velocity, position = t * s1, t * t * s2
+    velocity, position, ramp = t * s1, t * t * s2, t * t * t * s3
     for n in range(int(doublings.max(initial=0.0))):
         more = n < doublings
         f11 = 1.0 - a0 * position
         f22 = f11 - a1 * velocity
+        ramp = np.where(more, (1.0 + f11) * ramp + (t + velocity) * position, ramp)
         position, velocity = (
             np.where(more, position + f11 * position + velocity * velocity, position),
             np.where(more, velocity * (f11 + f22), velocity),
         )
-    return position, velocity
+        t = np.where(more, 2.0 * t, t)
+    return position, velocity, ramp
 
 
 def build(values: Mapping[str, Array], stiffness: float, step: float, period: float) -> Array:
@@ -92,15 +98,18 @@ def build(values: Mapping[str, Array], stiffness: float, step: float, period: fl
     c[k.FORCE_X] = a2 / (1.0 + half * a3)
 
     c[k.STIFFNESS] = stiffness
-    c[k.DAMPING_2] = 2.0 * v['damping'] / step
+    c[k.DAMPING_2] = 2.0 * (v['damping'] + v['mass'] * v['mass_damping']) / step
     c[k.MASS_4] = 4.0 * v['mass'] / step**2
     c[k.MASS_4V] = 4.0 * v['mass'] / step
 
     c[k.COULOMB] = v['coulomb_force'] + v['sliding_force']
-    c[k.STRIBECK_EXTRA] = v['sliding_force'] * (v['breakaway_ratio'] - 1.0)
-    with np.errstate(divide='ignore'):
-        c[k.STRIBECK_RATE] = 1.0 / (step * v['stribeck_velocity'])
-    c[k.STRIBECK_LAG] = np.exp(-step / FRICTION_MEMORY)
+    rise = v['sliding_force'] * (v['breakaway_ratio'] - 1.0)
+    with np.errstate(divide='ignore', invalid='ignore'):
+        speed = v['stribeck_velocity']
+        c[k.STRIBECK_EXTRA] = rise
+        c[k.STRIBECK_RATE] = 1.0 / (step * speed)
+        memory = np.maximum(FRICTION_MEMORY, MEMORY_MARGIN * rise / ((stiffness + a2) * speed))
+        c[k.STRIBECK_LAG] = np.exp(-step / memory)
 
     c[k.GAP] = v['gap']
     c[k.HARDENING] = v['hardening']
@@ -133,13 +142,15 @@ def _linear(
     with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
         a1 = (a3 * stiffness + b1 * d2) / d2
         a0 = (b1 * a3 * stiffness + n0) / d2
-        position, velocity = _exact(a1, a0, step)
+        position, velocity, ramp = _exact(a1, a0, step)
         c[k.EXACT_XX] = 1.0 - a0 * position
         c[k.EXACT_XV] = velocity
         c[k.EXACT_XU] = n0 / d2 * position
+        c[k.EXACT_XR] = n0 / d2 * (ramp / step - 0.5 * position)
         c[k.EXACT_VX] = -a0 * velocity
         c[k.EXACT_VV] = c[k.EXACT_XX] - a1 * velocity
         c[k.EXACT_VU] = n0 / d2 * velocity
+        c[k.EXACT_VR] = n0 / d2 * (position / step - 0.5 * velocity)
 
         below = 1.0 + 0.5 * step * b1
         from_e = 0.5 * step * n0 / below

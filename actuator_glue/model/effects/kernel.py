@@ -16,8 +16,10 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from actuator_glue.jit import njit
+from actuator_glue.records import Array
 
 LANES = 32
 
@@ -32,17 +34,17 @@ LANES = 32
     GAP, HARDENING, HARDENING_CAP, YIELD, INVERSE_YIELD, YIELD_RATIO,
     SHARP_1, SHARP_2, SHARP_4, SHARP_8, SHARP_16,
     BACKLASH, SENSOR_LAG, SENSOR_DECAY,
-    EXACT_XX, EXACT_XV, EXACT_XU, EXACT_VX, EXACT_VV, EXACT_VU,
+    EXACT_XX, EXACT_XV, EXACT_XU, EXACT_XR, EXACT_VX, EXACT_VV, EXACT_VU, EXACT_VR,
     TRAP_XX, TRAP_XQ, TRAP_XU, TRAP_QX, TRAP_QQ, TRAP_QU,
-) = range(52)  # fmt: skip
-COEFFICIENTS = 52
+) = range(54)  # fmt: skip
+COEFFICIENTS = 54
 
 # Rows of the state table.
 (
-    X, Q, QD, F, R, V, DX, DF, Z, ENVELOPE, LEVEL, PLAY, SENSED,
+    X, Q, QD, F, R, V, DX, DF, Z, ENVELOPE, LEVEL, PLAY, PLAY_DX, SENSED,
     X_EXACT, V_EXACT, X_TRAP, Q_TRAP,
-) = range(17)  # fmt: skip
-STATES = 17
+) = range(18)  # fmt: skip
+STATES = 18
 
 # Switches: one flag per stage that can be skipped.
 (
@@ -54,52 +56,61 @@ SWITCHES = 14
 # Rows of scratch behind coefficients and states in the kernel's own table.
 _S = COEFFICIENTS
 _W = COEFFICIENTS + STATES
-_U, _E, _ES, _QM, _QG, _FQ, _FS, _SP, _SS, _D0, _D1, _DS, _H, _XC, _XP = range(_W, _W + 15)
-_ROWS = _W + 15
+_U, _E, _ES, _QM, _QG, _FQ, _FS, _SP, _SS, _D0, _D1, _DS, _G, _DRY, _OIL, _RAMP = range(
+    _W, _W + 16
+)
+_ROWS = _W + 16
 _X, _Q, _QD, _F, _R, _V, _DX, _DF, _Z = (
     _S + X, _S + Q, _S + QD, _S + F, _S + R, _S + V, _S + DX, _S + DF, _S + Z,
 )  # fmt: skip
 _ENV, _LEVEL, _PLAY, _SENSED = _S + ENVELOPE, _S + LEVEL, _S + PLAY, _S + SENSED
+_PLAY_DX = _S + PLAY_DX
 _XE, _VE, _XT, _QT = _S + X_EXACT, _S + V_EXACT, _S + X_TRAP, _S + Q_TRAP
 
 
 @njit(inline='always')
-def _held(u: Any, at: int) -> float:
+def _held(u: Array, at: int) -> Any:
     """Command sample `at`, held constant before the first and after the last one."""
     return u[min(max(at, 0), u.shape[0] - 1)]
 
 
 @njit(inline='always')
-def _mean_command(u: Any, start: float, stop: float, linear: bool) -> float:
-    """Mean of the held command over [start, stop] samples (at most one sample long).
+def _command(u: Array, offset: int, start: float, stop: float, linear: bool) -> Any:
+    """Mean and slope of the held command over [start, stop] samples (at most one sample long).
 
-    The mean over each sub-step keeps the command's integral for any fractional shift.
+    The slope is that of the ramp with the same first moment: with both, any fractional shift of
+    a held command keeps its integral and its centre.
     """
-    i, k = int(math.floor(start)), int(math.floor(stop))
-    left, right = _held(u, i), _held(u, k)
-    share = (stop - k) / (stop - start)
+    i, k = math.floor(start), math.floor(stop)
+    left, right = _held(u, i - offset), _held(u, k - offset)
     if not linear:
-        return left if k == i else left + (right - left) * share
-    first = left + (start - i) * (_held(u, i + 1) - left)
-    last = right + (stop - k) * (_held(u, k + 1) - right)
+        share = (stop - k) / (stop - start) if k > i else 0.0
+        jump = right - left
+        return left + jump * share, 6.0 * jump * share * (1.0 - share)
+    first = left + (start - i) * (_held(u, i + 1 - offset) - left)
+    last = right + (stop - k) * (_held(u, k + 1 - offset) - right)
     if k == i:
-        return 0.5 * (first + last)
-    return 0.5 * ((first + right) * (1.0 - share) + (right + last) * share)
+        return 0.5 * (first + last), last - first
+    share = (stop - k) / (stop - start)
+    before, after = (first + right) * (1.0 - share), (right + last) * share
+    # 12 times the moment of the triangle by which a kink leaves the straight line.
+    kink = right - first * share - last * (1.0 - share)
+    return 0.5 * (before + after), last - first + kink * (1.0 - 2.0 * share)
 
 
 @njit(nogil=True)
 def advance(
-    coefficients: Any,
-    state: Any,
-    on: Any,
-    u: Any,
+    coefficients: Array,
+    state: Array,
+    on: NDArray[np.bool_],
+    u: Array,
     offset: int,
     begin: int,
     substeps: int,
     period: float,
     linear: bool,
-    displacement: Any,
-    force: Any,
+    displacement: Array,
+    force: Array,
 ) -> None:
     """Write the sensed displacement at samples begin, begin+1, ... and carry the state on.
 
@@ -125,6 +136,7 @@ def advance(
     step = period / substeps
     inverse = 1.0 / substeps
     want_force = force.shape[0] > 0
+    looks = 3 if on[ON_STRIBECK] else 2 if on[ON_GAP] else 1
     solid = on[ON_GAP] or on[ON_HARDENING] or on[ON_YIELD]
     flow = on[ON_SATURATION] or on[ON_ASYMMETRY] or on[ON_PRESSURE] or on[ON_DROOP] or on[ON_DRIFT]
     for i in range(displacement.shape[0]):
@@ -134,16 +146,19 @@ def advance(
             if on[ON_LAG]:
                 for n in range(LANES):
                     rate = 1.0 - w[SKEW, n]
-                    start = (at + j * inverse) * rate - w[LAG_SAMPLES, n] - offset
+                    start = (at + j * inverse) * rate - w[LAG_SAMPLES, n]
                     stop = start + rate * inverse
-                    w[_U, n] = w[GAIN, n] * _mean_command(u, start, stop, linear)
+                    mean, slope = _command(u, offset, start, stop, linear)
+                    w[_U, n] = w[GAIN, n] * mean
+                    w[_RAMP, n] = w[GAIN, n] * slope
             else:
-                start = at - offset + j * inverse
-                mean = _held(u, at - offset)
+                start = at + j * inverse
+                mean, slope = _held(u, at - offset), 0.0
                 if linear:
-                    mean = _mean_command(u, start, start + inverse, True)
+                    mean, slope = _command(u, offset, start, start + inverse, True)
                 for n in range(LANES):
                     w[_U, n] = w[GAIN, n] * mean
+                    w[_RAMP, n] = w[GAIN, n] * slope
             # --- valve
             for n in range(LANES):
                 w[_E, n] = w[_U, n] + w[NULL, n] - w[_X, n] - 0.5 * w[_DX, n]
@@ -190,50 +205,38 @@ def advance(
                     clipped = min(max(through, -limit), limit)
                     w[_FQ, n] = clipped
                     w[_FS, n] = w[_FS, n] * w[_QG, n] if clipped == through else 0.0
-            # --- specimen force at the expected end of the step, and its tangent
-            if solid:
-                for n in range(LANES):
-                    here, there = w[_X, n], w[_X, n] + w[_DX, n]
-                    g = w[GAP, n]
-                    after = there - min(max(there, -g), g)
-                    w[_D0, n] = here - min(max(here, -g), g)
-                    w[_D1, n] = after
-                    w[_DS, n] = 0.0 if (after == 0.0 and g > 0.0) else 1.0
-                    square = min(after * after, w[HARDENING_CAP, n])
-                    inside = 3.0 if after * after <= w[HARDENING_CAP, n] else 1.0
-                    w[_SP, n] = after * (w[YIELD_RATIO, n] + w[HARDENING, n] * square)
-                    w[_SS, n] = w[YIELD_RATIO, n] + w[HARDENING, n] * inside * square
-                if on[ON_YIELD]:
-                    for n in range(LANES):
-                        share = _yielding(w, n, w[_D1, n] - w[_D0, n])
-                        rest = 1.0 - w[YIELD_RATIO, n]
-                        end = w[_Z, n] + (w[_D1, n] - w[_D0, n]) * share
-                        w[_SP, n] += rest * min(max(end, -w[YIELD, n]), w[YIELD, n])
-                        w[_SS, n] += rest * share
-                for n in range(LANES):
-                    w[_SP, n] *= w[STIFFNESS, n]
-                    w[_SS, n] *= w[STIFFNESS, n] * w[_DS, n]
-            else:
-                for n in range(LANES):
-                    w[_SP, n] = w[STIFFNESS, n] * (w[_X, n] + w[_DX, n])
-                    w[_SS, n] = w[STIFFNESS, n]
-            # --- balance of forces: trial without slip, friction takes what it can, rest moves
+            # --- balance of forces from the expected increment; kinks may need another look
             for n in range(LANES):
-                guess = w[_DX, n]
-                slope = w[FORCE_Q, n] * w[_FS, n]
-                static = w[_SP, n] - w[_SS, n] * guess
-                oil = w[FORCE_F, n] * w[_F, n] + w[FORCE_Q, n] * w[_FQ, n] - slope * guess
-                trial = w[_F, n] + oil - w[_R, n] - static + w[MASS_4V, n] * w[_V, n]
-                stiff = w[FORCE_X, n] - slope + w[_SS, n] + w[DAMPING_2, n] + w[MASS_4, n]
-                dry = w[COULOMB, n] + w[_LEVEL, n]
-                friction = min(max(trial, -dry), dry)
-                dx = (trial - friction) / stiff
-                end = oil + (slope - w[FORCE_X, n]) * dx
-                w[_DF, n] = end - w[_F, n]
-                w[_F, n] = end
-                w[_R, n] = static + w[_SS, n] * dx + friction
+                w[_DRY, n] = w[COULOMB, n]
+                w[_G, n] = w[_DX, n]
+            for _ in range(looks):
+                if on[ON_STRIBECK]:
+                    for n in range(LANES):
+                        w[_DRY, n] = w[COULOMB, n] + _friction_rise(w, n)
+                if solid:
+                    _specimen(w, on[ON_YIELD])
+                else:
+                    for n in range(LANES):
+                        w[_SP, n] = w[STIFFNESS, n] * (w[_X, n] + w[_G, n])
+                        w[_SS, n] = w[STIFFNESS, n]
+                for n in range(LANES):  # trial without slip; friction takes what it can
+                    slope = w[FORCE_Q, n] * w[_FS, n]
+                    static = w[_SP, n] - w[_SS, n] * w[_G, n]
+                    oil = w[FORCE_F, n] * w[_F, n] + w[FORCE_Q, n] * w[_FQ, n] - slope * w[_DX, n]
+                    trial = w[_F, n] + oil - w[_R, n] - static + w[MASS_4V, n] * w[_V, n]
+                    stiff = w[FORCE_X, n] - slope + w[_SS, n] + w[DAMPING_2, n] + w[MASS_4, n]
+                    friction = min(max(trial, -w[_DRY, n]), w[_DRY, n])
+                    dx = (trial - friction) / stiff
+                    w[_G, n] = dx
+                    w[_SP, n] = static + w[_SS, n] * dx + friction
+                    w[_OIL, n] = oil + (slope - w[FORCE_X, n]) * dx
+            for n in range(LANES):
+                dx = w[_G, n]
+                w[_DF, n] = w[_OIL, n] - w[_F, n]
+                w[_F, n] = w[_OIL, n]
+                w[_R, n] = w[_SP, n]
                 w[_V, n] = 0.0 if dx == 0.0 else (2.0 / step) * dx - w[_V, n]
-                mean_flow = w[_QM, n] + w[VALVE_E, n] * w[_ES, n] * (dx - guess)
+                mean_flow = w[_QM, n] + w[VALVE_E, n] * w[_ES, n] * (dx - w[_DX, n])
                 w[_QD, n] = (4.0 / step) * (mean_flow - w[_Q, n]) - w[_QD, n]
                 w[_Q, n] = 2.0 * mean_flow - w[_Q, n]
                 w[_X, n] += dx
@@ -247,15 +250,24 @@ def advance(
                     w[_Z, n] = min(max(end, -w[YIELD, n]), w[YIELD, n])
             if on[ON_STRIBECK]:
                 for n in range(LANES):
-                    ratio = w[_DX, n] * w[STRIBECK_RATE, n]
-                    wish = w[STRIBECK_EXTRA, n] * _exp_minus(ratio * ratio)
-                    w[_LEVEL, n] = wish + (w[_LEVEL, n] - wish) * w[STRIBECK_LAG, n]
+                    w[_LEVEL, n] = _friction_rise(w, n)
             # --- what the scheme does wrong on the linear model
             if on[ON_CORRECTION]:
                 for n in range(LANES):
                     xe, ve, xt, qt, c = w[_XE, n], w[_VE, n], w[_XT, n], w[_QT, n], w[_U, n]
-                    w[_XE, n] = w[EXACT_XX, n] * xe + w[EXACT_XV, n] * ve + w[EXACT_XU, n] * c
-                    w[_VE, n] = w[EXACT_VX, n] * xe + w[EXACT_VV, n] * ve + w[EXACT_VU, n] * c
+                    ramp = w[_RAMP, n]
+                    w[_XE, n] = (
+                        w[EXACT_XX, n] * xe
+                        + w[EXACT_XV, n] * ve
+                        + w[EXACT_XU, n] * c
+                        + w[EXACT_XR, n] * ramp
+                    )
+                    w[_VE, n] = (
+                        w[EXACT_VX, n] * xe
+                        + w[EXACT_VV, n] * ve
+                        + w[EXACT_VU, n] * c
+                        + w[EXACT_VR, n] * ramp
+                    )
                     w[_XT, n] = w[TRAP_XX, n] * xt + w[TRAP_XQ, n] * qt + w[TRAP_XU, n] * c
                     w[_QT, n] = w[TRAP_QX, n] * xt + w[TRAP_QQ, n] * qt + w[TRAP_QU, n] * c
             # --- transducer
@@ -265,10 +277,13 @@ def advance(
                     half = w[BACKLASH, n]
                     before = w[_PLAY, n]
                     w[_PLAY, n] = min(max(before, corrected - half), corrected + half)
-                    ramp = (w[_PLAY, n] - before) * w[SENSOR_LAG, n]
-                    w[_SENSED, n] = (
-                        w[_PLAY, n] - ramp + w[SENSOR_DECAY, n] * (w[_SENSED, n] - before + ramp)
-                    )
+                    moved = w[_PLAY, n] - before
+                    # First-order lag of the parabola through the last three positions.
+                    bend, lag = 0.5 * (moved - w[_PLAY_DX, n]), w[SENSOR_LAG, n]
+                    end = w[_PLAY, n] - lag * (moved + bend - 2.0 * lag * bend)
+                    start_lag = before - lag * (moved - bend - 2.0 * lag * bend)
+                    w[_SENSED, n] = end + w[SENSOR_DECAY, n] * (w[_SENSED, n] - start_lag)
+                    w[_PLAY_DX, n] = moved
         if on[ON_BACKLASH] or on[ON_SENSOR_LAG]:
             for n in range(LANES):
                 displacement[i, n] = w[_SENSED, n]
@@ -293,7 +308,7 @@ def _exp_minus(z: float) -> float:
 
 
 @njit(inline='always')
-def _hardness(w: Any, n: int, z: float) -> float:
+def _hardness(w: Array, n: int, z: float) -> Any:
     """|z/x_y|^n, interpolated between the powers 1, 2, 4, 8 and 16."""
     r = min(abs(z) * w[INVERSE_YIELD, n], 1.0)
     r2 = r * r
@@ -309,9 +324,43 @@ def _hardness(w: Any, n: int, z: float) -> float:
 
 
 @njit(inline='always')
-def _yielding(w: Any, n: int, moved: float) -> float:
+def _yielding(w: Array, n: int, moved: float) -> Any:
     """Mean dz/dx of the Bouc-Wen model over a step `moved` (midpoint rule)."""
     z = w[_Z, n]
     first = 1.0 - (_hardness(w, n, z) if z * moved > 0.0 else 0.0)
     middle = z + 0.5 * moved * first
     return 1.0 - (_hardness(w, n, middle) if middle * moved > 0.0 else 0.0)
+
+
+@njit(inline='always')
+def _friction_rise(w: Array, n: int) -> Any:
+    """Rise of dry friction over its sliding value at the end of a step by _G."""
+    ratio = w[_G, n] * w[STRIBECK_RATE, n]
+    wish = w[STRIBECK_EXTRA, n] * _exp_minus(ratio * ratio)
+    return wish + (w[_LEVEL, n] - wish) * w[STRIBECK_LAG, n]
+
+
+@njit(inline='always')
+def _specimen(w: Array, yields: bool) -> None:
+    """Write specimen force and tangent at the expected end of the step."""
+    for n in range(LANES):
+        here, there = w[_X, n], w[_X, n] + w[_G, n]
+        g = w[GAP, n]
+        after = there - min(max(there, -g), g)
+        w[_D0, n] = here - min(max(here, -g), g)
+        w[_D1, n] = after
+        w[_DS, n] = 0.0 if (after == 0.0 and g > 0.0) else 1.0
+        square = min(after * after, w[HARDENING_CAP, n])
+        inside = 3.0 if after * after <= w[HARDENING_CAP, n] else 1.0
+        w[_SP, n] = after * (w[YIELD_RATIO, n] + w[HARDENING, n] * square)
+        w[_SS, n] = w[YIELD_RATIO, n] + w[HARDENING, n] * inside * square
+    if yields:
+        for n in range(LANES):
+            moved = w[_D1, n] - w[_D0, n]
+            share = _yielding(w, n, moved)
+            rest = 1.0 - w[YIELD_RATIO, n]
+            w[_SP, n] += rest * min(max(w[_Z, n] + moved * share, -w[YIELD, n]), w[YIELD, n])
+            w[_SS, n] += rest * share
+    for n in range(LANES):
+        w[_SP, n] *= w[STIFFNESS, n]
+        w[_SS, n] *= w[STIFFNESS, n] * w[_DS, n]

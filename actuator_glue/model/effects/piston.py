@@ -22,7 +22,7 @@ STRIBECK = Effect(
     name='stribeck-friction',
     place='piston',
     equation="f = f_specimen + F sign(v), T_m F' + F = F_c (1 + (r - 1) exp(-(v/v_s)^2)), "
-    'T_m = 2 ms',
+    'T_m = max(2 ms, 1.72 (r - 1) F_c/((k + alpha_2) v_s))',
     parameters=(
         Parameter('sliding_force', 'N', 0.0, 2e4, 'dry friction when sliding fast', 0.0),
         Parameter('breakaway_ratio', '1', 1.0, 4.0, 'break-away over sliding friction', 1.5),

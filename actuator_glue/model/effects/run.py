@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 import numpy as np
+from numpy.typing import NDArray
 
 from actuator_glue.model.effects import coefficients, kernel
 from actuator_glue.records import Array, Record
@@ -14,6 +15,11 @@ MAX_STEP = 1.05e-3  # s
 # ... and short against the fastest pole of Eq. (2), up to eight times shorter than MAX_STEP.
 _MAX_POLE_STEP = 0.8
 _MAX_REFINEMENT = 8
+
+
+def sample_steps(period: float) -> int:
+    """Return the usual number of sub-steps per sample."""
+    return max(1, int(np.ceil(period / MAX_STEP - 1e-9)))
 
 
 def refinement(values: Mapping[str, Array], stiffness: float, step: float) -> Array:
@@ -40,7 +46,7 @@ def initial(
     state = np.zeros((kernel.STATES, len(values['beta_1'])))
     state[[kernel.X, kernel.X_EXACT, kernel.X_TRAP, kernel.PLAY, kernel.SENSED]] = x
     state[[kernel.V, kernel.V_EXACT]] = v
-    state[kernel.DX] = v * step
+    state[[kernel.DX, kernel.PLAY_DX]] = v * step
     state[[kernel.F, kernel.R]] = stiffness * x
     flow = (stiffness + values['alpha_2']) * v + values['alpha_3'] * stiffness * x
     state[[kernel.Q, kernel.Q_TRAP]] = flow
@@ -55,11 +61,11 @@ def padded(table: Array) -> Array:
 
 def blocks(
     values: Mapping[str, Array],
-    on: Array,
+    on: NDArray[np.bool_],
     record: Record,
     start: tuple[float, float],
     rate: int,
-) -> Iterator[tuple[Array, Array]]:
+) -> Iterator[tuple[NDArray[np.intp], Array]]:
     """Simulate a record for every parameter set, LANES at a time.
 
     Args:
@@ -73,7 +79,7 @@ def blocks(
         Which parameter sets (c,) and their displacement (c, n) [m] before sensor post-steps.
     """
     stiffness = record.known_stiffness()
-    base = rate * max(1, int(np.ceil(record.period / MAX_STEP - 1e-9)))
+    base = rate * sample_steps(record.period)
     factors = refinement(values, stiffness, record.period / base)
     # One sample before the record: at rest the command was zero, else it was held.
     before = record.command[:1] if start != (0.0, 0.0) else np.zeros(1)
