@@ -1,0 +1,183 @@
+"""What a run came to: numbers for `summary.json` and the table that people see."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from actuator_glue.demo.bag import Content
+from actuator_glue.io.bag_reader import messages
+from actuator_glue.io.messages import deserialize
+from actuator_glue.online.job import WindowResult
+from actuator_glue.online.replay import Comparison, compare, items, published, replay
+
+SCHEMA = 'actuator_glue.demo/1'
+
+
+def replay_bag(bag: Path) -> Comparison:
+    """Run a bag through the estimator and hold every number against the published one.
+
+    Raises:
+        InputError: the bag is damaged.
+    """
+
+    def named() -> Any:
+        return ((m.type, deserialize(m.type, m.data)) for m in messages(bag, types=_TYPES))
+
+    live = published(named())
+    if live.settings is None or not live.models:
+        return Comparison(differing=['no estimator published its settings into this bag'])
+    results = replay(items(named()), live.settings, live.models[0][1], live.schedule())
+    return compare((r for r in results if isinstance(r, WindowResult)), live)
+
+
+_TYPES = frozenset(
+    f'actuator_glue_msgs/msg/{name}'
+    for name in (
+        'SampleBlock',
+        'TestSetup',
+        'EstimatorSetup',
+        'PosteriorMoments',
+        'PredictionBand',
+    )
+)
+
+
+@dataclass(slots=True)
+class Outcome:
+    """A finished run.
+
+    Attributes:
+        source: what was streamed, for people.
+        sent: samples published by the source.
+        content: the bag.
+        comparison: the replay held against the live run.
+        seconds: time from the first sample to the last picture [s].
+        diagnosis: JSON object of the diagnosis, None where none was made.
+    """
+
+    source: str
+    sent: int
+    content: Content
+    comparison: Comparison
+    seconds: float
+    diagnosis: dict[str, Any] | None = None
+
+    def count(self, key: str) -> int:
+        """Return one of the estimator's counters on /diagnostics."""
+        return int(self.content.health.get('estimator', {}).get(key, '0'))
+
+    def moments(self) -> dict[str, dict[str, float | bool]]:
+        """Return the moments of the last window by parameter."""
+        if not self.content.posteriors:
+            return {}
+        last = self.content.posteriors[-1]
+        return {
+            name: {
+                'mean': float(last.mean[i]),
+                'stddev': float(last.stddev[i]),
+                'skewness': float(last.skewness[i]),
+                'cov': float(last.cov[i]),
+                'rhat': float(last.rhat[i]),
+                'ess': float(last.ess[i]),
+                'prior_dominated': bool(last.prior_dominated[i]),
+            }
+            for i, name in enumerate(last.parameter_names)
+        }
+
+    @property
+    def lossless(self) -> bool:
+        """Every sample sent arrived at the estimator and is in the bag."""
+        return self.sent == self.count('samples') == self.content.samples
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object of `summary.json`."""
+        posteriors = self.content.posteriors
+        return {
+            'schema': SCHEMA,
+            'source': self.source,
+            'samples': {
+                'sent': self.sent,
+                'received': self.count('samples'),
+                'recorded': self.content.samples,
+            },
+            'windows': len(posteriors),
+            'windows_dropped': self.count('windows dropped'),
+            'windows_stopped_early': sum(bool(p.stopped_early) for p in posteriors),
+            'deadlines_missed': self.count('deadlines missed'),
+            'coverage': {kind: self.content.coverage(kind) for kind in ('total', 'parameter')},
+            'width_m': {
+                kind: {
+                    level: self.content.mean_width(kind, float(level))
+                    for level in self.content.coverage(kind)
+                }
+                for kind in ('total', 'parameter')
+            },
+            'moments': self.moments(),
+            'replay_identical': self.comparison.identical,
+            'replay': {
+                'windows': self.comparison.windows,
+                'bands': self.comparison.bands,
+                'differing': self.comparison.differing[:20],
+            },
+            'diagnosis': self.diagnosis,
+            'seconds': self.seconds,
+        }
+
+    def show(self, console: Console) -> None:
+        """Print what people want to know."""
+        if self.content.posteriors:
+            console.print(self._table_of_moments())
+        console.print(self._table_of_coverage())
+        sent, received, recorded = self.sent, self.count('samples'), self.content.samples
+        console.print(f'samples   {sent} sent, {received} received, {recorded} recorded')
+        console.print(
+            f'windows   {len(self.content.posteriors)}, deadlines missed '
+            f'{self.count("deadlines missed")}'
+        )
+        found = self.comparison
+        verdict = 'identical, bit for bit' if found.identical else 'NOT identical'
+        console.print(f'replay    {verdict} ({found.windows} posteriors, {found.bands} bands)')
+        for line in found.differing[:5]:
+            console.print(f'          {line}')
+
+    def _table_of_moments(self) -> Table:
+        last = self.content.posteriors[-1]
+        table = Table(title=f'Posterior of the last window ({last.window})', title_justify='left')
+        for name in ('parameter', 'unit', 'mean', 'st. dev.', 'skewness', 'COV', 'R-hat', 'ESS'):
+            table.add_column(name, justify='left' if name in ('parameter', 'unit') else 'right')
+        table.add_column('')
+        for i, (name, values) in enumerate(self.moments().items()):
+            table.add_row(
+                name,
+                str(last.units[i]),
+                f'{values["mean"]:.4g}',
+                f'{values["stddev"]:.2g}',
+                f'{values["skewness"]:.2f}',
+                f'{values["cov"]:.3f}',
+                f'{values["rhat"]:.3f}',
+                f'{values["ess"]:.0f}',
+                'says little more than the prior' if values['prior_dominated'] else '',
+            )
+        return table
+
+    def _table_of_coverage(self) -> Table:
+        table = Table(title='Forecast bands against what was then measured', title_justify='left')
+        for name in ('band', 'level', 'coverage', 'mean width'):
+            table.add_column(name, justify='left' if name == 'band' else 'right')
+        names = {
+            'total': 'total (parameters and residual)',
+            'parameter': 'parameters only (GLUE)',
+            'noise': 'parameters and sensor noise',
+        }
+        for kind, title in names.items():
+            for level, share in self.content.coverage(kind).items():
+                width = self.content.mean_width(kind, float(level))
+                table.add_row(
+                    title, f'{float(level):.0%}', f'{share:.1%}', f'{1e3 * width:.4f} mm'
+                )
+        return table
