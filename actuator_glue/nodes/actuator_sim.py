@@ -1,0 +1,246 @@
+"""A simulated actuator in real time, with effects that nobody is told of."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from actuator_glue.errors import InputError
+from actuator_glue.model import commands
+from actuator_glue.model.benchmark_plant import benchmark_plant
+from actuator_glue.model.parameters import BASE
+from actuator_glue.model.plant import MeasuredPlant, Plant
+from actuator_glue.model.sensor import SensorSpec
+from actuator_glue.model.stream import Stream
+from actuator_glue.model.structure import Structure
+from actuator_glue.nodes import base, undeclared
+from actuator_glue.nodes.blocks import BlockPublisher
+from actuator_glue.nodes.health import Rate
+from actuator_glue.nodes.pacer import Pacer, Step
+from actuator_glue.nodes.parameters import Parameters, Spec
+from actuator_glue.records import Array, Record
+
+# Parameters of the simulated actuator: near the paper's, not equal to any table's.
+_TRUE = {'beta_1': 134.0, 'alpha_1_beta_0': 1.1e9, 'alpha_2': 2.5e5, 'alpha_3': 0.5}
+COMMANDS = ('sweep', 'sine', 'noise', 'earthquake', 'file')
+
+SPECS = (
+    Spec('actuator', 'actuator', 'name of the actuator', read_only=True),
+    Spec('plant', 'paper', 'simulated plant', read_only=True, choices=('paper', 'benchmark')),
+    Spec('rate', 1000.0, 'sample rate', 'Hz', 1.0, 20_000.0, True),
+    Spec('block', 10, 'samples per message', '1', 1, 100_000, True),
+    Spec('specimen_stiffness', 250e3, 'specimen stiffness k', 'N/m', 0.0, 1e9),
+    *(
+        Spec(p.name, _TRUE[p.name], p.meaning, p.unit, p.lower, p.upper, True) for p in BASE
+    ),
+    Spec('command', 'sweep', 'commanded displacement', read_only=True, choices=COMMANDS),
+    Spec('command_file', '', 'bag or laboratory file whose command is used', read_only=True),
+    Spec('channels', '', 'channel map of command_file', read_only=True),
+    Spec('duration', 60.0, 'length of the command', 's', 0.1, 86_400.0, True),
+    Spec('amplitude', 2e-3, 'peak of the command', 'm', 0.0, 1.0, True),
+    Spec('frequency_start', 0.0, 'lowest frequency (sweep, noise)', 'Hz', 0.0, 1000.0, True),
+    Spec('frequency_end', 10.0, 'highest frequency, of a sine its own', 'Hz', 0.0, 1000.0, True),
+    Spec('rest', 1.0, 'rest before the command', 's', 0.0, 3600.0, True),
+    Spec('repeat', False, 'begin the command again at its end', read_only=True),
+    Spec('hold', 'zoh', 'how the command runs between its samples', choices=('zoh', 'linear')),
+    Spec('noise', 1e-5, 'noise of the displacement sensor, standard deviation', 'm', 0.0, 1.0),
+    Spec('force_noise', 2.0, 'noise of the load cell, standard deviation', 'N', 0.0, 1e6),
+    Spec('bits', 18, 'resolution of the displacement sensor, 0 for none', '1', 0, 52),
+    Spec('stroke', 0.1, 'half range of the displacement sensor', 'm', 1e-6, 10.0),
+    Spec('seed', 1, 'seed of noise and random commands', '1', 0, 2**53, True),
+    Spec('speed', 1.0, 'simulated seconds per second, 0 for no waiting', '1', 0.0, 1000.0, True),
+    Spec('preview', 0.0, 'how far ahead commands are published, 0 for not', 's', 0.0, 60.0, True),
+    Spec('exit_at_end', False, 'end the node when the command has ended', read_only=True),
+    Spec(
+        'undeclared_effect', '', f'effects of the plant, told to nobody; {undeclared.FORM}',
+        secret=True,
+    ),
+    Spec('sealed_file', '', 'file that gets the truth about undeclared_effect', read_only=True),
+)  # fmt: skip
+
+
+class SimulatorNode(base.SuiteNode):
+    """Steps a plant block by block and publishes what its sensors show."""
+
+    def __init__(self) -> None:
+        super().__init__('actuator_sim', SPECS)
+
+    def check(self, values: Mapping[str, Any]) -> None:
+        """Refuse combinations that cannot be simulated."""
+        if values['undeclared_effect'] != Parameters.HIDDEN:
+            given = undeclared.parse(values['undeclared_effect'])
+            if given and values['plant'] != 'paper':
+                raise InputError("undeclared effects need plant 'paper'")
+            if given and not values['sealed_file']:
+                raise InputError('undeclared_effect needs sealed_file, where the truth is kept')
+        if values['command'] == 'file' and not values['command_file']:
+            raise InputError("command 'file' needs command_file")
+        if values['command'] != 'file':
+            _command(values | {'duration': min(values['duration'], 1.0)})
+
+    def do_configure(self) -> None:
+        """Make the command and the publishers."""
+        self._values = self.parameters.values()
+        self.command = _command(self._values)
+        self.out = BlockPublisher(self.publisher)
+
+    def do_activate(self) -> None:
+        """Start from rest, at sample 0."""
+        self.plant = self._plant()
+        self._index = 0
+        self._previewed = 0
+        self._renewed = False
+        self.samples = Rate()
+        values = self._values
+        now = self.get_clock().now().nanoseconds
+        self.out.begin(values['actuator'], 1.0 / values['rate'], now)
+        self._announce()
+        self.pacer = Pacer(self._next, values['speed'], self._ended)
+        self.pacer.start()
+
+    def do_deactivate(self) -> None:
+        """Stop the stream."""
+        self.pacer.stop()
+
+    def changed(self, names: set[str]) -> None:
+        """A new specimen, sensor or effect: the plant goes on from rest with the next block."""
+        if self.active:
+            self._renewed = True
+
+    def clock_jumped(self) -> None:
+        """Stamps go on from the new time."""
+        if self.active:
+            now = self.get_clock().now().nanoseconds
+            self.out.begin(self.out.actuator, self.out.period, now, self._index)
+
+    def do_report(self) -> None:
+        """Rate and lateness."""
+        import time
+
+        if self.active:
+            self.health.values.update(
+                {
+                    'sample rate (1/s)': self.samples.per_second(time.monotonic()),
+                    'samples': self.samples.count,
+                    'late blocks': self.pacer.late,
+                    'latest block (s)': self.pacer.latest,
+                }
+            )
+
+    def _announce(self) -> None:
+        values = self._values
+        source = f'simulated {values["plant"]} plant, {values["command"]}'
+        stiffness = None if values['plant'] == 'benchmark' else values['specimen_stiffness']
+        self.out.setup(stiffness, values['hold'], self._index, source)
+
+    def _plant(self) -> Plant:
+        values = self._values
+        if values['plant'] == 'benchmark':
+            return benchmark_plant(period=1.0 / values['rate'], seed=values['seed'])
+        theta = np.array([values[p.name] for p in BASE])
+        truth: dict[str, dict[str, float]] = {}
+        if values['undeclared_effect']:
+            record = Record(
+                command=self.command[:200_000],
+                measured=self.command[:200_000],
+                period=1.0 / values['rate'],
+                stiffness=values['specimen_stiffness'],
+            )
+            truth = undeclared.sizes(undeclared.parse(values['undeclared_effect']), theta, record)
+        if values['sealed_file']:
+            undeclared.seal(Path(values['sealed_file']), truth, theta)
+        structure = Structure(truth)
+        full = structure.neutral(theta)
+        full[len(BASE) :] = [v for effect in truth.values() for v in effect.values()]
+        moving = Stream(
+            structure,
+            full,
+            stiffness=values['specimen_stiffness'],
+            period=1.0 / values['rate'],
+            hold=values['hold'],
+            rng=np.random.default_rng((values['seed'], 1)),
+        )
+        return MeasuredPlant(
+            moving,
+            SensorSpec(values['noise'], values['bits'] or None, values['stroke']),
+            SensorSpec(values['force_noise']),
+            seed=values['seed'],
+        )
+
+    # Called in the pacer's thread.
+
+    def _next(self) -> Step | None:
+        values = self._values
+        if self._index >= len(self.command) and not values['repeat']:
+            return None
+        start = self._index % len(self.command)
+        block = self.command[start : start + values['block']]
+        # A block can be published when its last sample has been taken.
+        due = (self._index + len(block)) / values['rate']
+        return Step(due, lambda: self._publish(block))
+
+    def _publish(self, command: Array) -> None:
+        if self._renewed:
+            self._renewed = False
+            self._values = self.parameters.values()
+            self.plant = self._plant()
+            self._announce()
+        self._publish_preview()
+        measured, force = self.plant.step(command)
+        self.out.samples(self._index, command, measured, force)
+        self._index += len(command)
+        self.samples.add(len(command))
+
+    def _publish_preview(self) -> None:
+        ahead = round(self._values['preview'] * self._values['rate'])
+        if ahead == 0:
+            return
+        first = max(self._index, self._previewed)
+        stop = self._index + ahead
+        if not self._values['repeat']:
+            stop = min(stop, len(self.command))
+        if stop > first:
+            self.out.preview(first, self.command[np.arange(first, stop) % len(self.command)])
+            self._previewed = stop
+
+    def _ended(self, failure: BaseException | None) -> None:
+        if failure is not None:
+            self.complain_of_bug(failure)
+            return
+        self.get_logger().info(f'command ended after {self._index} samples')
+        if self._values['exit_at_end']:
+            self.finished = True
+            self.wake()
+
+
+def _command(values: Mapping[str, Any]) -> Array:
+    rate, kind, duration = values['rate'], values['command'], values['duration']
+    amplitude, low, high = values['amplitude'], values['frequency_start'], values['frequency_end']
+    if kind == 'file':
+        from actuator_glue.io.load import load_records
+
+        record = load_records(values['command_file'], channels=values['channels'] or None)[0]
+        command = commands.recorded(record, rate)
+    elif kind == 'sweep':
+        command = commands.sweep(rate, duration, low, high, amplitude)
+    elif kind == 'sine':
+        command = commands.sine(rate, duration, high, amplitude)
+    elif kind == 'noise':
+        command = commands.noise(rate, duration, low, high, amplitude, seed=values['seed'])
+    else:
+        command = commands.earthquake(rate, duration, amplitude, seed=values['seed'])
+    rest = np.full(round(values['rest'] * rate), command[0])
+    return np.concatenate([rest, command])
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node."""
+    return base.main(SimulatorNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,324 @@
+"""What all nodes share: lifecycle with autostart, parameters, diagnostics, a clean end."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import rclpy
+from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
+from rclpy.duration import Duration
+from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.qos_overriding_options import QoSOverridingOptions
+from rclpy.signals import SignalHandlerOptions
+
+from actuator_glue.errors import InputError
+from actuator_glue.nodes import health
+from actuator_glue.nodes.parameters import Parameters, Spec
+from actuator_glue.nodes.topics import DIAGNOSTICS, Topic
+
+COMMON = (
+    Spec('autostart', True, 'configure and activate at the start', read_only=True),
+    Spec('diagnostics_period', 1.0, 'time between reports', 's', 0.1, 60.0, read_only=True),
+)
+SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
+
+
+class SuiteNode(LifecycleNode):  # type: ignore[misc]
+    """A lifecycle node of the suite; subclasses fill in the `do_` methods.
+
+    Publishers are made on configure, subscriptions and timers on activate. A callback that
+    raises is reported and the node goes on: no data end a node.
+
+    Args:
+        name: node name.
+        specs: parameters besides the common ones.
+    """
+
+    def __init__(self, name: str, specs: Sequence[Spec]) -> None:
+        super().__init__(name)
+        self.health = health.Health(self.get_fully_qualified_name())
+        self.active = False
+        self.finished = False
+        # Work for nobody, so that an executor that waits returns to its loop.
+        self.wake: Callable[[], None] = self.create_guard_condition(lambda: None).trigger
+        self._steady = Clock(clock_type=ClockType.STEADY_TIME)
+        self._topics: list[tuple[Topic, Any]] = []
+        self._made: list[Any] = []
+        self._timers_made: list[Any] = []
+        self.parameters = Parameters(self, (*COMMON, *specs), self.check, self.changed)
+        self._diagnostics = self.create_publisher(
+            DIAGNOSTICS.type, DIAGNOSTICS.name, DIAGNOSTICS.qos
+        )
+        self._jumps = self.get_clock().create_jump_callback(
+            JumpThreshold(
+                min_forward=None, min_backward=Duration(nanoseconds=-1), on_clock_change=True
+            ),
+            post_callback=self._jumped,
+        )
+
+    # What subclasses fill in.
+
+    def check(self, values: Mapping[str, Any]) -> None:
+        """Refuse parameter values with an InputError; called with all values at once."""
+
+    def changed(self, names: set[str]) -> None:
+        """React to parameters changed at run time."""
+
+    def do_configure(self) -> None:
+        """Read parameters, make publishers; an InputError refuses the transition."""
+
+    def do_activate(self) -> None:
+        """Make subscriptions and timers, start to work; an InputError refuses the transition."""
+
+    def do_deactivate(self) -> None:
+        """Stop working; subscriptions and timers are removed afterwards."""
+
+    def do_cleanup(self) -> None:
+        """Let go of what do_configure made, publishers apart."""
+
+    def do_report(self) -> None:
+        """Bring `health.values` up to date."""
+
+    def clock_jumped(self) -> None:
+        """The node's clock went back, or changed between system and simulated time."""
+
+    # What subclasses use.
+
+    def publisher(self, topic: Topic) -> Any:
+        """Return a publisher that lives until cleanup; parameters override its QoS."""
+        made = self.create_publisher(
+            topic.type,
+            topic.name,
+            topic.qos,
+            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+        )
+        self._made.append(made)
+        return made
+
+    def subscribe(
+        self, topic: Topic, callback: Callable[[Any], None], *, raw: bool = False
+    ) -> None:
+        """Subscribe until deactivation; what the callback raises is reported."""
+        made = self.create_subscription(
+            topic.type,
+            topic.name,
+            self.guarded(callback),
+            topic.qos,
+            raw=raw,
+            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+        )
+        self._topics.append((topic, made))
+
+    def every(self, period: float, callback: Callable[[], None]) -> None:
+        """Call back every `period` seconds of steady time until deactivation."""
+        self._timers_made.append(
+            self.create_timer(period, self.guarded(callback), clock=self._steady)
+        )
+
+    def guarded(self, callback: Callable[..., Any]) -> Callable[..., None]:
+        """Return the callback with everything it raises reported instead."""
+
+        def call(*args: Any) -> None:
+            try:
+                callback(*args)
+            except InputError as error:
+                self.complain('bad input', str(error))
+            except Exception as error:
+                self.complain_of_bug(error)
+
+        return call
+
+    def complain(self, kind: str, message: str, level: Any = health.WARN) -> None:
+        """Log a fault (not the same one more than once a second) and show it on /diagnostics."""
+        if self.health.fault(kind, message, time.monotonic(), level):
+            log = self.get_logger()
+            (log.error if level == health.ERROR else log.warning)(f'{kind}: {message}')
+
+    def complain_of_bug(self, error: BaseException) -> None:
+        """Report an exception nobody foresaw; the node goes on."""
+        self.get_logger().debug(''.join(traceback.format_exception(error)))
+        last = traceback.extract_tb(error.__traceback__)[-1:]
+        where = ''.join(f' ({Path(f.filename).name}:{f.lineno})' for f in last)
+        self.complain('internal error', f'{type(error).__name__}: {error}{where}', health.ERROR)
+
+    # Lifecycle.
+
+    @property
+    def state(self) -> str:
+        """Lifecycle state."""
+        return str(self._state_machine.current_state[1])
+
+    def on_configure(self, state: LifecycleState) -> Any:
+        """Configure; a refusal is logged."""
+        return self._transition('configure', self.do_configure, super().on_configure, state)
+
+    def on_activate(self, state: LifecycleState) -> Any:
+        """Activate; a refusal is logged."""
+
+        def work() -> None:
+            self.every(self.parameters['diagnostics_period'], self._report)
+            self.active = True
+            try:
+                self.do_activate()
+            except BaseException:
+                self._stop()
+                raise
+
+        return self._transition('activate', work, super().on_activate, state)
+
+    def on_deactivate(self, state: LifecycleState) -> Any:
+        """Deactivate."""
+        return self._transition('deactivate', self._stop, super().on_deactivate, state)
+
+    def on_cleanup(self, state: LifecycleState) -> Any:
+        """Clean up."""
+        return self._transition('clean up', self._clean, super().on_cleanup, state)
+
+    def on_shutdown(self, state: LifecycleState) -> Any:
+        """Stop and clean up from whatever state."""
+
+        def work() -> None:
+            self._stop()
+            self._clean()
+            self.finished = True
+            self.wake()
+
+        return self._transition('shut down', work, super().on_shutdown, state)
+
+    def on_error(self, state: LifecycleState) -> Any:
+        """Return to unconfigured after an error, ready to be configured again."""
+
+        def work() -> None:
+            self._stop()
+            self._clean()
+
+        return self._transition('recover', work, super().on_error, state)
+
+    def _transition(
+        self, name: str, work: Callable[[], None], base: Callable[..., Any], state: Any
+    ) -> Any:
+        try:
+            work()
+        except InputError as error:
+            self.get_logger().error(f'cannot {name}: {error}')
+            self.health.fault(f'cannot {name}', str(error), time.monotonic(), health.ERROR)
+            self._report(f'cannot {name}')
+            return FAILURE
+        except Exception as error:
+            self.get_logger().error(
+                f'cannot {name}: ' + ''.join(traceback.format_exception(error))
+            )
+            return TransitionCallbackReturn.ERROR
+        self._report({'configure': 'inactive', 'activate': 'active'}.get(name, name))
+        return base(state)
+
+    def _stop(self) -> None:
+        if not self.active:
+            return
+        self.active = False
+        try:
+            self.do_deactivate()
+        finally:
+            for timer in self._timers_made:
+                self.destroy_timer(timer)
+            for _, subscription in self._topics:
+                self.destroy_subscription(subscription)
+            self._timers_made.clear()
+            self._topics.clear()
+
+    def _clean(self) -> None:
+        try:
+            self.do_cleanup()
+        finally:
+            for publisher in self._made:
+                self.destroy_publisher(publisher)
+            self._made.clear()
+
+    # Diagnostics.
+
+    def _report(self, state: str | None = None) -> None:
+        self._check_types()
+        self.do_report()
+        stamp = self.get_clock().now().to_msg()
+        message = self.health.message(time.monotonic(), stamp, state or self.state)
+        self._diagnostics.publish(message)
+
+    def _check_types(self) -> None:
+        """Tell of publishers whose messages DDS will never hand over."""
+        for topic, subscription in self._topics:
+            wanted = _type_name(topic.type)
+            for info in self.get_publishers_info_by_topic(subscription.topic_name):
+                if info.topic_type != wanted:
+                    self.complain(
+                        'wrong message type',
+                        f'{info.node_namespace.rstrip("/")}/{info.node_name} publishes '
+                        f'{info.topic_type} on {subscription.topic_name}; {wanted} is expected',
+                    )
+
+    def _jumped(self, jump: TimeJump) -> None:
+        if jump.delta is not None and jump.delta.nanoseconds < 0:
+            seconds = jump.delta.nanoseconds * 1e-9
+            self.complain('clock', f'the clock jumped by {seconds:.3f} s')
+        self.guarded(self.clock_jumped)()
+
+
+def _type_name(cls: Any) -> str:
+    package = cls.__module__.partition('.')[0]
+    return f'{package}/msg/{cls.__name__}'
+
+
+def main(make: Callable[[], SuiteNode], args: Sequence[str] | None = None) -> int:
+    """Run a node until SIGINT, SIGTERM or its own end; return the exit code.
+
+    Signals are waited for in a thread of their own, so that they never interrupt a callback; a
+    second one ends the process at once.
+    """
+    signals = {signal.SIGINT, signal.SIGTERM}
+    signal.pthread_sigmask(signal.SIG_BLOCK, signals)
+    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    try:
+        node = make()
+    except InputError as error:
+        print(f'error: {error}', file=sys.stderr)
+        rclpy.try_shutdown()
+        return 2
+    executor = SingleThreadedExecutor()
+    executor.add_node(node)
+    stop = threading.Event()
+
+    def wait() -> None:
+        signal.sigwait(signals)
+        stop.set()
+        node.wake()
+        os._exit(128 + signal.sigwait(signals))
+
+    threading.Thread(target=wait, name='signals', daemon=True).start()
+    code = 0
+    if node.parameters['autostart']:
+        started = node.trigger_configure() == SUCCESS and node.trigger_activate() == SUCCESS
+        if not started:
+            code = 2
+            stop.set()
+    while not stop.is_set() and not node.finished and rclpy.ok():
+        try:
+            executor.spin_once()
+        except ExternalShutdownException:
+            break
+        except Exception as error:
+            # E.g. a packet that cannot be decoded, or a transition asked for in a wrong state.
+            node.complain_of_bug(error)
+    if node.state in ('unconfigured', 'inactive', 'active'):
+        node.trigger_shutdown()
+    executor.remove_node(node)
+    node.destroy_node()
+    rclpy.try_shutdown()
+    return code

@@ -1,0 +1,166 @@
+"""Node parameters: declared with description, unit and range, checked all at once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from rcl_interfaces.msg import (
+    FloatingPointRange,
+    IntegerRange,
+    ParameterDescriptor,
+    SetParametersResult,
+)
+from rclpy.exceptions import InvalidParameterTypeException, InvalidParameterValueException
+from rclpy.node import Node
+from rclpy.parameter import Parameter
+
+from actuator_glue.errors import InputError
+
+
+@dataclass(frozen=True, slots=True)
+class Spec:
+    """One parameter of a node.
+
+    Attributes:
+        name: its name.
+        default: value where nothing is given; its type is the parameter's.
+        meaning: one line for people.
+        unit: SI unit, '1' or empty where there is none.
+        lower: smallest value of a number.
+        upper: largest value of a number.
+        read_only: given at the start only, because other things are built on it.
+        choices: the words allowed.
+        secret: taken and then hidden: neither `get` nor /parameter_events shows it.
+    """
+
+    name: str
+    default: bool | int | float | str | list[float] | list[str]
+    meaning: str
+    unit: str = ''
+    lower: float | None = None
+    upper: float | None = None
+    read_only: bool = False
+    choices: tuple[str, ...] = ()
+    secret: bool = False
+
+    def descriptor(self) -> ParameterDescriptor:
+        """Return what `ros2 param describe` and rqt_reconfigure show."""
+        unit = f' [{self.unit}]' if self.unit else ''
+        words = f'; one of: {", ".join(self.choices)}' if self.choices else ''
+        found = ParameterDescriptor(
+            description=f'{self.meaning}{unit}{words}',
+            read_only=self.read_only,
+            additional_constraints=words.removeprefix('; '),
+        )
+        if self.lower is not None and self.upper is not None:
+            if isinstance(self.default, int):
+                found.integer_range = [
+                    IntegerRange(from_value=int(self.lower), to_value=int(self.upper), step=0)
+                ]
+            elif isinstance(self.default, float):
+                found.floating_point_range = [
+                    FloatingPointRange(from_value=self.lower, to_value=self.upper, step=0.0)
+                ]
+        return found
+
+
+class Parameters:
+    """The declared parameters of one node.
+
+    Args:
+        node: the node.
+        specs: its parameters.
+        check: called with all values as they would become; raises InputError to refuse them.
+        changed: called with the names that were changed at run time.
+
+    Raises:
+        InputError: a value given at the start has the wrong type or is out of range.
+    """
+
+    HIDDEN = '(hidden)'
+
+    def __init__(
+        self,
+        node: Node,
+        specs: Sequence[Spec],
+        check: Callable[[Mapping[str, Any]], None],
+        changed: Callable[[set[str]], None],
+    ) -> None:
+        self._node = node
+        self._specs = {spec.name: spec for spec in specs}
+        self._check = check
+        self._secrets: dict[str, Any] = {}
+        for spec in specs:
+            self._declare(spec)
+        self._check_all(self.values())
+        node.add_pre_set_parameters_callback(self._hide)
+        node.add_on_set_parameters_callback(self._validate)
+        node.add_post_set_parameters_callback(
+            lambda given: changed({p.name for p in given if p.name in self._specs})
+        )
+
+    def __getitem__(self, name: str) -> Any:
+        if name in self._secrets:
+            return self._secrets[name]
+        value = self._node.get_parameter(name).value
+        return list(value) if isinstance(self._specs[name].default, list) else value
+
+    def values(self) -> dict[str, Any]:
+        """Return all values by name."""
+        return {name: self[name] for name in self._specs}
+
+    def _declare(self, spec: Spec) -> None:
+        hidden = spec.secret
+        if hidden:
+            given = self._node._parameter_overrides.get(spec.name)
+            self._secrets[spec.name] = spec.default if given is None else given.value
+        try:
+            self._node.declare_parameter(
+                spec.name, spec.default, spec.descriptor(), ignore_override=hidden
+            )
+        except (InvalidParameterTypeException, InvalidParameterValueException) as error:
+            given = self._node._parameter_overrides.get(spec.name)
+            kind = type(spec.default).__name__
+            raise InputError(
+                f'parameter {spec.name} = {None if given is None else given.value!r} cannot be '
+                f'used: {spec.descriptor().description}, of type {kind} ({error})'
+            ) from error
+
+    def _check_all(self, values: Mapping[str, Any]) -> None:
+        for name, value in values.items():
+            choices = self._specs[name].choices
+            if choices and value not in choices:
+                raise InputError(f'{name} = {value!r} is not one of {", ".join(choices)}')
+        self._check(values)
+
+    def _hide(self, given: list[Parameter]) -> list[Parameter]:
+        shown = []
+        for parameter in given:
+            spec = self._specs.get(parameter.name)
+            if spec is not None and spec.secret:
+                value = parameter.value
+                if not isinstance(value, str):
+                    shown.append(parameter)
+                    continue
+                if value != self.HIDDEN:
+                    self._secrets[parameter.name] = value
+                shown.append(Parameter(parameter.name, Parameter.Type.STRING, self.HIDDEN))
+            else:
+                shown.append(parameter)
+        return shown
+
+    def _validate(self, given: list[Parameter]) -> SetParametersResult:
+        try:
+            self._check_all(
+                self.values()
+                | {
+                    p.name: p.value
+                    for p in given
+                    if p.name in self._specs and not self._specs[p.name].secret
+                }
+            )
+        except InputError as error:
+            return SetParametersResult(successful=False, reason=str(error))
+        return SetParametersResult(successful=True)

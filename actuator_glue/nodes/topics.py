@@ -1,0 +1,68 @@
+"""Topics of the suite: relative names, types, and the quality of service of each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from actuator_glue_msgs.msg import (
+    CommandPreview,
+    Diagnosis,
+    EstimatorSetup,
+    FrequencyResponseBand,
+    PosteriorMoments,
+    PredictionBand,
+    SampleBlock,
+    TestSetup,
+)
+from diagnostic_msgs.msg import DiagnosticArray
+from rclpy.qos import DurabilityPolicy, HistoryPolicy, QoSProfile, ReliabilityPolicy
+
+
+def _reliable(depth: int, *, latched: bool = False) -> QoSProfile:
+    return QoSProfile(
+        history=HistoryPolicy.KEEP_LAST,
+        depth=depth,
+        reliability=ReliabilityPolicy.RELIABLE,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """One topic.
+
+    Attributes:
+        name: relative name, to be remapped and put into namespaces.
+        type: message class.
+        qos: default profile of publishers and subscribers; parameters override it.
+    """
+
+    name: str
+    type: Any
+    qos: QoSProfile
+
+
+# Samples: reliable and deep, so that a computer that stalls for a second loses nothing.
+SAMPLES = Topic('samples', SampleBlock, _reliable(2000))
+PREVIEW = Topic('command_preview', CommandPreview, _reliable(200))
+# Whoever joins late must know what is being tested and estimated.
+TEST_SETUP = Topic('test_setup', TestSetup, _reliable(10, latched=True))
+ESTIMATOR_SETUP = Topic('estimator_setup', EstimatorSetup, _reliable(10, latched=True))
+DIAGNOSIS = Topic('diagnosis', Diagnosis, _reliable(1, latched=True))
+POSTERIOR = Topic('posterior', PosteriorMoments, _reliable(50))
+BAND = Topic('prediction_band', PredictionBand, _reliable(200))
+RESPONSE = Topic('frequency_response', FrequencyResponseBand, _reliable(50))
+DIAGNOSTICS = Topic('/diagnostics', DiagnosticArray, _reliable(50))
+
+RECORDED = (
+    SAMPLES,
+    PREVIEW,
+    TEST_SETUP,
+    ESTIMATOR_SETUP,
+    POSTERIOR,
+    BAND,
+    RESPONSE,
+    DIAGNOSIS,
+    DIAGNOSTICS,
+)

@@ -1,0 +1,124 @@
+"""One process beside a node, for work that must not hold up its callbacks."""
+
+from __future__ import annotations
+
+import multiprocessing
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from multiprocessing.connection import Connection
+from typing import Any, NamedTuple
+
+# Messages from the worker: (kind, payload).
+DONE, FAILED, PROGRESS, DIED = 'done', 'failed', 'progress', 'died'
+
+Tell = Callable[[Any], None]
+
+
+class Answer(NamedTuple):
+    """What a worker says: kind, payload, and seconds it worked."""
+
+    kind: str
+    payload: Any
+    seconds: float
+
+
+class Worker:
+    """Runs picklable functions, one at a time, in a process of its own.
+
+    The process is started afresh, not forked, because forked threads of DDS would be dead locks.
+    It ends with its parent, however that ends.
+
+    Args:
+        answer: called from a thread with each Answer.
+        warm: picklable function called once at the start, to compile and import.
+        nice: added to the scheduling priority's niceness.
+    """
+
+    def __init__(
+        self, answer: Callable[[Answer], None], warm: Callable[[], None] | None, nice: int = 0
+    ) -> None:
+        self._answer = answer
+        self._warm = warm
+        self._nice = nice
+        self._closed = False
+        self._lock = threading.Lock()
+        self.ready = threading.Event()
+        self._start()
+
+    def submit(self, function: Callable[..., Any], *args: Any) -> None:
+        """Have `function(*args, tell)` computed; `tell` sends a PROGRESS answer."""
+        with self._lock:
+            self._pipe.send((function, args))
+
+    def restart(self) -> None:
+        """End the process whatever it does and start another."""
+        self._end(patience=0.0)
+        self._start()
+
+    def close(self) -> None:
+        """End the process; what it computes is lost."""
+        self._closed = True
+        self._end(patience=0.5)
+
+    def _start(self) -> None:
+        context = multiprocessing.get_context('spawn')
+        self.ready.clear()
+        self._pipe, theirs = context.Pipe()
+        self._process = context.Process(
+            target=_serve, args=(theirs, self._warm, self._nice), daemon=True, name='worker'
+        )
+        self._process.start()
+        theirs.close()
+        threading.Thread(
+            target=self._listen, args=(self._pipe, self._process), daemon=True, name='answers'
+        ).start()
+
+    def _end(self, patience: float) -> None:
+        process, pipe = self._process, self._pipe
+        with suppress(OSError):
+            pipe.send(None)
+        process.join(patience)
+        if process.is_alive():
+            process.kill()
+            process.join(2.0)
+        pipe.close()
+
+    def _listen(self, pipe: Connection, process: Any) -> None:
+        while True:
+            try:
+                answer = pipe.recv()
+            except (EOFError, OSError):
+                break
+            if answer is None:
+                self.ready.set()
+            else:
+                self._answer(Answer(*answer))
+        if process is self._process and not self._closed:
+            process.join(1.0)
+            self._answer(Answer(DIED, f'the worker process ended ({process.exitcode})', 0.0))
+
+
+def _serve(pipe: Connection, warm: Callable[[], None] | None, nice: int) -> None:
+    # Ctrl-C reaches the whole group: the node decides when its worker ends.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
+    if nice:
+        os.nice(nice)
+    with suppress(EOFError, BrokenPipeError, ConnectionResetError):
+        if warm is not None:
+            warm()
+        pipe.send(None)
+        while (task := pipe.recv()) is not None:
+            function, args = task
+            started = time.monotonic()
+            try:
+                tell: Tell = lambda payload: pipe.send((PROGRESS, payload, 0.0))  # noqa: E731
+                kind, payload = DONE, function(*args, tell)
+            except Exception as error:
+                kind, payload = FAILED, f'{type(error).__name__}: {error}'
+            pipe.send((kind, payload, time.monotonic() - started))

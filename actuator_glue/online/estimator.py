@@ -1,0 +1,250 @@
+"""The online estimator as a state machine: samples in, jobs out, results back in."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from actuator_glue.errors import InputError
+from actuator_glue.online.fitting import starting_points
+from actuator_glue.online.forecast import Frozen
+from actuator_glue.online.job import Job, WindowResult
+from actuator_glue.online.settings import EstimatorSettings, ModelChoice
+from actuator_glue.online.stream import (
+    Block,
+    Dropped,
+    Event,
+    Failed,
+    Preview,
+    Rejected,
+    Setup,
+    Window,
+)
+from actuator_glue.online.windows import Tally, Windows
+from actuator_glue.records import MAX_DISPLACEMENT, Array
+
+# Forecasts wait for their samples for two or three hops; more only when windows are dropped.
+MAX_FROZEN = 8
+
+
+@dataclass(frozen=True, slots=True)
+class Schedule:
+    """What a live run did, for a replay to repeat it.
+
+    Attributes:
+        done: number and evaluations of each window that gave a posterior, by the running index
+            and the acquisition time [ns] of its first sample; all others were dropped.
+        models: model from each window number on, ascending.
+    """
+
+    done: Mapping[tuple[int, int], tuple[int, int]]
+    models: tuple[tuple[int, ModelChoice], ...] = ()
+
+
+@dataclass(slots=True)
+class _Memory:
+    """What is kept from the last result."""
+
+    archive: Array | None = None
+    model: ModelChoice | None = None
+    epoch: int = -1
+    frozen: list[Frozen] = field(default_factory=list)
+
+
+class Estimator:
+    """Windows, warm start and forecasts; knows no clock, no process and no ROS.
+
+    `push` what arrives, ask `next_job`, compute it wherever you like with `job.run`, hand the
+    result to `finish`. One job is out at a time. The results depend on the samples, the settings
+    and which windows were dropped or stopped early: a `Schedule` repeats those.
+
+    Args:
+        settings: settings; they do not change.
+        model: model to fit.
+        live: only the newest window waits, so that a slow computer drops windows instead of
+            falling behind; otherwise every window waits its turn.
+        schedule: repeats a live run.
+    """
+
+    def __init__(
+        self,
+        settings: EstimatorSettings,
+        model: ModelChoice,
+        *,
+        live: bool = False,
+        schedule: Schedule | None = None,
+    ) -> None:
+        self.settings = settings
+        self.model = model
+        self.live = live
+        self.schedule = schedule
+        self.running: Job | None = None
+        self._windows = Windows(settings)
+        self._waiting: list[Window] = []
+        self._memory = _Memory()
+        self._ahead = Ahead()
+
+    @property
+    def tally(self) -> Tally:
+        """Counts since the start."""
+        return self._windows.tally
+
+    @property
+    def test(self) -> Setup | None:
+        """The test set-up that holds."""
+        return self._windows.current
+
+    @property
+    def waiting(self) -> Window | None:
+        """The window that is next."""
+        return self._waiting[0] if self._waiting else None
+
+    def setup(self, setup: Setup) -> list[Event]:
+        """Take a test set-up."""
+        return self._windows.setup(setup)
+
+    def push(self, block: Block) -> list[Event]:
+        """Take one block of samples as it came; unusable ones are told, never raised."""
+        events, windows = self._windows.push(block)
+        self._ahead.forget(block.index)
+        for window in windows:
+            planned = self._planned(window)
+            if planned is None:
+                continue
+            if self.live and self._waiting:
+                old = self._waiting.pop()
+                events.append(Dropped(old.number, old.record.first_index))
+            self._waiting.append(planned)
+        return events
+
+    def preview(self, preview: Preview) -> list[Event]:
+        """Take commands that will be acted on."""
+        try:
+            self._ahead.take(preview)
+        except InputError as error:
+            return [Rejected(str(error))]
+        return []
+
+    def set_model(self, model: ModelChoice) -> None:
+        """Go on with another model from the next job on."""
+        self.model = model
+
+    def next_job(self) -> Job | None:
+        """Return the next job, or None where there is nothing to do or one is running."""
+        if self.running is not None or not self._waiting:
+            return None
+        window = self._waiting.pop(0)
+        memory, model = self._memory, self._model_for(window)
+        record = window.record
+        archive, afresh = None, True
+        if (
+            memory.archive is not None
+            and memory.model is not None
+            and (memory.epoch == window.epoch)
+        ):
+            seed = (self.settings.seed, record.first_index, 2)
+            archive = starting_points(model, memory.model, memory.archive, seed)
+            afresh = model != memory.model
+        settled = record.first_index + round(self.settings.settle / record.period)
+        self.running = Job(
+            window=window,
+            settings=self.settings,
+            model=model,
+            archive=archive,
+            afresh=afresh,
+            stop_at=None if self.schedule is None else self.schedule.done[_key(window)][1],
+            ahead=self._ahead.after(window.end, record.period),
+            frozen=tuple(
+                f
+                for f in memory.frozen
+                if f.segment == window.segment and f.stop <= window.end and f.start >= settled
+            ),
+        )
+        return self.running
+
+    def finish(self, result: WindowResult) -> list[Event]:
+        """Take the result of the running job."""
+        self.running = None
+        window = result.window
+        if result.failure:
+            return [Failed(window.number, window.record.first_index, result.failure)]
+        memory = self._memory
+        memory.archive, memory.model, memory.epoch = result.archive, result.model, window.epoch
+        memory.frozen = [
+            f for f in memory.frozen if f.segment == window.segment and f.stop > window.end
+        ]
+        if result.frozen is not None:
+            memory.frozen.append(result.frozen)
+            del memory.frozen[:-MAX_FROZEN]
+        return []
+
+    def abandon(self, reason: str) -> list[Event]:
+        """Give up the running job, whose process has died."""
+        job, self.running = self.running, None
+        if job is None:
+            return []
+        return [Failed(job.window.number, job.window.record.first_index, reason)]
+
+    def _planned(self, window: Window) -> Window | None:
+        """Return a window as the schedule numbers it; None where the live run dropped it."""
+        if self.schedule is None:
+            return window
+        done = self.schedule.done.get(_key(window))
+        return None if done is None else replace(window, number=done[0])
+
+    def _model_for(self, window: Window) -> ModelChoice:
+        if self.schedule is not None:
+            for number, model in self.schedule.models:
+                if number <= window.number:
+                    self.model = model
+        return self.model
+
+
+def _key(window: Window) -> tuple[int, int]:
+    return window.record.first_index, window.record.start_ns
+
+
+class Ahead:
+    """Commands that are known before they are acted on; bounded."""
+
+    def __init__(self, limit: int = 1_000_000) -> None:
+        self._limit = limit
+        self._start = 0
+        self._period = 0.0
+        self._command: Array = np.empty(0)
+
+    def take(self, preview: Preview) -> None:
+        """Join a preview to what is known; one that does not join replaces it.
+
+        Raises:
+            InputError: NaN, absurd values, or far too many samples.
+        """
+        command = np.asarray(preview.command, dtype=np.float64)
+        where = f'command preview at sample {preview.index}'
+        if not len(command) or len(command) > self._limit:
+            raise InputError(f'{where}: {len(command)} samples; 1 to {self._limit} can be used')
+        if not np.abs(command).max() <= MAX_DISPLACEMENT:
+            raise InputError(f'{where}: NaN, or a displacement beyond {MAX_DISPLACEMENT:g} m')
+        stop = self._start + len(self._command)
+        if preview.period == self._period and self._start <= preview.index <= stop:
+            command = np.concatenate([self._command[: preview.index - self._start], command])
+            self._command = command[-self._limit :]
+            self._start += len(command) - len(self._command)
+        else:
+            self._start, self._period, self._command = preview.index, preview.period, command
+
+    def forget(self, index: int) -> None:
+        """Forget commands before a sample."""
+        gone = min(max(0, index - self._start), len(self._command))
+        self._command = self._command[gone:]
+        self._start += gone
+
+    def after(self, index: int, period: float) -> Array | None:
+        """Return the commands from a sample on, as far as they are known without a gap."""
+        if self._period == 0.0 or abs(period / self._period - 1.0) > 1e-4:
+            return None
+        if not self._start <= index < self._start + len(self._command):
+            return None
+        return self._command[index - self._start :]

@@ -1,0 +1,206 @@
+"""The estimator over samples that are already there: the code that runs live, without a clock."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+from actuator_glue.errors import InputError
+from actuator_glue.online import wire
+from actuator_glue.online.estimator import Estimator, Schedule
+from actuator_glue.online.fitting import choose_model
+from actuator_glue.online.job import WindowResult, run
+from actuator_glue.online.settings import EstimatorSettings, ModelChoice
+from actuator_glue.online.stream import Block, Event, Preview, Rejected, Setup
+from actuator_glue.records import Record
+
+Item: TypeAlias = Setup | Block | Preview
+Named: TypeAlias = tuple[str, Any]
+
+
+def replay(
+    items: Iterable[Item],
+    settings: EstimatorSettings,
+    model: ModelChoice | None = None,
+    schedule: Schedule | None = None,
+) -> Iterator[WindowResult | Event]:
+    """Run the estimator over what was streamed; yield results and events in order.
+
+    Args:
+        items: set-ups, blocks and previews as they came.
+        settings: settings of the estimator.
+        model: model to fit; Eq. (2) where None.
+        schedule: repeats what a live run dropped or stopped early.
+    """
+    estimator = Estimator(settings, model or choose_model(), schedule=schedule)
+    for item in items:
+        if isinstance(item, Setup):
+            yield from estimator.setup(item)
+        elif isinstance(item, Preview):
+            yield from estimator.preview(item)
+        else:
+            yield from estimator.push(item)
+        while (job := estimator.next_job()) is not None:
+            result = run(job)
+            yield from estimator.finish(result)
+            if not result.failure:
+                yield result
+
+
+def stream(record: Record, block: int = 64) -> Iterator[Item]:
+    """Yield a record as it would have been streamed.
+
+    Args:
+        record: a record; its stiffness is announced with it.
+        block: samples per block.
+    """
+    yield Setup(
+        record.stiffness,
+        record.period,
+        record.actuator,
+        record.hold,
+        record.first_index,
+        record.source,
+    )
+    for start in range(0, len(record), block):
+        part = slice(start, start + block)
+        yield Block(
+            record.first_index + start,
+            record.period,
+            record.stamp_ns(start),
+            record.command[part],
+            record.measured[part],
+            None if record.force is None else record.force[part],
+        )
+
+
+@dataclass(slots=True)
+class Published:
+    """What a live estimator put into a bag.
+
+    Attributes:
+        settings: its settings; None where the bag has no EstimatorSetup.
+        models: model from each window number on.
+        posteriors: PosteriorMoments by window number.
+        scored: scored PredictionBands by window number, index and kind.
+    """
+
+    settings: EstimatorSettings | None = None
+    models: list[tuple[int, ModelChoice]] = field(default_factory=list)
+    posteriors: dict[int, Any] = field(default_factory=dict)
+    scored: dict[tuple[int, int, str], Any] = field(default_factory=dict)
+
+    def schedule(self) -> Schedule | None:
+        """What was dropped and stopped early; None where nothing was published."""
+        if not self.posteriors:
+            return None
+        done = {}
+        for number, message in self.posteriors.items():
+            last = wire.stamp_ns(message)
+            start = last - round((message.samples - 1) * message.period * 1e9)
+            done[int(message.index), start] = (number, int(message.evaluations))
+        return Schedule(done, tuple(sorted(self.models, key=lambda m: m[0])))
+
+
+def published(messages: Iterable[Named]) -> Published:
+    """Collect what a live estimator published from (type name, message) pairs.
+
+    Raises:
+        InputError: settings that cannot be read.
+    """
+    found = Published()
+    for name, message in messages:
+        kind = name.rpartition('/')[2]
+        if kind == 'EstimatorSetup':
+            found.settings = wire.estimator_settings(message)
+            found.models.append((int(message.window), wire.model_choice(message)))
+        elif kind == 'PosteriorMoments':
+            found.posteriors[int(message.window)] = message
+        elif kind == 'PredictionBand' and message.scored:
+            key = (int(message.window), int(message.index), str(message.kind))
+            found.scored[key] = message
+    return found
+
+
+def items(messages: Iterable[Named], rejected: list[Rejected] | None = None) -> Iterator[Item]:
+    """Yield what a live estimator received from (type name, message) pairs, in their order.
+
+    Previews are left out: they decide when a forecast is published, not what it says.
+
+    Args:
+        messages: as a bag holds them.
+        rejected: unusable set-ups are appended here; they were not used live either.
+    """
+    for name, message in messages:
+        kind = name.rpartition('/')[2]
+        if kind == 'SampleBlock':
+            yield wire.block(message)
+        elif kind == 'TestSetup':
+            try:
+                yield wire.setup(message)
+            except InputError as error:
+                if rejected is not None:
+                    rejected.append(Rejected(str(error)))
+
+
+@dataclass(slots=True)
+class Comparison:
+    """Replayed numbers held against the published ones, bit by bit.
+
+    Attributes:
+        windows: posteriors compared.
+        bands: scored bands compared.
+        differing: one line per window or band that differs or is missing.
+    """
+
+    windows: int = 0
+    bands: int = 0
+    differing: list[str] = field(default_factory=list)
+
+    @property
+    def identical(self) -> bool:
+        """Everything was there and equal, and there was something to compare."""
+        return self.windows > 0 and not self.differing
+
+
+def compare(results: Iterable[WindowResult], live: Published) -> Comparison:
+    """Hold replayed results against what was published live."""
+    found = Comparison()
+    seen: set[int] = set()
+    for result in results:
+        number = result.window.number
+        message = live.posteriors.get(number)
+        seen.add(number)
+        if message is None:
+            found.differing.append(f'window {number}: not published live')
+            continue
+        found.windows += 1
+        names = wire.differences(wire.posterior(result, float('nan'))[1], message)
+        if names:
+            found.differing.append(f'window {number}: posterior differs in {", ".join(names)}')
+        for prediction in result.scored:
+            key = (prediction.number, prediction.index, prediction.kind)
+            if key not in live.scored:
+                found.differing.append(f'window {number}: band {key} was not published live')
+                continue
+            found.bands += 1
+            fields = wire.prediction(prediction, '')[1]
+            names = wire.differences(fields, live.scored[key])
+            if names:
+                found.differing.append(f'band {key} differs in {", ".join(names)}')
+    missing = sorted(set(live.posteriors) - seen)
+    found.differing += [f'window {number}: not reproduced' for number in missing]
+    return found
+
+
+__all__ = [
+    'Comparison',
+    'Item',
+    'Published',
+    'compare',
+    'items',
+    'published',
+    'replay',
+    'stream',
+]

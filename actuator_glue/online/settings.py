@@ -1,0 +1,185 @@
+"""What the online estimator is told: window, sampler, bands; and the model it fits."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from typing import Any, Literal, TypeAlias
+
+import numpy as np
+
+from actuator_glue.errors import InputError
+from actuator_glue.records import Array
+
+Likelihood: TypeAlias = Literal['glue', 'gaussian']
+
+
+@dataclass(frozen=True, slots=True)
+class Limit:
+    """Range of one numeric setting.
+
+    Attributes:
+        unit: SI unit, '1' where there is none.
+        lower: smallest value allowed.
+        upper: largest value allowed.
+        meaning: one line for people.
+    """
+
+    unit: str
+    lower: float
+    upper: float
+    meaning: str
+
+
+# One table: the node declares its parameters from it and every entry point checks against it.
+LIMITS: dict[str, Limit] = {
+    'window': Limit('s', 0.05, 600.0, 'length of a window'),
+    'hop': Limit('s', 0.01, 600.0, 'time from one window to the next'),
+    'settle': Limit('s', 0.0, 60.0, 'start of a window that only lets the state be forgotten'),
+    'time_budget': Limit('s', 1e-3, 600.0, 'longest time one window may be computed'),
+    'shaping_factor': Limit('1', 1e-3, 1e9, 'G of L = -G ln Var[E], Eq. (4)'),
+    'evaluations': Limit('1', 2000, 10_000_000, 'likelihood evaluations per window'),
+    'start_evaluations': Limit('1', 2000, 10_000_000, 'evaluations of a window sampled afresh'),
+    'chains': Limit('1', 3, 256, 'Markov chains'),
+    'draws': Limit('1', 20, 5000, 'posterior draws simulated for a band'),
+    'seed': Limit('1', 0, 2**53, 'seed of the sampler'),
+    'rhat_limit': Limit('1', 1.0, 2.0, 'largest R-hat that counts as converged'),
+    'frequency_max': Limit('Hz', 0.1, 1000.0, 'upper end of the frequency-response band'),
+    'frequencies': Limit('1', 2, 2000, 'frequencies of the frequency-response band'),
+    'headline_frequency': Limit('Hz', 0.01, 1000.0, 'frequency of the scalars for plotting'),
+    'clock_tolerance': Limit('s', 1e-4, 60.0, 'step of the stamps that counts as a clock jump'),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class EstimatorSettings:
+    """Settings of the online estimator; times in seconds, whatever the sample rate.
+
+    `LIMITS` gives unit, range and meaning of each number.
+
+    Attributes:
+        likelihood: 'glue' is Eq. (4); 'gaussian' is a formal one.
+        levels: probability of each band, ascending, in (0, 1).
+
+    Raises:
+        InputError: a setting outside its range, or settings that contradict each other.
+    """
+
+    window: float = 5.0
+    hop: float = 1.0
+    settle: float = 0.5
+    time_budget: float = 0.5
+    shaping_factor: float = 256.0
+    evaluations: int = 8000
+    start_evaluations: int = 30_000
+    chains: int = 20
+    draws: int = 200
+    seed: int = 1
+    rhat_limit: float = 1.05
+    frequency_max: float = 10.0
+    frequencies: int = 50
+    headline_frequency: float = 5.0
+    clock_tolerance: float = 0.1
+    likelihood: Likelihood = 'glue'
+    levels: tuple[float, ...] = (0.5, 0.95)
+
+    def __post_init__(self) -> None:
+        for name, limit in LIMITS.items():
+            value = getattr(self, name)
+            if not (np.isfinite(value) and limit.lower <= value <= limit.upper):
+                raise InputError(
+                    f'{name} = {value:g} is outside [{limit.lower:g}, {limit.upper:g}] '
+                    f'{limit.unit} ({limit.meaning})'
+                )
+        object.__setattr__(self, 'levels', tuple(float(level) for level in self.levels))
+        if not self.levels or not all(0.0 < level < 1.0 for level in self.levels):
+            raise InputError(f'levels {self.levels} must lie between 0 and 1')
+        if list(self.levels) != sorted(set(self.levels)):
+            raise InputError(f'levels {self.levels} must ascend')
+        if self.likelihood not in ('glue', 'gaussian'):
+            raise InputError(f'likelihood {self.likelihood!r} is unknown; use glue or gaussian')
+        if self.hop > self.window:
+            raise InputError(f'hop {self.hop:g} s is longer than the window {self.window:g} s')
+        if self.settle > 0.8 * self.window:
+            raise InputError(
+                f'settle {self.settle:g} s leaves less than a fifth of the window '
+                f'{self.window:g} s to be fitted; shorten it'
+            )
+        if self.time_budget > self.hop:
+            raise InputError(
+                f'time_budget {self.time_budget:g} s is longer than the hop {self.hop:g} s: '
+                'windows would pile up'
+            )
+
+    @staticmethod
+    def from_mapping(values: Mapping[str, Any], source: str = '') -> EstimatorSettings:
+        """Return settings from names and values; what is not named keeps its default.
+
+        Raises:
+            InputError: unknown names, values of the wrong kind or outside their range.
+        """
+        where = f'{source}: ' if source else ''
+        kinds = {f.name: f.type for f in fields(EstimatorSettings)}
+        unknown = sorted(set(values) - set(kinds))
+        if unknown:
+            raise InputError(f'{where}unknown estimator settings {unknown}')
+        clean: dict[str, Any] = {}
+        for name, value in values.items():
+            try:
+                if name == 'levels':
+                    clean[name] = tuple(float(v) for v in value)
+                elif kinds[name] == 'int':
+                    clean[name] = int(value)
+                elif kinds[name] == 'float':
+                    clean[name] = float(value)
+                else:
+                    clean[name] = value
+            except (TypeError, ValueError) as error:
+                raise InputError(f'{where}setting {name} = {value!r} ({error})') from error
+        try:
+            return EstimatorSettings(**clean)
+        except InputError as error:
+            raise InputError(f'{where}{error}') from error
+
+    @staticmethod
+    def from_json(text: str, source: str = '') -> EstimatorSettings:
+        """Return settings from the JSON object of an EstimatorSetup.
+
+        Raises:
+            InputError: no JSON object, or as `from_mapping`.
+        """
+        try:
+            values = json.loads(text)
+        except ValueError as error:
+            raise InputError(f'{source}: estimator settings are no JSON ({error})') from error
+        if not isinstance(values, dict):
+            raise InputError(f'{source}: estimator settings are no JSON object')
+        values.pop('start', None)  # belongs to the model
+        return EstimatorSettings.from_mapping(values, source)
+
+
+@dataclass(frozen=True, slots=True)
+class ModelChoice:
+    """The model that is fitted: Eq. (2) with effects, and the uniform prior's box.
+
+    Attributes:
+        effects: names of the catalogue; empty for Eq. (2) itself.
+        names: the model's parameters.
+        units: their units.
+        lower: lower bounds of the prior.
+        upper: upper bounds of the prior.
+        start: where to start sampling; NaN or empty for anywhere in the prior.
+    """
+
+    effects: tuple[str, ...]
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+    start: tuple[float, ...] = ()
+
+    @property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper bounds, each of shape (p,)."""
+        return np.array(self.lower), np.array(self.upper)

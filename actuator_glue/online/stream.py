@@ -1,0 +1,210 @@
+"""What arrives: blocks of samples, the test set-up, commands ahead; and what is told about it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+
+from actuator_glue.errors import InputError
+from actuator_glue.records import (
+    MAX_DISPLACEMENT,
+    MAX_FORCE,
+    Array,
+    Hold,
+    Record,
+    check_stiffness,
+)
+
+# A block is a moment of a test; more than this is a file sent by mistake.
+MAX_BLOCK = 1_000_000
+MAX_INDEX = 2**62
+
+Reason: TypeAlias = Literal['gap', 'stream', 'clock', 'setup', 'bad-input', 'model']
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Block:
+    """Consecutive samples of one actuator, SI units; use `checked` on what comes from outside.
+
+    Attributes:
+        index: running index of the first sample.
+        period: time between samples [s].
+        stamp_ns: acquisition time of the first sample [ns].
+        command: commanded displacement, shape (n,) [m].
+        measured: measured displacement, shape (n,) [m].
+        force: measured force, shape (n,) [N], or None.
+    """
+
+    index: int
+    period: float
+    stamp_ns: int
+    command: Array
+    measured: Array
+    force: Array | None = None
+
+    def __len__(self) -> int:
+        return len(self.command)
+
+    def part(self, start: int, stop: int) -> Block:
+        """Return samples start:stop as a block of its own."""
+        return Block(
+            self.index + start,
+            self.period,
+            self.stamp_ns + round(start * self.period * 1e9),
+            self.command[start:stop],
+            self.measured[start:stop],
+            None if self.force is None else self.force[start:stop],
+        )
+
+
+def check_block(block: Block) -> Block:
+    """Return a block that can be used, as it is.
+
+    Raises:
+        InputError: empty, channels of different lengths, NaN, a displacement or force no
+            laboratory has, an absurd period, or far too many samples.
+    """
+    where = f'block at sample {block.index}'
+    channels = [('command', block.command, 'm', MAX_DISPLACEMENT)]
+    channels.append(('measured', block.measured, 'm', MAX_DISPLACEMENT))
+    if block.force is not None:
+        channels.append(('force', block.force, 'N', MAX_FORCE))
+    lengths = {name: len(values) for name, values, _, _ in channels}
+    if len(set(lengths.values())) != 1:
+        raise InputError(f'{where}: channels have different lengths {lengths}')
+    if not len(block):
+        raise InputError(f'{where}: it is empty; leave out blocks without samples')
+    if len(block) > MAX_BLOCK:
+        raise InputError(f'{where}: {len(block)} samples are more than {MAX_BLOCK}')
+    if not 0 <= block.index <= MAX_INDEX:
+        raise InputError(f'{where}: the running index is outside [0, {MAX_INDEX}]')
+    if not (np.isfinite(block.period) and 1e-6 <= block.period <= 10.0):
+        raise InputError(f'{where}: period {block.period:g} s is outside [1e-6, 10] s')
+    for name, values, unit, limit in channels:
+        # One pass where all is well: a NaN fails the comparison as well.
+        largest = float(np.abs(values).max())
+        if largest <= limit:
+            continue
+        bad = ~np.isfinite(values)
+        if bad.any():
+            at = int(bad.argmax())
+            raise InputError(f'{where}: {name} is NaN or infinite at sample {block.index + at}')
+        at = int(np.abs(values).argmax())
+        raise InputError(
+            f'{where}: {name} is {values[at]:g} {unit} at sample {block.index + at}, beyond '
+            f'{limit:g} {unit}; check the unit of this channel'
+        )
+    return block
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """What must be known of a test to use its samples.
+
+    Attributes:
+        stiffness: specimen stiffness k [N/m]; None where it is not known.
+        period: sample period [s].
+        actuator: name of the actuator.
+        hold: how the command runs between its samples.
+        index: running index of the first sample it holds for.
+        source: plant or file, for people.
+
+    Raises:
+        InputError: negative stiffness, absurd period, unknown hold.
+    """
+
+    stiffness: float | None
+    period: float
+    actuator: str = 'actuator'
+    hold: Hold = 'zoh'
+    index: int = 0
+    source: str = ''
+
+    def __post_init__(self) -> None:
+        where = f'test set-up of {self.actuator!r}'
+        if self.stiffness is not None:
+            object.__setattr__(self, 'stiffness', check_stiffness(self.stiffness, where))
+        if not (np.isfinite(self.period) and 1e-6 <= self.period <= 10.0):
+            raise InputError(f'{where}: sample period {self.period:g} s is outside [1e-6, 10] s')
+        if self.hold not in ('zoh', 'linear'):
+            raise InputError(f"{where}: hold {self.hold!r} is unknown; use 'zoh' or 'linear'")
+        if not 0 <= self.index <= MAX_INDEX:
+            raise InputError(f'{where}: the running index {self.index} is outside [0, 2^62]')
+
+    def same_test(self, other: Setup) -> bool:
+        """Whether samples under both set-ups may be fitted together."""
+        return (self.stiffness, self.period, self.actuator, self.hold) == (
+            other.stiffness,
+            other.period,
+            other.actuator,
+            other.hold,
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Preview:
+    """Commands that will be acted on: sample i of `command` gets running index `index` + i."""
+
+    index: int
+    period: float
+    command: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Window:
+    """Samples that are fitted together.
+
+    Attributes:
+        number: running number, dropped windows counted.
+        record: the samples, those that only let the state be forgotten included.
+        epoch: counts the actuators; a posterior of one says nothing about the next.
+        segment: counts the restarts; samples of one segment are contiguous.
+    """
+
+    number: int
+    record: Record
+    epoch: int
+    segment: int
+
+    @property
+    def end(self) -> int:
+        """Running index one past the last sample."""
+        return self.record.first_index + len(self.record)
+
+
+@dataclass(frozen=True, slots=True)
+class Restarted:
+    """The window begins anew at a sample, for a reason."""
+
+    index: int
+    reason: Reason
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
+class Rejected:
+    """Input that was not used."""
+
+    message: str
+
+
+@dataclass(frozen=True, slots=True)
+class Dropped:
+    """A window that was not computed because the one before was still running."""
+
+    number: int
+    index: int
+
+
+@dataclass(frozen=True, slots=True)
+class Failed:
+    """A window that gave no posterior, and why."""
+
+    number: int
+    index: int
+    message: str
+
+
+Event: TypeAlias = Restarted | Rejected | Dropped | Failed

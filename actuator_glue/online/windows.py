@@ -1,0 +1,231 @@
+"""Blocks to sliding windows by running sample index; whatever breaks a window restarts it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuator_glue.errors import InputError
+from actuator_glue.online.settings import EstimatorSettings
+from actuator_glue.online.stream import (
+    Block,
+    Event,
+    Reason,
+    Rejected,
+    Restarted,
+    Setup,
+    Window,
+    check_block,
+)
+from actuator_glue.records import Array, Record
+
+# Nobody streams into hundreds of announced set-ups; a publisher gone wild must not fill memory.
+MAX_ANNOUNCED = 16
+
+
+@dataclass(slots=True)
+class Tally:
+    """Counts since the start, for diagnostics."""
+
+    samples: int = 0
+    blocks: int = 0
+    lost: int = 0
+    gaps: int = 0
+    restarts: int = 0
+    rejected: int = 0
+    windows: int = 0
+
+
+class Tail:
+    """The last `keep` samples of two channels, in memory that does not grow."""
+
+    def __init__(self, keep: int) -> None:
+        self.keep = keep
+        self._data = np.empty((2, 2 * keep))
+        self._stop = 0
+        self._count = 0
+
+    def __len__(self) -> int:
+        return self._count
+
+    def clear(self) -> None:
+        """Forget all samples."""
+        self._stop = self._count = 0
+
+    def append(self, command: Array, measured: Array) -> None:
+        """Append samples; at most `keep` at once."""
+        n = len(command)
+        if self._stop + n > self._data.shape[1]:
+            kept = min(self._count, self.keep)
+            self._data[:, :kept] = self._data[:, self._stop - kept : self._stop].copy()
+            self._stop = kept
+        self._data[0, self._stop : self._stop + n] = command
+        self._data[1, self._stop : self._stop + n] = measured
+        self._stop += n
+        self._count = min(self._count + n, self.keep)
+
+    def last(self, n: int) -> tuple[Array, Array]:
+        """Return views of command and measured of the last n samples."""
+        part = self._data[:, self._stop - n : self._stop]
+        return part[0], part[1]
+
+
+class Windows:
+    """Turns blocks into windows.
+
+    Windows end where the running index is a multiple of the hop, so that whoever joins a stream
+    late forms the same windows. A set-up holds from the sample it names. No clock is read: the
+    same blocks and set-ups give the same windows, however they are cut into blocks.
+
+    Args:
+        settings: window, hop and clock tolerance are used.
+    """
+
+    def __init__(self, settings: EstimatorSettings) -> None:
+        self.settings = settings
+        self.tally = Tally()
+        self.current: Setup | None = None
+        self._announced: list[Setup] = []
+        self._tail: Tail | None = None
+        self._window = self._hop = 0
+        self._next: int | None = None
+        self._stamp_ns = 0
+        self._last_stamp_ns = 0
+        self._epoch = 0
+
+    def setup(self, setup: Setup) -> list[Event]:
+        """Take a test set-up; it holds from the sample it names, at once where that is past."""
+        if self._next is None or setup.index <= self._next:
+            return self._begin(setup)
+        self._announced = [s for s in self._announced if s.index != setup.index]
+        self._announced.append(setup)
+        self._announced.sort(key=lambda s: s.index)
+        del self._announced[MAX_ANNOUNCED:]
+        return []
+
+    def push(self, block: Block) -> tuple[list[Event], list[Window]]:
+        """Take one block as it came; return what happened and the windows it completes."""
+        try:
+            check_block(block)
+            self._check_period(block)
+        except InputError as error:
+            self.tally.rejected += 1
+            events: list[Event] = [Rejected(str(error))]
+            if len(block.command) and self._tail is not None and len(self._tail):
+                events.append(self._restart(block.index, 'bad-input', str(error)))
+            self._step_over(block)
+            return events, []
+        events = self._follow(block)
+        windows: list[Window] = []
+        position = 0
+        while position < len(block):
+            while self._announced and self._announced[0].index <= block.index + position:
+                events += self._begin(self._announced.pop(0))
+            stop = len(block)
+            if self._announced:
+                stop = min(stop, self._announced[0].index - block.index)
+            self._append(block.part(position, stop), windows)
+            position = stop
+        self.tally.samples += len(block)
+        self.tally.blocks += 1
+        self._next = block.index + len(block)
+        self._last_stamp_ns = block.stamp_ns
+        self._stamp_ns = block.stamp_ns + round(len(block) * block.period * 1e9)
+        return events, windows
+
+    def _step_over(self, block: Block) -> None:
+        """Count the samples of an unusable block as seen: the next block is no gap as well."""
+        if block.index == self._next and np.isfinite(block.period):
+            count = max(len(block.command), len(block.measured))
+            self._next += count
+            self._stamp_ns += round(count * float(np.clip(block.period, 0.0, 10.0)) * 1e9)
+
+    def _check_period(self, block: Block) -> None:
+        setup = self.current
+        if setup is not None and abs(block.period / setup.period - 1.0) > 1e-4:
+            raise InputError(
+                f'block at sample {block.index}: period {block.period:g} s, but the test set-up '
+                f'says {1.0 / setup.period:g} Hz; publish a set-up with the rate of the samples'
+            )
+
+    def _follow(self, block: Block) -> list[Event]:
+        """Compare a block with where the stream stood."""
+        if self._next is None:
+            return []
+        if block.index < self._next:
+            # Announced set-ups of the old numbering would fire at the wrong samples.
+            self._announced.clear()
+            message = (
+                f'sample index went back from {self._next} to {block.index}: the stream began '
+                'again, or two publishers share the topic'
+            )
+            return [self._restart(block.index, 'stream', message)]
+        if block.index > self._next:
+            lost = block.index - self._next
+            self.tally.gaps += 1
+            self.tally.lost += lost
+            message = f'{lost} samples are missing before sample {block.index}'
+            return [self._restart(block.index, 'gap', message)]
+        step = (block.stamp_ns - self._stamp_ns) * 1e-9
+        back = block.stamp_ns <= self._last_stamp_ns
+        if back or abs(step) > self.settings.clock_tolerance:
+            message = f'the clock jumped by {step:+.3f} s at sample {block.index}'
+            return [self._restart(block.index, 'clock', message)]
+        return []
+
+    def _restart(self, index: int, reason: Reason, message: str) -> Restarted:
+        if self._tail is not None:
+            self._tail.clear()
+        self.tally.restarts += 1
+        return Restarted(index, reason, f'window restarted: {message}')
+
+    def _begin(self, setup: Setup) -> list[Event]:
+        before, self.current = self.current, setup
+        if before is not None and setup.same_test(before):
+            return []
+        if before is None or setup.actuator != before.actuator:
+            self._epoch += 1
+        if before is None or setup.period != before.period or self._tail is None:
+            self._window = max(2, round(self.settings.window / setup.period))
+            self._hop = max(1, round(self.settings.hop / setup.period))
+            self._tail = Tail(self._window)
+        index = setup.index if self._next is None else max(setup.index, self._next)
+        known = 'unknown' if setup.stiffness is None else f'{setup.stiffness:g} N/m'
+        message = (
+            f'test set-up of {setup.actuator!r}: specimen stiffness {known}, '
+            f'{1.0 / setup.period:g} Hz, hold {setup.hold}'
+        )
+        return [self._restart(index, 'setup', message)]
+
+    def _append(self, block: Block, windows: list[Window]) -> None:
+        setup, tail = self.current, self._tail
+        if setup is None or tail is None:
+            return
+        start = 0
+        while start < len(block):
+            here = block.index + start
+            stop = min(len(block), start + self._hop - here % self._hop)
+            tail.append(block.command[start:stop], block.measured[start:stop])
+            end = block.index + stop
+            full = end % self._hop == 0 and len(tail) == self._window
+            if full and setup.stiffness is not None:
+                stamp = block.stamp_ns + round((stop - self._window) * block.period * 1e9)
+                windows.append(self._cut(end, stamp, setup, tail))
+            start = stop
+
+    def _cut(self, end: int, stamp_ns: int, setup: Setup, tail: Tail) -> Window:
+        command, measured = tail.last(self._window)
+        record = Record(
+            command=command,
+            measured=measured,
+            period=setup.period,
+            stiffness=setup.stiffness,
+            start_ns=stamp_ns,
+            first_index=end - self._window,
+            hold=setup.hold,
+            actuator=setup.actuator,
+        )
+        number = self.tally.windows
+        self.tally.windows += 1
+        return Window(number, record, self._epoch, self.tally.restarts)

@@ -1,0 +1,243 @@
+"""Messages to the estimator's types and back, for live nodes and for bags alike.
+
+Nothing here imports ROS: rclpy's messages and those read from a bag have the same attributes.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from actuator_glue.errors import InputError
+from actuator_glue.online.forecast import Prediction
+from actuator_glue.online.job import WindowResult
+from actuator_glue.online.settings import EstimatorSettings, ModelChoice
+from actuator_glue.online.stream import Block, Preview, Setup
+from actuator_glue.records import Array
+
+Fields = dict[str, Any]
+_NAN = float('nan')
+
+
+class Head(NamedTuple):
+    """What goes into a std_msgs/Header."""
+
+    stamp_ns: int
+    frame_id: str
+
+
+def stamp_ns(message: Any) -> int:
+    """Return the stamp of a message's header [ns]."""
+    stamp = message.header.stamp
+    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
+
+
+def block(message: Any) -> Block:
+    """Return the block of a SampleBlock, unchecked."""
+    return Block(
+        index=int(message.index),
+        period=float(message.period),
+        stamp_ns=stamp_ns(message),
+        command=_array(message.command),
+        measured=_array(message.measured),
+        force=_array(message.force) if len(message.force) else None,
+    )
+
+
+def setup(message: Any) -> Setup:
+    """Return the set-up of a TestSetup.
+
+    Raises:
+        InputError: negative stiffness, absurd rate, unknown hold.
+    """
+    stiffness, rate = float(message.specimen_stiffness), float(message.rate)
+    name = str(message.actuator or message.header.frame_id)
+    if not (np.isfinite(rate) and rate > 0.0):
+        raise InputError(f'test set-up of {name!r}: rate {rate:g} Hz is not positive')
+    return Setup(
+        stiffness=None if np.isnan(stiffness) else stiffness,
+        period=1.0 / rate,
+        actuator=name,
+        hold=message.hold,
+        index=int(message.index),
+        source=str(message.source),
+    )
+
+
+def preview(message: Any) -> Preview:
+    """Return the commands of a CommandPreview, unchecked."""
+    return Preview(int(message.index), float(message.period), _array(message.command))
+
+
+def model_choice(message: Any) -> ModelChoice:
+    """Return the model of an EstimatorSetup."""
+    start = json.loads(message.settings).get('start', ())
+    return ModelChoice(
+        effects=tuple(message.effects),
+        names=tuple(message.parameter_names),
+        units=tuple(message.units),
+        lower=tuple(float(v) for v in message.lower),
+        upper=tuple(float(v) for v in message.upper),
+        start=tuple(_NAN if v is None else float(v) for v in start),
+    )
+
+
+def estimator_settings(message: Any) -> EstimatorSettings:
+    """Return the settings of an EstimatorSetup.
+
+    Raises:
+        InputError: they cannot be read.
+    """
+    return EstimatorSettings.from_json(message.settings, 'EstimatorSetup')
+
+
+def estimator_setup(
+    settings: EstimatorSettings, model: ModelChoice, window: int, index: int
+) -> Fields:
+    """Return the fields of an EstimatorSetup but its header.
+
+    Args:
+        settings: settings of the estimator.
+        model: model it goes on with.
+        window: number of the first window it holds for.
+        index: running index of that window's first sample.
+    """
+    return {
+        'index': index,
+        'window': window,
+        'window_length': settings.window,
+        'hop': settings.hop,
+        'shaping_factor': settings.shaping_factor if settings.likelihood == 'glue' else _NAN,
+        'seed': settings.seed,
+        'effects': list(model.effects),
+        'parameter_names': list(model.names),
+        'units': list(model.units),
+        'lower': list(model.lower),
+        'upper': list(model.upper),
+        'settings': json.dumps(
+            {**asdict(settings), 'start': [None if np.isnan(v) else v for v in model.start]}
+        ),
+    }
+
+
+def posterior(result: WindowResult, seconds: float) -> tuple[Head, Fields]:
+    """Return header and fields of a PosteriorMoments.
+
+    Args:
+        result: a result that has a posterior.
+        seconds: time the window took [s].
+    """
+    moments, record, settings = result.moments, result.window.record, result.settings
+    assert moments is not None and result.rhat is not None and result.ess is not None
+    assert result.best is not None
+    fields: Fields = {
+        'window': result.window.number,
+        'index': record.first_index,
+        'samples': len(record),
+        'period': record.period,
+        'effects': list(result.model.effects),
+        'parameter_names': list(result.model.names),
+        'units': list(result.model.units),
+        'mean': moments.mean,
+        'stddev': moments.stddev,
+        'skewness': moments.skewness,
+        'cov': moments.cov,
+        'best': result.best,
+        'rhat': result.rhat,
+        'ess': result.ess,
+        'prior_dominated': [bool(flag) for flag in result.prior_dominated],
+        'rhat_max': float(result.rhat.max()),
+        'ess_min': float(result.ess.min()),
+        'rms_error': result.rms_error,
+        'nrmse': result.nrmse,
+        'shaping_factor': settings.shaping_factor if settings.likelihood == 'glue' else _NAN,
+        'evaluations': result.evaluations,
+        'seconds': seconds,
+        'converged': result.converged,
+        'stopped_early': result.stopped_early,
+    }
+    for name, mean, stddev in zip(result.model.names, moments.mean, moments.stddev, strict=True):
+        if name in ('beta_1', 'alpha_1_beta_0', 'alpha_2', 'alpha_3'):
+            fields[f'{name}_mean'] = float(mean)
+            fields[f'{name}_stddev'] = float(stddev)
+    return Head(record.stamp_ns(len(record) - 1), record.actuator), fields
+
+
+def prediction(result: Prediction, actuator: str) -> tuple[Head, Fields]:
+    """Return header and fields of a PredictionBand."""
+    band, scored = result.band, result.coverage is not None
+    fields: Fields = {
+        'window': result.number,
+        'index': result.index,
+        'period': result.period,
+        'kind': result.kind,
+        # Parameters are always frozen before the samples they are held against.
+        'forecast': True,
+        'scored': scored,
+        'levels': band.levels,
+        'lower': band.lower.ravel(),
+        'median': band.median,
+        'upper': band.upper.ravel(),
+        'coverage': result.coverage if result.coverage is not None else np.empty(0),
+        'width': result.width,
+        'widest_level': float(band.levels[-1]),
+        'widest_coverage': float(result.coverage[-1]) if result.coverage is not None else _NAN,
+        'widest_width': float(result.width[-1]),
+        'rms_error': result.rms_error,
+        'first_lower': float(band.lower[-1, 0]),
+        'first_median': float(band.median[0]),
+        'first_upper': float(band.upper[-1, 0]),
+    }
+    return Head(result.stamp_ns, actuator), fields
+
+
+def response(result: WindowResult) -> tuple[Head, Fields]:
+    """Return header and fields of a FrequencyResponseBand."""
+    found, record = result.response, result.window.record
+    assert found is not None
+    head, amplitude, phase, delay = found.headline
+    fields: Fields = {
+        'window': result.window.number,
+        'frequency': found.frequency,
+        'levels': found.amplitude.levels,
+        'amplitude_lower': found.amplitude.lower.ravel(),
+        'amplitude_median': found.amplitude.median,
+        'amplitude_upper': found.amplitude.upper.ravel(),
+        'phase_lower': found.phase.lower.ravel(),
+        'phase_median': found.phase.median,
+        'phase_upper': found.phase.upper.ravel(),
+        'headline_frequency': head,
+        'headline_amplitude': amplitude,
+        'headline_phase': phase,
+        'headline_delay': delay,
+    }
+    return Head(record.stamp_ns(len(record) - 1), record.actuator), fields
+
+
+def differences(fields: Mapping[str, Any], message: Any) -> list[str]:
+    """Return the names of the fields that a message holds otherwise, to the last bit.
+
+    `seconds` is not compared: it is how long the computer took.
+    """
+    return [
+        name
+        for name, value in fields.items()
+        if name != 'seconds' and not _same(value, getattr(message, name))
+    ]
+
+
+def _same(ours: Any, theirs: Any) -> bool:
+    if isinstance(ours, str | bool | int):
+        return bool(ours == theirs)
+    if isinstance(ours, list) and ours and isinstance(ours[0], str):
+        return list(ours) == list(theirs)
+    left, right = np.asarray(ours, np.float64), np.asarray(theirs, np.float64)
+    return left.shape == right.shape and left.tobytes() == right.tobytes()
+
+
+def _array(values: Iterable[float]) -> Array:
+    return np.asarray(values, dtype=np.float64)
