@@ -157,8 +157,8 @@ def read_records(
     Args:
         path: bag folder or lone .mcap.
         note: called with one line per damage; the default raises it.
-        gap: called with one line where a stream is split (samples missing, stream begun again,
-            set-up changed); the default raises for missing samples and says nothing of the rest.
+        gap: called with one line where a test is split (samples missing, set-up changed); the
+            default raises for missing samples and says nothing of the rest.
 
     Raises:
         InputError: no bag, no samples, damage, NaN or absurd samples, missing samples and nobody
@@ -183,32 +183,33 @@ def read_records(
         if segment is not None:
             reason = segment.break_before(item, setup)
             if reason is not None:
-                _tell(f'{path}: topic {item.topic}: {reason}', gap, 'missing' in reason)
+                where = f'{path}: topic {item.topic}: '
+                if item.index > segment.next_index and gap is None:
+                    raise InputError(
+                        f'{where}{reason}; cut the bag there, or use the stretches one by one'
+                    )
+                # A new test in the same bag begins at 0: nothing to be told.
+                if item.index and gap is not None:
+                    gap(f'{where}{reason}; the stretches are taken as records of their own')
                 done.append(segment)
                 segment = None
         if segment is None:
             segment = open_segments[item.topic] = _Segment(item, setup)
         segment.append(item)
     done.extend(open_segments.values())
+    long_enough = [segment for segment in done if len(segment.command) >= 2]
     records = [
-        segment.record(_source(path, segment.first.topic, len(open_segments)))
-        for segment in done
-        if len(segment.command) >= 2
+        segment.record(_source(path, segment.first.topic, len(open_segments), i, len(long_enough)))
+        for i, segment in enumerate(long_enough, start=1)
     ]
     if not records:
         raise InputError(_nothing(path))
     return records
 
 
-def _tell(text: str, gap: Note | None, is_gap: bool) -> None:
-    if gap is not None:
-        gap(f'{text}; the stretches are taken as records of their own')
-    elif is_gap:
-        raise InputError(f'{text}; cut the bag there, or use the stretches one by one')
-
-
-def _source(path: Path | str, topic: str, topics: int) -> str:
-    return f'{path}:{topic}' if topics > 1 else str(path)
+def _source(path: Path | str, topic: str, topics: int, number: int, records: int) -> str:
+    name = f'{path}:{topic}' if topics > 1 else str(path)
+    return f'{name} (record {number} of {records})' if records > 1 else name
 
 
 def _nothing(path: Path | str) -> str:

@@ -12,7 +12,8 @@ import numpy as np
 from actuator_glue.errors import InputError
 from actuator_glue.records import Array
 
-_DELIMITERS = (',', ';', '\t')
+# A comma may be the decimal sign where there is another delimiter, so it comes last.
+_DELIMITERS = (';', '\t', ',')
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,6 +17,7 @@ from typing import Any, BinaryIO
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
 from mcap.opcode import Opcode
+from mcap.reader import make_reader
 from mcap.records import Channel, Chunk, Message, Schema
 
 from actuator_glue.errors import InputError
@@ -38,6 +39,7 @@ class Scan:
         channels: channels seen so far, by id.
         finished: the file has its footer.
         position: first byte that is not read yet.
+        orphans: messages without a known topic.
     """
 
     path: Path
@@ -46,6 +48,7 @@ class Scan:
     channels: dict[int, Channel] = field(default_factory=dict)
     finished: bool = False
     position: int = 0
+    orphans: int = 0
 
     def messages(self, follow: bool = False) -> Iterator[tuple[Schema, Channel, Message]]:
         """Yield schema, channel and message in file order.
@@ -111,7 +114,9 @@ class Scan:
                 channel = self.channels[message.channel_id]
                 yield self.schemas[channel.schema_id], channel, message
         except KeyError:
-            self.note(f'{self.path}: message at byte {at} belongs to no known topic')
+            if not self.orphans:
+                self.note(f'{self.path}: messages from byte {at} on belong to no known topic')
+            self.orphans += 1
         except _UNREADABLE as error:
             self.note(f'{self.path}: damaged record at byte {at} ({error})')
 
@@ -123,6 +128,7 @@ class Scan:
         except _UNREADABLE as error:
             if whole:
                 self.note(f'{self.path}: damaged chunk at byte {at} ({error}); left out')
+                self._learn_topics()
             return
         position = 0
         while position + _HEAD.size <= len(data):
@@ -135,6 +141,17 @@ class Scan:
                 return
             if opcode in _PARSED:
                 yield from self._record(opcode, data[start:position], at)
+
+    def _learn_topics(self) -> None:
+        """Take topics from the end of the file: a damaged chunk may have held them."""
+        try:
+            with self.path.open('rb') as file:
+                summary = make_reader(file).get_summary()
+        except (OSError, *_UNREADABLE):
+            return
+        if summary is not None:
+            self.schemas = summary.schemas | self.schemas
+            self.channels = summary.channels | self.channels
 
 
 _PARSED = frozenset((Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE))

@@ -9,6 +9,7 @@ from actuator_glue.records import Array
 
 # A sample may lie this far off the uniform grid, in periods: rounded time stamps do.
 _TOLERANCE = 0.25
+_ROUNDED = 'where times are only rounded, give the rate in a channel map (--channels MAP.yaml)'
 
 
 def uniform_period(time: Array, where: str) -> float:
@@ -35,9 +36,10 @@ def uniform_period(time: Array, where: str) -> float:
     if back.any():
         at = int(back.argmax())
         how = 'goes back' if steps[at] < 0.0 else 'stands still'
+        hint = '' if steps[at] < 0.0 else f'; {_ROUNDED}'
         raise InputError(
             f'{where}: time {how} at sample {at + 1} ({time[at]:.9g} s, then '
-            f'{time[at + 1]:.9g} s); sort the record, or cut it there'
+            f'{time[at + 1]:.9g} s); sort the record, or cut it there{hint}'
         )
     typical = float(np.median(steps))
     gap = steps > 1.5 * typical
@@ -54,8 +56,7 @@ def uniform_period(time: Array, where: str) -> float:
         at = int(off.argmax())
         raise InputError(
             f'{where}: samples are not uniform in time: sample {at} is {off[at] / period:.2g} '
-            'periods off; resample the record, or, where the times are only rounded, give the '
-            'rate in a channel map (--channels MAP.yaml)'
+            f'periods off; resample the record; {_ROUNDED}'
         )
     whole = round(1.0 / period)
     if whole and abs(1.0 / whole - period) * len(time) < 0.05 * period:

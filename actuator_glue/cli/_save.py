@@ -1,0 +1,99 @@
+"""Options that say where records go, and writing them there."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from actuator_glue.cli._output import progress, say
+from actuator_glue.errors import InputError
+from actuator_glue.records import Record
+
+
+def add_out(parser: argparse.ArgumentParser) -> None:
+    """Add OUT, --block and --unit."""
+    parser.add_argument(
+        'out', metavar='OUT', help='.csv, .mat, or the folder of a new bag for any other name'
+    )
+    parser.add_argument(
+        '--block', type=int, default=64, metavar='N', help='samples per message (default 64)'
+    )
+    parser.add_argument(
+        '--unit',
+        choices=('mm', 'm'),
+        default='mm',
+        help='unit of displacements in .csv and .mat; m loses not one bit (default mm)',
+    )
+
+
+def check_out(args: argparse.Namespace) -> Path:
+    """Return where to write, before any long work is done for it.
+
+    Raises:
+        InputError: it exists, or is no name for a bag.
+    """
+    out = Path(args.out)
+    if out.suffix == '.mcap':
+        raise InputError(f'{out}: bags are folders; give a name without .mcap')
+    if args.block < 1:
+        raise InputError(f'--block {args.block}: a message holds at least one sample')
+    if out.exists():
+        raise InputError(f'{out} exists already; choose another name or move it')
+    return out
+
+
+def save(records: list[Record], args: argparse.Namespace) -> None:
+    """Write records as the options say and tell it; several become one bag or numbered files.
+
+    Raises:
+        InputError: the output exists or cannot be written.
+    """
+    out = check_out(args)
+    written = [out]
+    if out.suffix in ('.csv', '.mat'):
+        written = _files(records, out, args.unit)
+    else:
+        _bag(records, out, args.block)
+    samples = sum(len(r) for r in records)
+    say(f'{", ".join(map(str, written))}: {len(records)} record(s), {samples} samples', args)
+
+
+def _files(records: list[Record], out: Path, unit: str) -> list[Path]:
+    from actuator_glue.io.export import write_csv, write_mat
+
+    paths = [out]
+    if len(records) > 1:
+        paths = [out.with_name(f'{out.stem}_{i + 1}{out.suffix}') for i in range(len(records))]
+    for path in paths:
+        if path.exists():
+            raise InputError(f'{path} exists already; choose another name or move it')
+    with progress('writing', sum(len(r) for r in records)) as done:
+        before = 0
+        for path, record in zip(paths, records, strict=True):
+            (write_csv if out.suffix == '.csv' else write_mat)(path, record, unit=unit)
+            before += len(record)
+            done(before)
+    return paths
+
+
+def _bag(records: list[Record], out: Path, block: int) -> None:
+    """Write records into a new bag, each actuator under a namespace of its own.
+
+    Raises:
+        InputError: the bag exists or cannot be written.
+    """
+    from actuator_glue.io.bag_records import write_record
+    from actuator_glue.io.bag_writer import BagWriter
+
+    names = list(dict.fromkeys(r.actuator for r in records))
+    with progress('writing', sum(len(r) for r in records)) as done, BagWriter(out) as writer:
+        written = 0
+
+        def count(samples: int) -> None:
+            nonlocal written
+            written += samples
+            done(written)
+
+        for record in records:
+            namespace = '' if len(names) == 1 else f'/actuator_{names.index(record.actuator) + 1}'
+            write_record(writer, record, namespace=namespace, block=block, progress=count)

@@ -1,0 +1,297 @@
+"""Calibrate the servo-hydraulic model from one or several records jointly (GLUE, DREAM(ZS))."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from typing import TYPE_CHECKING, Any
+
+from actuator_glue.cli._output import add_json, note, progress, say, table, write_json
+from actuator_glue.cli._records import add_records, load, number
+from actuator_glue.errors import InputError
+from actuator_glue.records import Array, Record
+
+if TYPE_CHECKING:
+    from actuator_glue.inference.chains import Chains
+    from actuator_glue.inference.evaluate import LogDensity
+    from actuator_glue.model.parameters import Parameter
+    from actuator_glue.model.structure import Structure
+
+# R-hat above which draws are not yet the posterior (Vehtari et al. 2021).
+CONVERGED = 1.01
+# Share of its range that a record may be away from zero at its first sample and still count as
+# starting at rest.
+REST_SHARE = 0.05
+SETTLE = 0.5  # s
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add_records(parser)
+    parser.add_argument(
+        '--shaping-factor',
+        type=number,
+        default=256.0,
+        metavar='G',
+        help='G of L = -G ln Var[E], Eq. (4) (default 256)',
+    )
+    parser.add_argument(
+        '--likelihood',
+        choices=('glue', 'gaussian', 'ar1'),
+        default='glue',
+        help='glue is Eq. (4); gaussian and ar1 are formal ones (default glue)',
+    )
+    parser.add_argument(
+        '--evaluations',
+        type=int,
+        default=60_000,
+        metavar='N',
+        help='likelihood evaluations (default 60000)',
+    )
+    parser.add_argument('--seed', type=int, default=1, metavar='S', help='seed (default 1)')
+    parser.add_argument(
+        '--effect',
+        action='append',
+        default=[],
+        metavar='NAME',
+        help='calibrate Eq. (2) with this effect of the catalogue as well; repeatable',
+    )
+    parser.add_argument(
+        '--initial',
+        choices=('auto', 'rest', 'measured'),
+        default='auto',
+        help='state at the first sample: at rest at zero, or from the first measured samples '
+        '(auto: by looking)',
+    )
+    parser.add_argument(
+        '--settle',
+        type=number,
+        metavar='SECONDS',
+        help='start of each record that only lets the initial state be forgotten '
+        f'(default 0 from rest, else {SETTLE} s)',
+    )
+    parser.add_argument(
+        '--draws', metavar='OUT.npz', help='save the posterior draws: arrays draws, names, best'
+    )
+    add_json(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Calibrate and print the posterior moments.
+
+    Raises:
+        InputError: a record, option or output cannot be used.
+    """
+    if args.seed < 0:
+        raise InputError(f'--seed {args.seed} is negative')
+    records = load(args)
+    for record in records:
+        record.known_stiffness()
+    initial = _initial(args.initial, records)
+    settle = args.settle if args.settle is not None else (SETTLE if initial == 'measured' else 0.0)
+    if settle < 0.0:
+        raise InputError(f'--settle {settle:g} s is negative')
+
+    from actuator_glue.model.structure import Structure
+
+    structure = Structure(args.effect)
+    started = time.perf_counter()
+    chains = _sample(args, structure, records, initial, settle)
+    seconds = time.perf_counter() - started
+    errors = structure.errors(records, [round(settle / r.period) for r in records], initial)
+    fit = _fit(errors.residuals(chains.best[: len(structure.names)]), records, settle)
+    parameters = _parameters(structure, chains, args.likelihood)
+    converged = all(p['rhat'] is not None and p['rhat'] <= CONVERGED for p in parameters.values())
+    _show(args, records, parameters, chains, fit, seconds)
+    if not chains.annealed or not converged:
+        note(f'not converged (R-hat above {CONVERGED}); give more --evaluations')
+    for name, parameter in parameters.items():
+        if parameter['prior_dominated']:
+            note(f'{name}: these records say little more than its prior bounds{_advice(records)}')
+    if args.draws is not None:
+        _save_draws(args.draws, chains, tuple(parameters))
+    content = {
+        'schema': 'actuator_glue.calibration/1',
+        'parameters': parameters,
+        'evaluations': chains.evaluations,
+        'seconds': seconds,
+        'error': fit,
+        'converged': converged,
+        'effects': list(structure.effects),
+        'likelihood': args.likelihood,
+        'shaping_factor': args.shaping_factor if args.likelihood == 'glue' else None,
+        'seed': args.seed,
+        'initial': initial,
+        'settle_s': settle,
+        'records': [
+            {
+                'source': r.source,
+                'samples': len(r),
+                'rate_hz': r.rate,
+                'stiffness_n_per_m': r.stiffness,
+                'hold': r.hold,
+            }
+            for r in records
+        ],
+    }
+    write_json(content, args.json)
+    return 0
+
+
+def _initial(asked: str, records: list[Record]) -> Any:
+    """Return 'rest' or 'measured'; 'auto' is rest where every record starts near zero."""
+    if asked != 'auto':
+        return asked
+    for record in records:
+        span = float(record.measured.max() - record.measured.min())
+        start = max(abs(float(record.measured[0])), abs(float(record.command[0])))
+        if start > REST_SHARE * span:
+            return 'measured'
+    return 'rest'
+
+
+def _sample(
+    args: argparse.Namespace,
+    structure: Structure,
+    records: list[Record],
+    initial: Any,
+    settle: float,
+) -> Chains:
+    import numpy as np
+
+    from actuator_glue.inference import dream
+    from actuator_glue.inference.likelihood import (
+        Ar1Likelihood,
+        GaussianLikelihood,
+        GlueLikelihood,
+    )
+    from actuator_glue.model.fast import FastErrors
+
+    counts = [round(settle / r.period) for r in records]
+    errors = structure.errors(records, counts, initial)
+    sums = errors if structure.effects else FastErrors(records, counts, initial)
+    density: LogDensity
+    if args.likelihood == 'glue':
+        density = GlueLikelihood(sums, args.shaping_factor)
+    elif args.likelihood == 'gaussian':
+        density = GaussianLikelihood(sums)
+    else:
+        density = Ar1Likelihood(errors)
+    estimated = _estimated(structure, args.likelihood)
+    with progress('calibrating', args.evaluations) as done:
+        return dream.sample(
+            np.random.default_rng(args.seed),
+            density,
+            [p.lower for p in estimated],
+            [p.upper for p in estimated],
+            evaluations=args.evaluations,
+            progress=lambda made, _: done(made),
+        )
+
+
+def _fit(residuals: list[Array], records: list[Record], settle: float) -> dict[str, Any]:
+    """Return the error of the best draw over all records and of each."""
+    import numpy as np
+
+    measured = [r.measured[round(settle / r.period) :] for r in records]
+    every, spread = np.concatenate(residuals), np.concatenate(measured).std()
+    rms = float(np.sqrt(np.mean(every**2)))
+    return {
+        'rms_m': rms,
+        'nrmse': rms / float(spread) if spread > 0.0 else None,
+        'records': [
+            {
+                'source': r.source,
+                'rms_m': float(np.sqrt(np.mean(e**2))),
+                'nrmse': float(np.sqrt(np.mean(e**2)) / y.std()) if y.std() > 0.0 else None,
+            }
+            for r, e, y in zip(records, residuals, measured, strict=True)
+        ],
+    }
+
+
+def _estimated(structure: Structure, likelihood: str) -> tuple[Parameter, ...]:
+    """Return what is sampled: the model's parameters, and the errors' where they have one."""
+    from actuator_glue.inference.likelihood import PHI
+
+    return (*structure.parameters, *((PHI,) if likelihood == 'ar1' else ()))
+
+
+def _parameters(
+    structure: Structure, chains: Chains, likelihood: str
+) -> dict[str, dict[str, Any]]:
+    import arviz as az
+    import numpy as np
+
+    from actuator_glue.inference.moments import moments
+
+    parameters = _estimated(structure, likelihood)
+    bounds = np.array([(p.lower, p.upper) for p in parameters])
+    found = moments(chains.posterior(), *bounds.T)
+    # arviz wants (chain, draw, parameter).
+    kept = np.swapaxes(chains.kept, 0, 1)
+    data = az.convert_to_dataset({'theta': kept})
+    rhat, ess = az.rhat(data)['theta'].values, az.ess(data)['theta'].values
+    return {
+        p.name: {
+            'mean': float(found.mean[i]),
+            'stddev': float(found.stddev[i]),
+            'skewness': float(found.skewness[i]),
+            'cov': float(found.cov[i]),
+            'rhat': float(rhat[i]),
+            'ess': float(ess[i]),
+            'best': float(chains.best[i]),
+            'unit': p.unit,
+            'prior_dominated': bool(found.prior_dominated[i]),
+        }
+        for i, p in enumerate(parameters)
+    }
+
+
+def _show(
+    args: argparse.Namespace,
+    records: list[Record],
+    parameters: dict[str, dict[str, Any]],
+    chains: Chains,
+    fit: dict[str, Any],
+    seconds: float,
+) -> None:
+    rows = [
+        (
+            name,
+            p['unit'],
+            f'{p["mean"]:.5g}',
+            f'{p["stddev"]:.3g}',
+            f'{p["skewness"]:.2f}',
+            f'{p["cov"]:.3g}',
+            f'{p["rhat"]:.4f}',
+            f'{p["ess"]:.0f}',
+            'prior' if p['prior_dominated'] else '',
+        )
+        for name, p in parameters.items()
+    ]
+    columns = ('parameter', 'unit', 'mean', 'sd', 'skewness', 'COV', 'R-hat', 'ESS', '')
+    how = f'G = {args.shaping_factor:g}' if args.likelihood == 'glue' else args.likelihood
+    table(f'Posterior moments, {len(records)} record(s), {how}', columns, rows, args)
+    percent = '-' if fit['nrmse'] is None else f'{100 * fit["nrmse"]:.2f} %'
+    say(
+        f'error of the best draw {1e3 * fit["rms_m"]:.4g} mm rms ({percent} of the measured '
+        f'spread); {chains.evaluations} evaluations in {seconds:.1f} s',
+        args,
+    )
+
+
+def _advice(records: list[Record]) -> str:
+    stiffnesses = {r.stiffness for r in records}
+    if len(stiffnesses) < 2:
+        return '; a second record with another specimen stiffness would tell it'
+    return ''
+
+
+def _save_draws(out: str, chains: Chains, names: tuple[str, ...]) -> None:
+    import numpy as np
+
+    try:
+        np.savez_compressed(out, draws=chains.posterior(), names=np.array(names), best=chains.best)
+    except OSError as error:
+        raise InputError(f'{out}: cannot be written ({error.strerror or error})') from error

@@ -1,0 +1,427 @@
+"""Bags: written as rosbag2 does, read back bit by bit, whatever was cut or damaged."""
+
+import shutil
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+from rosbags.highlevel import AnyReader
+
+from actuator_glue.errors import InputError
+from actuator_glue.io import messages
+from actuator_glue.io.bag_metadata import LATCHED, Qos
+from actuator_glue.io.bag_reader import is_bag, summarise
+from actuator_glue.io.bag_reader import messages as bag_messages
+from actuator_glue.io.bag_records import read_records, write_record
+from actuator_glue.io.bag_writer import BagWriter
+from actuator_glue.io.recover import recover
+from actuator_glue.records import Record
+
+Make = Callable[..., Record]
+
+
+def same(a: Record, b: Record) -> bool:
+    """Whether two records hold the same test, bit by bit."""
+    channels = [(a.command, b.command), (a.measured, b.measured)]
+    if a.force is not None or b.force is not None:
+        assert a.force is not None
+        assert b.force is not None
+        channels.append((a.force, b.force))
+    equal = all(x.tobytes() == y.tobytes() for x, y in channels)
+    keys = ('period', 'stiffness', 'hold', 'actuator', 'start_ns', 'first_index')
+    return equal and all(getattr(a, k) == getattr(b, k) for k in keys)
+
+
+@pytest.mark.parametrize('block', [1, 7, 64, 10_000])
+@pytest.mark.parametrize('hold', ['zoh', 'linear'])
+def test_record_survives_a_bag(tmp_path: Path, record: Record, block: int, hold: str) -> None:
+    """Samples, set-up and clock come back to the last bit, whatever the block size."""
+    record = replace(record, hold=hold)
+    with BagWriter(tmp_path / 'bag') as writer:
+        write_record(writer, record, block=block)
+    (back,) = read_records(tmp_path / 'bag')
+    assert same(record, back)
+
+
+@pytest.mark.parametrize('stiffness', [None, 0.0])
+def test_unknown_stiffness_is_not_zero(
+    tmp_path: Path, stiffness: float | None, make_record: Make
+) -> None:
+    """An unknown stiffness and a free actuator are different things."""
+    with BagWriter(tmp_path / 'bag') as writer:
+        write_record(writer, make_record(stiffness=stiffness, force=False))
+    (back,) = read_records(tmp_path / 'bag')
+    assert back.stiffness == stiffness
+    assert back.force is None
+
+
+def test_layout_is_rosbag2s(bag: Path) -> None:
+    """Names and metadata as `ros2 bag record -s mcap` (Jazzy) makes them."""
+    assert sorted(p.name for p in bag.iterdir()) == ['bag_0.mcap', 'metadata.yaml']
+    content = yaml.safe_load((bag / 'metadata.yaml').read_text())['rosbag2_bagfile_information']
+    assert list(content) == [
+        'version',
+        'storage_identifier',
+        'duration',
+        'starting_time',
+        'message_count',
+        'topics_with_message_count',
+        'compression_format',
+        'compression_mode',
+        'relative_file_paths',
+        'files',
+        'custom_data',
+        'ros_distro',
+    ]
+    assert content['version'] == 9
+    assert content['message_count'] == 33
+    assert content['files'][0]['message_count'] == 33
+    topics = {t['topic_metadata']['name']: t for t in content['topics_with_message_count']}
+    assert topics['/samples']['message_count'] == 32
+    qos = topics['/test_setup']['topic_metadata']['offered_qos_profiles']
+    assert qos[0]['durability'] == 'transient_local'
+    assert len(qos[0]) == 9
+
+
+def test_mcap_carries_what_rosbag2_reads(bag: Path) -> None:
+    """Profile, definitions, QoS, hash and the metadata record, through mcap's own reader."""
+    with (bag / 'bag_0.mcap').open('rb') as file:
+        reader = make_reader(file)
+        assert reader.get_header().profile == 'ros2'
+        summary = reader.get_summary()
+        assert summary is not None
+        assert summary.statistics is not None
+        assert summary.statistics.message_count == 33
+        for channel in summary.channels.values():
+            schema = summary.schemas[channel.schema_id]
+            known = messages.message_type(schema.name)
+            assert channel.message_encoding == 'cdr'
+            assert schema.encoding == 'ros2msg'
+            assert schema.data.decode() == known.definition
+            assert channel.metadata['topic_type_hash'] == known.rihs01
+            assert yaml.safe_load(channel.metadata['offered_qos_profiles'])[0]['history']
+        records = [m for m in reader.iter_metadata() if m.name == 'rosbag2']
+        assert yaml.safe_load(records[0].metadata['serialized_metadata'])['version'] == 9
+
+
+def test_rosbags_reads_our_bag(bag: Path, record: Record) -> None:
+    """An independent reader finds the same samples and the same type hash."""
+    with AnyReader([bag]) as reader:
+        samples = [c for c in reader.connections if c.topic == '/samples']
+        assert samples[0].digest == messages.message_type('SampleBlock').rihs01
+        blocks = [reader.deserialize(raw, c.msgtype) for c, _, raw in reader.messages(samples)]
+    command = np.concatenate([b.command for b in blocks])
+    assert command.tobytes() == record.command.tobytes()
+    assert [b.index for b in blocks] == list(range(0, 500, 16))
+
+
+def test_we_read_rosbags_bag(tmp_path: Path, record: Record) -> None:
+    """A bag by another writer, as a folder and as a lone .mcap."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+
+    store = messages.typestore()
+    name = 'actuator_glue_msgs/msg/SampleBlock'
+    with Writer(tmp_path / 'b', version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        connection = writer.add_connection('/ns/samples', name, typestore=store)
+        for start in range(0, 500, 50):
+            part = slice(start, start + 50)
+            block = messages.message(
+                'SampleBlock',
+                header=messages.header(record.stamp_ns(start), 'a'),
+                period=record.period,
+                index=start,
+                command=record.command[part],
+                measured=record.measured[part],
+                force=np.empty(0),
+            )
+            writer.write(connection, record.stamp_ns(start), store.serialize_cdr(block, name))
+    for path in (tmp_path / 'b', tmp_path / 'b' / 'b.mcap'):
+        (back,) = read_records(path)
+        assert back.measured.tobytes() == record.measured.tobytes()
+        assert back.stiffness is None
+
+
+@pytest.fixture(scope='module')
+def whole(make_record: Make) -> bytes:
+    """The bytes of a small finished .mcap with several chunks."""
+    with tempfile.TemporaryDirectory() as folder:
+        with BagWriter(Path(folder) / 'bag') as writer:
+            write_record(writer, make_record(300).slice(0, 150), block=4)
+            writer.flush()
+            write_record(writer, make_record(300).slice(150, 300), block=4)
+        return (Path(folder) / 'bag' / 'bag_0.mcap').read_bytes()
+
+
+SLOW_DISK = [HealthCheck.function_scoped_fixture, HealthCheck.too_slow]
+
+
+@settings(max_examples=120, deadline=None, suppress_health_check=SLOW_DISK)
+@given(data=st.data())
+def test_any_cut_is_readable(whole: bytes, tmp_path: Path, data: st.DataObject) -> None:
+    """Cut anywhere: every message before the cut is there, whole, and it is said to be cut."""
+    cut = data.draw(st.integers(0, len(whole)))
+    path = tmp_path / 'cut.mcap'
+    path.write_bytes(whole[:cut])
+    notes: list[str] = []
+    found = list(bag_messages(path, note=notes.append))
+    expected = list(_complete_messages(whole))
+    assert [(m.topic, m.data) for m in found] == expected[: len(found)]
+    inside = sum(1 for end in _message_ends(whole) if end <= cut)
+    assert len(found) == inside
+    footer_end = len(whole) - 8
+    assert bool(notes) == (cut < footer_end)
+    if notes:
+        with pytest.raises(InputError, match='recover'):
+            read_records(path)
+
+
+def _complete_messages(whole: bytes) -> list[tuple[str, bytes]]:
+    import io
+
+    reader = make_reader(io.BytesIO(whole))
+    return [(c.topic, m.data) for _, c, m in reader.iter_messages(log_time_order=False)]
+
+
+def _message_ends(whole: bytes) -> list[int]:
+    """Byte after each message, by walking the records independently of the code under test."""
+    ends, at = [], 8
+    while at < len(whole) - 8:
+        opcode, length = whole[at], int.from_bytes(whole[at + 1 : at + 9], 'little')
+        if opcode == 6:
+            inner, stop = at + 9 + 40, at + 9 + length
+            while inner < stop:
+                size = int.from_bytes(whole[inner + 1 : inner + 9], 'little')
+                if whole[inner] == 5:
+                    ends.append(inner + 9 + size)
+                inner += 9 + size
+        at += 9 + length
+    return ends
+
+
+@settings(max_examples=150, deadline=None, suppress_health_check=SLOW_DISK)
+@given(data=st.data())
+def test_damage_never_raises_anything_else(
+    whole: bytes, tmp_path: Path, data: st.DataObject
+) -> None:
+    """Overwritten bytes anywhere: InputError at most, never a crash, never a wrong sample."""
+    at = data.draw(st.integers(0, len(whole) - 1))
+    junk = data.draw(st.binary(min_size=1, max_size=40))
+    path = tmp_path / 'damaged.mcap'
+    path.write_bytes(whole[:at] + junk + whole[at + len(junk) :])
+    try:
+        for _ in bag_messages(path, note=lambda _: None):
+            pass
+        read_records(path, note=lambda _: None, gap=lambda _: None)
+    except InputError as error:
+        assert str(path) in str(error) or 'damaged.mcap' in str(error)
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=SLOW_DISK)
+@given(junk=st.binary(max_size=300))
+def test_hostile_files_get_one_message(tmp_path: Path, junk: bytes) -> None:
+    """Random bytes, with and without the magic, are refused or read as cut."""
+    for prefix in (b'', b'\x89MCAP0\r\n'):
+        path = tmp_path / 'hostile.mcap'
+        path.write_bytes(prefix + junk)
+        with pytest.raises(InputError):
+            read_records(path)
+
+
+def test_a_claimed_size_is_not_believed(tmp_path: Path) -> None:
+    """A chunk that claims 2^60 bytes, and a compressed bomb, take no memory."""
+    import zstandard
+
+    huge = b'\x06' + (1 << 60).to_bytes(8, 'little') + b'\x00' * 64
+    bomb = zstandard.compress(bytes(1 << 26))
+    head = bytes(16) + (1 << 40).to_bytes(8, 'little') + bytes(4)
+    body = head + (4).to_bytes(4, 'little') + b'zstd' + len(bomb).to_bytes(8, 'little') + bomb
+    chunk = b'\x06' + len(body).to_bytes(8, 'little') + body
+    for content in (huge, chunk):
+        path = tmp_path / 'hostile.mcap'
+        path.write_bytes(b'\x89MCAP0\r\n' + content)
+        notes: list[str] = []
+        assert list(bag_messages(path, note=notes.append)) == []
+        assert notes
+
+
+def test_recover_gives_back_everything_before_the_cut(bag: Path, record: Record) -> None:
+    """The mended bag is a finished bag for us and for rosbags; the original is kept."""
+    file = bag / 'bag_0.mcap'
+    content = file.read_bytes()
+    file.write_bytes(content[: len(content) // 2])
+    (bag / 'metadata.yaml').unlink()
+    with pytest.raises(InputError, match='actuator-glue recover'):
+        read_records(bag)
+    recovery = recover(bag)
+    assert recovery.rewritten == ['bag_0.mcap']
+    assert (bag / 'bag_0.mcap.cut').read_bytes() == content[: len(content) // 2]
+    (back,) = read_records(bag)
+    assert 100 < len(back) < 400
+    assert back.command.tobytes() == record.command[: len(back)].tobytes()
+    with AnyReader([bag]) as reader:
+        assert reader.message_count == recovery.messages
+    again = recover(bag)
+    assert again.rewritten == []
+    assert again.notes == []
+
+
+def test_recover_writes_a_lost_metadata_file(bag: Path) -> None:
+    """A bag without metadata.yaml but with whole files only lacks that."""
+    before = yaml.safe_load((bag / 'metadata.yaml').read_text())
+    (bag / 'metadata.yaml').unlink()
+    assert recover(bag).rewritten == []
+    assert yaml.safe_load((bag / 'metadata.yaml').read_text()) == before
+
+
+def test_recover_refuses_what_holds_nothing(tmp_path: Path) -> None:
+    """An empty file, as rosbag2 leaves after a kill, cannot be mended."""
+    folder = tmp_path / 'bag'
+    folder.mkdir()
+    (folder / 'bag_0.mcap').write_bytes(b'')
+    with pytest.raises(InputError, match='not one whole message'):
+        recover(folder)
+
+
+def test_recover_leaves_a_bag_that_is_being_recorded(tmp_path: Path, record: Record) -> None:
+    """A running recorder would go on writing into the renamed original."""
+    with BagWriter(tmp_path / 'bag') as writer:
+        write_record(writer, record)
+        with pytest.raises(InputError, match='being recorded'):
+            recover(tmp_path / 'bag')
+
+
+def test_damaged_chunk_is_left_out(tmp_path: Path, whole: bytes) -> None:
+    """A flipped byte inside a chunk costs that chunk, not the bag."""
+    total = len(_complete_messages(whole))
+    folder = tmp_path / 'bag'
+    folder.mkdir()
+    first = _message_ends(whole)[0] - 10
+    content = bytearray(whole)
+    content[first] ^= 0xFF
+    (folder / 'bag_0.mcap').write_bytes(content)
+    recovery = recover(folder)
+    assert any('checksum' in note for note in recovery.notes)
+    assert 0 < recovery.messages < total
+
+
+def test_files_are_split_and_read_as_one(tmp_path: Path, make_record: Make) -> None:
+    """A long recording goes on in the next file; memory and files stay small."""
+    record = make_record(20_000)
+    writer = BagWriter(tmp_path / 'bag', flush_period=0.0, max_file_bytes=100_000)
+    with writer:
+        write_record(writer, record, block=100)
+    files = sorted(p.name for p in (tmp_path / 'bag').glob('*.mcap'))
+    assert len(files) > 3
+    (back,) = read_records(tmp_path / 'bag')
+    assert same(record, back)
+    with AnyReader([tmp_path / 'bag']) as reader:
+        assert reader.message_count == writer.count == 201
+    (tmp_path / 'bag' / 'metadata.yaml').unlink()
+    assert same(record, read_records(tmp_path / 'bag')[0])
+
+
+def test_log_times_strictly_increase(tmp_path: Path) -> None:
+    """Equal and backward stamps keep their order of arrival."""
+    with BagWriter(tmp_path / 'bag') as writer:
+        writer.add_topic('/s', 'std_msgs/msg/Float64')
+        for stamp in (5, 5, 3, 9):
+            content = messages.message('std_msgs/msg/Float64', data=float(stamp))
+            writer.write('/s', content, stamp)
+    times = [m.log_time for m in bag_messages(tmp_path / 'bag')]
+    assert times == [5, 6, 7, 9]
+
+
+def test_writer_says_what_is_wrong(tmp_path: Path) -> None:
+    """Existing bag, unknown topic, two types on one topic, unknown type, closed bag."""
+    with BagWriter(tmp_path / 'bag') as writer:
+        writer.add_topic('/a', 'std_msgs/msg/Float64', qos=(Qos(), LATCHED))
+        writer.add_topic('/a', 'std_msgs/msg/Float64')
+        with pytest.raises(InputError, match='cannot also be'):
+            writer.add_topic('/a', 'std_msgs/msg/Int32')
+        with pytest.raises(InputError, match='unknown'):
+            writer.add_topic('/b', 'nobody_msgs/msg/Nothing')
+        with pytest.raises(InputError, match='not declared'):
+            writer.write_raw('/c', b'', 0)
+    with pytest.raises(InputError, match='closed'):
+        writer.write_raw('/a', b'', 0)
+    with pytest.raises(InputError, match='exists already'):
+        BagWriter(tmp_path / 'bag')
+
+
+def test_an_error_does_not_lose_what_was_recorded(tmp_path: Path, record: Record) -> None:
+    """An exception while recording still leaves a finished bag."""
+    with pytest.raises(RuntimeError), BagWriter(tmp_path / 'bag') as writer:
+        write_record(writer, record)
+        raise RuntimeError
+    assert same(record, read_records(tmp_path / 'bag')[0])
+    assert summarise(tmp_path / 'bag').finished
+
+
+def test_foreign_types_are_recorded_raw(tmp_path: Path) -> None:
+    """A type of somebody else's package goes in with its own text and comes out untouched."""
+    with BagWriter(tmp_path / 'bag') as writer:
+        writer.add_topic(
+            '/x', 'lab_msgs/msg/Pump', definition='float64 pressure\n', rihs01='RIHS01_00'
+        )
+        writer.write_raw('/x', b'\x00\x01\x00\x00' + bytes(8), 10, 7)
+    (found,) = bag_messages(tmp_path / 'bag')
+    assert found.data == b'\x00\x01\x00\x00' + bytes(8)
+    assert (found.log_time, found.publish_time) == (10, 7)
+    summary = summarise(tmp_path / 'bag')
+    assert summary.topics['/x'].rihs01 == 'RIHS01_00'
+    assert summary.definitions['lab_msgs/msg/Pump'] == 'float64 pressure\n'
+
+
+def test_what_is_no_bag(tmp_path: Path) -> None:
+    """Missing path, empty folder, sqlite3 bag, bag without samples: one message each."""
+    with pytest.raises(InputError, match='no such bag'):
+        read_records(tmp_path / 'nothing')
+    (tmp_path / 'empty').mkdir()
+    assert not is_bag(tmp_path / 'empty')
+    with pytest.raises(InputError, match='no bag in MCAP format'):
+        read_records(tmp_path / 'empty')
+    sqlite = tmp_path / 'sqlite'
+    sqlite.mkdir()
+    (sqlite / 'metadata.yaml').write_text(
+        'rosbag2_bagfile_information:\n  relative_file_paths: [a_0.db3]\n'
+    )
+    with pytest.raises(InputError, match='ros2 bag convert'):
+        read_records(sqlite)
+    with BagWriter(tmp_path / 'other') as writer:
+        writer.add_topic('/s', 'std_msgs/msg/Float64')
+        writer.write('/s', messages.message('std_msgs/msg/Float64', data=1.0), 0)
+    with pytest.raises(InputError, match=r'SampleBlock.*/s \(std_msgs'):
+        read_records(tmp_path / 'other')
+
+
+def test_metadata_that_is_none_is_said(bag: Path) -> None:
+    """A damaged metadata.yaml is told and recover writes it anew."""
+    (bag / 'metadata.yaml').write_text('not: [a bag')
+    with pytest.raises(InputError, match='not the metadata'):
+        read_records(bag)
+    recover(bag)
+    assert len(read_records(bag)) == 1
+
+
+def test_a_missing_file_is_said(bag: Path) -> None:
+    """A file that metadata.yaml names but is not there is damage."""
+    shutil.copy(bag / 'bag_0.mcap', bag / 'spare')
+    (bag / 'bag_0.mcap').unlink()
+    with pytest.raises(InputError, match='missing'):
+        read_records(bag)
+
+
+@pytest.mark.skipif(sys.platform == 'win32', reason='POSIX permissions and limits')
+def test_no_permission_and_no_room(tmp_path: Path) -> None:
+    """A folder that cannot be made is one message; so is a file where a folder is needed."""
+    (tmp_path / 'file').write_text('')
+    with pytest.raises(InputError, match='cannot be made'):
+        BagWriter(tmp_path / 'file' / 'bag')

@@ -1,0 +1,228 @@
+"""Gaps, restarts and set-ups inside a bag, and what a killed or starved writer leaves."""
+
+import os
+import signal
+import subprocess
+import sys
+import textwrap
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuator_glue.errors import InputError
+from actuator_glue.io import messages
+from actuator_glue.io.bag_records import read_records, write_record
+from actuator_glue.io.bag_writer import BagWriter
+from actuator_glue.io.recover import recover
+from actuator_glue.records import Record
+
+Make = Callable[..., Record]
+
+
+def samples(record: Record, start: int, stop: int) -> object:
+    """Return samples start:stop of a record as a SampleBlock."""
+    return messages.message(
+        'SampleBlock',
+        header=messages.header(record.stamp_ns(start), record.actuator),
+        period=record.period,
+        index=record.first_index + start,
+        command=record.command[start:stop],
+        measured=record.measured[start:stop],
+        force=np.empty(0),
+    )
+
+
+def setup(record: Record, at: int, stiffness: float) -> object:
+    """Return a TestSetup that holds from a sample on."""
+    return messages.message(
+        'TestSetup',
+        header=messages.header(record.stamp_ns(at), record.actuator),
+        actuator=record.actuator,
+        specimen_stiffness=stiffness,
+        rate=record.rate,
+        hold=record.hold,
+        index=at,
+        source='',
+    )
+
+
+def open_bag(path: Path) -> BagWriter:
+    """Return a writer with the two topics declared."""
+    writer = BagWriter(path)
+    writer.add_topic('/samples', 'SampleBlock')
+    writer.add_topic('/test_setup', 'TestSetup')
+    return writer
+
+
+def test_missing_samples_are_told_or_split(tmp_path: Path, record: Record) -> None:
+    """A gap is an error where nobody listens, and two records where somebody does."""
+    with open_bag(tmp_path / 'bag') as writer:
+        for start in (0, 100, 300, 400):
+            writer.write('/samples', samples(record, start, start + 100), start)
+    with pytest.raises(
+        InputError, match=r'100 samples \(0\.1 s\) are missing before at sample 300'
+    ):
+        read_records(tmp_path / 'bag')
+    told: list[str] = []
+    first, second = read_records(tmp_path / 'bag', gap=told.append)
+    assert len(told) == 1
+    assert (len(first), len(second)) == (200, 200)
+    assert (second.first_index, second.start_ns) == (300, record.stamp_ns(300))
+    assert second.command.tobytes() == record.command[300:].tobytes()
+
+
+def test_a_stream_that_begins_again_is_a_new_record(tmp_path: Path, record: Record) -> None:
+    """Two tests in one bag are two records, each with its own set-up."""
+    with open_bag(tmp_path / 'bag') as writer:
+        write_record(writer, record)
+        later = replace(record, stiffness=0.0, start_ns=record.start_ns + 10**10)
+        write_record(writer, later)
+    first, second = read_records(tmp_path / 'bag')
+    assert (first.stiffness, second.stiffness) == (250e3, 0.0)
+    assert len(first) == len(second) == 500
+
+
+@pytest.mark.parametrize('delay', [0, 1, 2])
+def test_a_changed_setup_splits_at_its_sample(tmp_path: Path, record: Record, delay: int) -> None:
+    """The set-up's stamp says from when on it holds, even if it is recorded some blocks late."""
+    with open_bag(tmp_path / 'bag') as writer:
+        writer.write('/test_setup', setup(record, 0, 0.0), 0)
+        for i, start in enumerate(range(0, 500, 50)):
+            if i == 4 + delay:
+                writer.write('/test_setup', setup(record, 200, 5e4), start)
+            writer.write('/samples', samples(record, start, start + 50), start)
+    first, second = read_records(tmp_path / 'bag')
+    assert (len(first), first.stiffness) == (200, 0.0)
+    assert (len(second), second.stiffness) == (300, 5e4)
+
+
+def test_a_setup_recorded_after_the_first_samples_still_holds(
+    tmp_path: Path, record: Record
+) -> None:
+    """Latched topics may arrive late at the recorder."""
+    with open_bag(tmp_path / 'bag') as writer:
+        writer.write('/samples', samples(record, 0, 250), 0)
+        writer.write('/samples', samples(record, 250, 500), 1)
+        writer.write('/test_setup', setup(record, 0, 7e4), 2)
+    (only,) = read_records(tmp_path / 'bag')
+    assert only.stiffness == 7e4
+
+
+def test_two_actuators_are_two_records(tmp_path: Path, record: Record, make_record: Make) -> None:
+    """Namespaces keep actuators and their set-ups apart."""
+    other = replace(make_record(stiffness=0.0), actuator='other')
+    with BagWriter(tmp_path / 'bag') as writer:
+        write_record(writer, record, namespace='/a')
+        write_record(writer, other, namespace='/b')
+    first, second = read_records(tmp_path / 'bag')
+    assert (first.actuator, first.stiffness) == ('mts', 250e3)
+    assert (second.actuator, second.stiffness) == ('other', 0.0)
+    assert first.source.endswith(':/a/samples (record 1 of 2)')
+
+
+def test_bad_samples_in_a_bag_are_one_message(tmp_path: Path, record: Record) -> None:
+    """NaN, absurd values, unequal channels and bytes that are no message."""
+    command = record.command[:100].copy()
+    command[42] = np.nan
+    cases = {'NaN': command, '1e+06 m': np.full(100, 1e6), 'different lengths': command[:50]}
+    for i, (words, values) in enumerate(cases.items()):
+        block = samples(record, 0, 100)
+        block.command = values
+        with open_bag(tmp_path / f'bag{i}') as writer:
+            writer.write('/samples', block, 0)
+        with pytest.raises(InputError, match=words.replace('+', r'\+')):
+            read_records(tmp_path / f'bag{i}')
+    with open_bag(tmp_path / 'bag') as writer:
+        writer.write_raw('/samples', b'\x00\x01\x00\x00' + b'\xff' * 20, 0)
+    with pytest.raises(InputError, match='are not a actuator_glue_msgs/msg/SampleBlock'):
+        read_records(tmp_path / 'bag')
+
+
+RECORDER = textwrap.dedent(
+    """
+    import sys, time
+    import numpy as np
+    from actuator_glue.io import messages
+    from actuator_glue.io.bag_writer import BagWriter
+
+    writer = BagWriter(sys.argv[1])
+    writer.add_topic('/samples', 'SampleBlock')
+    zeros = np.zeros(10)
+    index, start = 0, time.monotonic()
+    while True:
+        block = messages.message(
+            'SampleBlock', header=messages.header(time.time_ns(), 'a'), period=1e-3,
+            index=index, command=zeros, measured=zeros, force=zeros[:0],
+        )
+        writer.write('/samples', block, time.time_ns())
+        print(time.time_ns(), flush=True)
+        index += 10
+        time.sleep(max(0.0, start + index * 1e-3 - time.monotonic()))
+    """
+)
+
+
+def test_a_killed_recorder_loses_half_a_second_at_most(tmp_path: Path) -> None:
+    """SIGKILL while recording: the rest is readable and recover finishes the bag."""
+    with subprocess.Popen(
+        [sys.executable, '-c', RECORDER, str(tmp_path / 'bag')], stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdout is not None
+        process.stdout.readline()
+        time.sleep(1.5)
+        os.kill(process.pid, signal.SIGKILL)
+        stamps = [int(line) for line in process.stdout.read().split()]
+    assert not (tmp_path / 'bag' / 'metadata.yaml').exists()
+    recovery = recover(tmp_path / 'bag')
+    (record,) = read_records(tmp_path / 'bag')
+    assert recovery.messages == len(record) // 10
+    last = record.stamp_ns(len(record) - 10)
+    # The recorder's loop ran on real time, so stamps tell how much of it was lost.
+    lost = stamps[-1] - stamps[min(recovery.messages, len(stamps)) - 1]
+    assert lost <= 0.5e9, (lost, last)
+
+
+STARVED = textwrap.dedent(
+    """
+    import resource, signal, sys
+    import numpy as np
+    from actuator_glue.errors import InputError
+    from actuator_glue.io.bag_records import write_record
+    from actuator_glue.io.bag_writer import BagWriter
+    from actuator_glue.records import Record
+
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
+    values = np.arange(50_000) * 1e-6
+    writer = BagWriter(sys.argv[1], flush_period=0.0)
+    for attempt in range(2):
+        try:
+            write_record(writer, Record(values, values, 1e-3), block=50)
+        except InputError as error:
+            print(error)
+    try:
+        writer.close()
+    except InputError as error:
+        print(error)
+    """
+)
+
+
+def test_a_full_disk_is_one_message_and_keeps_the_rest(tmp_path: Path) -> None:
+    """The message comes back on every later call; what was flushed is readable and mendable."""
+    done = subprocess.run(
+        [sys.executable, '-c', STARVED, str(tmp_path / 'bag')], capture_output=True, text=True
+    )
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    assert len(lines) == 3
+    assert all('full' in line and 'recover' in line for line in lines)
+    assert done.stderr == ''
+    recover(tmp_path / 'bag')
+    (record,) = read_records(tmp_path / 'bag')
+    assert len(record) > 5_000
+    assert record.command.tobytes() == (np.arange(len(record)) * 1e-6).tobytes()

@@ -1,0 +1,315 @@
+"""Laboratory files: what is read, and one clear message for what is not."""
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from scipy.io import savemat
+
+from actuator_glue.errors import InputError
+from actuator_glue.io.channel_map import parse_channel_map, read_channel_map
+from actuator_glue.io.export import write_csv, write_mat
+from actuator_glue.io.laboratory import read
+from actuator_glue.io.load import load_records
+from actuator_glue.io.time_base import uniform_period
+from actuator_glue.records import Record
+
+ROOT = Path(__file__).resolve().parents[2]
+MTS_MAP = ROOT / 'config' / 'channels' / 'mts.yaml'
+MTS = Path(os.environ.get('ACTUATOR_GLUE_MTS', ROOT.parent / 'shared' / 'data' / 'mts'))
+
+
+def csv(path: Path, header: str, rows: list[str] | None = None) -> Path:
+    """Write a CSV of a header and rows."""
+    rows = rows or [f'{i * 1e-3:.3f},{i},{i * 0.5},{i * 2}' for i in range(10)]
+    path.write_text('\n'.join([header, *rows]) + '\n')
+    return path
+
+
+def test_units_are_in_the_names(tmp_path: Path) -> None:
+    """Each unit the issue names, and both ways to write it."""
+    for name, column, factor in (
+        ('m', 'command_m', 1.0),
+        ('mm', 'Command [mm]', 1e-3),
+        ('um', 'command_um', 1e-6),
+        ('in', 'command_in', 0.0254),
+    ):
+        path = csv(tmp_path / f'{name}.csv', f'time_s,{column},measured_mm,force_kN')
+        record = read(path)
+        np.testing.assert_allclose(record.command, np.arange(10) * factor, rtol=1e-15)
+        np.testing.assert_allclose(record.measured, np.arange(10) * 0.5e-3, rtol=1e-15)
+        assert record.force is not None
+        np.testing.assert_allclose(record.force, np.arange(10) * 2e3, rtol=1e-15)
+        assert record.period == 1e-3
+
+
+@pytest.mark.parametrize('delimiter', [',', ';', '\t', ' '])
+def test_delimiters_are_found(tmp_path: Path, delimiter: str) -> None:
+    """Comma, semicolon, tab and blanks; other columns are not looked at."""
+    header = delimiter.join(['comment', 'time_ms', 'measured_mm', 'command_mm'])
+    rows = [delimiter.join(['text', str(i), str(i * 0.5), str(i)]) for i in range(10)]
+    record = read(csv(tmp_path / 'a.txt', header, rows))
+    np.testing.assert_allclose(record.command, np.arange(10) * 1e-3)
+    assert record.force is None
+
+
+@pytest.mark.parametrize(
+    ('header', 'words'),
+    [
+        ('time_s,command,measured_mm,force_N', 'command_m or command_mm'),
+        ('time,command_mm,measured_mm,force_N', "'time' has no unit"),
+        ('time_s,command_furlong,measured_mm,force_N', "unit 'furlong'"),
+        ('time_s,command_MM,measured_mm,force_N', "unit 'MM'"),
+        ('time_s,command_mm,mesured_mm,force_N', 'no column for measured'),
+        ('time_s,command_mm,command_m,measured_mm', 'two columns are called command'),
+        ('0.0,1,2,3', 'first line must name the columns'),
+        ('a,b,c,d', 'no column for time'),
+    ],
+)
+def test_a_header_that_cannot_be_used(tmp_path: Path, header: str, words: str) -> None:
+    """Missing or unknown unit, missing or doubled column, no header."""
+    path = csv(tmp_path / 'a.csv', header)
+    with pytest.raises(InputError, match=words) as caught:
+        read(path)
+    assert str(path) in str(caught.value)
+
+
+def rows(time: list[float], command: str = '1') -> list[str]:
+    """Return rows with these times."""
+    return [f'{t!r},{command},0,0' for t in time]
+
+
+GRID = [i * 1e-3 for i in range(10)]
+
+
+@pytest.mark.parametrize(
+    ('lines', 'words'),
+    [
+        (rows([0.0]), r'1 sample\(s\)'),
+        (rows([0.0, 0.001, 0.003, 0.002]), 'time goes back at sample 3'),
+        (rows([0.0, 0.001, 0.001, 0.002]), 'time stands still at sample 2'),
+        (rows([*GRID, 0.5, 0.501]), 'without samples after sample 9'),
+        (rows([0.0, 0.001, 0.0014, 0.003, 0.004]), 'not uniform'),
+        (rows([float('nan'), 0.001, 0.002]), 'time is NaN'),
+        (rows(GRID, 'nan'), 'NaN or infinite'),
+        (rows(GRID, '1e9'), 'check the unit'),
+        (rows(GRID, 'abc'), "'abc'"),
+        (rows(GRID, ''), "''"),
+        (['0,1', '0.001,1'], 'cannot read the samples'),
+        ([], 'no samples after'),
+    ],
+)
+def test_samples_that_cannot_be_used(tmp_path: Path, lines: list[str], words: str) -> None:
+    """One sample, time going back, gap, jitter, NaN, 1e6 m, text, short row, no row."""
+    path = tmp_path / 'a.csv'
+    path.write_text('\n'.join(['time_s,command_mm,measured_mm,force_N', *lines]) + '\n')
+    with pytest.raises(InputError, match=words) as caught:
+        read(path)
+    assert str(path) in str(caught.value)
+
+
+def test_files_that_are_none(tmp_path: Path) -> None:
+    """Missing, empty, a folder, bytes, UTF-16."""
+    with pytest.raises(InputError, match='no such file'):
+        read(tmp_path / 'a.csv')
+    (tmp_path / 'a.csv').write_text('')
+    with pytest.raises(InputError, match='empty'):
+        read(tmp_path / 'a.csv')
+    with pytest.raises(InputError, match='folder'):
+        read(tmp_path)
+    for content in (bytes(range(256)) * 10, 'time_s,command_mm\n0,1\n'.encode('utf-16')):
+        (tmp_path / 'b.csv').write_bytes(content)
+        with pytest.raises(InputError):
+            read(tmp_path / 'b.csv')
+
+
+@settings(
+    max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(text=st.text(max_size=200), named=st.booleans())
+def test_any_text_gives_a_record_or_one_message(tmp_path: Path, text: str, named: bool) -> None:
+    """Whatever is in a text file, nothing but InputError comes out."""
+    path = tmp_path / 'any.csv'
+    head = 'time_s,command_mm,measured_mm\n' if named else ''
+    path.write_text(head + text, encoding='utf-8', errors='surrogatepass')
+    with pytest.raises(InputError):
+        read(path)
+
+
+def test_time_base_takes_rounded_and_skewed_clocks() -> None:
+    """Rounded stamps give the rate back; a clock 20 ppm off is not rounded away."""
+    count = np.arange(60_000)
+    assert uniform_period(np.round(count / 1024, 4), 'x') == 1 / 1024
+    assert uniform_period(1e9 + count * 5e-3, 'x') == 5e-3
+    skewed = uniform_period(count * 1e-3 * (1 + 20e-6), 'x')
+    assert skewed == pytest.approx(1e-3 * (1 + 20e-6), rel=1e-9)
+    with pytest.raises(InputError, match='channel map'):
+        uniform_period(np.round(count / 1024, 3), 'x')
+
+
+@pytest.mark.parametrize('suffix', ['.csv', '.mat'])
+@pytest.mark.parametrize('stiffness', [None, 0.0, 250e3])
+def test_export_and_back(
+    tmp_path: Path, record: Record, suffix: str, stiffness: float | None
+) -> None:
+    """In m nothing is lost; in mm one rounding; stiffness, hold and name come back."""
+    record = replace(record, stiffness=stiffness, hold='linear')
+    write = write_csv if suffix == '.csv' else write_mat
+    for unit in ('m', 'mm'):
+        path = tmp_path / f'{unit}{suffix}'
+        write(path, record, unit=unit)
+        back = read(path)
+        assert back.stiffness == stiffness
+        assert (back.hold, back.actuator, back.period) == ('linear', 'mts', 1e-3)
+        assert back.start_ns == record.start_ns
+        np.testing.assert_allclose(back.command, record.command, rtol=3e-16, atol=0)
+        if unit == 'm':
+            assert back.measured.tobytes() == record.measured.tobytes()
+            assert back.force is not None
+            assert record.force is not None
+            assert back.force.tobytes() == record.force.tobytes()
+
+
+def test_matlab_structs_and_version_7_3(tmp_path: Path, record: Record) -> None:
+    """Fields of a struct are found; an HDF5 file and a damaged one are told."""
+    test = {'time_s': record.time, 'command_mm': record.command * 1e3}
+    savemat(tmp_path / 'a.mat', {'test': {**test, 'measured_mm': record.measured[:, None] * 1e3}})
+    np.testing.assert_allclose(read(tmp_path / 'a.mat').measured, record.measured)
+    with h5py.File(tmp_path / 'b.mat', 'w', userblock_size=512) as file:
+        file['time_s'] = record.time
+    with (tmp_path / 'b.mat').open('r+b') as file:
+        file.write(b'MATLAB 7.3 MAT-file'.ljust(124) + b'\x00\x02IM')
+    with pytest.raises(InputError, match='-v7'):
+        read(tmp_path / 'b.mat')
+    content = (tmp_path / 'a.mat').read_bytes()
+    for cut in (0, 50, 128, 140, len(content) // 2):
+        (tmp_path / 'c.mat').write_bytes(content[:cut])
+        with pytest.raises(InputError, match=r'c\.mat'):
+            read(tmp_path / 'c.mat')
+
+
+MAP = {
+    'command': {'column': 'u', 'unit': 'mm', 'scale': 10},
+    'measured': {'column': 3, 'unit': 'mm', 'scale': -10, 'offset': 1.0},
+    'rate': 100,
+    'header_lines': 2,
+}
+
+
+def test_a_map_reads_any_text(tmp_path: Path) -> None:
+    """Column by name and number, scale, offset, header lines, decimal comma."""
+    path = tmp_path / 'a.txt'
+    path.write_text('made by nobody\nx;u;y\n' + ''.join(f'a;{i},5;{i},25\n' for i in range(20)))
+    record = read(path, channels=parse_channel_map({**MAP, 'decimal': ','}, 'map'), hold='linear')
+    i = np.arange(20)
+    np.testing.assert_allclose(record.command, (i + 0.5) * 10e-3)
+    np.testing.assert_allclose(record.measured, ((i + 0.25) * -10 + 1) * 1e-3, atol=1e-18)
+    assert (record.period, record.hold) == (0.01, 'linear')
+
+
+@pytest.mark.parametrize(
+    ('change', 'words'),
+    [
+        ({'comand': {}}, 'did you mean command'),
+        ({'measured': None}, 'measured is missing'),
+        ({'measured': {'unit': 'mm'}}, 'column is missing'),
+        ({'measured': {'column': 'y'}}, 'unit is missing'),
+        ({'measured': {'column': 'y', 'unit': 'N'}}, "unit 'N'"),
+        ({'measured': {'column': 0, 'unit': 'mm'}}, 'counted from 1'),
+        ({'measured': {'column': 1.5, 'unit': 'mm'}}, 'name or a number'),
+        ({'measured': {'column': 1, 'unit': 'mm', 'scale': 'x'}}, 'scale must be a number'),
+        ({'measured': {'column': 1, 'unit': 'mm', 'remove_rest_offset': True}}, 'rest_samples'),
+        ({'measured': 3}, 'must be a mapping'),
+        ({'rate': None}, 'give `rate`'),
+        ({'rate': -5}, 'outside'),
+        ({'header_lines': -1}, 'at least 0'),
+        ({'hold': 'cubic'}, 'use one of'),
+        ({'stiffness': -1}, 'outside'),
+        ({'delimiter': 5}, 'must be text'),
+    ],
+)
+def test_maps_that_cannot_be_used(change: dict[str, object], words: str) -> None:
+    """Unknown entry, missing entry, wrong kind, unit or range."""
+    with pytest.raises(InputError, match=words):
+        parse_channel_map({**MAP, **change}, 'map.yaml')
+
+
+def test_map_files_that_cannot_be_used(tmp_path: Path) -> None:
+    """Missing file, no YAML, no mapping; exponents without a point are numbers."""
+    path = tmp_path / 'm.yaml'
+    with pytest.raises(InputError, match='cannot be read'):
+        read_channel_map(path)
+    path.write_text('a: [b')
+    with pytest.raises(InputError, match='not YAML'):
+        read_channel_map(path)
+    path.write_text('5')
+    with pytest.raises(InputError, match='must be a mapping'):
+        read_channel_map(path)
+    path.write_text('rate: 1e3\ncommand: {column: 1, unit: m}\nmeasured: {column: 2, unit: m}\n')
+    assert read_channel_map(path).rate == 1000.0
+
+
+def test_a_wrong_column_and_a_moving_rest(tmp_path: Path) -> None:
+    """A name that is not there lists those that are; a test at rest must be at rest."""
+    path = tmp_path / 'a.txt'
+    path.write_text('\nx,u,y\n' + ''.join(f'{i},{i},{i}\n' for i in range(50)))
+    wrong = parse_channel_map({**MAP, 'command': {'column': 'v', 'unit': 'mm'}}, 'map')
+    with pytest.raises(InputError, match=r"no column is called 'v'.*'x', 'u', 'y'"):
+        read(path, channels=wrong)
+    moving = {'column': 'u', 'unit': 'mm', 'remove_rest_offset': True}
+    for samples, words in ((20, 'not at rest'), (50, '50 rest samples, but 50')):
+        rest = parse_channel_map({**MAP, 'command': moving, 'rest_samples': samples}, 'map')
+        with pytest.raises(InputError, match=words):
+            read(path, channels=rest)
+    far = parse_channel_map({**MAP, 'command': {'column': 9, 'unit': 'mm'}}, 'map')
+    with pytest.raises(InputError, match='cannot read the samples'):
+        read(path, channels=far)
+
+
+@pytest.mark.skipif(not MTS.is_dir(), reason=f'measured MTS records are not at {MTS}')
+@pytest.mark.parametrize(('name', 'samples'), [('0A', 46_800), ('0p5A', 48_000), ('1A', 51_900)])
+def test_measured_mts_records(name: str, samples: int) -> None:
+    """The shipped map gives the sizes, rest noise and travel that the records' notes state."""
+    path = MTS / f'mts_2022-05-25_chirp15Hz_MR{name}.txt'
+    record = read(path, channels=MTS_MAP, stiffness=0.0)
+    assert (len(record), record.period, record.actuator) == (samples, 1e-3, 'mts')
+    rest = slice(0, 2000)
+    assert abs(record.measured[rest].mean()) < 1e-9
+    assert record.measured[rest].std() == pytest.approx(3e-6, rel=0.3)
+    assert np.ptp(record.command) == pytest.approx(4e-3, rel=0.01)
+    assert record.command.max() < 0.05e-3  # one-sided: 0 to -4 mm
+    assert record.force is not None
+    # 0 A moves 0.5 kN peak to peak; the force grows about five-fold at 0.5 A and 1 A.
+    assert 400 < np.ptp(record.force) < 4000
+
+
+@pytest.mark.skipif(not MTS.is_dir(), reason=f'measured MTS records are not at {MTS}')
+def test_a_gap_in_the_sample_numbers_is_found(tmp_path: Path) -> None:
+    """Rows taken out of a measured record are missed."""
+    lines = (MTS / 'mts_2022-05-25_chirp15Hz_MR0A.txt').read_text().splitlines(keepends=True)
+    path = tmp_path / 'cut.txt'
+    path.write_text(''.join(lines[:5000] + lines[5003:]))
+    with pytest.raises(InputError, match='jump from 4993 to 4997'):
+        read(path, channels=MTS_MAP)
+
+
+def test_load_takes_anything(tmp_path: Path, bag: Path, record: Record) -> None:
+    """Bag and file together, stiffnesses one for all, per path, per record."""
+    write_csv(tmp_path / 'a.csv', record, unit='m')
+    paths = [bag, tmp_path / 'a.csv']
+    assert [r.stiffness for r in load_records(paths)] == [250e3, 250e3]
+    assert [r.stiffness for r in load_records(paths, stiffness=0)] == [0.0, 0.0]
+    assert [r.stiffness for r in load_records(paths, stiffness=[0, 5])] == [0.0, 5.0]
+    assert [r.hold for r in load_records(paths, hold='linear')] == ['linear', 'linear']
+    assert load_records(bag / 'bag_0.mcap')[0].measured.tobytes() == record.measured.tobytes()
+    with pytest.raises(InputError, match='3 stiffnesses for 2 path'):
+        load_records(paths, stiffness=[1, 2, 3])
+    with pytest.raises(InputError, match='outside'):
+        load_records(paths, stiffness=-1)
+    with pytest.raises(InputError, match='no record'):
+        load_records([])
