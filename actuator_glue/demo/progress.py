@@ -7,7 +7,14 @@ from typing import Self
 
 from rich.console import Console, Group
 from rich.live import Live
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    Progress,
+    TaskID,
+    TaskProgressColumn,
+    TextColumn,
+    TimeRemainingColumn,
+)
 from rich.table import Table
 
 from actuator_glue.demo.watch import Watch
@@ -47,14 +54,14 @@ class Display:
     ) -> None:
         self._live.stop()
 
-    def stage(self, name: str, total: float = 1.0) -> int:
+    def stage(self, name: str, total: float = 1.0) -> TaskID:
         """Begin a stage of `total` steps; return its number for `advance`."""
         if not self.console.is_terminal:
             self.console.print(name)
             self._next_line = LINE_SECONDS
         return self._bar.add_task(name, total=total)
 
-    def advance(self, stage: int, done: float) -> None:
+    def advance(self, stage: TaskID, done: float) -> None:
         """Set how much of a stage is done."""
         self._bar.update(stage, completed=done)
 

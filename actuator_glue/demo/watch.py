@@ -13,6 +13,7 @@ from actuator_glue.io.messages import deserialize, full_name
 SAMPLES = full_name('SampleBlock')
 POSTERIOR = full_name('PosteriorMoments')
 BAND = full_name('PredictionBand')
+HEALTH = 'diagnostic_msgs/msg/DiagnosticArray'
 
 
 @dataclass(slots=True)
@@ -26,6 +27,7 @@ class Watch:
         stopped_early: how many of them the time budget ended.
         posterior: the last PosteriorMoments, None before the first.
         forecast: the last PredictionBand that was made before its data and is scored, or None.
+        ready: the estimator's worker has compiled and waits for samples.
         coverages: coverage of the widest level, one per scored forecast.
     """
 
@@ -35,6 +37,7 @@ class Watch:
     stopped_early: int = 0
     posterior: Any = None
     forecast: Any = None
+    ready: bool = False
     coverages: list[float] = field(default_factory=list)
     _scans: dict[Path, Scan] = field(default_factory=dict)
 
@@ -51,6 +54,9 @@ class Watch:
                 self.posterior = content
                 self.windows += 1
                 self.stopped_early += bool(content.stopped_early)
+            elif name == HEALTH:
+                values = {v.key: v.value for s in content.status for v in s.values}
+                self.ready = self.ready or values.get('worker') == 'ready'
             elif content.forecast and content.scored and content.kind == 'total':
                 self.forecast = content
                 self.coverages.append(float(content.widest_coverage))
@@ -59,5 +65,5 @@ class Watch:
         for path in sorted(self.bag.glob('*.mcap')):
             scan = self._scans.setdefault(path, Scan(path, lambda _: None))
             for schema, _, message in scan.messages(follow=True):
-                if schema.name in (SAMPLES, POSTERIOR, BAND):
+                if schema.name in (SAMPLES, POSTERIOR, BAND, HEALTH):
                     yield schema.name, deserialize(schema.name, message.data)

@@ -1,0 +1,162 @@
+"""The demonstration from the first process to the last picture."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import shutil
+import time
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from actuator_glue.demo import bag as demo_bag
+from actuator_glue.demo import pictures
+from actuator_glue.demo.outcome import Outcome, replay_bag
+from actuator_glue.demo.processes import Node, Nodes
+from actuator_glue.demo.progress import Display
+from actuator_glue.demo.sources import Source
+from actuator_glue.demo.watch import Watch
+from actuator_glue.errors import InputError
+
+READY_SECONDS = 180.0  # the first start on a machine compiles the kernels
+DRAIN_SECONDS = 15.0  # for the last window to be computed after the last sample
+POLL_SECONDS = 0.25
+# What a run leaves in its folder; only these are removed by the next one.
+LEAVINGS = ('bag', 'nodes', 'summary.json', 'truth.json')
+
+
+def prepare(folder: Path) -> None:
+    """Make the folder and remove what an earlier run left in it.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name in LEAVINGS:
+            path = folder / name
+            if path.is_dir():
+                shutil.rmtree(path)
+            else:
+                path.unlink(missing_ok=True)
+        for path in folder.glob('*.png'):
+            path.unlink()
+        (folder / 'nodes').mkdir()
+    except OSError as error:
+        raise InputError(f'{folder}: cannot be written ({error.strerror})') from error
+
+
+def stream(source: Source, settings: dict[str, Any], folder: Path, display: Display) -> Watch:
+    """Run recorder, estimator and source as processes until the last window is in the bag.
+
+    Raises:
+        InputError: a node dies or does not get ready.
+    """
+    logs = folder / 'nodes'
+    watch = Watch(folder / 'bag')
+    with Nodes() as nodes:
+        nodes.start('recorder', {'bag': str((folder / 'bag').resolve())}, logs)
+        nodes.start('estimator', settings, logs)
+        _wait_until_ready(nodes, watch, display)
+        sender = nodes.start(source.node, source.parameters, logs)
+        _wait_until_sent(nodes, sender, source, watch, display)
+        _wait_until_drained(nodes, watch)
+    watch.update()
+    return watch
+
+
+def _wait_until_ready(nodes: Nodes, watch: Watch, display: Display) -> None:
+    stage = display.stage('starting recorder, estimator', total=READY_SECONDS)
+    start = time.monotonic()
+    while not watch.ready:
+        elapsed = time.monotonic() - start
+        if elapsed > READY_SECONDS:
+            raise InputError(f'the estimator is not ready after {READY_SECONDS:g} s; see its log')
+        nodes.check()
+        watch.update()
+        display.advance(stage, elapsed)
+        time.sleep(POLL_SECONDS)
+    display.advance(stage, READY_SECONDS)
+
+
+def _wait_until_sent(
+    nodes: Nodes, sender: Node, source: Source, watch: Watch, display: Display
+) -> None:
+    stage = display.stage(source.title, total=source.samples)
+    start = time.monotonic()
+    while sender.running:
+        nodes.check()
+        watch.update()
+        display.advance(stage, watch.samples)
+        display.show(watch, time.monotonic() - start)
+        time.sleep(POLL_SECONDS)
+    nodes.check()
+    display.advance(stage, source.samples)
+
+
+def _wait_until_drained(nodes: Nodes, watch: Watch) -> None:
+    """Wait until the estimator has reported once more and no window is being computed."""
+    end = time.monotonic() + DRAIN_SECONDS
+    seen, since = -1, time.monotonic()
+    while time.monotonic() < end:
+        nodes.check()
+        watch.update()
+        if watch.windows != seen:
+            seen, since = watch.windows, time.monotonic()
+        # Two reports of /diagnostics without another window: it is done.
+        elif time.monotonic() - since > 2.5:
+            return
+        time.sleep(POLL_SECONDS)
+
+
+def finish(
+    source: Source, watch: Watch, folder: Path, display: Display, started: float
+) -> Outcome:
+    """Read the bag, replay it, draw the pictures, write `summary.json`.
+
+    Raises:
+        InputError: the bag is damaged or holds no window.
+    """
+    stage = display.stage('replaying the bag', total=1)
+    content = demo_bag.read(folder / 'bag')
+    comparison = replay_bag(folder / 'bag')
+    display.advance(stage, 1)
+    stage = display.stage('drawing', total=2)
+    pictures.bands(content, folder / 'bands.png')
+    display.advance(stage, 1)
+    pictures.parameters(content, folder / 'parameters.png', source.truth)
+    display.advance(stage, 2)
+    return Outcome(
+        source.title, _sent(source, folder), content, comparison, time.monotonic() - started
+    )
+
+
+def _sent(source: Source, folder: Path) -> int:
+    """Return how many samples the source says it has published, in the last line of its log."""
+    log = (folder / 'nodes' / f'{source.node}.log').read_text(encoding='utf-8', errors='replace')
+    found = re.findall(r'stream ended after (\d+) samples', log)
+    return int(found[-1]) if found else 0
+
+
+def write_summary(outcome: Outcome, folder: Path) -> Path:
+    """Write `summary.json` in one step and return its path."""
+    path = folder / 'summary.json'
+    part = path.with_suffix('.part')
+    part.write_text(json.dumps(outcome.to_json(), indent=2) + '\n', encoding='utf-8')
+    part.replace(path)
+    return path
+
+
+def own_domain() -> None:
+    """Keep the nodes to this machine, in a domain of their own unless the user has set one."""
+    # Linux: up to 101 domains leave the ephemeral ports alone.
+    os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 101))
+    os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
+
+
+def terminal() -> Console:
+    """Return where progress and results are shown."""
+    return Console(highlight=False, soft_wrap=False)
