@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,10 +18,9 @@ from actuator_glue.model.plant import MeasuredPlant, Plant
 from actuator_glue.model.sensor import SensorSpec
 from actuator_glue.model.stream import Stream
 from actuator_glue.model.structure import Structure
-from actuator_glue.nodes import base, undeclared
+from actuator_glue.nodes import base, streamer, undeclared
 from actuator_glue.nodes.blocks import BlockPublisher
-from actuator_glue.nodes.health import Rate
-from actuator_glue.nodes.pacer import Pacer, Step
+from actuator_glue.nodes.pacer import Step
 from actuator_glue.nodes.parameters import Parameters, Spec
 from actuator_glue.records import Array, Record
 
@@ -52,9 +52,8 @@ SPECS = (
     Spec('bits', 18, 'resolution of the displacement sensor, 0 for none', '1', 0, 52),
     Spec('stroke', 0.1, 'half range of the displacement sensor', 'm', 1e-6, 10.0),
     Spec('seed', 1, 'seed of noise and random commands', '1', 0, 2**53, True),
-    Spec('speed', 1.0, 'simulated seconds per second, 0 for no waiting', '1', 0.0, 1000.0, True),
     Spec('preview', 0.0, 'how far ahead commands are published, 0 for not', 's', 0.0, 60.0, True),
-    Spec('exit_at_end', False, 'end the node when the command has ended', read_only=True),
+    *streamer.specs(exit_at_end=False),
     Spec(
         'undeclared_effect', '', f'effects of the plant, told to nobody; {undeclared.FORM}',
         secret=True,
@@ -63,10 +62,11 @@ SPECS = (
 )  # fmt: skip
 
 
-class SimulatorNode(base.SuiteNode):
+class SimulatorNode(streamer.Streamer):
     """Steps a plant block by block and publishes what its sensors show."""
 
     def __init__(self) -> None:
+        self._renewed = self._clock_changed = False
         super().__init__('actuator_sim', SPECS)
 
     def check(self, values: Mapping[str, Any]) -> None:
@@ -88,48 +88,13 @@ class SimulatorNode(base.SuiteNode):
         self.command = _command(self._values)
         self.out = BlockPublisher(self.publisher)
 
-    def do_activate(self) -> None:
-        """Start from rest, at sample 0."""
-        self.plant = self._plant()
-        self._index = 0
-        self._previewed = 0
-        self._renewed = False
-        self.samples = Rate()
-        values = self._values
-        now = self.get_clock().now().nanoseconds
-        self.out.begin(values['actuator'], 1.0 / values['rate'], now)
-        self._announce()
-        self.pacer = Pacer(self._next, values['speed'], self._ended)
-        self.pacer.start()
-
-    def do_deactivate(self) -> None:
-        """Stop the stream."""
-        self.pacer.stop()
-
     def changed(self, names: set[str]) -> None:
         """A new specimen, sensor or effect: the plant goes on from rest with the next block."""
-        if self.active:
-            self._renewed = True
+        self._renewed = True
 
     def clock_jumped(self) -> None:
         """Stamps go on from the new time."""
-        if self.active:
-            now = self.get_clock().now().nanoseconds
-            self.out.begin(self.out.actuator, self.out.period, now, self._index)
-
-    def do_report(self) -> None:
-        """Rate and lateness."""
-        import time
-
-        if self.active:
-            self.health.values.update(
-                {
-                    'sample rate (1/s)': self.samples.per_second(time.monotonic()),
-                    'samples': self.samples.count,
-                    'late blocks': self.pacer.late,
-                    'latest block (s)': self.pacer.latest,
-                }
-            )
+        self._clock_changed = True
 
     def _announce(self) -> None:
         values = self._values
@@ -171,23 +136,36 @@ class SimulatorNode(base.SuiteNode):
             seed=values['seed'],
         )
 
-    # Called in the pacer's thread.
+    # Below runs in the pacer's thread.
 
-    def _next(self) -> Step | None:
-        values = self._values
-        if self._index >= len(self.command) and not values['repeat']:
-            return None
-        start = self._index % len(self.command)
-        block = self.command[start : start + values['block']]
-        # A block can be published when its last sample has been taken.
-        due = (self._index + len(block)) / values['rate']
-        return Step(due, lambda: self._publish(block))
+    def stream(self) -> Iterator[Step]:
+        """Yield the blocks of the command, from rest at sample 0."""
+        self._renew()
+        self._index = self._previewed = 0
+        self._start_clock()
+        self._announce()
+        rate, size = self._values['rate'], self._values['block']
+        while self._index < len(self.command) or self._values['repeat']:
+            start = self._index % len(self.command)
+            block = self.command[start : start + size]
+            # A block can be published when its last sample has been taken.
+            yield Step((self._index + len(block)) / rate, partial(self._publish, block))
+
+    def _start_clock(self) -> None:
+        self._clock_changed = False
+        now = self.get_clock().now().nanoseconds
+        self.out.begin(self._values['actuator'], 1.0 / self._values['rate'], now, self._index)
+
+    def _renew(self) -> None:
+        self._renewed = False
+        self._values = self.parameters.values()
+        self.plant = self._plant()
 
     def _publish(self, command: Array) -> None:
+        if self._clock_changed:
+            self._start_clock()
         if self._renewed:
-            self._renewed = False
-            self._values = self.parameters.values()
-            self.plant = self._plant()
+            self._renew()
             self._announce()
         self._publish_preview()
         measured, force = self.plant.step(command)
@@ -197,24 +175,12 @@ class SimulatorNode(base.SuiteNode):
 
     def _publish_preview(self) -> None:
         ahead = round(self._values['preview'] * self._values['rate'])
-        if ahead == 0:
-            return
-        first = max(self._index, self._previewed)
-        stop = self._index + ahead
+        first, stop = max(self._index, self._previewed), self._index + ahead
         if not self._values['repeat']:
             stop = min(stop, len(self.command))
-        if stop > first:
+        if ahead and stop > first:
             self.out.preview(first, self.command[np.arange(first, stop) % len(self.command)])
             self._previewed = stop
-
-    def _ended(self, failure: BaseException | None) -> None:
-        if failure is not None:
-            self.complain_of_bug(failure)
-            return
-        self.get_logger().info(f'command ended after {self._index} samples')
-        if self._values['exit_at_end']:
-            self.finished = True
-            self.wake()
 
 
 def _command(values: Mapping[str, Any]) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import socket
 import sys
 import threading
 import time
@@ -255,7 +256,7 @@ class SuiteNode(LifecycleNode):  # type: ignore[misc]
     def _check_types(self) -> None:
         """Tell of publishers whose messages DDS will never hand over."""
         for topic, subscription in self._topics:
-            wanted = _type_name(topic.type)
+            wanted = type_name(topic.type)
             for info in self.get_publishers_info_by_topic(subscription.topic_name):
                 if info.topic_type != wanted:
                     self.complain(
@@ -271,7 +272,8 @@ class SuiteNode(LifecycleNode):  # type: ignore[misc]
         self.guarded(self.clock_jumped)()
 
 
-def _type_name(cls: Any) -> str:
+def type_name(cls: Any) -> str:
+    """Return the full name of a message class, `package/msg/Name`."""
     package = cls.__module__.partition('.')[0]
     return f'{package}/msg/{cls.__name__}'
 
@@ -279,11 +281,8 @@ def _type_name(cls: Any) -> str:
 def main(make: Callable[[], SuiteNode], args: Sequence[str] | None = None) -> int:
     """Run a node until SIGINT, SIGTERM or its own end; return the exit code.
 
-    Signals are waited for in a thread of their own, so that they never interrupt a callback; a
-    second one ends the process at once.
+    A second signal ends the process at once.
     """
-    signals = {signal.SIGINT, signal.SIGTERM}
-    signal.pthread_sigmask(signal.SIG_BLOCK, signals)
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = make()
@@ -294,14 +293,7 @@ def main(make: Callable[[], SuiteNode], args: Sequence[str] | None = None) -> in
     executor = SingleThreadedExecutor()
     executor.add_node(node)
     stop = threading.Event()
-
-    def wait() -> None:
-        signal.sigwait(signals)
-        stop.set()
-        node.wake()
-        os._exit(128 + signal.sigwait(signals))
-
-    threading.Thread(target=wait, name='signals', daemon=True).start()
+    _on_signal(stop, node.wake)
     code = 0
     if node.parameters['autostart']:
         started = node.trigger_configure() == SUCCESS and node.trigger_activate() == SUCCESS
@@ -322,3 +314,26 @@ def main(make: Callable[[], SuiteNode], args: Sequence[str] | None = None) -> in
     node.destroy_node()
     rclpy.try_shutdown()
     return code
+
+
+def _on_signal(stop: threading.Event, wake: Callable[[], None]) -> None:
+    """Set `stop` on SIGINT or SIGTERM without interrupting whatever callback is running.
+
+    Python's own handlers run in the main thread only, which waits inside the middleware; the
+    wake-up descriptor is written at once, whatever thread the signal reaches.
+    """
+    reader, writer = socket.socketpair()
+    writer.setblocking(False)
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: None)
+    signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
+
+    def wait() -> None:
+        reader.recv(1)
+        stop.set()
+        wake()
+        number = reader.recv(1)[0]
+        writer.close()
+        os._exit(128 + number)
+
+    threading.Thread(target=wait, name='signals', daemon=True).start()

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
+
+# A step counts as late from here on [s]; the operating system's sleep is good for a tenth of it.
+LATE = 5e-3
 
 
 class Step(NamedTuple):
@@ -24,18 +27,21 @@ class Pacer:
     """Does steps when they are due, in a thread; a late step is done at once, none is left out.
 
     Args:
-        next_step: returns the next step, None at the end; called in the thread.
+        steps: what to do, in order; iterated in the thread.
+        ready: asked until it says that the stream may begin.
         speed: stream seconds per second; 0 for as fast as possible.
         done: called in the thread after the last step, or with what a step raised.
     """
 
     def __init__(
         self,
-        next_step: Callable[[], Step | None],
+        steps: Iterator[Step],
+        ready: Callable[[], bool],
         speed: float,
         done: Callable[[BaseException | None], None],
     ) -> None:
-        self._next = next_step
+        self._steps = steps
+        self._ready = ready
         self._speed = speed
         self._done = done
         self._stop = threading.Event()
@@ -44,7 +50,7 @@ class Pacer:
         self._thread = threading.Thread(target=self._run, name='pacer', daemon=True)
 
     def start(self) -> None:
-        """Begin; the stream's time 0 is now."""
+        """Begin as soon as it is ready; that is the stream's time 0."""
         self._thread.start()
 
     def stop(self) -> None:
@@ -63,14 +69,18 @@ class Pacer:
             self._done(failure)
 
     def _pace(self) -> None:
+        while not self._ready():
+            if self._stop.wait(0.02):
+                return
         start = time.monotonic()
-        while not self._stop.is_set() and (step := self._next()) is not None:
+        for step in self._steps:
             if self._speed > 0.0:
                 wait = start + step.due / self._speed - time.monotonic()
-                if wait > 0.0 and self._stop.wait(wait):
-                    return
-                # Half a millisecond is what the operating system's sleep is good for.
-                if wait < -5e-3:
+                if wait > 0.0:
+                    self._stop.wait(wait)
+                elif wait < -LATE:
                     self.late += 1
                     self.latest = max(self.latest, -wait)
+            if self._stop.is_set():
+                return
             step.act()

@@ -92,6 +92,7 @@ class Parameters:
         self._specs = {spec.name: spec for spec in specs}
         self._check = check
         self._secrets: dict[str, Any] = {}
+        self._offered: dict[str, Any] = {}
         for spec in specs:
             self._declare(spec)
         self._check_all(self.values())
@@ -136,31 +137,25 @@ class Parameters:
         self._check(values)
 
     def _hide(self, given: list[Parameter]) -> list[Parameter]:
+        """Take secrets out of what is about to be set, stored and told to everybody."""
+        self._offered.clear()
         shown = []
         for parameter in given:
             spec = self._specs.get(parameter.name)
-            if spec is not None and spec.secret:
-                value = parameter.value
-                if not isinstance(value, str):
-                    shown.append(parameter)
-                    continue
-                if value != self.HIDDEN:
-                    self._secrets[parameter.name] = value
-                shown.append(Parameter(parameter.name, Parameter.Type.STRING, self.HIDDEN))
-            else:
-                shown.append(parameter)
+            if spec is not None and spec.secret and isinstance(parameter.value, str):
+                if parameter.value != self.HIDDEN:
+                    self._offered[parameter.name] = parameter.value
+                parameter = Parameter(parameter.name, Parameter.Type.STRING, self.HIDDEN)
+            shown.append(parameter)
         return shown
 
     def _validate(self, given: list[Parameter]) -> SetParametersResult:
+        new = {p.name: p.value for p in given if p.name in self._specs}
+        new = {name: value for name, value in new.items() if not self._specs[name].secret}
+        offered, self._offered = self._offered, {}
         try:
-            self._check_all(
-                self.values()
-                | {
-                    p.name: p.value
-                    for p in given
-                    if p.name in self._specs and not self._specs[p.name].secret
-                }
-            )
+            self._check_all(self.values() | new | offered)
         except InputError as error:
             return SetParametersResult(successful=False, reason=str(error))
+        self._secrets |= offered
         return SetParametersResult(successful=True)

@@ -42,6 +42,11 @@ class Topic:
     type: Any
     qos: QoSProfile
 
+    @property
+    def latched(self) -> bool:
+        """Whether late subscribers get the last messages."""
+        return bool(self.qos.durability == DurabilityPolicy.TRANSIENT_LOCAL)
+
 
 # Samples: reliable and deep, so that a computer that stalls for a second loses nothing.
 SAMPLES = Topic('samples', SampleBlock, _reliable(2000))

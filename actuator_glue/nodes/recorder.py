@@ -1,0 +1,168 @@
+"""Everything the suite publishes, as a bag that a killed process leaves readable."""
+
+from __future__ import annotations
+
+import importlib
+import queue
+import sys
+import threading
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from actuator_glue.errors import InputError
+from actuator_glue.io.bag_metadata import LATCHED, Qos
+from actuator_glue.io.bag_writer import BagWriter
+from actuator_glue.nodes import base, topics
+from actuator_glue.nodes.health import ERROR, Rate
+from actuator_glue.nodes.parameters import Spec
+
+SPECS = (
+    Spec('bag', '', 'folder of the bag, empty for bag_DATE_TIME here', read_only=True),
+    Spec('suite', True, 'record the topics of the suite', read_only=True),
+    Spec('topics', [''], 'further topics, recorded as soon as they appear', read_only=True),
+    Spec('flush_period', 0.2, 'longest time a message stays in memory', 's', 0.01, 10.0, True),
+    Spec('max_file', 1 << 30, 'size at which the next file begins', 'B', 1 << 20, 1 << 40, True),
+    Spec('max_waiting', 256 << 20, 'messages kept while the disk stalls', 'B', 1 << 20, 1 << 40),
+)
+
+
+class RecorderNode(base.SuiteNode):
+    """Takes messages as bytes; a thread of its own writes them, so that no disk delays DDS."""
+
+    def __init__(self) -> None:
+        self.writer: BagWriter | None = None
+        self._bags = 0
+        super().__init__('recorder', SPECS)
+
+    def do_activate(self) -> None:
+        """Open the bag and subscribe."""
+        values = self.parameters.values()
+        self.writer = BagWriter(
+            self._path(values),
+            flush_period=values['flush_period'],
+            max_file_bytes=values['max_file'],
+        )
+        self._bags += 1
+        self.get_logger().info(f'recording to {self.writer.path}')
+        self._queue: queue.SimpleQueue[tuple[str, bytes, int, float] | None] = queue.SimpleQueue()
+        self._waiting_bytes = self._lost = 0
+        self._lag = self._worst_lag = 0.0
+        self._failed = ''
+        self.received = Rate()
+        self._wanted = {name for name in values['topics'] if name}
+        self._thread = threading.Thread(target=self._write, name='writer', daemon=True)
+        self._thread.start()
+        for topic in topics.RECORDED if values['suite'] else ():
+            self._record(topic)
+        if self._wanted:
+            self._look()
+            self.every(0.5, self._look)
+
+    def do_deactivate(self) -> None:
+        """Write what has arrived and finish the bag."""
+        if self.writer is None:
+            return
+        self._queue.put(None)
+        self._thread.join()
+        try:
+            self.writer.close()
+        except InputError as error:
+            self.get_logger().error(str(error))
+        else:
+            self.get_logger().info(f'{self.writer.path}: {self.writer.count} messages, finished')
+        self.writer = None
+
+    def do_report(self) -> None:
+        """Rate, bag write lag, losses."""
+        if self.writer is None:
+            return
+        self.health.values.update(
+            {
+                'bag': str(self.writer.path),
+                'message rate (1/s)': self.received.per_second(time.monotonic()),
+                'messages written': self.writer.count,
+                'bag write lag (s)': self._lag,
+                'worst bag write lag (s)': self._worst_lag,
+                'messages waiting (B)': self._waiting_bytes,
+                'messages lost': self._lost,
+            }
+        )
+        if self._failed:
+            self.complain('bag', self._failed, ERROR)
+
+    def _path(self, values: Mapping[str, Any]) -> Path:
+        path = Path(values['bag'] or time.strftime('bag_%Y_%m_%d-%H_%M_%S'))
+        return path if self._bags == 0 else path.with_name(f'{path.name}_{self._bags + 1}')
+
+    def _record(self, topic: topics.Topic) -> None:
+        """Declare and subscribe to a topic; one that cannot be recorded is reported."""
+        assert self.writer is not None
+        name = self.resolve_topic_name(topic.name)
+        kind = base.type_name(topic.type)
+        try:
+            self.writer.add_topic(name, kind, qos=(LATCHED if topic.latched else Qos(),))
+        except InputError as error:
+            self.complain('topic', str(error))
+            return
+        self.subscribe(topic, lambda data: self._take(name, data), raw=True)
+
+    def _look(self) -> None:
+        """Subscribe to further topics that have appeared."""
+        if not self._wanted:
+            return
+        for name, types in self.get_topic_names_and_types():
+            for wanted in [w for w in self._wanted if self.resolve_topic_name(w) == name]:
+                self._wanted.discard(wanted)
+                try:
+                    self._record(topics.Topic(wanted, _message(types[0]), topics.SAMPLES.qos))
+                except (ImportError, AttributeError) as error:
+                    self.complain('topic', f'{name}: type {types[0]} is not installed ({error})')
+
+    def _take(self, name: str, data: bytes) -> None:
+        self.received.add()
+        if self._waiting_bytes + len(data) > self.parameters['max_waiting']:
+            self._lost += 1
+            self.complain('disk', f'the disk stalls: {self._lost} messages lost', ERROR)
+            return
+        self._waiting_bytes += len(data)
+        now = self.get_clock().now().nanoseconds
+        self._queue.put((name, data, now, time.monotonic()))
+
+    def _write(self) -> None:
+        """Write what arrives until None arrives; runs in its own thread."""
+        writer = self.writer
+        assert writer is not None
+        while True:
+            try:
+                item = self._queue.get(timeout=0.05)
+            except queue.Empty:
+                item = ('', b'', 0, time.monotonic())
+            if item is None:
+                return
+            name, data, stamp, arrived = item
+            try:
+                if name:
+                    writer.write_raw(name, data, stamp)
+                else:
+                    writer.flush_if_due()
+            except InputError as error:
+                self._failed = str(error)
+            self._waiting_bytes -= len(data)
+            self._lag = time.monotonic() - arrived
+            self._worst_lag = max(self._worst_lag, self._lag)
+
+
+def _message(type_name: str) -> Any:
+    package, _, name = type_name.split('/')
+    return getattr(importlib.import_module(f'{package}.msg'), name)
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node."""
+    return base.main(RecorderNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

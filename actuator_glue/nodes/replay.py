@@ -1,0 +1,70 @@
+"""The samples of a bag, published again byte for byte."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+
+from rosgraph_msgs.msg import Clock
+
+from actuator_glue.errors import InputError
+from actuator_glue.io.bag_reader import is_bag, messages
+from actuator_glue.io.messages import deserialize
+from actuator_glue.nodes import base, streamer, topics
+from actuator_glue.nodes.pacer import Step
+from actuator_glue.nodes.parameters import Spec
+
+SPECS = (
+    Spec('bag', '', 'bag folder or .mcap file', read_only=True),
+    Spec('results', False, 'publish the recorded results too, not only samples', read_only=True),
+    Spec('clock', False, 'publish the recorded time on /clock', read_only=True),
+    *streamer.specs(exit_at_end=True),
+)
+INPUTS = (topics.SAMPLES, topics.TEST_SETUP, topics.PREVIEW)
+RESULTS = (topics.POSTERIOR, topics.BAND, topics.RESPONSE, topics.DIAGNOSIS)
+
+
+class ReplayNode(streamer.Streamer):
+    """Publishes what a bag holds, at the pace it was recorded, under its own topic names."""
+
+    def __init__(self) -> None:
+        super().__init__('replay', SPECS)
+
+    def do_configure(self) -> None:
+        """Make the publishers."""
+        self.path = self.parameters['bag']
+        if not is_bag(self.path):
+            raise InputError(f'parameter bag = {self.path!r} is neither a bag nor an .mcap file')
+        chosen = INPUTS + (RESULTS if self.parameters['results'] else ())
+        self._publishers = {base.type_name(t.type): self.publisher(t) for t in chosen}
+        clock = topics.Topic('/clock', Clock, topics.PREVIEW.qos)
+        self._clock: Any = self.publisher(clock) if self.parameters['clock'] else None
+
+    def stream(self) -> Iterator[Step]:
+        """Yield the messages of the bag in the order they were recorded."""
+        first: int | None = None
+        note = partial(self.complain, 'bag')
+        for found in messages(self.path, types=tuple(self._publishers), note=note):
+            first = found.log_time if first is None else first
+            due = (found.log_time - first) * 1e-9
+            yield Step(due, partial(self._publish, found.type, found.data, found.log_time))
+
+    def _publish(self, kind: str, data: bytes, log_time: int) -> None:
+        if self._clock is not None:
+            message = Clock()
+            message.clock.sec, message.clock.nanosec = divmod(log_time, 1_000_000_000)
+            self._clock.publish(message)
+        self._publishers[kind].publish(data)
+        if kind == base.type_name(topics.SAMPLES.type):
+            self.samples.add(len(deserialize(kind, data).command))
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node."""
+    return base.main(ReplayNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

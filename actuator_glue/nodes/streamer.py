@@ -1,0 +1,69 @@
+"""What simulator, laboratory bridge and replay share: a stream that is published on time."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator, Sequence
+
+from actuator_glue.nodes import base, topics
+from actuator_glue.nodes.health import Rate
+from actuator_glue.nodes.pacer import Pacer, Step
+from actuator_glue.nodes.parameters import Spec
+
+
+def specs(*, exit_at_end: bool) -> tuple[Spec, ...]:
+    """Return the parameters of a stream; whether its end ends the node differs."""
+    return (
+        Spec('speed', 1.0, 'stream seconds per second, 0 for no waiting', '1', 0.0, 1e4, True),
+        Spec('exit_at_end', exit_at_end, 'end the node when the stream has ended', read_only=True),
+        Spec('wait_for', 0, 'subscribers of the samples to wait for', '1', 0, 100, True),
+    )
+
+
+class Streamer(base.SuiteNode):
+    """A node that publishes a stream from a thread of its own; subclasses give `stream`."""
+
+    def __init__(self, name: str, specs: Sequence[Spec]) -> None:
+        super().__init__(name, specs)
+        self.samples = Rate()
+        self.pacer: Pacer | None = None
+
+    def stream(self) -> Iterator[Step]:
+        """Yield what is published, and when; runs in the pacer's thread."""
+        raise NotImplementedError
+
+    def ready(self) -> bool:
+        """Whether everybody who was waited for listens."""
+        listening = self.count_subscribers(topics.SAMPLES.name)
+        return bool(listening >= self.parameters['wait_for'])
+
+    def do_activate(self) -> None:
+        """Begin the stream."""
+        self.samples = Rate()
+        self.pacer = Pacer(self.stream(), self.ready, self.parameters['speed'], self._ended)
+        self.pacer.start()
+
+    def do_deactivate(self) -> None:
+        """Stop the stream after the message being published."""
+        if self.pacer is not None:
+            self.pacer.stop()
+
+    def do_report(self) -> None:
+        """Rate and lateness."""
+        if self.pacer is not None:
+            self.health.values.update(
+                {
+                    'sample rate (1/s)': self.samples.per_second(time.monotonic()),
+                    'samples': self.samples.count,
+                    'late messages': self.pacer.late,
+                    'latest message (s)': self.pacer.latest,
+                }
+            )
+
+    def _ended(self, failure: BaseException | None) -> None:
+        if failure is not None:
+            self.complain_of_bug(failure)
+        self.get_logger().info(f'stream ended after {self.samples.count} samples')
+        if self.parameters['exit_at_end']:
+            self.finished = True
+            self.wake()
