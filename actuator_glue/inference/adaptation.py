@@ -41,12 +41,10 @@ def empty_counts(settings: Settings) -> Array:
 def tune(points: Array, counts: Array, settings: Settings) -> Tuning:
     """Fit the proposals to points (m, p) and the shares to what the moves achieved.
 
-    Crossover classes get probabilities proportional to their mean squared jump (Vrugt 2016, section
-    3.2.1); the independence and parallel moves share what the snooker move leaves by the same
+    Crossover classes get probabilities proportional to their mean squared jump (Vrugt 2016,
+    section 3.2.1); the independence and parallel moves share what the snooker move leaves by the same
     measure.
     """
-    centre, factor = independence.fit(points)
-    scale = np.sqrt((factor**2).sum(axis=1))
     reach = _mean_jumps(counts)
     crossover = reach[len(NAMES) :]
     if crossover.sum() > 0.0:
@@ -58,13 +56,18 @@ def tune(points: Array, counts: Array, settings: Settings) -> Tuning:
     share = settings.independence * share if settings.independence > 0.0 else 0.0
     free = 1.0 - settings.snooker
     moves = np.array([free * (1.0 - share), settings.snooker, free * share])
-    return Tuning(
-        move_cdf=np.cumsum(moves),
-        crossover_cdf=np.cumsum(crossover / crossover.sum()),
-        scale=scale,
-        centre=centre,
-        factor=factor,
-    )
+    return _fitted(points, np.cumsum(moves), np.cumsum(crossover / crossover.sum()))
+
+
+def refit(points: Array, tuning: Tuning) -> Tuning:
+    """Fit the proposals to points (m, p); the shares stay as they are."""
+    return _fitted(points, tuning.move_cdf, tuning.crossover_cdf)
+
+
+def _fitted(points: Array, move_cdf: Array, crossover_cdf: Array) -> Tuning:
+    centre, factor = independence.fit(points)
+    scale = np.sqrt((factor**2).sum(axis=1))
+    return Tuning(move_cdf, crossover_cdf, scale, centre, factor)
 
 
 def _mean_jumps(counts: Array) -> Array:

@@ -1,10 +1,10 @@
 """From the prior, or from an earlier posterior, to the posterior by tempering.
 
 The targets are pi_b(z) = r(z)^(1-b) p(z)^b with r the reference the points start from, p the
-posterior and b rising from 0 to 1 by steps that keep a set share of the points alive: sequential
-Monte Carlo (Del Moral, Doucet and Jasra 2006) in the form that keeps every state of every chain
-(Dau and Chopin 2022), with the sampler's own moves. It only chooses where chains start and what the
-first archive holds; nothing of it enters the posterior draws.
+posterior and b rising from 0 to 1 by steps that keep a set share of the points alive:
+sequential Monte Carlo (Del Moral, Doucet and Jasra 2006) in the form that keeps every state of
+every chain (Dau and Chopin 2022), with the sampler's own moves. It only chooses where chains start
+and what the first archive holds; nothing of it enters the posterior draws.
 """
 
 from __future__ import annotations
@@ -168,4 +168,4 @@ def resample(rng: np.random.Generator, log_weights: Array, size: int) -> NDArray
     weights = np.exp(log_weights - log_weights.max())
     cumulative = np.cumsum(weights)
     places = (np.arange(size) + rng.random()) / size * cumulative[-1]
-    return np.minimum(np.searchsorted(cumulative, places), len(weights) - 1)
+    return np.asarray(np.minimum(np.searchsorted(cumulative, places), len(weights) - 1))

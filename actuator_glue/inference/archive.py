@@ -41,6 +41,11 @@ class Archive:
         """The points, (size, p)."""
         return self._buffer.rows[: self.size]
 
+    @property
+    def newest_half(self) -> Array:
+        """The later half of the points: what came from the start fades."""
+        return self._buffer.rows[self.size // 2 : self.size]
+
     def append(self, points: Array) -> Archive:
         """Return the archive with points (m, p) added."""
         end = self.size + len(points)

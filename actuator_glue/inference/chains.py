@@ -50,7 +50,7 @@ class Chains:
 
     def evaluations_at(self, generation: int) -> int:
         """Likelihood evaluations made when the given generation (from 0) was complete."""
-        return self.start_evaluations + (generation + 1) * self.draws.shape[1]
+        return self.start_evaluations + (generation + 1) * int(self.draws.shape[1])
 
     @cached_property
     def rhat(self) -> Array:
@@ -74,4 +74,4 @@ class Chains:
         """At most 1000 points (m, p) spread over the posterior draws, for a warm start."""
         points = self.posterior()
         chosen = np.linspace(0, len(points) - 1, min(_ARCHIVE, len(points))).astype(np.intp)
-        return points[chosen]
+        return np.asarray(points[chosen])

@@ -1,7 +1,7 @@
 """Unbounded coordinates: a bounded uniform prior becomes a density on the whole of R^p.
 
-Every coordinate x in (lower, upper) is carried as z = ln((x - lower) / (upper - x)). Proposals made
-in z can never leave the prior, so no reflection is needed, and parameters that differ by nine
+Every coordinate x in (lower, upper) is carried as z = ln((x - lower) / (upper - x)). Proposals
+made in z can never leave the prior, so no reflection is needed, and parameters that differ by nine
 orders of magnitude all live on the same scale. The density of z is the density of x times the
 Jacobian dx/dz = (x - lower)(upper - x) / (upper - lower); see docs/dream.md for why folding at the
 bounds is not exact for correlated jumps.
@@ -23,7 +23,7 @@ _EDGE = 1e-12
 
 @njit
 def bounded(z, lower, width, x):  # type: ignore[no-untyped-def]
-    """Write the physical point of z into x (both (p,)), return the log Jacobian less a constant."""
+    """Write the physical point of z into x, both (p,); return its log Jacobian less a constant."""
     log_jacobian = 0.0
     for j in range(z.size):
         small = math.exp(-abs(z[j]))

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference import generation
-from actuator_glue.inference.adaptation import Tuning, empty_counts, outliers, tune
+from actuator_glue.inference.adaptation import Tuning, empty_counts, outliers, refit, tune
 from actuator_glue.inference.anneal import anneal, archive_reference, prior_reference
 from actuator_glue.inference.archive import Archive
 from actuator_glue.inference.chains import Chains
@@ -35,7 +35,8 @@ class State(NamedTuple):
         log_density: log likelihood at x, (n,).
         log_target: log density of z, (n,) = log_density + log Jacobian.
         archive: past states Z in unbounded coordinates.
-        tuning: proposal distributions; constant once `adapting` is False.
+        tuning: proposal distributions of the moves.
+        fitted: size of the archive when they were last fitted.
         counts: uses, acceptances and squared jumps since adaptation began.
         mean_log_density: sum of log_density since the last look at outliers, (n,).
         generation: generations since the chains started.
@@ -49,6 +50,7 @@ class State(NamedTuple):
     log_target: Array
     archive: Archive
     tuning: Tuning
+    fitted: int
     counts: Array
     mean_log_density: Array
     generation: int
@@ -134,6 +136,7 @@ def init(
         log_target=values[chosen] + log_jacobian,
         archive=Archive.of(z),
         tuning=tune(z, counts, settings),
+        fitted=len(z),
         counts=empty_counts(settings),
         mean_log_density=np.zeros(settings.chains),
         generation=0,
@@ -181,6 +184,7 @@ def step(rng: np.random.Generator, state: State, log_density: LogDensity) -> tup
         log_target=target,
         archive=state.archive.append(z) if keep else state.archive,
         tuning=state.tuning,
+        fitted=state.fitted,
         counts=state.counts,
         mean_log_density=state.mean_log_density,
         generation=done,
@@ -192,6 +196,11 @@ def step(rng: np.random.Generator, state: State, log_density: LogDensity) -> tup
     )
     if state.adapting:
         new = _adapt(rng, state, new, accepted, label, keep)
+    elif keep and new.archive.size >= 2 * state.fitted:
+        # The moves that draw on the archive follow it, ever more rarely; the shares stay.
+        new = new._replace(
+            tuning=refit(new.archive.newest_half, new.tuning), fitted=new.archive.size
+        )
     return new, Info(accepted, label[:, 0], label[:, 1])
 
 
@@ -211,7 +220,9 @@ def _adapt(
     if not look:
         return new
     new = new._replace(
-        tuning=tune(new.archive.rows, counts, new.settings), mean_log_density=np.zeros(len(mean))
+        tuning=tune(new.archive.newest_half, counts, new.settings),
+        fitted=new.archive.size,
+        mean_log_density=np.zeros(len(mean)),
     )
     lost = outliers(mean)
     if lost.size == 0:

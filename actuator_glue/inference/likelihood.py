@@ -1,7 +1,7 @@
 """Log likelihoods of simulation errors: GLUE's informal one and two formal ones.
 
-All are callables (m, p) -> (m,) as the sampler wants them. Constants that do not depend on theta are
-left out except where a docstring says so.
+All are callables (m, p) -> (m,) as the sampler wants them. Constants that do not depend on
+theta are left out.
 """
 
 from __future__ import annotations

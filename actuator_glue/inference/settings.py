@@ -38,15 +38,15 @@ class Settings:
     crossovers: int = 3
     snooker: float = 0.1
     unit_jump: float = 0.2
-    independence: float = 0.7
+    independence: float = 0.9
     jitter: float = 0.05
     noise: float = 1e-6
-    thinning: int = 10
-    adaptation: int = 50
+    thinning: int = 5
+    adaptation: int = 60
     start: Literal['annealed', 'prior'] = 'annealed'
     population: int = 400
     sweeps: int = 10
-    survivors: float = 0.3
+    survivors: float = 0.6
 
     def __post_init__(self) -> None:
         for name, lowest in (
