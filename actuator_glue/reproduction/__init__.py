@@ -1,0 +1,1 @@
+"""The paper's complete study on data reconstructed from its Eqs. (3a) and (3b)."""
