@@ -6,7 +6,7 @@ import re
 from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import NamedTuple, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 import yaml
 
@@ -14,6 +14,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.io import bag_metadata
 from actuator_glue.io.bag_metadata import Part, Topic
 from actuator_glue.io.mcap_scan import Scan
+from actuator_glue.io.messages import deserialize, full_name
 
 Note = Callable[[str], None]
 
@@ -185,3 +186,32 @@ def _qos(text: str) -> list[dict[str, object]]:
     except yaml.YAMLError:
         return []
     return [q for q in loaded if isinstance(q, dict)] if isinstance(loaded, list) else []
+
+
+def decoded(
+    path: Path | str,
+    names: Collection[str],
+    *,
+    topics: Collection[str] | None = None,
+    note: Note = refuse,
+) -> Iterator[tuple[str, Any]]:
+    """Yield (type name, message) of the wanted types in the order they were recorded.
+
+    Args:
+        path: bag folder or lone .mcap.
+        names: types, bare names for those of actuator_glue_msgs.
+        topics: topics wanted, all where None.
+        note: as in `messages`.
+
+    Raises:
+        InputError: no bag, damage and nobody to note it, or bytes that are no such message.
+    """
+    types = {full_name(name) for name in names}
+    for found in messages(path, types=types, topics=topics, note=note):
+        try:
+            yield found.type, deserialize(found.type, found.data)
+        except InputError as error:
+            raise InputError(
+                f'{path}: topic {found.topic}: {error}; was it recorded with another version of '
+                'the messages?'
+            ) from error

@@ -1,0 +1,80 @@
+"""Draw records: command and displacement, and what a bag holds of bands and posteriors."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from actuator_glue.cli._output import note, say
+from actuator_glue.cli._records import add_records, load
+from actuator_glue.errors import InputError
+from actuator_glue.records import Record
+
+if TYPE_CHECKING:
+    from actuator_glue.demo.bag import Content
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add_records(parser)
+    parser.add_argument(
+        '--out', default='.', metavar='DIR', help='where the pictures go (default: here)'
+    )
+    parser.add_argument(
+        '--format', choices=('png', 'svg', 'pdf'), default='png', help='default png'
+    )
+
+
+def run(args: argparse.Namespace) -> int:
+    """Draw every record, and bands and parameters of bags that have them.
+
+    Raises:
+        InputError: a record cannot be used, or a picture cannot be written.
+    """
+    from actuator_glue.io.bag_reader import is_bag
+
+    folder = Path(args.out)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise InputError(f'{folder}: cannot be made ({error.strerror or error})') from error
+    for i, record in enumerate(load(args), start=1):
+        name = f'{_stem(record)}_{i}' if len(args.records) > 1 or i > 1 else _stem(record)
+        _draw(record, folder / f'{name}.{args.format}', args)
+    for path in args.records:
+        if is_bag(path):
+            _draw_estimate(Path(path), folder, args)
+    return 0
+
+
+def _stem(record: Record) -> str:
+    name = Path(record.source.split(' (record')[0]).stem or 'record'
+    return ''.join(c if c.isalnum() or c in '-_.' else '_' for c in name)
+
+
+def _draw(record: Record, path: Path, args: argparse.Namespace) -> None:
+    from actuator_glue.report import style
+    from actuator_glue.report.records import record_figure
+
+    style.save(record_figure(record), path)
+    say(f'{path}: {len(record)} samples of {record.source}', args)
+
+
+def _draw_estimate(bag: Path, folder: Path, args: argparse.Namespace) -> None:
+    """Draw the forecast bands and the posteriors that a live estimator left in a bag."""
+    from actuator_glue.demo import pictures
+    from actuator_glue.demo.bag import read
+
+    content: Content = read(bag)
+    if not content.posteriors:
+        note(f'{bag}: holds no posterior; `actuator-glue replay {bag}` makes them')
+        return
+    for draw, name in ((pictures.bands, 'bands'), (pictures.parameters, 'parameters')):
+        path = folder / f'{bag.stem}_{name}.{args.format}'
+        try:
+            draw(content, path)
+        except InputError as error:
+            note(str(error))
+            continue
+        say(f'{path}: {name} of {bag}', args)
