@@ -63,7 +63,7 @@ class ExactErrors:
             np.array(linear.initial_state(r) if initial == 'measured' else (0.0, 0.0))
             for r in self.records
         )
-        self._padded = tuple(linear.padded(record.command) for record in self.records)
+        self.padded = tuple(linear.padded(record.command) for record in self.records)
 
     @property
     def sizes(self) -> NDArray[np.int64]:
@@ -79,16 +79,27 @@ class ExactErrors:
         Raises:
             InputError: theta is not (4,) or (m, 4).
         """
-        m = len(linear.thetas(theta))
-        out = np.empty((len(self.records), m, 2))
-        for r, record in enumerate(self.records):
-            rows = linear.table(theta, self.stiffness[r], record.period, record.hold)
-            foh = record.hold == 'linear'
-            kernel.error_sums(
-                rows, self.starts[r], record.measured, self._padded[r], self.settle[r], foh, out[r]
-            )
-        shape = (*np.shape(theta)[:-1], len(self.records), 2)
-        return np.ascontiguousarray(out.transpose(1, 0, 2)).reshape(shape)
+        table = linear.thetas(theta)
+        out = np.empty((len(table), len(self.records), 2))
+        for r in range(len(self.records)):
+            out[:, r] = self.of_record(r, linear.systems(table, self.stiffness[r]))
+        return out.reshape(*np.shape(theta)[:-1], len(self.records), 2)
+
+    def of_record(self, r: int, systems: Array) -> Array:
+        """Return (sum of e, sum of e^2) of systems a1, a0, b0 (m, 3) over one record, (m, 2)."""
+        record = self.records[r]
+        foh = record.hold == 'linear'
+        out = np.empty((len(systems), 2))
+        kernel.error_sums(
+            kernel.discretise(systems, record.period, foh),
+            self.starts[r],
+            record.measured,
+            self.padded[r],
+            self.settle[r],
+            foh,
+            out,
+        )
+        return out
 
     def residuals(self, theta: ArrayLike) -> list[Array]:
         """Return the counted errors of every record, shape (n_r,) or (m, n_r) each [m].

@@ -53,12 +53,8 @@ def coefficients(theta: ArrayLike, stiffness: float) -> tuple[Array, Array, Arra
         InputError: wrong shape, or a stiffness that cannot be used.
     """
     k = check_stiffness(stiffness)
-    table = thetas(theta)
-    b1, ab, a2, a3 = table.T
-    d0 = b1 * a3 * k + ab
-    shape = np.shape(theta)[:-1]
-    parts = (ab, k + a2, a3 * k + b1 * k + b1 * a2, d0)
-    n0, d2, d1, d0 = (part.reshape(shape) for part in parts)
+    rows = np.array([kernel.equation_2a(row, k) for row in thetas(theta)]).reshape(-1, 4)
+    n0, d2, d1, d0 = (part.reshape(np.shape(theta)[:-1]) for part in rows.T)
     return n0, d2, d1, d0
 
 
@@ -71,9 +67,8 @@ def systems(theta: ArrayLike, stiffness: float) -> Array:
     Raises:
         InputError: wrong shape, or a stiffness that cannot be used.
     """
-    n0, d2, d1, d0 = coefficients(thetas(theta), stiffness)
-    with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
-        return np.ascontiguousarray(np.stack([d1 / d2, d0 / d2, n0 / d2], axis=-1))
+    out: Array = kernel.systems(thetas(theta), check_stiffness(stiffness))
+    return out
 
 
 def table(theta: ArrayLike, stiffness: float, period: float, hold: Hold = 'zoh') -> Array:
