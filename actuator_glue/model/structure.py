@@ -57,7 +57,6 @@ class Structure:
             first += len(effect.parameters)
         self._on = np.zeros(kernel.SWITCHES, dtype=np.bool_)
         self._on[[s for effect in self.entries for s in effect.switches]] = True
-        self._on[kernel.ON_CORRECTION] = True
         self._linear = _OUTSIDE.issuperset(self.effects)
 
     def __repr__(self) -> str:

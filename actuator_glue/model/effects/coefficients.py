@@ -98,8 +98,8 @@ def build(values: Mapping[str, Array], stiffness: float, step: float, period: fl
     c[k.FORCE_X] = a2 / (1.0 + half * a3)
 
     c[k.STIFFNESS] = stiffness
-    c[k.DAMPING_2] = 2.0 * (v['damping'] + v['mass'] * v['mass_damping']) / step
-    c[k.MASS_4] = 4.0 * v['mass'] / step**2
+    damping = v['damping'] + v['mass'] * v['mass_damping']
+    c[k.DAMPING_2] = 2.0 * damping / step + 4.0 * v['mass'] / step**2
     c[k.MASS_4V] = 4.0 * v['mass'] / step
 
     c[k.COULOMB] = v['coulomb_force'] + v['sliding_force']

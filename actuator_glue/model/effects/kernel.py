@@ -29,15 +29,15 @@ LANES = 32
     VALVE_E, VALVE_Q, VALVE_D,
     SATURATION, ASYMMETRY, INVERSE_STALL, DROOP, DROOP_HALF, GAIN_DRIFT, INVERSE_ALPHA_2,
     FORCE_F, FORCE_Q, FORCE_X,
-    STIFFNESS, DAMPING_2, MASS_4, MASS_4V,
+    STIFFNESS, DAMPING_2, MASS_4V,
     COULOMB, STRIBECK_EXTRA, STRIBECK_RATE, STRIBECK_LAG,
     GAP, HARDENING, HARDENING_CAP, YIELD, INVERSE_YIELD, YIELD_RATIO,
     SHARP_1, SHARP_2, SHARP_4, SHARP_8, SHARP_16,
     BACKLASH, SENSOR_LAG, SENSOR_DECAY,
     EXACT_XX, EXACT_XV, EXACT_XU, EXACT_XR, EXACT_VX, EXACT_VV, EXACT_VU, EXACT_VR,
     TRAP_XX, TRAP_XQ, TRAP_XU, TRAP_QX, TRAP_QQ, TRAP_QU,
-) = range(54)  # fmt: skip
-COEFFICIENTS = 54
+) = range(53)  # fmt: skip
+COEFFICIENTS = 53
 
 # Rows of the state table.
 (
@@ -48,17 +48,17 @@ STATES = 18
 
 # Switches: one flag per stage that can be skipped.
 (
-    ON_LAG, ON_DEADBAND, ON_SATURATION, ON_ASYMMETRY, ON_PRESSURE, ON_DROOP, ON_DRIFT,
-    ON_STRIBECK, ON_GAP, ON_HARDENING, ON_YIELD, ON_BACKLASH, ON_SENSOR_LAG, ON_CORRECTION,
-) = range(14)  # fmt: skip
-SWITCHES = 14
+    ON_LAG, ON_SATURATION, ON_ASYMMETRY, ON_PRESSURE, ON_DROOP, ON_DRIFT,
+    ON_STRIBECK, ON_GAP, ON_HARDENING, ON_YIELD, ON_BACKLASH, ON_SENSOR_LAG,
+) = range(12)  # fmt: skip
+SWITCHES = 12
 
 # Rows of scratch behind coefficients and states in the kernel's own table.
 _S = COEFFICIENTS
 _W = COEFFICIENTS + STATES
-_U, _E, _ES, _QM, _QG, _FQ, _FS, _SP, _SS, _D0, _D1, _DS, _G, _DRY, _OIL, _RAMP = range(
-    _W, _W + 16
-)
+(
+    _U, _RAMP, _QM, _QR, _QG, _FQ, _FR, _SP, _SS, _D0, _D1, _DS, _G, _RISE, _REST, _OIL,
+) = range(_W, _W + 16)  # fmt: skip
 _ROWS = _W + 16
 _X, _Q, _QD, _F, _R, _V, _DX, _DF, _Z = (
     _S + X, _S + Q, _S + QD, _S + F, _S + R, _S + V, _S + DX, _S + DF, _S + Z,
@@ -98,6 +98,180 @@ def _command(u: Array, offset: int, start: float, stop: float, linear: bool) -> 
     return 0.5 * (before + after), last - first + kink * (1.0 - 2.0 * share)
 
 
+@njit(inline='always')
+def _valve(w: Array, n: int) -> Any:
+    """Mean spool flow over the step if the piston goes on as before, and d(flow)/d(dx)."""
+    error = w[_U, n] + w[NULL, n] - w[_X, n] - 0.5 * w[_DX, n]
+    band = w[DEADBAND, n]
+    left = error - min(max(error, -band), band)
+    flow = w[VALVE_E, n] * left + w[VALVE_Q, n] * w[_Q, n] + w[VALVE_D, n] * w[_QD, n]
+    return flow, (-0.5 * w[VALVE_E, n] if abs(error) >= band else 0.0)
+
+
+@njit(inline='always')
+def _flow(w: Array, on: NDArray[np.bool_], time: float) -> None:
+    """Write the flow into the cylinder and its d/d(dx): gain of the orifice, then its limit."""
+    for n in range(LANES):
+        w[_QG, n] = 1.0
+    if on[ON_DRIFT]:
+        for n in range(LANES):
+            w[_QG, n] = max(1.0 + w[GAIN_DRIFT, n] * time, 0.0)
+    if on[ON_ASYMMETRY]:
+        for n in range(LANES):
+            w[_QG, n] *= 1.0 + (w[ASYMMETRY, n] if w[_QM, n] > 0.0 else -w[ASYMMETRY, n])
+    if on[ON_PRESSURE]:
+        for n in range(LANES):
+            load = (w[_F, n] + 0.5 * w[_DF, n]) * w[INVERSE_STALL, n]
+            w[_QG, n] *= math.sqrt(max(1.0 - (load if w[_QM, n] > 0.0 else -load), 0.0))
+    if on[ON_DROOP]:
+        for n in range(LANES):
+            before = w[_ENV, n]
+            speed = abs(w[_QM, n]) * w[INVERSE_ALPHA_2, n]
+            middle = before + w[DROOP_HALF, n] * (speed - before)
+            w[_QG, n] *= math.sqrt(max(1.0 - w[DROOP, n] * middle, 0.0))
+            w[_ENV, n] = 2.0 * middle - before
+    for n in range(LANES):
+        through, limit = w[_QM, n] * w[_QG, n], w[SATURATION, n]
+        w[_FQ, n] = min(max(through, -limit), limit)
+        w[_FR, n] = w[_QR, n] * w[_QG, n] if abs(through) <= limit else 0.0
+
+
+@njit(inline='always')
+def _balance(
+    w: Array,
+    n: int,
+    flow: float,
+    response: float,
+    spring: float,
+    tangent: float,
+    dry: float,
+    guess: float,
+) -> Any:
+    """Solve the balance of forces: increment, force beyond inertia and damping, oil force.
+
+    A trial without slip first; dry friction takes what it can and the rest moves the piston.
+    """
+    slope = w[FORCE_Q, n] * response
+    static = spring - tangent * guess
+    oil = w[FORCE_F, n] * w[_F, n] + w[FORCE_Q, n] * flow - slope * w[_DX, n]
+    trial = w[_F, n] + oil - w[_R, n] - static + w[MASS_4V, n] * w[_V, n]
+    stiff = w[FORCE_X, n] - slope + tangent + w[DAMPING_2, n]
+    friction = min(max(trial, -dry), dry)
+    dx = (trial - friction) / stiff
+    return dx, static + tangent * dx + friction, oil + (slope - w[FORCE_X, n]) * dx
+
+
+@njit(inline='always')
+def _finish(
+    w: Array,
+    n: int,
+    per_second: float,
+    flow: float,
+    response: float,
+    dx: float,
+    rest: float,
+    oil: float,
+) -> None:
+    """Carry the state on, and both linear chains: Eq. (2) exactly and as the scheme solves it."""
+    w[_DF, n] = oil - w[_F, n]
+    w[_F, n] = oil
+    w[_R, n] = rest
+    w[_V, n] = 0.0 if dx == 0.0 else per_second * dx - w[_V, n]
+    mean = flow + response * (dx - w[_DX, n])
+    w[_QD, n] = 2.0 * per_second * (mean - w[_Q, n]) - w[_QD, n]
+    w[_Q, n] = 2.0 * mean - w[_Q, n]
+    w[_X, n] += dx
+    w[_DX, n] = dx
+    xe, ve, xt, qt, c, r = w[_XE, n], w[_VE, n], w[_XT, n], w[_QT, n], w[_U, n], w[_RAMP, n]
+    exact = w[EXACT_XX, n] * xe + w[EXACT_XV, n] * ve
+    w[_XE, n] = exact + w[EXACT_XU, n] * c + w[EXACT_XR, n] * r
+    exact = w[EXACT_VX, n] * xe + w[EXACT_VV, n] * ve
+    w[_VE, n] = exact + w[EXACT_VU, n] * c + w[EXACT_VR, n] * r
+    w[_XT, n] = w[TRAP_XX, n] * xt + w[TRAP_XQ, n] * qt + w[TRAP_XU, n] * c
+    w[_QT, n] = w[TRAP_QX, n] * xt + w[TRAP_QQ, n] * qt + w[TRAP_QU, n] * c
+
+
+@njit(inline='always')
+def _transducer(w: Array, n: int) -> None:
+    """Play, then the first-order lag of the parabola through the last three positions."""
+    corrected, before, lag = w[_X, n] + w[_XE, n] - w[_XT, n], w[_PLAY, n], w[SENSOR_LAG, n]
+    after = min(max(before, corrected - w[BACKLASH, n]), corrected + w[BACKLASH, n])
+    moved = after - before
+    bend = 0.5 * (moved - w[_PLAY_DX, n])
+    end = after - lag * (moved + bend - 2.0 * lag * bend)
+    first = before - lag * (moved - bend - 2.0 * lag * bend)
+    w[_SENSED, n] = end + w[SENSOR_DECAY, n] * (w[_SENSED, n] - first)
+    w[_PLAY, n] = after
+    w[_PLAY_DX, n] = moved
+
+
+@njit(inline='always')
+def _friction_rise(w: Array, n: int) -> Any:
+    """Rise of dry friction over its sliding value at the end of a step by _G."""
+    ratio = w[_G, n] * w[STRIBECK_RATE, n]
+    # exp(-z) as a Pade quotient to the 16th power: vector code, error below 1e-6.
+    s = min(ratio * ratio, 40.0) * 0.0625
+    e = (1.0 - 0.5 * s + s * s / 12.0) / (1.0 + 0.5 * s + s * s / 12.0)
+    e = e * e
+    e = e * e
+    e = e * e
+    wish = w[STRIBECK_EXTRA, n] * e * e
+    return wish + (w[_LEVEL, n] - wish) * w[STRIBECK_LAG, n]
+
+
+@njit(inline='always')
+def _specimen(w: Array, yields: bool) -> None:
+    """Write specimen force and tangent at the expected end of the step."""
+    for n in range(LANES):
+        here, there, g = w[_X, n], w[_X, n] + w[_G, n], w[GAP, n]
+        after = there - min(max(there, -g), g)
+        w[_D0, n] = here - min(max(here, -g), g)
+        w[_D1, n] = after
+        w[_DS, n] = 1.0 if abs(there) >= g else 0.0
+        square, cap = after * after, w[HARDENING_CAP, n]
+        cubic = w[HARDENING, n] * min(square, cap)
+        w[_SP, n] = after * (w[YIELD_RATIO, n] + cubic)
+        w[_SS, n] = w[YIELD_RATIO, n] + cubic * (3.0 if square <= cap else 1.0)
+    if yields:
+        for n in range(LANES):
+            moved = w[_D1, n] - w[_D0, n]
+            share, rest = _yielding(w, n, moved), 1.0 - w[YIELD_RATIO, n]
+            w[_SP, n] += rest * min(max(w[_Z, n] + moved * share, -w[YIELD, n]), w[YIELD, n])
+            w[_SS, n] += rest * share
+    for n in range(LANES):
+        w[_SP, n] *= w[STIFFNESS, n]
+        w[_SS, n] *= w[STIFFNESS, n] * w[_DS, n]
+
+
+@njit(inline='always')
+def _yield(w: Array, n: int) -> None:
+    """Carry the hysteretic displacement z on over the step _G."""
+    there, g = w[_X, n] + w[_G, n], w[GAP, n]
+    moved = there - min(max(there, -g), g) - w[_D0, n]
+    end = w[_Z, n] + moved * _yielding(w, n, moved)
+    w[_Z, n] = min(max(end, -w[YIELD, n]), w[YIELD, n])
+
+
+@njit(inline='always')
+def _hardness(w: Array, n: int, z: float) -> Any:
+    """|z/x_y|^n, interpolated between the powers 1, 2, 4, 8 and 16."""
+    r = min(abs(z) * w[INVERSE_YIELD, n], 1.0)
+    r2 = r * r
+    r4 = r2 * r2
+    r8 = r4 * r4
+    low = w[SHARP_1, n] * r + w[SHARP_2, n] * r2 + w[SHARP_4, n] * r4
+    return low + w[SHARP_8, n] * r8 + w[SHARP_16, n] * r8 * r8
+
+
+@njit(inline='always')
+def _yielding(w: Array, n: int, moved: float) -> Any:
+    """Mean dz/dx of the Bouc-Wen model over a step `moved` (midpoint rule)."""
+    z = w[_Z, n]
+    first = 1.0 - (_hardness(w, n, z) if z * moved > 0.0 else 0.0)
+    middle = z + 0.5 * moved * first
+    return 1.0 - (_hardness(w, n, middle) if middle * moved > 0.0 else 0.0)
+
+
 @njit(nogil=True)
 def advance(
     coefficients: Array,
@@ -132,158 +306,74 @@ def advance(
     w[:COEFFICIENTS] = coefficients
     w[_S : _S + STATES] = state
     w[_W:] = 0.0
-    w[_ES] = -0.5
-    step = period / substeps
     inverse = 1.0 / substeps
+    per_second = 2.0 * substeps / period
     want_force = force.shape[0] > 0
-    looks = 3 if on[ON_STRIBECK] else 2 if on[ON_GAP] else 1
     solid = on[ON_GAP] or on[ON_HARDENING] or on[ON_YIELD]
     flow = on[ON_SATURATION] or on[ON_ASYMMETRY] or on[ON_PRESSURE] or on[ON_DROOP] or on[ON_DRIFT]
+    plain = not (solid or flow or on[ON_STRIBECK])
+    looks = 3 if on[ON_STRIBECK] else 2 if on[ON_GAP] else 1
     for i in range(displacement.shape[0]):
         at = begin + i - 1  # the interval from sample `at` to the sample written now
         for j in range(substeps if at >= 0 else 0):
-            # --- command
             if on[ON_LAG]:
                 for n in range(LANES):
                     rate = 1.0 - w[SKEW, n]
                     start = (at + j * inverse) * rate - w[LAG_SAMPLES, n]
-                    stop = start + rate * inverse
-                    mean, slope = _command(u, offset, start, stop, linear)
+                    mean, slope = _command(u, offset, start, start + rate * inverse, linear)
                     w[_U, n] = w[GAIN, n] * mean
                     w[_RAMP, n] = w[GAIN, n] * slope
             else:
-                start = at + j * inverse
                 mean, slope = _held(u, at - offset), 0.0
                 if linear:
+                    start = at + j * inverse
                     mean, slope = _command(u, offset, start, start + inverse, True)
                 for n in range(LANES):
                     w[_U, n] = w[GAIN, n] * mean
                     w[_RAMP, n] = w[GAIN, n] * slope
-            # --- valve
-            for n in range(LANES):
-                w[_E, n] = w[_U, n] + w[NULL, n] - w[_X, n] - 0.5 * w[_DX, n]
-            if on[ON_DEADBAND]:
+            if plain:  # one pass
                 for n in range(LANES):
-                    error, band = w[_E, n], w[DEADBAND, n]
-                    left = error - min(max(error, -band), band)
-                    w[_E, n] = left
-                    w[_ES, n] = 0.0 if left == 0.0 else -0.5
-            for n in range(LANES):
-                mean_flow = (
-                    w[VALVE_E, n] * w[_E, n] + w[VALVE_Q, n] * w[_Q, n] + w[VALVE_D, n] * w[_QD, n]
-                )
-                w[_QM, n] = mean_flow
-                w[_FQ, n] = mean_flow
-                w[_FS, n] = w[VALVE_E, n] * w[_ES, n]
-            # --- flow: gain of the orifice, then its limit
-            if flow:
+                    q, response = _valve(w, n)
+                    k, guess = w[STIFFNESS, n], w[_DX, n]
+                    spring = k * (w[_X, n] + guess)
+                    dx, rest, oil = _balance(w, n, q, response, spring, k, w[COULOMB, n], guess)
+                    _finish(w, n, per_second, q, response, dx, rest, oil)
+            else:  # a pass for every stage that acts
                 for n in range(LANES):
-                    w[_QG, n] = 1.0
-                if on[ON_DRIFT]:
-                    middle = (at + (j + 0.5) * inverse) * period
-                    for n in range(LANES):
-                        w[_QG, n] = max(1.0 + w[GAIN_DRIFT, n] * middle, 0.0)
-                if on[ON_ASYMMETRY]:
-                    for n in range(LANES):
-                        a = w[ASYMMETRY, n]
-                        w[_QG, n] *= 1.0 + (a if w[_QM, n] > 0.0 else -a)
-                if on[ON_PRESSURE]:
-                    for n in range(LANES):
-                        load = (w[_F, n] + 0.5 * w[_DF, n]) * w[INVERSE_STALL, n]
-                        drop = 1.0 - (load if w[_QM, n] > 0.0 else -load)
-                        w[_QG, n] *= math.sqrt(max(drop, 0.0))
-                if on[ON_DROOP]:
-                    for n in range(LANES):
-                        before = w[_ENV, n]
-                        speed = abs(w[_QM, n]) * w[INVERSE_ALPHA_2, n]
-                        middle_envelope = before + w[DROOP_HALF, n] * (speed - before)
-                        w[_QG, n] *= math.sqrt(max(1.0 - w[DROOP, n] * middle_envelope, 0.0))
-                        w[_ENV, n] = 2.0 * middle_envelope - before
+                    w[_QM, n], w[_QR, n] = _valve(w, n)
+                    w[_FQ, n], w[_FR, n] = w[_QM, n], w[_QR, n]
+                if flow:
+                    _flow(w, on, (at + (j + 0.5) * inverse) * period)
                 for n in range(LANES):
-                    through = w[_QM, n] * w[_QG, n]
-                    limit = w[SATURATION, n]
-                    clipped = min(max(through, -limit), limit)
-                    w[_FQ, n] = clipped
-                    w[_FS, n] = w[_FS, n] * w[_QG, n] if clipped == through else 0.0
-            # --- balance of forces from the expected increment; kinks may need another look
-            for n in range(LANES):
-                w[_DRY, n] = w[COULOMB, n]
-                w[_G, n] = w[_DX, n]
-            for _ in range(looks):
+                    w[_G, n] = w[_DX, n]
+                for _ in range(looks):
+                    if on[ON_STRIBECK]:
+                        for n in range(LANES):
+                            w[_RISE, n] = _friction_rise(w, n)
+                    if solid:
+                        _specimen(w, on[ON_YIELD])
+                    else:
+                        for n in range(LANES):
+                            w[_SP, n] = w[STIFFNESS, n] * (w[_X, n] + w[_G, n])
+                            w[_SS, n] = w[STIFFNESS, n]
+                    for n in range(LANES):
+                        dry = w[COULOMB, n] + w[_RISE, n]
+                        w[_G, n], w[_REST, n], w[_OIL, n] = _balance(
+                            w, n, w[_FQ, n], w[_FR, n], w[_SP, n], w[_SS, n], dry, w[_G, n]
+                        )
                 if on[ON_STRIBECK]:
                     for n in range(LANES):
-                        w[_DRY, n] = w[COULOMB, n] + _friction_rise(w, n)
-                if solid:
-                    _specimen(w, on[ON_YIELD])
-                else:
+                        w[_LEVEL, n] = _friction_rise(w, n)
+                if on[ON_YIELD]:
                     for n in range(LANES):
-                        w[_SP, n] = w[STIFFNESS, n] * (w[_X, n] + w[_G, n])
-                        w[_SS, n] = w[STIFFNESS, n]
-                for n in range(LANES):  # trial without slip; friction takes what it can
-                    slope = w[FORCE_Q, n] * w[_FS, n]
-                    static = w[_SP, n] - w[_SS, n] * w[_G, n]
-                    oil = w[FORCE_F, n] * w[_F, n] + w[FORCE_Q, n] * w[_FQ, n] - slope * w[_DX, n]
-                    trial = w[_F, n] + oil - w[_R, n] - static + w[MASS_4V, n] * w[_V, n]
-                    stiff = w[FORCE_X, n] - slope + w[_SS, n] + w[DAMPING_2, n] + w[MASS_4, n]
-                    friction = min(max(trial, -w[_DRY, n]), w[_DRY, n])
-                    dx = (trial - friction) / stiff
-                    w[_G, n] = dx
-                    w[_SP, n] = static + w[_SS, n] * dx + friction
-                    w[_OIL, n] = oil + (slope - w[FORCE_X, n]) * dx
-            for n in range(LANES):
-                dx = w[_G, n]
-                w[_DF, n] = w[_OIL, n] - w[_F, n]
-                w[_F, n] = w[_OIL, n]
-                w[_R, n] = w[_SP, n]
-                w[_V, n] = 0.0 if dx == 0.0 else (2.0 / step) * dx - w[_V, n]
-                mean_flow = w[_QM, n] + w[VALVE_E, n] * w[_ES, n] * (dx - w[_DX, n])
-                w[_QD, n] = (4.0 / step) * (mean_flow - w[_Q, n]) - w[_QD, n]
-                w[_Q, n] = 2.0 * mean_flow - w[_Q, n]
-                w[_X, n] += dx
-                w[_DX, n] = dx
-            if on[ON_YIELD]:
+                        _yield(w, n)
                 for n in range(LANES):
-                    g = w[GAP, n]
-                    after = w[_X, n] - min(max(w[_X, n], -g), g)
-                    moved = after - w[_D0, n]
-                    end = w[_Z, n] + moved * _yielding(w, n, moved)
-                    w[_Z, n] = min(max(end, -w[YIELD, n]), w[YIELD, n])
-            if on[ON_STRIBECK]:
-                for n in range(LANES):
-                    w[_LEVEL, n] = _friction_rise(w, n)
-            # --- what the scheme does wrong on the linear model
-            if on[ON_CORRECTION]:
-                for n in range(LANES):
-                    xe, ve, xt, qt, c = w[_XE, n], w[_VE, n], w[_XT, n], w[_QT, n], w[_U, n]
-                    ramp = w[_RAMP, n]
-                    w[_XE, n] = (
-                        w[EXACT_XX, n] * xe
-                        + w[EXACT_XV, n] * ve
-                        + w[EXACT_XU, n] * c
-                        + w[EXACT_XR, n] * ramp
+                    _finish(
+                        w, n, per_second, w[_QM, n], w[_QR, n], w[_G, n], w[_REST, n], w[_OIL, n]
                     )
-                    w[_VE, n] = (
-                        w[EXACT_VX, n] * xe
-                        + w[EXACT_VV, n] * ve
-                        + w[EXACT_VU, n] * c
-                        + w[EXACT_VR, n] * ramp
-                    )
-                    w[_XT, n] = w[TRAP_XX, n] * xt + w[TRAP_XQ, n] * qt + w[TRAP_XU, n] * c
-                    w[_QT, n] = w[TRAP_QX, n] * xt + w[TRAP_QQ, n] * qt + w[TRAP_QU, n] * c
-            # --- transducer
             if on[ON_BACKLASH] or on[ON_SENSOR_LAG]:
                 for n in range(LANES):
-                    corrected = w[_X, n] + w[_XE, n] - w[_XT, n]
-                    half = w[BACKLASH, n]
-                    before = w[_PLAY, n]
-                    w[_PLAY, n] = min(max(before, corrected - half), corrected + half)
-                    moved = w[_PLAY, n] - before
-                    # First-order lag of the parabola through the last three positions.
-                    bend, lag = 0.5 * (moved - w[_PLAY_DX, n]), w[SENSOR_LAG, n]
-                    end = w[_PLAY, n] - lag * (moved + bend - 2.0 * lag * bend)
-                    start_lag = before - lag * (moved - bend - 2.0 * lag * bend)
-                    w[_SENSED, n] = end + w[SENSOR_DECAY, n] * (w[_SENSED, n] - start_lag)
-                    w[_PLAY_DX, n] = moved
+                    _transducer(w, n)
         if on[ON_BACKLASH] or on[ON_SENSOR_LAG]:
             for n in range(LANES):
                 displacement[i, n] = w[_SENSED, n]
@@ -294,73 +384,3 @@ def advance(
             for n in range(LANES):
                 force[i, n] = w[_F, n]
     state[:] = w[_S : _S + STATES]
-
-
-@njit(inline='always')
-def _exp_minus(z: float) -> float:
-    """exp(-z) for z >= 0 by a Pade quotient to the 16th power (vector code, error < 1e-6)."""
-    s = min(z, 40.0) * 0.0625
-    r = (1.0 - 0.5 * s + s * s / 12.0) / (1.0 + 0.5 * s + s * s / 12.0)
-    r = r * r
-    r = r * r
-    r = r * r
-    return r * r
-
-
-@njit(inline='always')
-def _hardness(w: Array, n: int, z: float) -> Any:
-    """|z/x_y|^n, interpolated between the powers 1, 2, 4, 8 and 16."""
-    r = min(abs(z) * w[INVERSE_YIELD, n], 1.0)
-    r2 = r * r
-    r4 = r2 * r2
-    r8 = r4 * r4
-    return (
-        w[SHARP_1, n] * r
-        + w[SHARP_2, n] * r2
-        + w[SHARP_4, n] * r4
-        + w[SHARP_8, n] * r8
-        + w[SHARP_16, n] * r8 * r8
-    )
-
-
-@njit(inline='always')
-def _yielding(w: Array, n: int, moved: float) -> Any:
-    """Mean dz/dx of the Bouc-Wen model over a step `moved` (midpoint rule)."""
-    z = w[_Z, n]
-    first = 1.0 - (_hardness(w, n, z) if z * moved > 0.0 else 0.0)
-    middle = z + 0.5 * moved * first
-    return 1.0 - (_hardness(w, n, middle) if middle * moved > 0.0 else 0.0)
-
-
-@njit(inline='always')
-def _friction_rise(w: Array, n: int) -> Any:
-    """Rise of dry friction over its sliding value at the end of a step by _G."""
-    ratio = w[_G, n] * w[STRIBECK_RATE, n]
-    wish = w[STRIBECK_EXTRA, n] * _exp_minus(ratio * ratio)
-    return wish + (w[_LEVEL, n] - wish) * w[STRIBECK_LAG, n]
-
-
-@njit(inline='always')
-def _specimen(w: Array, yields: bool) -> None:
-    """Write specimen force and tangent at the expected end of the step."""
-    for n in range(LANES):
-        here, there = w[_X, n], w[_X, n] + w[_G, n]
-        g = w[GAP, n]
-        after = there - min(max(there, -g), g)
-        w[_D0, n] = here - min(max(here, -g), g)
-        w[_D1, n] = after
-        w[_DS, n] = 0.0 if (after == 0.0 and g > 0.0) else 1.0
-        square = min(after * after, w[HARDENING_CAP, n])
-        inside = 3.0 if after * after <= w[HARDENING_CAP, n] else 1.0
-        w[_SP, n] = after * (w[YIELD_RATIO, n] + w[HARDENING, n] * square)
-        w[_SS, n] = w[YIELD_RATIO, n] + w[HARDENING, n] * inside * square
-    if yields:
-        for n in range(LANES):
-            moved = w[_D1, n] - w[_D0, n]
-            share = _yielding(w, n, moved)
-            rest = 1.0 - w[YIELD_RATIO, n]
-            w[_SP, n] += rest * min(max(w[_Z, n] + moved * share, -w[YIELD, n]), w[YIELD, n])
-            w[_SS, n] += rest * share
-    for n in range(LANES):
-        w[_SP, n] *= w[STIFFNESS, n]
-        w[_SS, n] *= w[STIFFNESS, n] * w[_DS, n]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from actuator_glue.model.effects import kernel
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.parameters import Parameter
 
@@ -29,7 +28,6 @@ DEADBAND = Effect(
     source='Merritt 1967, sec. 5.6; Tao & Kokotovic 1996, Adaptive Control of Systems with '
     'Actuator and Sensor Nonlinearities',
     starts=lambda s: ((0.005 * s.stroke,), (0.02 * s.stroke,), (0.06 * s.stroke,)),
-    switches=(kernel.ON_DEADBAND,),
 )
 
 NULL = Effect(
