@@ -42,8 +42,8 @@ def tune(points: Array, counts: Array, settings: Settings) -> Tuning:
     """Fit the proposals to points (m, p) and the shares to what the moves achieved.
 
     Crossover classes get probabilities proportional to their mean squared jump (Vrugt 2016,
-    section 3.2.1); the independence and parallel moves share what the snooker move leaves by the same
-    measure.
+    section 3.2.1); the independence and parallel moves share what the snooker move leaves by the
+    same measure.
     """
     reach = _mean_jumps(counts)
     crossover = reach[len(NAMES) :]

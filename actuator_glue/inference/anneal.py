@@ -19,7 +19,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.inference import generation
 from actuator_glue.inference.adaptation import empty_counts, tune
 from actuator_glue.inference.coordinates import bounded_all
-from actuator_glue.inference.evaluate import LogDensity, evaluate
+from actuator_glue.inference.evaluate import LogDensity, evaluate, refuse_infinite
 from actuator_glue.inference.moves import independence, uniforms_per_chain
 from actuator_glue.inference.settings import Settings
 from actuator_glue.records import Array
@@ -60,8 +60,8 @@ def archive_reference(rng: np.random.Generator, size: int, archive: Array) -> Re
     points = np.empty((size, archive.shape[1]))
     uniforms = rng.random((size, archive.shape[1] + 5))
     for point, row in zip(points, uniforms, strict=True):
-        independence.draw(row, centre, factor, point)
-    return Reference(points, lambda z, _: independence.log_density_all(z, centre, factor))
+        independence.draw(row, 0, centre, factor, point)
+    return Reference(points, lambda z, _: independence.log_density(z, centre, factor))
 
 
 def anneal(
@@ -82,6 +82,8 @@ def anneal(
     size, dimension = z.shape
     x, log_jacobian = bounded_all(z, lower, width)
     values = evaluate(log_density, x)
+    if np.isposinf(values).any():
+        refuse_infinite(x[values.argmax()])
     if not np.isfinite(values).any():
         raise InputError(
             f'the log density is not finite at any of {size} points of the prior; '
@@ -113,9 +115,11 @@ def anneal(
             )  # fmt: skip
             new_values = evaluate(log_density, new_x)
             new_target = _target(reference, power, new_z, new_values, new_jacobian)
-            accepted = generation.accept(
+            accepted, infinite = generation.accept(
                 *now, target, new_z, new_x, new_values, new_target, correction, uniforms
             )
+            if infinite >= 0:
+                refuse_infinite(new_x[infinite])
             generation.tally(now[0], new_z, accepted, label, tuning.scale, counts)
             now, target = (new_z, new_x, new_values), new_target
             history.append(now)

@@ -66,8 +66,8 @@ class Chains:
     def best(self) -> Array:
         """Point (p,) of the largest log likelihood visited."""
         at = int(self.log_density.argmax())
-        flat: Array = self.draws.reshape(-1, self.draws.shape[2])
-        return flat[at]
+        flat = self.draws.reshape(-1, self.draws.shape[2])
+        return np.asarray(flat[at])
 
     @property
     def archive(self) -> Array:

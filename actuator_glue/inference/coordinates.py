@@ -24,13 +24,20 @@ _EDGE = 1e-12
 @njit
 def bounded(z, lower, width, x):  # type: ignore[no-untyped-def]
     """Write the physical point of z into x, both (p,); return its log Jacobian less a constant."""
-    log_jacobian = 0.0
+    # ln(share (1 - share)) = -|z| - 2 ln(1 + exp(-|z|)); the logarithms wait in one product.
+    far = 0.0
+    product = 1.0
     for j in range(z.size):
-        small = math.exp(-abs(z[j]))
-        share = 1.0 / (1.0 + small) if z[j] > 0.0 else small / (1.0 + small)
+        size = abs(z[j])
+        small = math.exp(-size)
+        share = (1.0 if z[j] > 0.0 else small) / (1.0 + small)
         x[j] = lower[j] + width[j] * share
-        log_jacobian -= abs(z[j]) + 2.0 * math.log1p(small)
-    return log_jacobian
+        far += size
+        product *= 1.0 + small
+        if product > 1e300:
+            far += 2.0 * math.log(product)
+            product = 1.0
+    return -far - 2.0 * math.log(product)
 
 
 @njit

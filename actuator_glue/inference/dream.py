@@ -18,7 +18,7 @@ from actuator_glue.inference.anneal import anneal, archive_reference, prior_refe
 from actuator_glue.inference.archive import Archive
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.coordinates import bounded_all, check_bounds, unbounded
-from actuator_glue.inference.evaluate import LogDensity, evaluate
+from actuator_glue.inference.evaluate import LogDensity, evaluate, refuse_infinite
 from actuator_glue.inference.moves import uniforms_per_chain
 from actuator_glue.inference.settings import Settings
 from actuator_glue.records import Array
@@ -171,10 +171,12 @@ def step(rng: np.random.Generator, state: State, log_density: LogDensity) -> tup
     )  # fmt: skip
     values = evaluate(log_density, x)
     target = values + log_jacobian
-    accepted = generation.accept(
+    accepted, infinite = generation.accept(
         state.z, state.x, state.log_density, state.log_target,
         z, x, values, target, correction, uniforms,
     )  # fmt: skip
+    if infinite >= 0:
+        refuse_infinite(x[infinite])
     done = state.generation + 1
     keep = done % s.thinning == 0
     new = State(

@@ -54,6 +54,8 @@ def propose(  # type: ignore[no-untyped-def]
     log_jacobian = np.empty(n)
     correction = np.empty(n)
     label = np.empty((n, 2), np.int64)
+    indices = np.empty((3, max(2 * pairs, 3)), np.int64)
+    residual = np.empty(d)
     for i in range(n):
         row = uniforms[i]
         move = choose(row[U_MOVE], move_cdf)
@@ -72,12 +74,13 @@ def propose(  # type: ignore[no-untyped-def]
                 unit_jump,
                 jitter,
                 noise,
+                indices,
                 candidate[i],
             )
         elif move == SNOOKER:
-            correction[i] = snooker.propose(z[i], row, rows, size, scale, candidate[i])
+            correction[i] = snooker.propose(z[i], row, rows, size, scale, indices, candidate[i])
         elif move == INDEPENDENCE:
-            correction[i] = independence.propose(z[i], row, centre, factor, candidate[i])
+            correction[i] = independence.propose(z[i], row, centre, factor, residual, candidate[i])
         log_jacobian[i] = bounded(candidate[i], lower, width, x[i])
     return candidate, x, log_jacobian, correction, label
 
@@ -88,11 +91,15 @@ def accept(  # type: ignore[no-untyped-def]
 ):
     """Metropolis-Hastings: overwrite the new_ arrays with the current state where rejected.
 
-    A target that is not a number is rejected. Returns accepted (n,) bool.
+    A target that is not a number is rejected. Returns accepted (n,) bool, and the first chain
+    whose candidate has a target of plus infinity, -1 where none has.
     """
     n = z.shape[0]
     accepted = np.empty(n, np.bool_)
+    infinite = -1
     for i in range(n):
+        if new_target[i] == np.inf and infinite < 0:
+            infinite = i
         log_ratio = new_target[i] - target[i] + correction[i]
         accepted[i] = math.log1p(-uniforms[i, U_ACCEPT]) < log_ratio
         if not accepted[i]:
@@ -100,7 +107,7 @@ def accept(  # type: ignore[no-untyped-def]
             new_x[i] = x[i]
             new_log_density[i] = log_density[i]
             new_target[i] = target[i]
-    return accepted
+    return accepted, infinite
 
 
 @njit

@@ -8,24 +8,24 @@ from actuator_glue.jit import njit
 
 
 @njit
-def distinct(uniforms, first, indices, displaced, size):  # type: ignore[no-untyped-def]
-    """Fill indices with an ordered sample of range(size) without replacement.
+def distinct(uniforms, first, count, size, indices):  # type: ignore[no-untyped-def]
+    """Write an ordered sample of range(size) without replacement into indices[0, :count].
 
-    A Fisher-Yates shuffle of which only the first entries are made: position[k] = displaced[0, k]
-    holds displaced[1, k] instead of its own number. displaced is scratch of shape (2, count).
+    A Fisher-Yates shuffle of which only the first entries are made: position indices[1, m] holds
+    indices[2, m] instead of its own number. indices has shape (3, >= count).
     """
-    for k in range(indices.size):
+    for k in range(count):
         position = k + int(uniforms[first + k] * (size - k))
         here = position
         mine = k
         for m in range(k):
-            if displaced[0, m] == position:
-                here = displaced[1, m]
-            if displaced[0, m] == k:
-                mine = displaced[1, m]
-        indices[k] = here
-        displaced[0, k] = position
-        displaced[1, k] = mine
+            if indices[1, m] == position:
+                here = indices[2, m]
+            if indices[1, m] == k:
+                mine = indices[2, m]
+        indices[0, k] = here
+        indices[1, k] = position
+        indices[2, k] = mine
 
 
 @njit

@@ -37,8 +37,8 @@ def fit(points: Array) -> tuple[Array, Array]:
 
 
 @njit
-def log_density(z, centre, factor, residual):  # type: ignore[no-untyped-def]
-    """Log density of the fitted Student t at z, less a constant; residual is scratch (p,)."""
+def _distance2(z, centre, factor, residual):  # type: ignore[no-untyped-def]
+    """Squared Mahalanobis distance of z from the centre; residual is scratch (p,)."""
     distance2 = 0.0
     for j in range(z.size):
         value = z[j] - centre[j]
@@ -46,31 +46,32 @@ def log_density(z, centre, factor, residual):  # type: ignore[no-untyped-def]
             value -= factor[j, k] * residual[k]
         residual[j] = value / factor[j, j]
         distance2 += residual[j] * residual[j]
-    return -0.5 * (DEGREES + z.size) * math.log1p(distance2 / DEGREES)
+    return distance2
 
 
 @njit
-def log_density_all(z, centre, factor):  # type: ignore[no-untyped-def]
+def log_density(z, centre, factor):  # type: ignore[no-untyped-def]
     """Log density (m,) of the fitted Student t at points z (m, p), less a constant."""
     values = np.empty(z.shape[0])
     residual = np.empty(z.shape[1])
     for i in range(z.shape[0]):
-        values[i] = log_density(z[i], centre, factor, residual)
+        distance2 = _distance2(z[i], centre, factor, residual)
+        values[i] = -0.5 * (DEGREES + z.shape[1]) * math.log1p(distance2 / DEGREES)
     return values
 
 
 @njit
-def draw(uniforms, centre, factor, candidate):  # type: ignore[no-untyped-def]
-    """Write one draw of the fitted Student t into candidate, from p + 5 uniforms."""
+def draw(uniforms, first, centre, factor, candidate):  # type: ignore[no-untyped-def]
+    """Write one draw of the fitted Student t into candidate, from uniforms[first:]."""
     d = centre.size
     # Chi-squared with five degrees of freedom: two exponentials and one squared normal.
-    normal, _ = normal_pair(uniforms[2], uniforms[3])
-    chi2 = normal * normal - 2.0 * (math.log1p(-uniforms[0]) + math.log1p(-uniforms[1]))
+    normal, spare = normal_pair(uniforms[first + 2], uniforms[first + 3])
+    chi2 = normal * normal - 2.0 * math.log((1.0 - uniforms[first]) * (1.0 - uniforms[first + 1]))
     stretch = math.sqrt(DEGREES / chi2)
     for j in range(d):
-        candidate[j] = centre[j]
-    for k in range(0, d, 2):
-        one, two = normal_pair(uniforms[4 + k], uniforms[5 + k])
+        candidate[j] = centre[j] + stretch * spare * factor[j, 0]
+    for k in range(1, d, 2):
+        one, two = normal_pair(uniforms[first + 3 + k], uniforms[first + 4 + k])
         for j in range(k, d):
             candidate[j] += stretch * factor[j, k] * one
         for j in range(k + 1, d):
@@ -78,10 +79,12 @@ def draw(uniforms, centre, factor, candidate):  # type: ignore[no-untyped-def]
 
 
 @njit
-def propose(z, uniforms, centre, factor, candidate):  # type: ignore[no-untyped-def]
-    """Write a candidate that does not depend on z, return the log Hastings correction."""
-    draw(uniforms[U_FREE:], centre, factor, candidate)
-    residual = np.empty(z.size)
-    return log_density(z, centre, factor, residual) - log_density(
-        candidate, centre, factor, residual
-    )
+def propose(z, uniforms, centre, factor, residual, candidate):  # type: ignore[no-untyped-def]
+    """Write a candidate that does not depend on z, return the log Hastings correction.
+
+    residual is scratch (p,).
+    """
+    draw(uniforms, U_FREE, centre, factor, candidate)
+    here = DEGREES + _distance2(z, centre, factor, residual)
+    there = DEGREES + _distance2(candidate, centre, factor, residual)
+    return 0.5 * (DEGREES + z.size) * math.log(there / here)

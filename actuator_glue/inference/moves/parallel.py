@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from actuator_glue.inference.moves import U_FREE
 from actuator_glue.inference.moves.draw import choose, distinct
 from actuator_glue.jit import njit
@@ -13,7 +11,18 @@ from actuator_glue.jit import njit
 
 @njit
 def propose(  # type: ignore[no-untyped-def]
-    z, uniforms, rows, size, scale, crossover_cdf, pairs, unit_jump, jitter, noise, candidate
+    z,
+    uniforms,
+    rows,
+    size,
+    scale,
+    crossover_cdf,
+    pairs,
+    unit_jump,
+    jitter,
+    noise,
+    indices,
+    candidate,
 ):
     """Write a candidate, return the crossover class used (-1: unit jump, all coordinates).
 
@@ -32,8 +41,7 @@ def propose(  # type: ignore[no-untyped-def]
         delta = min(1 + int(uniforms[at + 2] * pairs), size // 2)
     lone = int(uniforms[at + 3] * d)
     at += 4
-    indices = np.empty(2 * delta, np.int64)
-    distinct(uniforms, at, indices, np.empty((2, 2 * delta), np.int64), size)
+    distinct(uniforms, at, 2 * delta, size, indices)
     at += 2 * pairs
 
     rate = (crossover + 1.0) / crossover_cdf.size
@@ -47,7 +55,7 @@ def propose(  # type: ignore[no-untyped-def]
         if crossover < 0 or uniforms[at + j] < rate or (moved == 0 and j == lone):
             direction = 0.0
             for k in range(delta):
-                direction += rows[indices[2 * k], j] - rows[indices[2 * k + 1], j]
+                direction += rows[indices[0, 2 * k], j] - rows[indices[0, 2 * k + 1], j]
             stretch = 1.0 + jitter * (2.0 * uniforms[at + d + j] - 1.0)
             small = noise * scale[j] * (2.0 * uniforms[at + 2 * d + j] - 1.0)
             candidate[j] += stretch * gamma * direction + small

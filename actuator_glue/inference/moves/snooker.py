@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from actuator_glue.inference.moves import U_FREE
 from actuator_glue.inference.moves.draw import distinct
 from actuator_glue.jit import njit
 
 
 @njit
-def propose(z, uniforms, rows, size, scale, candidate):  # type: ignore[no-untyped-def]
+def propose(z, uniforms, rows, size, scale, indices, candidate):  # type: ignore[no-untyped-def]
     """Write a candidate on the line from an archive point through z, return log correction.
 
     candidate = z + gamma (P(b) - P(c)), gamma ~ U(1.2, 2.2), with P the orthogonal projection on
@@ -21,15 +19,14 @@ def propose(z, uniforms, rows, size, scale, candidate):  # type: ignore[no-untyp
     coordinates divided by `scale`, so that no coordinate rules the others.
     """
     d = z.size
-    indices = np.empty(3, np.int64)
-    distinct(uniforms, U_FREE, indices, np.empty((2, 3), np.int64), size)
-    anchor = rows[indices[0]]
+    distinct(uniforms, U_FREE, 3, size, indices)
+    anchor = rows[indices[0, 0]]
     length2 = 0.0
     along = 0.0
     for j in range(d):
         line = (z[j] - anchor[j]) / scale[j]
         length2 += line * line
-        along += line * (rows[indices[1], j] - rows[indices[2], j]) / scale[j]
+        along += line * (rows[indices[0, 1], j] - rows[indices[0, 2], j]) / scale[j]
     if length2 == 0.0:
         # The chain stands on the anchor: no line, stay.
         candidate[:] = z
