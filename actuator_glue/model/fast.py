@@ -18,7 +18,7 @@ from actuator_glue.model.exact import ExactErrors, Initial
 from actuator_glue.records import Array, Record
 
 TOLERANCE = 1e-9  # relative error of the sum of squares; times G = 256 it is 3e-7 in L
-_FEWEST, _MOST = 12, 64  # terms of the basis
+_FEWEST, _MOST = 16, 64  # terms of the basis
 _ENOUGH = 1e-11  # what the terms should leave of the response
 # Grid that looks for the reference system: points per axis, refinements, range in s and in Hz.
 _GRID, _LEVELS = 8, 8
@@ -135,7 +135,7 @@ def _terms(system: Array) -> int:
             poles = np.roots([1.0, system[0] * damping, system[1] * frequency])
             worst = max(worst, float(np.abs((poles + sigma) / (poles - sigma)).max()))
     wanted = math.log(_ENOUGH) / math.log(worst) if 0.0 < worst < 1.0 else float(_MOST)
-    return 4 * math.ceil(min(max(wanted, _FEWEST), _MOST) / 4)
+    return laguerre.BLOCK * math.ceil(min(max(wanted, _FEWEST), _MOST) / laguerre.BLOCK)
 
 
 def _reference(exact: ExactErrors, r: int) -> Array:

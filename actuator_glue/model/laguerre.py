@@ -16,9 +16,10 @@ from actuator_glue.records import Array
 
 Flags: TypeAlias = NDArray[np.bool_]
 
-TAIL = 16  # terms beyond the basis that are summed one by one for the truncation bound
-_BLOCK = 256  # samples per pass of the filter bank: the bank's outputs stay in the cache
-_WIDTH = 8  # thetas expanded together
+BLOCK = 8  # terms that stand together; where there are two banks, their blocks take turns
+TAIL = 2 * BLOCK  # terms beyond the basis that are summed one by one for the truncation bound
+_SAMPLES = 256  # samples per pass of the filter bank: the bank's outputs stay in the cache
+_ROUNDING = 1e-15  # of the quadratic form, relative to the largest of what it adds up
 _FAR = 1e4  # misfit, relative to the reference's, up to which the tolerance grows with it
 
 # One row per record: numbers, then reference coefficients, column sums, cross products, Gram.
@@ -94,18 +95,60 @@ def _beyond(radius: float, last: float, before: float) -> float:
 
 
 @njit
+def _series(start: Array, banks: int, weight: float, z: Array) -> float:
+    """Write all terms of one system into z and bound the sum of those that follow.
+
+    Terms one by one as far as block two; from there on whole blocks at once, by the recursion
+    that every eighth term obeys (its poles are the eighth powers).
+
+    Args:
+        start: as written by `expand`.
+        banks: 1, or 2 where the initial state has terms of its own.
+        weight: of the command's terms in the bound; the initial state's have weight one.
+        z: shape (blocks, BLOCK); blocks of both banks take turns.
+    """
+    r1, r2, d4 = start[0], start[1], start[1] ** 4
+    t4 = (r1 * r1 - 2.0 * r2) ** 2 - 2.0 * r2 * r2
+    t8, d8 = t4 * t4 - 2.0 * d4, d4 * d4
+    beyond = 0.0
+    for bank in range(banks):
+        k0 = 2 + 3 * bank
+        z[bank, 0], z[bank, 1], z[bank, 2] = start[k0], start[k0 + 1], start[k0 + 2]
+        before, last = start[k0 + 1], start[k0 + 2]
+        for i in range(3, BLOCK):
+            before, last = last, -r1 * last - r2 * before
+            z[bank, i] = last
+        for i in range(BLOCK):
+            before, last = last, -r1 * last - r2 * before
+            z[banks + bank, i] = last
+        for row in range(2 * banks + bank, len(z), banks):
+            for i in range(BLOCK):
+                z[row, i] = t8 * z[row - banks, i] - d8 * z[row - 2 * banks, i]
+            if row < 3 * banks:  # the recursion does not hold for the very first term
+                z[row, 0] = -r1 * last - r2 * before
+        row = len(z) - banks + bank
+        beyond += (1.0 if bank else weight) * _beyond(
+            start[8], z[row, BLOCK - 1], z[row, BLOCK - 2]
+        )
+    return beyond
+
+
+@njit
 def _filter_bank(
     x: Array, size: int, banks: int, memory: Array, pole: float, delta: float
 ) -> None:
-    """Fill rows banks.. of x with the row `banks` before passed through (1 - pole z)/(z - pole).
+    """Fill each bank's rows of x with its first one passed through (1 - pole z)/(z - pole).
 
     Written as zeta = delta (z + 1)/(z - pole) - 1, which loses nothing when the pole is near one.
     `memory` (rows, 2) holds each section's last input and low-pass output across blocks.
     """
-    for row in range(banks, len(x)):
+    for row in range(len(x)):
+        if row < banks * BLOCK and row % BLOCK == 0:
+            continue  # the inputs themselves
+        source = row - 1 if row % BLOCK else row - 1 - (banks - 1) * BLOCK
         before, low = memory[row, 0], memory[row, 1]
         for n in range(size):
-            new = x[row - banks, n]
+            new = x[source, n]
             low = pole * low + delta * (new + before)
             x[row, n] = low - new
             before = new
@@ -165,28 +208,22 @@ def prepare(t: Array, c: Array, measured: Array, command: Array, settle: int) ->
     N, dims = K + TAIL, K * banks
     start = np.empty(9)
     expand(c, t, start)
-    reference = t[HEADER : HEADER + N * banks]
-    for i in range(len(reference)):
-        k, bank = i // banks, i % banks
-        if k < 3:
-            reference[i] = start[2 + 3 * bank + k]
-        else:
-            reference[i] = -start[0] * reference[i - banks] - start[1] * reference[i - 2 * banks]
+    _series(start, banks, 1.0, t[HEADER : HEADER + N * banks].reshape(-1, BLOCK))
     state = np.zeros(kernel.STREAM)
     state[1], state[2] = t[X0], t[V0]
     at = HEADER + N * banks
     column_sums, cross = t[at : at + dims], t[at + dims : at + 2 * dims]
     gram = t[at + 2 * dims : at + (2 + dims) * dims].reshape(dims, dims)
-    x, e = np.zeros((dims, _BLOCK)), np.empty(_BLOCK)  # both banks take turns
+    x, e = np.zeros((dims, _SAMPLES)), np.empty(_SAMPLES)
     memory = np.zeros((dims, 2))
     first, n = 0, len(command)
     while first < n:
-        last = min(first + _BLOCK, n if first >= settle else settle)
+        last = min(first + _SAMPLES, n if first >= settle else settle)
         size = last - first
         x[0, :size] = command[first:last]
         if banks == 2:
-            x[1, :size] = 0.0
-            x[1, 0] = 1.0 if first == 0 else 0.0
+            x[BLOCK, :size] = 0.0
+            x[BLOCK, 0] = 1.0 if first == 0 else 0.0
         _filter_bank(x, size, banks, memory, t[POLE], t[DELTA])
         kernel.stream(c, state, command[first:last], e[:size])
         for i in range(size):
@@ -200,72 +237,31 @@ def prepare(t: Array, c: Array, measured: Array, command: Array, settle: int) ->
         first = last
     for i in range(dims):
         gram[i, i] *= 0.5
-        gram[i, i + 1 :] = 0.0
+        gram[:i, i] = gram[i, :i]
+        gram[i, :i] = 0.0
     t[COUNT] = n - settle
     t[NORM] = np.sqrt(t[NORM])
 
 
 @njit
-def _differences(t: Array, theta: Array, first: int, z: Array, beyond: Array) -> None:
-    """Fill z with all terms less the reference's, and bound what follows them, for one block.
-
-    Args:
-        t: the record's row.
-        theta: shape (m, 4); beyond its end the last one is repeated.
-        first: the block's first theta.
-        z: shape (terms, _WIDTH), both banks taking turns.
-        beyond: shape (_WIDTH,) [m].
-    """
-    W, banks, norm = _WIDTH, 1 + int(t[FREE]), t[NORM]
-    starts = np.empty((9, W))
-    row, start = np.empty(kernel.COLUMNS), np.empty(9)
-    for j in range(W):
-        one = theta[min(first + j, len(theta) - 1)]
-        n0, d2, d1, d0 = kernel.equation_2a(one, t[STIFFNESS])
-        kernel.discretise_one(d1 / d2, d0 / d2, n0 / d2, t[PERIOD], t[FOH] > 0.0, row)
-        expand(row, t, start)
-        starts[:, j] = start
-    N = len(z)
-    for i in range(3):
-        for bank in range(banks):
-            z[i * banks + bank] = starts[2 + 3 * bank + i]
-    for i in range(3 * banks, N):
-        for j in range(W):
-            z[i, j] = -starts[0, j] * z[i - banks, j] - starts[1, j] * z[i - 2 * banks, j]
-    beyond[:] = 0.0
-    for bank in range(banks):
-        i = N - banks + bank
-        for j in range(W):
-            weight = 1.0 if bank else norm
-            beyond[j] += weight * _beyond(starts[8, j], z[i, j], z[i - banks, j])
-    for i in range(N):
-        reference = t[HEADER + i]
-        for j in range(W):
-            z[i, j] -= reference
-
-
-@njit
-def _two_rows(gram: Array, dims: int, i: int, z: Array, term: Array) -> None:
-    """Write rows i and i + 1 of (lower triangle, diagonal halved) times z into `term`.
-
-    Four columns at a time; the triangle is stored with zeros up to the next multiple of four.
-    """
-    term[:] = 0.0
-    a, b = gram[i * dims : (i + 1) * dims], gram[(i + 1) * dims : (i + 2) * dims]
-    for k in range(0, i + 2, 4):
-        a0, a1, a2, a3 = a[k], a[k + 1], a[k + 2], a[k + 3]
-        b0, b1, b2, b3 = b[k], b[k + 1], b[k + 2], b[k + 3]
-        for j in range(_WIDTH):
-            z0, z1, z2, z3 = z[k, j], z[k + 1, j], z[k + 2, j], z[k + 3, j]
-            term[0, j] += (a0 * z0 + a1 * z1) + (a2 * z2 + a3 * z3)
-            term[1, j] += (b0 * z0 + b1 * z1) + (b2 * z2 + b3 * z3)
+def _half_product(gram: Array, dims: int, z: Array, used: int, out: Array) -> None:
+    """Write (lower triangle of the Gram matrix, diagonal halved) times z into out[:used]."""
+    out[:used] = 0.0
+    for k in range(0, used, 4):
+        z0, z1, z2, z3 = z[k], z[k + 1], z[k + 2], z[k + 3]
+        a = gram[k * dims : k * dims + used]
+        b = gram[(k + 1) * dims : (k + 1) * dims + used]
+        c = gram[(k + 2) * dims : (k + 2) * dims + used]
+        d = gram[(k + 3) * dims : (k + 3) * dims + used]
+        for i in range(k - k % BLOCK, used):
+            out[i] += (a[i] * z0 + b[i] * z1) + (c[i] * z2 + d[i] * z3)
 
 
 @njit
 def evaluate(t: Array, theta: Array, tolerance: float, out: Array, exact: Flags) -> None:
     """Write (sum e, sum e^2) of many thetas over one record, and which need the exact kernel.
 
-    A block of thetas uses as many terms as its own truncation bound asks for.
+    Each theta uses as many blocks of terms as its own truncation bound asks for.
 
     Args:
         t: the record's row.
@@ -275,49 +271,47 @@ def evaluate(t: Array, theta: Array, tolerance: float, out: Array, exact: Flags)
         out: shape (m, 2) [m, m^2].
         exact: shape (m,), True where the bound is not met (or the system does not exist).
     """
-    W = _WIDTH
     banks, norm = 1 + int(t[FREE]), t[NORM]
     dims, N = int(t[TERMS]) * banks, (int(t[TERMS]) + TAIL) * banks
-    sums, cross, gram = HEADER + N, HEADER + N + dims, HEADER + N + 2 * dims
+    reference, sums = t[HEADER : HEADER + N], t[HEADER + N : HEADER + N + dims]
+    cross, gram = t[HEADER + N + dims : HEADER + N + 2 * dims], t[HEADER + N + 2 * dims :]
     least = t[SQUARES] - t[SUM] * t[SUM] / t[COUNT]
     enough = 0.1 * tolerance * np.sqrt(least)
-    z = np.empty((N, W))
-    tail, near, s, q = np.empty(W), np.empty(W), np.empty(W), np.empty(W)
-    term = np.empty((2, W))
-    for first in range(0, len(theta), W):
-        _differences(t, theta, first, z, tail)
-        used = N
-        while used > 0:
-            weight = norm if banks == 1 or used % 2 == 1 else 1.0
-            more = 0.0
-            for j in range(W):
-                near[j] = tail[j] + weight * abs(z[used - 1, j])
-                more = max(more, near[j])
-            if used <= dims and not more <= enough:
-                break
-            used -= 1
-            tail[:] = near
-        used += used % 2
-        near[:] = 0.0
-        s[:] = t[SUM]
-        q[:] = t[SQUARES]
-        for i in range(0, used, 2):
-            _two_rows(t[gram:], dims, i, z, term)
-            for half in range(2):
-                n = i + half
-                weight = norm if banks == 1 or n % 2 == 0 else 1.0
-                for j in range(W):
-                    s[j] -= t[sums + n] * z[n, j]
-                    q[j] += 2.0 * z[n, j] * (term[half, j] - t[cross + n])
-                    near[j] += weight * abs(z[n, j])
-        for j in range(min(W, len(theta) - first)):
-            out[first + j, 0], out[first + j, 1] = s[j], q[j]
-            about_mean = q[j] - s[j] * s[j] / t[COUNT]
-            rounding = 1e-15 * (np.sqrt(t[SQUARES]) + near[j]) ** 2
-            bound = (2.0 * np.sqrt(max(about_mean, 0.0)) + tail[j]) * tail[j] + rounding
-            # Far from the best fit less accuracy does: L itself is lower by G ln(misfit).
-            misfit = min(max(about_mean / least, 1.0), _FAR)
-            exact[first + j] = not bound <= tolerance * misfit * about_mean
+    row, start, size = np.empty(kernel.COLUMNS), np.empty(9), np.empty(N // BLOCK)
+    z, half = np.empty(N), np.empty(dims)
+    blocks = z.reshape(-1, BLOCK)
+    for m in range(len(theta)):
+        n0, d2, d1, d0 = kernel.equation_2a(theta[m], t[STIFFNESS])
+        kernel.discretise_one(d1 / d2, d0 / d2, n0 / d2, t[PERIOD], t[FOH] > 0.0, row)
+        expand(row, t, start)
+        tail = _series(start, banks, norm, blocks)
+        for i in range(N):
+            z[i] -= reference[i]
+        for block in range(len(size)):
+            total = 0.0
+            for i in range(BLOCK):
+                total += abs(blocks[block, i])
+            size[block] = total * (norm if banks == 1 or block % 2 == 0 else 1.0)
+        count = len(size)
+        while count > 0 and (count * BLOCK > dims or tail + size[count - 1] <= enough):
+            count -= 1
+            tail += size[count]
+        near = np.sqrt(t[SQUARES])
+        for block in range(count):
+            near += size[block]
+        used = count * BLOCK
+        _half_product(gram, dims, z, used, half)
+        s = q = 0.0
+        for i in range(used):
+            s += sums[i] * z[i]
+            q += z[i] * (half[i] - cross[i])
+        s, q = t[SUM] - s, t[SQUARES] + 2.0 * q
+        out[m, 0], out[m, 1] = s, q
+        about_mean = q - s * s / t[COUNT]
+        bound = (2.0 * np.sqrt(max(about_mean, 0.0)) + tail) * tail + _ROUNDING * near * near
+        # Far from the best fit less accuracy does: L itself is lower by G ln(misfit).
+        misfit = min(max(about_mean / least, 1.0), _FAR)
+        exact[m] = not bound <= tolerance * misfit * about_mean
 
 
 @njit
