@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
+import matplotlib.colors
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -17,6 +19,12 @@ from actuator_glue.report import style
 
 Zoom = tuple[float, float]
 MM = 1e3
+# Either band may be the wider one: the total one is drawn by its edges.
+TOTAL_LOOK: dict[str, Any] = {
+    'facecolor': matplotlib.colors.to_rgba(style.TOTAL, 0.15),
+    'edgecolor': style.TOTAL,
+    'linewidth': 0.8,
+}
 
 
 def frequency_zooms(
@@ -104,7 +112,7 @@ def band_over_measured(
             axes.set_title(zoom_titles[i])
     panels[0].set_ylabel('displacement [mm]')
     handles, names = panels[0].get_legend_handles_labels()
-    figure.legend(handles, names, loc='outside lower center', ncols=len(names))
+    figure.legend(handles, names, loc='outside lower center', ncols=3)
     if title:
         figure.suptitle(title)
     return figure
@@ -138,10 +146,11 @@ def band_at_zooms(
         _zoom(upper, record, start, stop)
         part = slice(*np.searchsorted(time, (start, stop)))
         measured = record.measured[part]
-        for limit, colour, shade in ((total, style.TOTAL, 0.4), (limits, style.BAND, 0.45)):
-            if limit is not None:
-                low, high = (MM * (edge[part] - measured) for edge in limit.at(level))
-                lower.fill_between(time[part], low, high, color=colour, alpha=shade, lw=0)
+        low, high = (MM * (edge[part] - measured) for edge in limits.at(level))
+        lower.fill_between(time[part], low, high, color=style.BAND, alpha=0.4, lw=0)
+        if total is not None:
+            low, high = (MM * (edge[part] - measured) for edge in total.at(level))
+            lower.fill_between(time[part], low, high, **TOTAL_LOOK)
         if deterministic is not None:
             off = MM * (deterministic[part] - measured)
             lower.plot(time[part], off, '--', color=style.DETERMINISTIC)
@@ -152,7 +161,7 @@ def band_at_zooms(
     rows[0, 0].set_ylabel('displacement [mm]')
     rows[1, 0].set_ylabel('less measured [mm]')
     handles, names = rows[0, 0].get_legend_handles_labels()
-    figure.legend(handles, names, loc='outside lower center', ncols=len(names))
+    figure.legend(handles, names, loc='outside lower center', ncols=3)
     if title:
         figure.suptitle(title)
     return figure
@@ -215,7 +224,7 @@ def parameters_against_time(
     for axes in panels[max(0, count - columns) : count]:
         axes.set_xlabel('time [s]')
     handles, names = panels[0].get_legend_handles_labels()
-    figure.legend(handles, names, loc='outside lower center', ncols=len(names))
+    figure.legend(handles, names, loc='outside lower center', ncols=3)
     if title:
         figure.suptitle(title)
     return figure
@@ -240,12 +249,6 @@ def _draw(
 ) -> None:
     time = record.time
     percent = f'{100 * level:g} %'
-    if total is not None:
-        lower, upper = total.at(level)
-        axes.fill_between(
-            time, MM * lower, MM * upper, color=style.TOTAL, alpha=0.4, lw=0,
-            label=f'{percent} total predictive band',
-        )  # fmt: skip
     axes.plot(time, MM * record.command, ':', color=style.COMMAND, label='command')
     axes.plot(time, MM * record.measured, color=style.MEASURED, lw=0.9, label='measured')
     if deterministic is not None:
@@ -255,6 +258,12 @@ def _draw(
         time, MM * lower, MM * upper, color=style.BAND, alpha=0.45, lw=0, zorder=3,
         label=f'{percent} {band_name}',
     )  # fmt: skip
+    if total is not None:
+        lower, upper = total.at(level)
+        axes.fill_between(
+            time, MM * lower, MM * upper, zorder=3, label=f'{percent} total predictive band',
+            **TOTAL_LOOK,
+        )  # fmt: skip
 
 
 def _zoom(axes: Axes, record: Record, start: float, stop: float) -> None:

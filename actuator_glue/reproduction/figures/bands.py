@@ -48,7 +48,7 @@ def frequency_response(
         )
         for row, (outer, inner, of, unit) in enumerate(rows):
             axes = panels[row, test]
-            _shade(axes, unit * outer, style.TOTAL, 0.55, 'GLUE band, matched residual')
+            _shade(axes, unit * outer, style.LIGHT_BAND, 0.55, 'GLUE band, matched residual')
             _shade(axes, unit * inner, style.BAND, 1.0, 'GLUE band, sensor noise')
             axes.plot(GRID, unit * of(curve.experiment), color=style.MEASURED, label='experiment')
             axes.plot(
@@ -99,7 +99,7 @@ def histograms(bands: FrequencyBands, curve: Curves) -> Figure:
         for column, frequency in enumerate(CLOSE_UPS):
             axes = panels[row, column]
             axes.hist(
-                unit * draws[:, column], bins=30, color=style.TOTAL, density=True,
+                unit * draws[:, column], bins=30, color=style.LIGHT_BAND, density=True,
                 label='matched posterior',
             )  # fmt: skip
             experiment = unit * of(curve.close_experiment)[column]

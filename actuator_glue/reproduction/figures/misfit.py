@@ -38,7 +38,10 @@ def residual_by_frequency(
             axes.plot(centres, UM * rms, look, color=colour, label=name)
         axes.axhline(UM * noise, color='black', lw=0.8, ls=(0, (6, 3)), label='sensor noise')
         axes.set(xlabel='frequency [Hz]', xlim=(0, 10), title=stiffness_name(test))
-        axes.set_ylim(bottom=0)
+    top = max(
+        float(by_frequency(records[t], r.residual[t])[1].max()) for r in both for t in (0, 1)
+    )
+    panels[0].set_ylim(0, 1.05 * UM * top)
     panels[0].set_ylabel('residual rms [um]')
     figure.legend(*panels[0].get_legend_handles_labels(), loc='outside lower center', ncols=2)
     return figure

@@ -86,6 +86,7 @@ def spread_against_g(shaped: Mapping[str, Sequence[Shaped]], names: Mapping[str,
     """
     figure = style.new_figure(3.6)
     left, right = figure.subplots(1, 2)
+    first = next(iter(shaped))
     for (kind, entries), dash, fill in zip(
         shaped.items(), ('-', '--'), ('full', 'none'), strict=True
     ):
@@ -94,7 +95,7 @@ def spread_against_g(shaped: Mapping[str, Sequence[Shaped]], names: Mapping[str,
             left.plot(
                 factor, [s.ours.moments.cov[i] for s in entries], dash, marker=MARKS[i],
                 color=COLOURS[i], fillstyle=fill,
-                label=f'{style.SYMBOL[parameter.name]}, {names[kind]}',
+                label=style.SYMBOL[parameter.name] if kind == first else None,
             )  # fmt: skip
         right.plot(
             factor, [100 * s.held_out for s in entries], dash, marker='o', fillstyle=fill,
@@ -104,12 +105,14 @@ def spread_against_g(shaped: Mapping[str, Sequence[Shaped]], names: Mapping[str,
         [CHOSEN] * 3, TABLE_4.cov[:3], '*', ms=9, color=style.PUBLISHED, label='Table 4', zorder=5
     )
     right.axhline(100 * LEVEL, color=style.TRUTH, lw=0.9, label='nominal 95 %')
+    for kind, dash in zip(shaped, ('-', '--'), strict=True):
+        left.plot([], [], dash, color='black', label=names[kind])
     for axes in (left, right):
         axes.set_xscale('log', base=2)
         axes.xaxis.set_minor_locator(NullLocator())
         axes.set_xlabel('shaping factor G')
-    left.set(yscale='log', ylabel='COV', title='(a) spread')
+    left.set(yscale='log', ylabel='COV', title='(a) spread', ylim=(8e-4, 12))
     right.set(ylim=(0, 103), ylabel='held-out samples inside [%]', title='(b) 95 % GLUE band')
-    left.legend(loc='lower left', fontsize=7)
-    right.legend(loc='center left', fontsize=7)
+    left.legend(loc='upper right', ncols=2, fontsize=7.5)
+    right.legend(loc='center left', fontsize=7.5)
     return figure

@@ -46,7 +46,8 @@ def against_residual(spread: Spread, sensor_rms: float) -> Figure:
         panels[0, i].set_title(style.SYMBOL[parameter.name], loc='center')
     panels[0, 0].set_ylabel('COV')
     panels[1, 0].set_ylabel('skewness')
-    figure.supxlabel('residual rms at the best fit [mm]', fontsize=8.5)
+    for axes in panels[1]:
+        axes.set_xlabel('residual rms [mm]')
     figure.legend(*panels[0, 0].get_legend_handles_labels(), loc='outside lower center', ncols=4)
     return figure
 
