@@ -9,17 +9,17 @@ and what the first archive holds; nothing of it enters the posterior draws.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.errors import InputError
 from actuator_glue.inference import generation
 from actuator_glue.inference.adaptation import empty_counts, tune
 from actuator_glue.inference.coordinates import bounded_all
-from actuator_glue.inference.evaluate import LogDensity, evaluate, refuse_infinite
+from actuator_glue.inference.evaluate import LogDensity, check_values, evaluate, refuse_infinite
 from actuator_glue.inference.moves import independence, uniforms_per_chain
 from actuator_glue.inference.settings import Settings
 from actuator_glue.records import Array
@@ -71,30 +71,25 @@ def anneal(
     width: Array,
     reference: Reference,
     settings: Settings,
-    limit: int,
+    limit: int | None = None,
 ) -> Population:
     """Carry the reference's points to the posterior within `limit` evaluations.
 
     Raises:
-        InputError: the log density is not finite at any point of the reference.
+        InputError: the log density is finite at no point of the reference, or plus infinity.
     """
     z = reference.points
     size, dimension = z.shape
     x, log_jacobian = bounded_all(z, lower, width)
     values = evaluate(log_density, x)
-    if np.isposinf(values).any():
-        refuse_infinite(x[values.argmax()])
-    if not np.isfinite(values).any():
-        raise InputError(
-            f'the log density is not finite at any of {size} points of the prior; '
-            'check the bounds, the units and the records'
-        )
+    check_values(values, x)
     evaluations = size
     power = 0.0
     counts = empty_counts(settings)
     chains = max(size // settings.sweeps, 2)
     columns = uniforms_per_chain(dimension, settings.pairs)
-    while power < 1.0 and evaluations + chains * settings.sweeps <= limit:
+    most = math.inf if limit is None else limit
+    while power < 1.0 and evaluations + chains * settings.sweeps <= most:
         gain = values + log_jacobian - reference.log_density(z, log_jacobian)
         gain[~np.isfinite(values)] = -np.inf
         rise = next_rise(gain, 1.0 - power, settings.survivors)

@@ -14,11 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 from actuator_glue.errors import InputError
 from actuator_glue.inference import generation
 from actuator_glue.inference.adaptation import Tuning, empty_counts, outliers, refit, tune
-from actuator_glue.inference.anneal import anneal, archive_reference, prior_reference
+from actuator_glue.inference.anneal import Population, anneal, archive_reference, prior_reference
 from actuator_glue.inference.archive import Archive
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.coordinates import bounded_all, check_bounds, unbounded
-from actuator_glue.inference.evaluate import LogDensity, evaluate, refuse_infinite
+from actuator_glue.inference.evaluate import LogDensity, check_values, evaluate, refuse_infinite
 from actuator_glue.inference.moves import uniforms_per_chain
 from actuator_glue.inference.settings import Settings
 from actuator_glue.records import Array
@@ -105,47 +105,57 @@ def init(
     """
     settings = settings or Settings()
     low, width = check_bounds(np.asarray(lower, np.float64), np.asarray(upper, np.float64))
-    d = len(low)
-    size = max(settings.population, 10 * d)
-    if archive is not None:
-        old = unbounded(_check_archive(np.asarray(archive, np.float64), low, width), low, width)
-        size = max(settings.population // 4, 5 * d)
-        reference = archive_reference(rng, size, old)
-    else:
-        reference = prior_reference(rng, size, d)
-    if settings.start == 'annealed' or archive is not None:
-        most = 10**9 if limit is None else limit
-        population = anneal(rng, log_density, low, width, reference, settings, most)
-        z, x, values = population.z, population.x, population.log_density
-        finite = np.flatnonzero(np.isfinite(values))
-        chosen = rng.permutation(finite)[: settings.chains]
-        chosen = np.resize(chosen, settings.chains)
-        evaluations, power, counts = population.evaluations, population.power, population.counts
-    else:
-        z = reference.points
-        x, _ = bounded_all(z, low, width)
-        chosen = np.arange(settings.chains) % size
-        values = np.full(size, np.nan)
-        values[chosen] = evaluate(log_density, x[chosen])
-        evaluations, power, counts = settings.chains, 1.0, empty_counts(settings)
-    _, log_jacobian = bounded_all(z[chosen], low, width)
+    start = _points(rng, log_density, low, width, settings, archive, limit)
+    # Chains start at different points of the population; impossible points are no start.
+    possible = rng.permutation(np.flatnonzero(np.isfinite(start.log_density)))
+    chosen = np.resize(possible, settings.chains)
+    _, log_jacobian = bounded_all(start.z[chosen], low, width)
     return State(
-        x=x[chosen],
-        z=z[chosen],
-        log_density=values[chosen],
-        log_target=values[chosen] + log_jacobian,
-        archive=Archive.of(z),
-        tuning=tune(z, counts, settings),
-        fitted=len(z),
+        x=start.x[chosen],
+        z=start.z[chosen],
+        log_density=start.log_density[chosen],
+        log_target=start.log_density[chosen] + log_jacobian,
+        archive=Archive.of(start.z),
+        tuning=tune(start.z, start.counts, settings),
+        fitted=len(start.z),
         counts=empty_counts(settings),
         mean_log_density=np.zeros(settings.chains),
         generation=0,
-        evaluations=evaluations,
-        power=power,
+        evaluations=start.evaluations,
+        power=start.power,
         lower=low,
         width=width,
         settings=settings,
     )
+
+
+def _points(
+    rng: np.random.Generator,
+    log_density: LogDensity,
+    lower: Array,
+    width: Array,
+    settings: Settings,
+    archive: ArrayLike | None,
+    limit: int | None,
+) -> Population:
+    """The points that become the first archive and the chains' starts."""
+    d = len(lower)
+    if archive is not None:
+        old = unbounded(
+            _check_archive(np.asarray(archive, np.float64), lower, width), lower, width
+        )
+        reference = archive_reference(rng, max(settings.population // 4, 5 * d), old)
+    else:
+        reference = prior_reference(rng, max(settings.population, 10 * d), d)
+        if settings.start == 'prior':
+            # As Vrugt (2016): only the chains' own points are evaluated.
+            x, _ = bounded_all(reference.points, lower, width)
+            values = np.full(len(x), np.nan)
+            values[: settings.chains] = evaluate(log_density, x[: settings.chains])
+            check_values(values, x)
+            counts = empty_counts(settings)
+            return Population(reference.points, x, values, counts, 1.0, settings.chains)
+    return anneal(rng, log_density, lower, width, reference, settings, limit)
 
 
 def _check_archive(archive: Array, lower: Array, width: Array) -> Array:

@@ -40,3 +40,18 @@ def refuse_infinite(point: Array) -> None:
         f'the log density is plus infinity at {point.tolist()}: errors without any spread cannot '
         'be weighed; check that measured is not a copy of the simulation'
     )
+
+
+def check_values(values: Array, x: Array) -> None:
+    """Look at the log densities (m,) of the start.
+
+    Raises:
+        InputError: none is finite, or one is plus infinity.
+    """
+    if np.isposinf(values).any():
+        refuse_infinite(x[int(np.isposinf(values).argmax())])
+    if not np.isfinite(values).any():
+        raise InputError(
+            f'the log density is not finite at any of {len(x)} points of the prior; '
+            'check the bounds, the units and the records'
+        )
