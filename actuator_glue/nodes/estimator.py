@@ -69,7 +69,7 @@ class EstimatorNode(base.SuiteNode):
         self._answers: deque[Answer] = deque()
         self._guard = self.create_guard_condition(self.guarded(self._take_answers))
         self.worker = Worker(self._answered, warm_up)
-        self._publishers = {
+        self._out = {
             topic: self.publisher(topic)
             for topic in (topics.POSTERIOR, topics.BAND, topics.RESPONSE, topics.ESTIMATOR_SETUP)
         }
@@ -197,10 +197,10 @@ class EstimatorNode(base.SuiteNode):
         self.last = result
         self.windows.add()
         actuator = result.window.record.actuator
-        publish(self._publishers[topics.POSTERIOR], *wire.posterior(result, seconds))
+        publish(self._out[topics.POSTERIOR], *wire.posterior(result, seconds))
         for prediction in (*result.scored, *result.forecast):
-            publish(self._publishers[topics.BAND], *wire.prediction(prediction, actuator))
-        publish(self._publishers[topics.RESPONSE], *wire.response(result))
+            publish(self._out[topics.BAND], *wire.prediction(prediction, actuator))
+        publish(self._out[topics.RESPONSE], *wire.response(result))
         latency = time.monotonic() - self._started
         self.compute.append(seconds)
         self.latency.append(latency)
@@ -224,7 +224,7 @@ class EstimatorNode(base.SuiteNode):
             number, index = job.window.number, record.first_index
             stamp, actuator = record.start_ns, record.actuator
         fields = wire.estimator_setup(self.settings, model, number, index)
-        publish(self._publishers[topics.ESTIMATOR_SETUP], wire.Head(stamp, actuator), fields)
+        publish(self._out[topics.ESTIMATOR_SETUP], wire.Head(stamp, actuator), fields)
 
     def _set_model(self, request: Any, response: Any) -> Any:
         try:

@@ -28,7 +28,7 @@ def _reliable(depth: int, *, latched: bool = False) -> QoSProfile:
     )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Topic:
     """One topic.
 
