@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 
 from actuator_glue.cli._output import note
-from actuator_glue.io.load import load_records
 from actuator_glue.records import Record
 
 
@@ -61,6 +60,8 @@ def load(args: argparse.Namespace) -> list[Record]:
     Raises:
         InputError: a record cannot be used.
     """
+    from actuator_glue.io.load import load_records
+
     return load_records(
         args.records,
         stiffness=args.stiffness,

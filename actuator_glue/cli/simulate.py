@@ -113,6 +113,10 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
+def _given(value: float | None, default: float) -> float:
+    return default if value is None else value
+
+
 def _problem_r(args: argparse.Namespace) -> list[Record]:
     from actuator_glue.model.problem_r import NOISE, RATE, STIFFNESS, records
 
@@ -146,19 +150,18 @@ def _command(args: argparse.Namespace) -> tuple[Array, float]:
             )
         record = load_records(args.shape, channels=args.channels, hold=args.hold)[0]
         amplitude = None if args.amplitude_mm is None else args.amplitude_mm * 1e-3
-        rate = args.rate or record.rate
+        rate = _given(args.rate, record.rate)
         return commands.recorded(record, rate, amplitude), rate
-    rate = args.rate or 1000.0
-    duration = args.duration or 60.0
-    peak = (2.0 if args.amplitude_mm is None else args.amplitude_mm) * 1e-3
-    f1 = 10.0 if args.f1 is None else args.f1
+    rate, duration = _given(args.rate, 1000.0), _given(args.duration, 60.0)
+    peak, f1 = _given(args.amplitude_mm, 2.0) * 1e-3, _given(args.f1, 10.0)
     if args.shape == 'sweep':
-        return commands.sweep(rate, duration, args.f0 or 0.0, f1, peak), rate
+        return commands.sweep(rate, duration, _given(args.f0, 0.0), f1, peak), rate
     if args.shape == 'sine':
         return commands.sine(rate, duration, args.frequency, peak), rate
     if args.shape == 'noise':
-        f0 = 0.1 if args.f0 is None else args.f0
-        return commands.noise(rate, duration, f0, f1, peak, args.command_seed), rate
+        return commands.noise(
+            rate, duration, _given(args.f0, 0.1), f1, peak, args.command_seed
+        ), rate
     return commands.earthquake(rate, duration, peak, args.command_seed), rate
 
 
@@ -197,7 +200,7 @@ def _plant(
         rng=np.random.default_rng((seed, 1)),
     )
     span = 2.0 * float(np.abs(command).max()) or 1e-3
-    force = 2.0 if args.force_noise_n is None else args.force_noise_n
+    force = _given(args.force_noise_n, 2.0)
     made = MeasuredPlant(
         stream,
         SensorSpec(1e-5 if noise is None else noise, args.bits, span),

@@ -1,0 +1,219 @@
+"""simulate, convert, info, recover, plot: files in, files out, one message where not."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuator_glue.io.load import load_records
+
+
+def test_simulated_bag_holds_what_was_asked(run, short_bag: Path) -> None:
+    """Rate, length, stiffness and channels are as the options said."""
+    done = run('info', short_bag, '--json', '-')
+    assert done.code == 0
+    assert done.json['schema'] == 'actuator_glue.info/1'
+    (file,) = done.json['files']
+    assert file['finished'] is True
+    assert {t['name'] for t in file['topics']} == {'/samples', '/test_setup'}
+    assert all(t['type_hash'].startswith('RIHS01_') for t in file['topics'])
+    (record,) = file['records']
+    assert (record['samples'], record['rate_hz']) == (801, 100.0)
+    assert record['stiffness_n_per_m'] == 250e3
+    assert record['force_n'] is not None
+    assert 'record' in done.err  # people's lines go to standard error beside JSON
+
+
+def test_same_seed_same_bits_other_seed_other_noise(run, tmp_path: Path) -> None:
+    """A simulation repeats to the last bit; its noise depends on the seed alone."""
+    options = ('--rate', 100, '--duration', 2, '--f1', 5)
+    for name, seed in (('a', 1), ('b', 1), ('c', 2)):
+        assert run('simulate', tmp_path / name, *options, '--seed', seed).code == 0
+    a, b, c = (load_records(tmp_path / name)[0] for name in 'abc')
+    assert a.measured.tobytes() == b.measured.tobytes()
+    assert 0.5e-5 < (a.measured - c.measured).std() / np.sqrt(2) < 2e-5
+
+
+@pytest.mark.parametrize('shape', ['sweep', 'sine', 'noise', 'earthquake'])
+@pytest.mark.parametrize('plant', ['paper', 'benchmark'])
+def test_commands_and_plants(run, tmp_path: Path, shape: str, plant: str) -> None:
+    """Each command drives each plant, which follows it."""
+    out = tmp_path / 'r.csv'
+    options = ('--command', shape, '--plant', plant, '--rate', 256, '--duration', 8)
+    assert run('simulate', out, *options, '--f1', 4).code == 0
+    (record,) = load_records(out)
+    assert np.abs(record.command).max() == pytest.approx(2e-3, rel=0.01)
+    assert np.corrcoef(record.command, record.measured)[0, 1] > 0.8
+
+
+def test_a_recorded_command_and_an_undeclared_effect(run, tmp_path: Path, short_bag: Path) -> None:
+    """A record's command is used again; the output does not tell which effect acts."""
+    out = tmp_path / 'effect'
+    effect = ('--effect', 'backlash:backlash=2e-4', '--noise-mm', 0)
+    done = run('simulate', out, '--command', short_bag, '--stiffness', 250e3, *effect)
+    assert done.code == 0, done.err
+    assert (
+        run('simulate', tmp_path / 'none', '--command', short_bag, '--stiffness', 250e3).code == 0
+    )
+    (with_effect,), (without,) = load_records(out), load_records(tmp_path / 'none')
+    assert with_effect.command.tobytes() == load_records(short_bag)[0].command.tobytes()
+    assert (with_effect.measured - without.measured).std() > 3e-5
+    truth = json.loads((tmp_path / 'effect.truth.json').read_text())
+    assert truth['effects'] == ['backlash']
+    for file in out.iterdir():
+        assert b'backlash' not in file.read_bytes()
+
+
+@pytest.mark.parametrize(
+    ('options', 'words'),
+    [
+        (('--effect', 'gremlins'), 'not in the catalogue'),
+        (('--effect', 'backlash:width=1'), 'no parameter'),
+        (('--effect', 'backlash:width'), 'PARAMETER=VALUE'),
+        (('--stiffness', '-1'), 'outside'),
+        (('--rate', '5'), '10 Hz'),
+        (('--duration', '0'), 'no full sample'),
+        (('--amplitude-mm', '-1'), 'amplitude'),
+        (('--command', 'nothing.csv'), 'nor a file'),
+        (('--plant', 'problem-r', '--stiffness', '5'), 'problem-r'),
+        (('--plant', 'benchmark', '--stiffness', '5'), 'own specimen'),
+        (('--seed', '-1'), 'seed'),
+        (('--noise-mm', '-1'), 'noise'),
+        (('--bits', '90'), 'bits'),
+        (('--block', '0'), 'at least one'),
+        (('--theta', '1', '2', 'x', '4'), 'not a number'),
+    ],
+)
+def test_simulate_refuses(run, tmp_path: Path, options: tuple[str, ...], words: str) -> None:
+    """One message, exit 2, and nothing left behind."""
+    done = run('simulate', tmp_path / 'out', *options)
+    assert done.code == 2
+    assert words in (done.err if 'usage:' in done.err else done.message)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_outputs_are_never_overwritten(run, tmp_path: Path, short_bag: Path) -> None:
+    """What exists stays; a bag is a folder."""
+    (tmp_path / 'a.csv').write_text('precious')
+    assert 'exists already' in run('convert', short_bag, tmp_path / 'a.csv').message
+    assert (tmp_path / 'a.csv').read_text() == 'precious'
+    assert 'folders' in run('convert', short_bag, tmp_path / 'a.mcap').message
+
+
+@pytest.mark.parametrize('suffix', ['csv', 'mat'])
+def test_there_and_back(run, tmp_path: Path, short_bag: Path, suffix: str) -> None:
+    """Bag to file to bag loses nothing where the unit is m."""
+    middle, last = tmp_path / f'm.{suffix}', tmp_path / 'bag'
+    assert run('convert', short_bag, middle, '--unit', 'm').code == 0
+    assert run('convert', middle, last, '--block', 7).code == 0
+    (a,), (b,) = load_records(short_bag), load_records(last)
+    assert a.measured.tobytes() == b.measured.tobytes()
+    assert (a.stiffness, a.hold, a.period) == (b.stiffness, b.hold, b.period)
+
+
+def test_mapped_text_through_a_bag(run, tmp_path: Path) -> None:
+    """Text with a channel map becomes a bag that needs no map any more."""
+    lines = [f'{i};{np.sin(i / 9):.6f};{np.sin(i / 9 - 0.2):.6f}' for i in range(300)]
+    (tmp_path / 'lab.txt').write_text('x;u;y\n' + '\n'.join(lines) + '\n')
+    (tmp_path / 'map.yaml').write_text(
+        'header_lines: 1\nrate: 50\ncommand: {column: u, unit: mm}\n'
+        'measured: {column: y, unit: mm}\nhold: linear\n'
+    )
+    bag = tmp_path / 'bag'
+    lab, channels = tmp_path / 'lab.txt', ('--channels', tmp_path / 'map.yaml')
+    assert run('convert', lab, bag, *channels, '--stiffness', 5e4).code == 0
+    (record,) = load_records(bag)
+    assert (len(record), record.period, record.hold, record.stiffness) == (
+        300,
+        0.02,
+        'linear',
+        5e4,
+    )
+    assert 'no column for time' in run('info', lab).message
+
+
+def test_several_records_are_one_bag_or_numbered_files(
+    run, tmp_path: Path, problem_r: Path
+) -> None:
+    """The paper's pair of tests: two files, one bag, two files."""
+    bag = tmp_path / 'pair'
+    assert run('convert', problem_r / 'r_1.csv', problem_r / 'r_2.csv', bag).code == 0
+    assert [r.stiffness for r in load_records(bag)] == [0.0, 250e3]
+    assert run('convert', bag, tmp_path / 'x.csv').code == 0
+    assert sorted(p.name for p in tmp_path.glob('*.csv')) == ['x_1.csv', 'x_2.csv']
+
+
+def test_a_cut_bag_is_told_mended_and_used(run, tmp_path: Path, short_bag: Path) -> None:
+    """Info and calibrate say what to do, recover does it, and then they work."""
+    bag = tmp_path / 'bag'
+    bag.mkdir()
+    content = next(short_bag.glob('*.mcap')).read_bytes()
+    (bag / 'bag_0.mcap').write_bytes(content[: len(content) * 2 // 3])
+    done = run('info', bag, '--json', '-')
+    assert done.code == 2
+    assert done.json['files'][0]['finished'] is False
+    assert done.json['files'][0]['records'][0]['samples'] > 300
+    assert 'actuator-glue recover' in done.err
+    for command in (('calibrate', bag), ('replay', bag), ('convert', bag, tmp_path / 'x.csv')):
+        refused = run(*command)
+        assert refused.code == 2
+        assert 'recover' in refused.message
+    mended = run('recover', bag, '--json', '-')
+    assert mended.code == 0
+    assert mended.json['schema'] == 'actuator_glue.recovery/1'
+    assert mended.json['rewritten'] == ['bag_0.mcap']
+    assert run('info', bag).code == 0
+    assert 'nothing to mend' in run('recover', bag).out
+    assert 'no such bag' in run('recover', tmp_path / 'nothing').message
+
+
+def test_pictures_of_records(run, tmp_path: Path, short_bag: Path, problem_r: Path) -> None:
+    """One picture per record; a bag without posteriors says how to get them."""
+    done = run('plot', short_bag, problem_r / 'r_1.csv', '--out', tmp_path / 'pics')
+    assert done.code == 0
+    assert 'actuator-glue replay' in done.err
+    names = sorted(p.name for p in (tmp_path / 'pics').iterdir())
+    assert names == ['bag_1.png', 'r_1_2.png']
+    assert (tmp_path / 'pics' / 'bag_1.png').read_bytes().startswith(b'\x89PNG')
+
+
+BAD_FILES = {
+    'nan': ('time_s,command_mm,measured_mm\n0,1,nan\n0.1,2,3\n', 'NaN'),
+    'empty': ('', 'empty'),
+    'one sample': ('time_s,command_mm,measured_mm\n0,1,2\n', 'at least two'),
+    'time back': ('time_s,command_mm,measured_mm\n0,1,2\n0.2,1,2\n0.1,1,2\n', 'goes back'),
+    'huge': ('time_s,command_m,measured_m\n0,1e6,2\n0.1,1,2\n', 'check the unit'),
+    'wrong column': ('time_s,comand_mm,measured_mm\n0,1,2\n0.1,1,2\n', 'no column for command'),
+    'no unit': ('time_s,command,measured_mm\n0,1,2\n0.1,1,2\n', 'no unit'),
+}
+
+
+@pytest.mark.parametrize('command', ['calibrate', 'info', 'convert', 'replay', 'plot'])
+@pytest.mark.parametrize('case', BAD_FILES)
+def test_bad_records_are_one_message(run, tmp_path: Path, command: str, case: str) -> None:
+    """Every command that reads records refuses the same things in the same words, exit 2."""
+    content, words = BAD_FILES[case]
+    path = tmp_path / 'bad.csv'
+    path.write_text(content)
+    more = (tmp_path / 'out',) if command == 'convert' else ()
+    done = run(command, path, *more, '--stiffness', 0)
+    assert done.code == 2
+    assert words in done.message
+    assert str(path) in done.message
+
+
+def test_stiffness_and_options_that_cannot_be_used(run, tmp_path: Path, problem_r: Path) -> None:
+    """Negative, unknown, too many, not a number; a map that is none; an unwritable output."""
+    one, two = problem_r / 'r_1.csv', problem_r / 'r_2.csv'
+    assert 'outside' in run('calibrate', one, '--stiffness', '-5').message
+    assert 'one per path' in run('calibrate', one, '--stiffness', 1, 2, 3).message
+    done = run('calibrate', one, two, '--stiffness', 'soft')
+    assert done.code == 2
+    assert "'soft' is not a number" in done.err
+    unknown = tmp_path / 'unknown.csv'
+    unknown.write_text('time_s,command_mm,measured_mm\n0,1,2\n0.1,1,2\n0.2,1,2\n')
+    assert '--stiffness N/m' in run('calibrate', unknown).message
+    assert '--stiffness N/m' in run('replay', unknown).message
+    assert 'channel map' in run('info', one, '--channels', tmp_path / 'no.yaml').message
+    assert 'cannot be written' in run('info', one, '--json', one / 'x.json').message
