@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from actuator_glue.errors import InputError
-from actuator_glue.model.effects import coefficients, kernel, run
+from actuator_glue.model.effects import kernel, run
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Hold, check_stiffness
 
@@ -70,17 +70,16 @@ class Stream:
             raise InputError('timing-jitter and sensor noise need a random generator (rng)')
         self._rng = rng
         base = run.sample_steps(self.period)
-        step = self.period / base
-        self._substeps = base * int(run.refinement(self._values, self.stiffness, step)[0])
-        self._step = self.period / self._substeps
-        table = coefficients.build(self._values, self.stiffness, self._step, self.period)
-        self._table = run.padded(table)
+        finer = run.refinement(self._values, self.stiffness, self.period / base)
+        self._substeps = base * int(finer[0])
         self.reset()
 
     def reset(self) -> None:
         """Return to rest at zero displacement, sample 0 (the random generator runs on)."""
-        state = run.initial(self._values, self.stiffness, self._step, (0.0, 0.0))
-        self._state = run.padded(state)
+        start = (0.0, 0.0)
+        self._table = run.tables(self._values, self.stiffness, self._substeps, self.period, start)[
+            0
+        ]
         self._history = np.zeros(1)
         self._offset = -1
         self._begin = 0
@@ -107,7 +106,6 @@ class Stream:
         force = np.empty_like(out)
         kernel.advance(
             self._table,
-            self._state,
             self.structure.switches,
             u,
             self._offset,
@@ -121,7 +119,7 @@ class Stream:
         samples = np.arange(self._begin, self._begin + len(block), dtype=np.float64)
         self._begin += len(block)
         self._forget(u)
-        y = self.structure.sensed(self.theta[np.newaxis], samples * self.period, out[:, :1].T)[0]
+        y = self.structure.sensed(self.theta[np.newaxis], samples * self.period, out[:, :1])[:, 0]
         return self._measured(y), force[:, 0].copy()
 
     def _forget(self, u: Array) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -130,8 +130,8 @@ class Structure:
         table = self._table(theta)
         start = linear.initial_state(record) if initial == 'measured' else (0.0, 0.0)
         out = np.empty((len(table), len(record)))
-        for which, part in self._parts(table, record, start, rate):
-            out[which] = part
+        for which, begin, part in self._parts(table, record, start, rate):
+            out[which, begin : begin + len(part)] = part.T
         return out.reshape(*np.shape(theta)[:-1], len(record))
 
     def errors(
@@ -227,11 +227,11 @@ class Structure:
         return self._on.copy()
 
     def sensed(self, table: Array, time: Array, displacement: Array) -> Array:
-        """Return the displacement (m, n) after the sensor's post-steps (bias, drift, hum)."""
+        """Return the displacement (n, m) after the sensor's post-steps (bias, drift, hum)."""
         for effect in self.entries:
             if effect.output is not None:
                 part = table[:, self._columns[effect.name]]
-                displacement = effect.output(part, time, displacement)
+                displacement = effect.output(part, time[:, np.newaxis], displacement)
         return displacement
 
     def _table(self, theta: ArrayLike) -> Array:
@@ -246,31 +246,32 @@ class Structure:
 
     def _parts(
         self, table: Array, record: Record, start: tuple[float, float], rate: int = 1
-    ) -> Iterable[tuple[NDArray[np.intp], Array]]:
-        """Yield which parameter sets (c,) and what they are expected to record (c, n)."""
-        if self._linear:
-            base = table[:, : len(BASE)]
-            x = linear.simulate(
-                base,
-                record.command,
-                stiffness=record.known_stiffness(),
-                period=record.period,
-                hold=record.hold,
-                initial=start,
-            )
-            if 'gain' in self._columns:
-                free = linear.simulate(
-                    base,
-                    np.zeros(len(record)),
-                    stiffness=record.known_stiffness(),
-                    period=record.period,
-                    initial=start,
-                )
-                x = free + table[:, self._columns['gain']] * (x - free)
-            yield np.arange(len(table)), self.sensed(table, record.time, x)
+    ) -> Iterator[tuple[NDArray[np.intp], int, Array]]:
+        """Yield which parameter sets (c,), from which sample, and what they record (n, c)."""
+        time = record.time
+        if not self._linear:
+            for which, begin, x in run.blocks(self.values(table), self._on, record, start, rate):
+                now = time[begin : begin + len(x)]
+                yield which, begin, self.sensed(table[which], now, x)
             return
-        for which, x in run.blocks(self.values(table), self._on, record, start, rate):
-            yield which, self.sensed(table[which], record.time, x)
+        base = table[:, : len(BASE)]
+        x = _respond(base, record, record.command, start)
+        if 'gain' in self._columns:
+            free = _respond(base, record, np.zeros(len(record)), start)
+            x = free + table[:, self._columns['gain']] * (x - free)
+        yield np.arange(len(table)), 0, self.sensed(table, time, x.T)
+
+
+def _respond(base: Array, record: Record, command: Array, start: tuple[float, float]) -> Array:
+    """Return Eq. (2)'s displacement under a command, shape (m, n) [m]."""
+    return linear.simulate(
+        base,
+        command,
+        stiffness=record.known_stiffness(),
+        period=record.period,
+        hold=record.hold,
+        initial=start,
+    )
 
 
 class StructureErrors:
@@ -316,13 +317,14 @@ class StructureErrors:
         if not self.structure.effects:
             return self._exact(theta)
         table = self.structure._table(theta)
-        out = np.empty((len(table), len(self.records), 2))
+        out = np.zeros((len(table), len(self.records), 2))
         for r, record in enumerate(self.records):
-            counted = record.measured[self.settle[r] :]
-            for which, y in self.structure._parts(table, record, self._starts[r]):
-                error = counted - y[:, self.settle[r] :]
-                out[which, r, 0] = error.sum(axis=1)
-                out[which, r, 1] = np.einsum('ij,ij->i', error, error)
+            for which, begin, y in self.structure._parts(table, record, self._starts[r]):
+                first = max(begin, self.settle[r])
+                counted = record.measured[first : begin + len(y), np.newaxis]
+                error = counted - y[first - begin :]
+                out[which, r, 0] += error.sum(axis=0)
+                out[which, r, 1] += np.einsum('ij,ij->j', error, error)
         return out.reshape(*np.shape(theta)[:-1], len(self.records), 2)
 
     def residuals(self, theta: ArrayLike) -> list[Array]:

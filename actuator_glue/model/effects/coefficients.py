@@ -57,7 +57,7 @@ def _exact(a1: Array, a0: Array, step: float) -> tuple[Array, Array, Array]:
 
 
 def build(values: Mapping[str, Array], stiffness: float, step: float, period: float) -> Array:
-    """Return the coefficient table of every parameter set, shape (kernel.COEFFICIENTS, m).
+    """Return the kernel's table of every parameter set, states zero, shape (kernel.ROWS, m).
 
     Args:
         values: every base and effect parameter of the compiled stages by name, each (m,).
@@ -67,7 +67,7 @@ def build(values: Mapping[str, Array], stiffness: float, step: float, period: fl
     """
     v = values
     b1, n0, a2, a3 = v['beta_1'], v['alpha_1_beta_0'], v['alpha_2'], v['alpha_3']
-    c = np.zeros((k.COEFFICIENTS, len(b1)))
+    c = np.zeros((k.ROWS, len(b1)))
     half = 0.5 * step
 
     c[k.GAIN] = v['gain']

@@ -80,8 +80,8 @@ class Effect:
         starts: sizes from which a fit may start, given the scale of the test; each row holds
             one value per parameter.
         switches: the kernel's stages it needs (kernel.ON_...).
-        output: post-step on the recorded displacement: (parameters (m, p), time (n,),
-            displacement (m, n)) -> (m, n).
+        output: post-step on the recorded displacement: (parameters (m, p), time (n, 1),
+            displacement (n, m)) -> (n, m).
         variance: variance it adds to the measurement: (parameters (m, p), velocity of the
             recorded displacement (m, n) [m/s]) -> (m, n) [m^2]; such an effect leaves the mean.
     """

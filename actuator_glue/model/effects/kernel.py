@@ -23,7 +23,7 @@ from actuator_glue.records import Array
 
 LANES = 32
 
-# Rows of the coefficient table, one column per parameter set (filled by coefficients.py).
+# Rows of the table, one column per parameter set: coefficients (filled by coefficients.py) ...
 (
     GAIN, LAG_SAMPLES, SKEW, NULL, DEADBAND,
     VALVE_E, VALVE_Q, VALVE_D,
@@ -36,15 +36,13 @@ LANES = 32
     BACKLASH, SENSOR_LAG, SENSOR_DECAY,
     EXACT_XX, EXACT_XV, EXACT_XU, EXACT_XR, EXACT_VX, EXACT_VV, EXACT_VU, EXACT_VR,
     TRAP_XX, TRAP_XQ, TRAP_XU, TRAP_QX, TRAP_QQ, TRAP_QU,
-) = range(53)  # fmt: skip
-COEFFICIENTS = 53
-
-# Rows of the state table.
-(
+    # ... states (filled by run.py, carried on by `advance`) ...
     X, Q, QD, F, R, V, DX, DF, Z, ENVELOPE, LEVEL, PLAY, PLAY_DX, SENSED,
     X_EXACT, V_EXACT, X_TRAP, Q_TRAP,
-) = range(18)  # fmt: skip
-STATES = 18
+    # ... and scratch within one step.
+    _U, _RAMP, _QM, _QR, _QG, _FQ, _FR, _SP, _SS, _D0, _D1, _DS, _G, _RISE, _REST, _OIL,
+) = range(87)  # fmt: skip
+ROWS = 87
 
 # Switches: one flag per stage that can be skipped.
 (
@@ -52,20 +50,6 @@ STATES = 18
     ON_STRIBECK, ON_GAP, ON_HARDENING, ON_YIELD, ON_BACKLASH, ON_SENSOR_LAG,
 ) = range(12)  # fmt: skip
 SWITCHES = 12
-
-# Rows of scratch behind coefficients and states in the kernel's own table.
-_S = COEFFICIENTS
-_W = COEFFICIENTS + STATES
-(
-    _U, _RAMP, _QM, _QR, _QG, _FQ, _FR, _SP, _SS, _D0, _D1, _DS, _G, _RISE, _REST, _OIL,
-) = range(_W, _W + 16)  # fmt: skip
-_ROWS = _W + 16
-_X, _Q, _QD, _F, _R, _V, _DX, _DF, _Z = (
-    _S + X, _S + Q, _S + QD, _S + F, _S + R, _S + V, _S + DX, _S + DF, _S + Z,
-)  # fmt: skip
-_ENV, _LEVEL, _PLAY, _SENSED = _S + ENVELOPE, _S + LEVEL, _S + PLAY, _S + SENSED
-_PLAY_DX = _S + PLAY_DX
-_XE, _VE, _XT, _QT = _S + X_EXACT, _S + V_EXACT, _S + X_TRAP, _S + Q_TRAP
 
 
 @njit(inline='always')
@@ -101,10 +85,10 @@ def _command(u: Array, offset: int, start: float, stop: float, linear: bool) -> 
 @njit(inline='always')
 def _valve(w: Array, n: int) -> Any:
     """Mean spool flow over the step if the piston goes on as before, and d(flow)/d(dx)."""
-    error = w[_U, n] + w[NULL, n] - w[_X, n] - 0.5 * w[_DX, n]
+    error = w[_U, n] + w[NULL, n] - w[X, n] - 0.5 * w[DX, n]
     band = w[DEADBAND, n]
     left = error - min(max(error, -band), band)
-    flow = w[VALVE_E, n] * left + w[VALVE_Q, n] * w[_Q, n] + w[VALVE_D, n] * w[_QD, n]
+    flow = w[VALVE_E, n] * left + w[VALVE_Q, n] * w[Q, n] + w[VALVE_D, n] * w[QD, n]
     return flow, (-0.5 * w[VALVE_E, n] if abs(error) >= band else 0.0)
 
 
@@ -121,15 +105,15 @@ def _flow(w: Array, on: NDArray[np.bool_], time: float) -> None:
             w[_QG, n] *= 1.0 + (w[ASYMMETRY, n] if w[_QM, n] > 0.0 else -w[ASYMMETRY, n])
     if on[ON_PRESSURE]:
         for n in range(LANES):
-            load = (w[_F, n] + 0.5 * w[_DF, n]) * w[INVERSE_STALL, n]
+            load = (w[F, n] + 0.5 * w[DF, n]) * w[INVERSE_STALL, n]
             w[_QG, n] *= math.sqrt(max(1.0 - (load if w[_QM, n] > 0.0 else -load), 0.0))
     if on[ON_DROOP]:
         for n in range(LANES):
-            before = w[_ENV, n]
+            before = w[ENVELOPE, n]
             speed = abs(w[_QM, n]) * w[INVERSE_ALPHA_2, n]
             middle = before + w[DROOP_HALF, n] * (speed - before)
             w[_QG, n] *= math.sqrt(max(1.0 - w[DROOP, n] * middle, 0.0))
-            w[_ENV, n] = 2.0 * middle - before
+            w[ENVELOPE, n] = 2.0 * middle - before
     for n in range(LANES):
         through, limit = w[_QM, n] * w[_QG, n], w[SATURATION, n]
         w[_FQ, n] = min(max(through, -limit), limit)
@@ -137,72 +121,63 @@ def _flow(w: Array, on: NDArray[np.bool_], time: float) -> None:
 
 
 @njit(inline='always')
-def _balance(
-    w: Array,
-    n: int,
-    flow: float,
-    response: float,
-    spring: float,
-    tangent: float,
-    dry: float,
-    guess: float,
-) -> Any:
+def _balance(w: Array, n: int, q: Any, dq: Any, f: Any, df: Any, dry: Any, guess: Any) -> Any:
     """Solve the balance of forces: increment, force beyond inertia and damping, oil force.
 
     A trial without slip first; dry friction takes what it can and the rest moves the piston.
+    q is the flow at the last increment, f the specimen force at the guess; dq, df: d/d(dx).
     """
-    slope = w[FORCE_Q, n] * response
-    static = spring - tangent * guess
-    oil = w[FORCE_F, n] * w[_F, n] + w[FORCE_Q, n] * flow - slope * w[_DX, n]
-    trial = w[_F, n] + oil - w[_R, n] - static + w[MASS_4V, n] * w[_V, n]
-    stiff = w[FORCE_X, n] - slope + tangent + w[DAMPING_2, n]
+    slope = w[FORCE_Q, n] * dq
+    static = f - df * guess
+    oil = w[FORCE_F, n] * w[F, n] + w[FORCE_Q, n] * q - slope * w[DX, n]
+    trial = w[F, n] + oil - w[R, n] - static + w[MASS_4V, n] * w[V, n]
     friction = min(max(trial, -dry), dry)
-    dx = (trial - friction) / stiff
-    return dx, static + tangent * dx + friction, oil + (slope - w[FORCE_X, n]) * dx
+    dx = (trial - friction) / (w[FORCE_X, n] - slope + df + w[DAMPING_2, n])
+    return dx, static + df * dx + friction, oil + (slope - w[FORCE_X, n]) * dx
 
 
 @njit(inline='always')
-def _finish(
-    w: Array,
-    n: int,
-    per_second: float,
-    flow: float,
-    response: float,
-    dx: float,
-    rest: float,
-    oil: float,
-) -> None:
+def _finish(w: Array, n: int, rate: Any, q: Any, dq: Any, dx: Any, rest: Any, oil: Any) -> None:
     """Carry the state on, and both linear chains: Eq. (2) exactly and as the scheme solves it."""
-    w[_DF, n] = oil - w[_F, n]
-    w[_F, n] = oil
-    w[_R, n] = rest
-    w[_V, n] = 0.0 if dx == 0.0 else per_second * dx - w[_V, n]
-    mean = flow + response * (dx - w[_DX, n])
-    w[_QD, n] = 2.0 * per_second * (mean - w[_Q, n]) - w[_QD, n]
-    w[_Q, n] = 2.0 * mean - w[_Q, n]
-    w[_X, n] += dx
-    w[_DX, n] = dx
-    xe, ve, xt, qt, c, r = w[_XE, n], w[_VE, n], w[_XT, n], w[_QT, n], w[_U, n], w[_RAMP, n]
+    w[DF, n], w[F, n], w[R, n] = oil - w[F, n], oil, rest
+    w[V, n] = 0.0 if dx == 0.0 else rate * dx - w[V, n]
+    mean = q + dq * (dx - w[DX, n])
+    w[QD, n] = 2.0 * rate * (mean - w[Q, n]) - w[QD, n]
+    w[Q, n] = 2.0 * mean - w[Q, n]
+    w[X, n] += dx
+    w[DX, n] = dx
+    xe, ve, xt, qt, c, r = (
+        w[X_EXACT, n],
+        w[V_EXACT, n],
+        w[X_TRAP, n],
+        w[Q_TRAP, n],
+        w[_U, n],
+        w[_RAMP, n],
+    )
     exact = w[EXACT_XX, n] * xe + w[EXACT_XV, n] * ve
-    w[_XE, n] = exact + w[EXACT_XU, n] * c + w[EXACT_XR, n] * r
+    w[X_EXACT, n] = exact + w[EXACT_XU, n] * c + w[EXACT_XR, n] * r
     exact = w[EXACT_VX, n] * xe + w[EXACT_VV, n] * ve
-    w[_VE, n] = exact + w[EXACT_VU, n] * c + w[EXACT_VR, n] * r
-    w[_XT, n] = w[TRAP_XX, n] * xt + w[TRAP_XQ, n] * qt + w[TRAP_XU, n] * c
-    w[_QT, n] = w[TRAP_QX, n] * xt + w[TRAP_QQ, n] * qt + w[TRAP_QU, n] * c
+    w[V_EXACT, n] = exact + w[EXACT_VU, n] * c + w[EXACT_VR, n] * r
+    w[X_TRAP, n] = w[TRAP_XX, n] * xt + w[TRAP_XQ, n] * qt + w[TRAP_XU, n] * c
+    w[Q_TRAP, n] = w[TRAP_QX, n] * xt + w[TRAP_QQ, n] * qt + w[TRAP_QU, n] * c
 
 
 @njit(inline='always')
 def _transducer(w: Array, n: int) -> None:
     """Play, then the first-order lag of the parabola through the last three positions."""
-    corrected, before, lag = w[_X, n] + w[_XE, n] - w[_XT, n], w[_PLAY, n], w[SENSOR_LAG, n]
+    corrected, before, lag = (
+        w[X, n] + w[X_EXACT, n] - w[X_TRAP, n],
+        w[PLAY, n],
+        w[SENSOR_LAG, n],
+    )
     after = min(max(before, corrected - w[BACKLASH, n]), corrected + w[BACKLASH, n])
     moved = after - before
-    bend = 0.5 * (moved - w[_PLAY_DX, n])
+    bend = 0.5 * (moved - w[PLAY_DX, n])
     end = after - lag * (moved + bend - 2.0 * lag * bend)
     first = before - lag * (moved - bend - 2.0 * lag * bend)
-    w[_SENSED, n] = end + w[SENSOR_DECAY, n] * (w[_SENSED, n] - first)
-    w[_PLAY, n] = after
-    w[_PLAY_DX, n] = moved
+    w[SENSED, n] = end + w[SENSOR_DECAY, n] * (w[SENSED, n] - first)
+    w[PLAY, n] = after
+    w[PLAY_DX, n] = moved
 
 
 @njit(inline='always')
@@ -216,14 +191,14 @@ def _friction_rise(w: Array, n: int) -> Any:
     e = e * e
     e = e * e
     wish = w[STRIBECK_EXTRA, n] * e * e
-    return wish + (w[_LEVEL, n] - wish) * w[STRIBECK_LAG, n]
+    return wish + (w[LEVEL, n] - wish) * w[STRIBECK_LAG, n]
 
 
 @njit(inline='always')
 def _specimen(w: Array, yields: bool) -> None:
     """Write specimen force and tangent at the expected end of the step."""
     for n in range(LANES):
-        here, there, g = w[_X, n], w[_X, n] + w[_G, n], w[GAP, n]
+        here, there, g = w[X, n], w[X, n] + w[_G, n], w[GAP, n]
         after = there - min(max(there, -g), g)
         w[_D0, n] = here - min(max(here, -g), g)
         w[_D1, n] = after
@@ -236,7 +211,7 @@ def _specimen(w: Array, yields: bool) -> None:
         for n in range(LANES):
             moved = w[_D1, n] - w[_D0, n]
             share, rest = _yielding(w, n, moved), 1.0 - w[YIELD_RATIO, n]
-            w[_SP, n] += rest * min(max(w[_Z, n] + moved * share, -w[YIELD, n]), w[YIELD, n])
+            w[_SP, n] += rest * min(max(w[Z, n] + moved * share, -w[YIELD, n]), w[YIELD, n])
             w[_SS, n] += rest * share
     for n in range(LANES):
         w[_SP, n] *= w[STIFFNESS, n]
@@ -246,10 +221,10 @@ def _specimen(w: Array, yields: bool) -> None:
 @njit(inline='always')
 def _yield(w: Array, n: int) -> None:
     """Carry the hysteretic displacement z on over the step _G."""
-    there, g = w[_X, n] + w[_G, n], w[GAP, n]
+    there, g = w[X, n] + w[_G, n], w[GAP, n]
     moved = there - min(max(there, -g), g) - w[_D0, n]
-    end = w[_Z, n] + moved * _yielding(w, n, moved)
-    w[_Z, n] = min(max(end, -w[YIELD, n]), w[YIELD, n])
+    end = w[Z, n] + moved * _yielding(w, n, moved)
+    w[Z, n] = min(max(end, -w[YIELD, n]), w[YIELD, n])
 
 
 @njit(inline='always')
@@ -266,7 +241,7 @@ def _hardness(w: Array, n: int, z: float) -> Any:
 @njit(inline='always')
 def _yielding(w: Array, n: int, moved: float) -> Any:
     """Mean dz/dx of the Bouc-Wen model over a step `moved` (midpoint rule)."""
-    z = w[_Z, n]
+    z = w[Z, n]
     first = 1.0 - (_hardness(w, n, z) if z * moved > 0.0 else 0.0)
     middle = z + 0.5 * moved * first
     return 1.0 - (_hardness(w, n, middle) if middle * moved > 0.0 else 0.0)
@@ -274,8 +249,7 @@ def _yielding(w: Array, n: int, moved: float) -> Any:
 
 @njit(nogil=True)
 def advance(
-    coefficients: Array,
-    state: Array,
+    table: Array,
     on: NDArray[np.bool_],
     u: Array,
     offset: int,
@@ -289,9 +263,8 @@ def advance(
     """Write the sensed displacement at samples begin, begin+1, ... and carry the state on.
 
     Args:
-        coefficients: (COEFFICIENTS, LANES), from coefficients.py.
-        state: (STATES, LANES), read and updated; it stands at sample begin - 1, or at sample 0
-            where begin is 0.
+        table: (ROWS, LANES), read and updated; its states stand at sample begin - 1, or at
+            sample 0 where begin is 0.
         on: (SWITCHES,) which stages act.
         u: command samples [m]; u[0] is sample `offset` of the stream.
         offset: stream index of u[0].
@@ -302,12 +275,10 @@ def advance(
         displacement: (n, LANES) output, recorded displacement before sensor post-steps [m].
         force: (n, LANES) output, actuator force [N]; (0, LANES) where it is not wanted.
     """
-    w = np.empty((_ROWS, LANES))
-    w[:COEFFICIENTS] = coefficients
-    w[_S : _S + STATES] = state
-    w[_W:] = 0.0
+    w = np.empty((ROWS, LANES))  # its size is known to the compiler: vector code
+    w[:] = table
     inverse = 1.0 / substeps
-    per_second = 2.0 * substeps / period
+    rate = 2.0 * substeps / period
     want_force = force.shape[0] > 0
     solid = on[ON_GAP] or on[ON_HARDENING] or on[ON_YIELD]
     flow = on[ON_SATURATION] or on[ON_ASYMMETRY] or on[ON_PRESSURE] or on[ON_DROOP] or on[ON_DRIFT]
@@ -318,9 +289,9 @@ def advance(
         for j in range(substeps if at >= 0 else 0):
             if on[ON_LAG]:
                 for n in range(LANES):
-                    rate = 1.0 - w[SKEW, n]
-                    start = (at + j * inverse) * rate - w[LAG_SAMPLES, n]
-                    mean, slope = _command(u, offset, start, start + rate * inverse, linear)
+                    clock = 1.0 - w[SKEW, n]
+                    start = (at + j * inverse) * clock - w[LAG_SAMPLES, n]
+                    mean, slope = _command(u, offset, start, start + clock * inverse, linear)
                     w[_U, n] = w[GAIN, n] * mean
                     w[_RAMP, n] = w[GAIN, n] * slope
             else:
@@ -334,10 +305,10 @@ def advance(
             if plain:  # one pass
                 for n in range(LANES):
                     q, response = _valve(w, n)
-                    k, guess = w[STIFFNESS, n], w[_DX, n]
-                    spring = k * (w[_X, n] + guess)
+                    k, guess = w[STIFFNESS, n], w[DX, n]
+                    spring = k * (w[X, n] + guess)
                     dx, rest, oil = _balance(w, n, q, response, spring, k, w[COULOMB, n], guess)
-                    _finish(w, n, per_second, q, response, dx, rest, oil)
+                    _finish(w, n, rate, q, response, dx, rest, oil)
             else:  # a pass for every stage that acts
                 for n in range(LANES):
                     w[_QM, n], w[_QR, n] = _valve(w, n)
@@ -345,7 +316,7 @@ def advance(
                 if flow:
                     _flow(w, on, (at + (j + 0.5) * inverse) * period)
                 for n in range(LANES):
-                    w[_G, n] = w[_DX, n]
+                    w[_G, n] = w[DX, n]
                 for _ in range(looks):
                     if on[ON_STRIBECK]:
                         for n in range(LANES):
@@ -354,33 +325,47 @@ def advance(
                         _specimen(w, on[ON_YIELD])
                     else:
                         for n in range(LANES):
-                            w[_SP, n] = w[STIFFNESS, n] * (w[_X, n] + w[_G, n])
+                            w[_SP, n] = w[STIFFNESS, n] * (w[X, n] + w[_G, n])
                             w[_SS, n] = w[STIFFNESS, n]
                     for n in range(LANES):
                         dry = w[COULOMB, n] + w[_RISE, n]
                         w[_G, n], w[_REST, n], w[_OIL, n] = _balance(
-                            w, n, w[_FQ, n], w[_FR, n], w[_SP, n], w[_SS, n], dry, w[_G, n]
+                            w,
+                            n,
+                            w[_FQ, n],
+                            w[_FR, n],
+                            w[_SP, n],
+                            w[_SS, n],
+                            dry,
+                            w[_G, n],
                         )
                 if on[ON_STRIBECK]:
                     for n in range(LANES):
-                        w[_LEVEL, n] = _friction_rise(w, n)
+                        w[LEVEL, n] = _friction_rise(w, n)
                 if on[ON_YIELD]:
                     for n in range(LANES):
                         _yield(w, n)
                 for n in range(LANES):
                     _finish(
-                        w, n, per_second, w[_QM, n], w[_QR, n], w[_G, n], w[_REST, n], w[_OIL, n]
+                        w,
+                        n,
+                        rate,
+                        w[_QM, n],
+                        w[_QR, n],
+                        w[_G, n],
+                        w[_REST, n],
+                        w[_OIL, n],
                     )
             if on[ON_BACKLASH] or on[ON_SENSOR_LAG]:
                 for n in range(LANES):
                     _transducer(w, n)
         if on[ON_BACKLASH] or on[ON_SENSOR_LAG]:
             for n in range(LANES):
-                displacement[i, n] = w[_SENSED, n]
+                displacement[i, n] = w[SENSED, n]
         else:
             for n in range(LANES):
-                displacement[i, n] = w[_X, n] + w[_XE, n] - w[_XT, n]
+                displacement[i, n] = w[X, n] + w[X_EXACT, n] - w[X_TRAP, n]
         if want_force:
             for n in range(LANES):
-                force[i, n] = w[_F, n]
-    state[:] = w[_S : _S + STATES]
+                force[i, n] = w[F, n]
+    table[:] = w

@@ -15,6 +15,8 @@ MAX_STEP = 1.05e-3  # s
 # ... and short against the fastest pole of Eq. (2), up to eight times shorter than MAX_STEP.
 _MAX_POLE_STEP = 0.8
 _MAX_REFINEMENT = 8
+# Samples simulated at a time: their displacements stay in the second-level cache.
+_CHUNK = 1024
 
 
 def sample_steps(period: float) -> int:
@@ -31,32 +33,37 @@ def refinement(values: Mapping[str, Array], stiffness: float, step: float) -> Ar
     return np.asarray(np.clip(np.nan_to_num(factor, nan=1.0), 1.0, _MAX_REFINEMENT))
 
 
-def initial(
-    values: Mapping[str, Array], stiffness: float, step: float, start: tuple[float, float]
+def tables(
+    values: Mapping[str, Array],
+    stiffness: float,
+    substeps: int,
+    period: float,
+    start: tuple[float, float],
 ) -> Array:
-    """Return the kernel's state at the first sample, shape (kernel.STATES, m).
+    """Return the kernel's tables at the first sample, shape (blocks, kernel.ROWS, kernel.LANES).
+
+    The last block is filled up by repeating the last parameter set.
 
     Args:
-        values: parameters by name, each (m,).
+        values: parameters of every compiled stage by name, each (m,).
         stiffness: specimen stiffness k [N/m].
-        step: sub-step [s].
+        substeps: sub-steps per sample.
+        period: sample period [s].
         start: position [m] and velocity [m/s].
     """
     x, v = start
-    state = np.zeros((kernel.STATES, len(values['beta_1'])))
-    state[[kernel.X, kernel.X_EXACT, kernel.X_TRAP, kernel.PLAY, kernel.SENSED]] = x
-    state[[kernel.V, kernel.V_EXACT]] = v
-    state[[kernel.DX, kernel.PLAY_DX]] = v * step
-    state[[kernel.F, kernel.R]] = stiffness * x
+    step = period / substeps
+    table = coefficients.build(values, stiffness, step, period)
+    table[[kernel.X, kernel.X_EXACT, kernel.X_TRAP, kernel.PLAY, kernel.SENSED]] = x
+    table[[kernel.V, kernel.V_EXACT]] = v
+    table[[kernel.DX, kernel.PLAY_DX]] = v * step
+    table[[kernel.F, kernel.R]] = stiffness * x
     flow = (stiffness + values['alpha_2']) * v + values['alpha_3'] * stiffness * x
-    state[[kernel.Q, kernel.Q_TRAP]] = flow
-    return state
-
-
-def padded(table: Array) -> Array:
-    """Return the columns of a table filled up to whole lane blocks by repeating the last."""
+    table[[kernel.Q, kernel.Q_TRAP]] = flow
     missing = -table.shape[1] % kernel.LANES
-    return np.ascontiguousarray(np.pad(table, ((0, 0), (0, missing)), mode='edge'))
+    wide = np.pad(table, ((0, 0), (0, missing)), mode='edge')
+    split = wide.reshape(kernel.ROWS, -1, kernel.LANES).transpose(1, 0, 2)
+    return np.ascontiguousarray(split)
 
 
 def blocks(
@@ -64,9 +71,9 @@ def blocks(
     on: NDArray[np.bool_],
     record: Record,
     start: tuple[float, float],
-    rate: int,
-) -> Iterator[tuple[NDArray[np.intp], Array]]:
-    """Simulate a record for every parameter set, LANES at a time.
+    rate: int = 1,
+) -> Iterator[tuple[NDArray[np.intp], int, Array]]:
+    """Simulate a record for every parameter set, some samples and sets at a time.
 
     Args:
         values: parameters of every compiled stage by name, each (m,).
@@ -76,7 +83,8 @@ def blocks(
         rate: how many times finer than usual the sub-steps are.
 
     Yields:
-        Which parameter sets (c,) and their displacement (c, n) [m] before sensor post-steps.
+        Which parameter sets (c,), the first sample, and displacement (n, c) [m] before sensor
+        post-steps; the array is overwritten by the next block.
     """
     stiffness = record.known_stiffness()
     base = rate * sample_steps(record.period)
@@ -85,28 +93,26 @@ def blocks(
     before = record.command[:1] if start != (0.0, 0.0) else np.zeros(1)
     command = np.concatenate([before, record.command])
     nothing = np.empty((0, kernel.LANES))
-    out = np.empty((len(record), kernel.LANES))
+    out = np.empty((min(len(record), _CHUNK), kernel.LANES))
     for factor in np.unique(factors):
         which = np.flatnonzero(factors == factor)
         substeps = base * int(factor)
-        step = record.period / substeps
         some = {name: value[which] for name, value in values.items()}
-        table = padded(coefficients.build(some, stiffness, step, record.period))
-        state = padded(initial(some, stiffness, step, start))
-        for first in range(0, len(which), kernel.LANES):
-            lanes = slice(first, first + kernel.LANES)
-            kernel.advance(
-                np.ascontiguousarray(table[:, lanes]),
-                np.ascontiguousarray(state[:, lanes]),
-                on,
-                command,
-                -1,
-                0,
-                substeps,
-                record.period,
-                record.hold == 'linear',
-                out,
-                nothing,
-            )
-            members = which[lanes]
-            yield members, np.ascontiguousarray(out[:, : len(members)].T)
+        members = (which[i : i + kernel.LANES] for i in range(0, len(which), kernel.LANES))
+        split = tables(some, stiffness, substeps, record.period, start)
+        for lanes, table in zip(members, split, strict=True):
+            for begin in range(0, len(record), _CHUNK):
+                part = out[: min(_CHUNK, len(record) - begin)]
+                kernel.advance(
+                    table,
+                    on,
+                    command,
+                    -1,
+                    begin,
+                    substeps,
+                    record.period,
+                    record.hold == 'linear',
+                    part,
+                    nothing,
+                )
+                yield lanes, begin, part[:, : len(lanes)]

@@ -11,16 +11,16 @@ from actuator_glue.records import Array
 
 
 def _bias(p: Array, time: Array, y: Array) -> Array:
-    return y + p[:, :1]
+    return y + p[:, 0]
 
 
 def _drift(p: Array, time: Array, y: Array) -> Array:
-    return y + p[:, :1] * time
+    return y + time * p[:, 0]
 
 
 def _hum(p: Array, time: Array, y: Array) -> Array:
-    angle = 2.0 * np.pi * p[:, 2:3] * time
-    return np.asarray(y + p[:, :1] * np.cos(angle) + p[:, 1:2] * np.sin(angle))
+    angle = 2.0 * np.pi * time * p[:, 2]
+    return np.asarray(y + p[:, 0] * np.cos(angle) + p[:, 1] * np.sin(angle))
 
 
 def _quantisation(p: Array, velocity: Array) -> Array:
@@ -65,7 +65,10 @@ DRIFT = Effect(
     group='drift',
     signature='linear trend',
     source='IEEE Std 1057-2017 (drift)',
-    starts=lambda s: ((0.02 * s.stroke / s.duration,), (-0.02 * s.stroke / s.duration,)),
+    starts=lambda s: (
+        (0.02 * s.stroke / s.duration,),
+        (-0.02 * s.stroke / s.duration,),
+    ),
     output=_drift,
 )
 
