@@ -321,10 +321,9 @@ class StructureErrors:
         for r, record in enumerate(self.records):
             for which, begin, y in self.structure._parts(table, record, self._starts[r]):
                 first = max(begin, self.settle[r])
-                counted = record.measured[first : begin + len(y), np.newaxis]
-                error = counted - y[first - begin :]
-                out[which, r, 0] += error.sum(axis=0)
-                out[which, r, 1] += np.einsum('ij,ij->j', error, error)
+                sums = np.zeros((2, len(which)))
+                run.add_errors(y[first - begin :], record.measured[first : begin + len(y)], sums)
+                out[which, r] += sums.T
         return out.reshape(*np.shape(theta)[:-1], len(self.records), 2)
 
     def residuals(self, theta: ArrayLike) -> list[Array]:

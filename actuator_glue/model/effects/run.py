@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from actuator_glue.jit import njit
 from actuator_glue.model.effects import coefficients, kernel
 from actuator_glue.records import Array, Record
 
@@ -116,3 +117,21 @@ def blocks(
                     nothing,
                 )
                 yield lanes, begin, part[:, : len(lanes)]
+
+
+@njit(nogil=True)
+def add_errors(displacement: Array, measured: Array, sums: Array) -> None:
+    """Add sum e and sum e^2 of e = measured - displacement to `sums`, shape (2, c).
+
+    Args:
+        displacement: (n, c), c at most kernel.LANES [m].
+        measured: (n,) [m].
+        sums: (2, c), updated [m, m^2].
+    """
+    total = np.zeros((2, kernel.LANES))
+    for i in range(displacement.shape[0]):
+        for n in range(displacement.shape[1]):
+            error = measured[i] - displacement[i, n]
+            total[0, n] += error
+            total[1, n] += error * error
+    sums += total[:, : sums.shape[1]]
