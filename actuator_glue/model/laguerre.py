@@ -237,24 +237,29 @@ def prepare(t: Array, c: Array, measured: Array, command: Array, settle: int) ->
         first = last
     for i in range(dims):
         gram[i, i] *= 0.5
-        gram[:i, i] = gram[i, :i]
-        gram[i, :i] = 0.0
+        gram[i, i + 1 :] = 0.0
     t[COUNT] = n - settle
     t[NORM] = np.sqrt(t[NORM])
 
 
 @njit
-def _half_product(gram: Array, dims: int, z: Array, used: int, out: Array) -> None:
-    """Write (lower triangle of the Gram matrix, diagonal halved) times z into out[:used]."""
-    out[:used] = 0.0
-    for k in range(0, used, 4):
-        z0, z1, z2, z3 = z[k], z[k + 1], z[k + 2], z[k + 3]
-        a = gram[k * dims : k * dims + used]
-        b = gram[(k + 1) * dims : (k + 1) * dims + used]
-        c = gram[(k + 2) * dims : (k + 2) * dims + used]
-        d = gram[(k + 3) * dims : (k + 3) * dims + used]
-        for i in range(k - k % BLOCK, used):
-            out[i] += (a[i] * z0 + b[i] * z1) + (c[i] * z2 + d[i] * z3)
+def _half_form(gram: Array, z: Array, used: int) -> float:
+    """Return half of z' A z over the first `used` terms, a multiple of four.
+
+    Args:
+        gram: lower triangle of A with the diagonal halved and zeros beside it, shape (dims, dims).
+        z: shape (dims,) or longer.
+        used: number of terms.
+    """
+    total = 0.0
+    for i in range(0, used, 4):
+        z0, z1, z2, z3 = z[i], z[i + 1], z[i + 2], z[i + 3]
+        part = 0.0
+        for k in range(i + 4):
+            above = gram[i, k] * z0 + gram[i + 1, k] * z1
+            part += z[k] * (above + (gram[i + 2, k] * z2 + gram[i + 3, k] * z3))
+        total += part
+    return total
 
 
 @njit
@@ -274,11 +279,12 @@ def evaluate(t: Array, theta: Array, tolerance: float, out: Array, exact: Flags)
     banks, norm = 1 + int(t[FREE]), t[NORM]
     dims, N = int(t[TERMS]) * banks, (int(t[TERMS]) + TAIL) * banks
     reference, sums = t[HEADER : HEADER + N], t[HEADER + N : HEADER + N + dims]
-    cross, gram = t[HEADER + N + dims : HEADER + N + 2 * dims], t[HEADER + N + 2 * dims :]
+    cross = t[HEADER + N + dims : HEADER + N + 2 * dims]
+    gram = t[HEADER + N + 2 * dims : HEADER + N + (2 + dims) * dims].reshape(dims, dims)
     least = t[SQUARES] - t[SUM] * t[SUM] / t[COUNT]
     enough = 0.1 * tolerance * np.sqrt(least)
     row, start, size = np.empty(kernel.COLUMNS), np.empty(9), np.empty(N // BLOCK)
-    z, half = np.empty(N), np.empty(dims)
+    z = np.empty(N)
     blocks = z.reshape(-1, BLOCK)
     for m in range(len(theta)):
         n0, d2, d1, d0 = kernel.equation_2a(theta[m], t[STIFFNESS])
@@ -300,12 +306,11 @@ def evaluate(t: Array, theta: Array, tolerance: float, out: Array, exact: Flags)
         for block in range(count):
             near += size[block]
         used = count * BLOCK
-        _half_product(gram, dims, z, used, half)
         s = q = 0.0
         for i in range(used):
             s += sums[i] * z[i]
-            q += z[i] * (half[i] - cross[i])
-        s, q = t[SUM] - s, t[SQUARES] + 2.0 * q
+            q += cross[i] * z[i]
+        s, q = t[SUM] - s, t[SQUARES] + 2.0 * (_half_form(gram, z, used) - q)
         out[m, 0], out[m, 1] = s, q
         about_mean = q - s * s / t[COUNT]
         bound = (2.0 * np.sqrt(max(about_mean, 0.0)) + tail) * tail + _ROUNDING * near * near
