@@ -16,7 +16,7 @@ from actuator_glue.records import Array, Record
 
 WANTED = {
     full_name(name): name
-    for name in ('PosteriorMoments', 'PredictionBand', 'EstimatorSetup', 'Diagnosis')
+    for name in ('PosteriorMoments', 'PredictionBand', 'FrequencyResponseBand', 'Diagnosis')
 } | {'diagnostic_msgs/msg/DiagnosticArray': 'DiagnosticArray'}
 
 
@@ -30,6 +30,7 @@ class Content:
         gaps: one line per gap.
         posteriors: PosteriorMoments in the order of their windows.
         bands: scored PredictionBands in order.
+        response: the last FrequencyResponseBand, None without one.
         diagnoses: Diagnosis messages.
         health: last values of each node on /diagnostics, by node and key.
     """
@@ -39,35 +40,28 @@ class Content:
     gaps: list[str]
     posteriors: list[Any] = field(default_factory=list)
     bands: list[Any] = field(default_factory=list)
+    response: Any = None
     diagnoses: list[Any] = field(default_factory=list)
     health: dict[str, dict[str, str]] = field(default_factory=dict)
 
-    def stitched(self, kind: str) -> tuple[Record, Band] | None:
-        """Join the scored bands of one kind; return them with the record they lie over.
+    def stitched(self, kind: str) -> Band | None:
+        """Join the scored bands of one kind over the whole record, NaN where there is none.
 
         Where two bands cover a sample the later one holds. None without such bands.
         """
         parts = [b for b in self.bands if b.kind == kind]
         if not parts:
             return None
-        first = self.record.first_index
-        start = min(int(b.index) for b in parts) - first
-        stop = max(int(b.index) + len(b.median) for b in parts) - first
-        start, stop = max(start, 0), min(stop, len(self.record))
         levels = np.asarray(parts[0].levels)
-        joined = np.full((2 * len(levels) + 1, stop - start), np.nan)
+        count, n = len(levels), len(self.record)
+        joined = np.full((2 * count + 1, n), np.nan)
         for part in parts:
-            rows = np.vstack(
-                [_rows(part.lower, levels), np.asarray(part.median), _rows(part.upper, levels)]
-            )
-            at = int(part.index) - first - start
-            joined[:, at : at + rows.shape[1]] = rows[:, : stop - start - at]
-        known = np.flatnonzero(np.isfinite(joined).all(axis=0))
-        start, stop = start + int(known[0]), start + int(known[-1]) + 1
-        joined = joined[:, known[0] : known[-1] + 1]
-        count = len(levels)
-        band = Band(levels, joined[:count], joined[count], joined[count + 1 :])
-        return self.record.slice(start, stop), band
+            rows = np.vstack([_rows(part.lower, count), part.median, _rows(part.upper, count)])
+            at = int(part.index) - self.record.first_index
+            first, stop = max(at, 0), min(at + rows.shape[1], n)
+            if first < stop:
+                joined[:, first:stop] = rows[:, first - at : stop - at]
+        return Band(levels, joined[:count], joined[count], joined[count + 1 :])
 
     def coverage(self, kind: str) -> dict[str, float]:
         """Return level -> share of measured samples inside the scored bands of one kind."""
@@ -85,8 +79,8 @@ class Content:
         return float(np.mean(widths)) if widths else float('nan')
 
 
-def _rows(flat: Array, levels: Array) -> Array:
-    return np.asarray(flat, dtype=np.float64).reshape(len(levels), -1)
+def _rows(flat: Array, count: int) -> Array:
+    return np.asarray(flat, dtype=np.float64).reshape(count, -1)
 
 
 def read(bag: Path) -> Content:
@@ -105,6 +99,8 @@ def read(bag: Path) -> Content:
             content.posteriors.append(message)
         elif kind == 'PredictionBand' and message.scored:
             content.bands.append(message)
+        elif kind == 'FrequencyResponseBand':
+            content.response = message
         elif kind == 'Diagnosis':
             content.diagnoses.append(message)
         elif kind == 'DiagnosticArray':

@@ -6,16 +6,29 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rich import box
 from rich.console import Console
 from rich.table import Table
 
 from actuator_glue.demo.bag import Content
-from actuator_glue.io.bag_reader import messages
-from actuator_glue.io.messages import deserialize
+from actuator_glue.io.bag_reader import decoded
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.replay import Comparison, compare, items, published, replay
 
 SCHEMA = 'actuator_glue.demo/1'
+BANDS = {
+    'total': 'total (parameters and residual)',
+    'parameter': 'parameters only (GLUE)',
+    'noise': 'parameters and sensor noise',
+}
+LOOK: dict[str, Any] = {
+    'box': box.SIMPLE_HEAD,
+    'title_justify': 'left',
+    'caption_justify': 'left',
+    'pad_edge': False,
+}
+INPUTS = ('SampleBlock', 'TestSetup')
+RESULTS = ('EstimatorSetup', 'PosteriorMoments', 'PredictionBand')
 
 
 def replay_bag(bag: Path) -> Comparison:
@@ -24,27 +37,13 @@ def replay_bag(bag: Path) -> Comparison:
     Raises:
         InputError: the bag is damaged.
     """
-
-    def named() -> Any:
-        return ((m.type, deserialize(m.type, m.data)) for m in messages(bag, types=_TYPES))
-
-    live = published(named())
+    live = published(decoded(bag, RESULTS))
     if live.settings is None or not live.models:
         return Comparison(differing=['no estimator published its settings into this bag'])
-    results = replay(items(named()), live.settings, live.models[0][1], live.schedule())
-    return compare((r for r in results if isinstance(r, WindowResult)), live)
-
-
-_TYPES = frozenset(
-    f'actuator_glue_msgs/msg/{name}'
-    for name in (
-        'SampleBlock',
-        'TestSetup',
-        'EstimatorSetup',
-        'PosteriorMoments',
-        'PredictionBand',
+    results = replay(
+        items(decoded(bag, INPUTS)), live.settings, live.models[0][1], live.schedule()
     )
-)
+    return compare((r for r in results if isinstance(r, WindowResult)), live)
 
 
 @dataclass(slots=True)
@@ -139,6 +138,11 @@ class Outcome:
             f'windows   {len(self.content.posteriors)}, deadlines missed '
             f'{self.count("deadlines missed")}'
         )
+        if (found := self.content.response) is not None:
+            console.print(
+                f'actuator  {1e3 * found.headline_delay:.2f} ms delay, amplitude '
+                f'{found.headline_amplitude:.3f} at {found.headline_frequency:g} Hz'
+            )
         found = self.comparison
         verdict = 'identical, bit for bit' if found.identical else 'NOT identical'
         console.print(f'replay    {verdict} ({found.windows} posteriors, {found.bands} bands)')
@@ -147,13 +151,12 @@ class Outcome:
 
     def _table_of_moments(self) -> Table:
         last = self.content.posteriors[-1]
-        table = Table(title=f'Posterior of the last window ({last.window})', title_justify='left')
-        for name in ('parameter', 'unit', 'mean', 'st. dev.', 'skewness', 'COV', 'R-hat', 'ESS'):
+        table = Table(title=f'Posterior of the last window ({last.window})', **LOOK)
+        for name in ('parameter', 'unit', 'mean', 'sd', 'skewness', 'COV', 'R-hat', 'ESS'):
             table.add_column(name, justify='left' if name in ('parameter', 'unit') else 'right')
-        table.add_column('')
         for i, (name, values) in enumerate(self.moments().items()):
             table.add_row(
-                name,
+                name + ('*' if values['prior_dominated'] else ''),
                 str(last.units[i]),
                 f'{values["mean"]:.4g}',
                 f'{values["stddev"]:.2g}',
@@ -161,20 +164,16 @@ class Outcome:
                 f'{values["cov"]:.3f}',
                 f'{values["rhat"]:.3f}',
                 f'{values["ess"]:.0f}',
-                'says little more than the prior' if values['prior_dominated'] else '',
             )
+        if any(last.prior_dominated):
+            table.caption = '* the window says little more than the prior'
         return table
 
     def _table_of_coverage(self) -> Table:
-        table = Table(title='Forecast bands against what was then measured', title_justify='left')
+        table = Table(title='Forecast bands against what was then measured', **LOOK)
         for name in ('band', 'level', 'coverage', 'mean width'):
             table.add_column(name, justify='left' if name == 'band' else 'right')
-        names = {
-            'total': 'total (parameters and residual)',
-            'parameter': 'parameters only (GLUE)',
-            'noise': 'parameters and sensor noise',
-        }
-        for kind, title in names.items():
+        for kind, title in BANDS.items():
             for level, share in self.content.coverage(kind).items():
                 width = self.content.mean_width(kind, float(level))
                 table.add_row(

@@ -12,31 +12,31 @@ from actuator_glue.model.parameters import Parameter
 from actuator_glue.records import Array, Record
 
 FREQUENCIES = (1.0, 5.0, 10.0)  # Hz, where the paper looks
+CYCLES = 2.0  # of the command in each zoom
 
 
 def bands(content: Content, path: Path) -> Path:
-    """Draw the forecast bands over the measured displacement, whole and at three zooms.
+    """Draw the forecast bands over the measured displacement at three zooms.
 
     Raises:
         InputError: the bag holds no scored bands.
     """
     from actuator_glue.report import style
-    from actuator_glue.report.timeseries import band_over_measured
+    from actuator_glue.report.timeseries import band_at_zooms
 
-    total, limits = content.stitched('total'), content.stitched('parameter')
-    if total is None or limits is None:
+    total, parameter = content.stitched('total'), content.stitched('parameter')
+    if total is None or parameter is None:
         raise InputError('the estimator published no bands; the run was shorter than a window')
-    record, wide = total
-    zooms, titles = _zooms(record)
-    level = float(wide.levels[-1])
-    figure = band_over_measured(
-        record,
-        limits[1],
-        level=level,
-        total=wide,
-        zooms=zooms,
+    known = np.flatnonzero(np.isfinite(total.median))
+    zooms, titles = _zooms(content.record, int(known[0]), int(known[-1]) + 1)
+    figure = band_at_zooms(
+        content.record,
+        parameter,
+        zooms,
+        level=float(total.levels[-1]),
+        total=total,
         zoom_titles=titles,
-        title='Each band was fixed before its samples were measured',
+        title='Forecast: each band was fixed before its samples were measured',
     )
     return style.save(figure, path)
 
@@ -73,23 +73,31 @@ def parameters(content: Content, path: Path, truth: Array | None = None) -> Path
         mean + 2 * spread,
         columns,
         truth=truth,
+        # Told by the last windows: the first ones are short of samples.
+        prior_dominated=np.mean([p.prior_dominated for p in same[-5:]], axis=0) > 0.5,
         title='Posterior of each window against the time of its last sample',
         band_name='mean +- 2 standard deviations',
     )
     return style.save(figure, path)
 
 
-def _zooms(record: Record) -> tuple[list[tuple[float, float]], list[str]]:
+def _zooms(record: Record, start: int, stop: int) -> tuple[list[tuple[float, float]], list[str]]:
+    """Return three time spans [s] between two samples, and their titles."""
     from actuator_glue.inference.scores import instantaneous_frequency
     from actuator_glue.report.timeseries import even_zooms, frequency_zooms
 
+    part = record.slice(start, stop)
+    offset = start * record.period
     try:
-        frequency = instantaneous_frequency(record.command, record.period)
-        swept = frequency.max() > 1.5 * FREQUENCIES[0] and frequency.min() <= FREQUENCIES[0]
+        frequency = instantaneous_frequency(part.command, part.period)
+        low, high = np.quantile(frequency, (0.01, 0.99))
     except InputError:
-        swept = False
-    if not swept:
-        zooms = even_zooms(record)
-        return zooms, [f'at {start:.0f} s' for start, _ in zooms]
-    reached = [min(f, float(frequency.max())) for f in FREQUENCIES]
-    return frequency_zooms(record, reached), [f'near {f:.3g} Hz' for f in reached]
+        low = high = 0.0
+    wanted = [float(np.clip(f, low, high)) for f in FREQUENCIES]
+    if len(set(wanted)) == len(wanted):
+        zooms = frequency_zooms(part, wanted, CYCLES)
+        titles = [f'near {f:.2g} Hz' for f in wanted]
+    else:
+        zooms = even_zooms(part, CYCLES)
+        titles = [f'{offset + first:.0f} s' for first, _ in zooms]
+    return [(offset + first, offset + last) for first, last in zooms], titles

@@ -159,4 +159,6 @@ def own_domain() -> None:
 
 def terminal() -> Console:
     """Return where progress and results are shown."""
-    return Console(highlight=False, soft_wrap=False)
+    console = Console(highlight=False)
+    # A pipe has no width of its own: do not fold tables there.
+    return console if console.is_terminal else Console(highlight=False, width=120)

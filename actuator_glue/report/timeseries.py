@@ -133,8 +133,8 @@ def band_at_zooms(
 ) -> Figure:
     """Draw bands over the measured displacement at zooms only, one row of panels.
 
-    Below each panel the same relative to the measured displacement, so that a band much narrower
-    than the motion is seen. Arguments and errors as `band_over_measured`.
+    Below each panel the same relative to the median of the (total) band, so that a band much
+    narrower than the motion is seen. Arguments and errors as `band_over_measured`.
     """
     _same_length(record, limits, total, deterministic)
     figure = style.new_figure(4.6)
@@ -145,23 +145,24 @@ def band_at_zooms(
         _draw(upper, record, limits, level, total, deterministic, band_name)
         _zoom(upper, record, start, stop)
         part = slice(*np.searchsorted(time, (start, stop)))
-        measured = record.measured[part]
-        low, high = (MM * (edge[part] - measured) for edge in limits.at(level))
+        middle = (limits if total is None else total).median[part]
+        low, high = (MM * (edge[part] - middle) for edge in limits.at(level))
         lower.fill_between(time[part], low, high, color=style.BAND, alpha=0.4, lw=0)
         if total is not None:
-            low, high = (MM * (edge[part] - measured) for edge in total.at(level))
+            low, high = (MM * (edge[part] - middle) for edge in total.at(level))
             lower.fill_between(time[part], low, high, **TOTAL_LOOK)
         if deterministic is not None:
-            off = MM * (deterministic[part] - measured)
+            off = MM * (deterministic[part] - middle)
             lower.plot(time[part], off, '--', color=style.DETERMINISTIC)
-        lower.axhline(0.0, color=style.MEASURED, lw=0.8)
+        off = MM * (record.measured[part] - middle)
+        lower.plot(time[part], off, color=style.MEASURED, lw=0.6)
         lower.set_xlabel('time [s]')
         if zoom_titles is not None:
             upper.set_title(zoom_titles[i])
     rows[0, 0].set_ylabel('displacement [mm]')
-    rows[1, 0].set_ylabel('less measured [mm]')
+    rows[1, 0].set_ylabel('less median [mm]')
     handles, names = rows[0, 0].get_legend_handles_labels()
-    figure.legend(handles, names, loc='outside lower center', ncols=3)
+    figure.legend(handles, names, loc='outside lower center', ncols=len(names))
     if title:
         figure.suptitle(title)
     return figure
@@ -177,6 +178,7 @@ def parameters_against_time(
     *,
     truth: Array | None = None,
     reference: Array | None = None,
+    prior_dominated: Array | None = None,
     title: str = '',
     band_name: str = '95 % GLUE interval',
 ) -> Figure:
@@ -190,6 +192,8 @@ def parameters_against_time(
         parameters: name and unit of each column, length p.
         truth: true values where known (simulated plant), shape (p,) or (w, p).
         reference: values to compare with, such as the deterministic ones, shape (p,).
+        prior_dominated: parameters of which the data say little more than the prior, shape (p,);
+            drawn in grey.
         title: title of the figure.
         band_name: what the interval is called in the legend.
 
@@ -210,16 +214,19 @@ def parameters_against_time(
     for unused in panels[count:]:
         unused.set_visible(False)
     for i, (axes, parameter) in enumerate(zip(panels, parameters, strict=False)):
+        dominated = prior_dominated is not None and bool(prior_dominated[i])
+        colour = style.COMMAND if dominated else style.BAND
         axes.fill_between(
-            time_s, lower[:, i], upper[:, i], color=style.BAND, alpha=0.3, lw=0, label=band_name
+            time_s, lower[:, i], upper[:, i], color=colour, alpha=0.3, lw=0, label=band_name
         )
-        axes.plot(time_s, mean[:, i], '-o', color=style.BAND, label='posterior mean')
+        axes.plot(time_s, mean[:, i], '-o', color=colour, label='posterior mean')
         if truth is not None:
             column = np.broadcast_to(np.asarray(truth, float), mean.shape)[:, i]
             axes.plot(time_s, column, '--', color=style.TRUTH, label='true value')
         if reference is not None:
             axes.axhline(reference[i], ls=':', color=style.DETERMINISTIC, label='deterministic')
-        axes.set_title(style.label(parameter.name, parameter.unit))
+        note = ', little more than the prior' if dominated else ''
+        axes.set_title(style.label(parameter.name, parameter.unit) + note)
         axes.tick_params(labelbottom=i >= count - columns)
     for axes in panels[max(0, count - columns) : count]:
         axes.set_xlabel('time [s]')
