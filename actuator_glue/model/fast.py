@@ -18,7 +18,9 @@ from actuator_glue.model.exact import ExactErrors, Initial
 from actuator_glue.records import Array, Record
 
 TOLERANCE = 1e-9  # relative error of the sum of squares; times G = 256 it is 3e-7 in L
-_FEWEST, _MOST = 16, 64  # terms of the basis
+# Terms of the basis; fewer where the initial state has as many of its own: such a window is one of
+# many, and its preparation counts.
+_FEWEST, _MOST, _MOST_FREE = 16, 64, 48
 _ENOUGH = 1e-11  # what the terms should leave of the response
 # Grid that looks for the reference system: points per axis, refinements, range in s and in Hz.
 _GRID, _LEVELS = 8, 8
@@ -37,6 +39,8 @@ class FastErrors:
         settle: samples at each record's beginning that are simulated but not counted.
         initial: state at the first sample: 'rest', or 'measured' from the first samples.
         tolerance: bound on the relative error of each record's sum of squares about its mean.
+        near: theta (4,) close to the best fit where one is known, as from the window before;
+            saves the search for the system that the basis is built around.
 
     Attributes:
         fallbacks: record-theta pairs that the exact kernel did, over all calls.
@@ -51,11 +55,12 @@ class FastErrors:
         settle: Sequence[int] | int = 0,
         initial: Initial = 'rest',
         tolerance: float = TOLERANCE,
+        near: ArrayLike | None = None,
     ) -> None:
         self.exact = ExactErrors(records, settle, initial)
         self.tolerance = tolerance
         self.fallbacks = 0
-        rows = [_row(self.exact, r) for r in range(len(self.exact.records))]
+        rows = [_row(self.exact, r, near) for r in range(len(self.exact.records))]
         self._rows = np.zeros((len(rows), max(len(row) for row in rows)))
         for wide, row in zip(self._rows, rows, strict=True):
             wide[: len(row)] = row
@@ -92,11 +97,13 @@ class FastErrors:
         return self.exact.residuals(theta)
 
 
-def _row(exact: ExactErrors, r: int) -> Array:
+def _row(exact: ExactErrors, r: int, near: ArrayLike | None) -> Array:
     """Return everything about one record that the quadratic form needs."""
     record, (x0, v0) = exact.records[r], exact.starts[r]
     foh = record.hold == 'linear'
-    system = _reference(exact, r)
+    system = np.full(3, np.nan) if near is None else linear.systems(near, exact.stiffness[r])[0]
+    if not (np.isfinite(system).all() and (system > 0.0).all()):
+        system = _reference(exact, r)
     u0 = record.command[0] if foh else 0.0
     free = bool(x0 or v0 or u0)
     delta = -math.expm1(-min(math.sqrt(system[1]) * record.period, 5.0))
@@ -111,7 +118,7 @@ def _row(exact: ExactErrors, r: int) -> Array:
         laguerre.V0: v0,
         laguerre.U0: u0,
     }
-    K = _terms(system)
+    K = _terms(system, _MOST_FREE if free else _MOST)
     dims = K * (1 + free)
     row = np.zeros(laguerre.HEADER + (K + laguerre.TAIL) * (1 + free) + dims * (2 + dims))
     row[laguerre.TERMS] = K
@@ -122,7 +129,7 @@ def _row(exact: ExactErrors, r: int) -> Array:
     return row
 
 
-def _terms(system: Array) -> int:
+def _terms(system: Array, most: int) -> int:
     """Return the number of terms that poles near the reference system's need.
 
     A pole p leaves |(p - sigma)/(p + sigma)| per term; the worst of systems with 30 % more or less
@@ -134,8 +141,8 @@ def _terms(system: Array) -> int:
         for frequency in (0.7, 1.0, 1.4):
             poles = np.roots([1.0, system[0] * damping, system[1] * frequency])
             worst = max(worst, float(np.abs((poles + sigma) / (poles - sigma)).max()))
-    wanted = math.log(_ENOUGH) / math.log(worst) if 0.0 < worst < 1.0 else float(_MOST)
-    return laguerre.BLOCK * math.ceil(min(max(wanted, _FEWEST), _MOST) / laguerre.BLOCK)
+    wanted = math.log(_ENOUGH) / math.log(worst) if 0.0 < worst < 1.0 else float(most)
+    return laguerre.BLOCK * math.ceil(min(max(wanted, _FEWEST), most) / laguerre.BLOCK)
 
 
 def _reference(exact: ExactErrors, r: int) -> Array:

@@ -135,6 +135,18 @@ def test_near_the_best_fit_the_exact_kernel_is_not_needed(initial, hold):
     assert fast.fallbacks == 0
 
 
+def test_any_hint_gives_the_same_answer():
+    """A hint saves the search; a bad or impossible one costs exact evaluations, not accuracy."""
+    theta, record = window(1000.0, 5.0, 'zoh', 250e3, 3, 'noise')
+    near = theta * np.exp(0.03 * np.random.default_rng(0).standard_normal((50, 4)))
+    for hint in (theta, 0.3 * theta, UPPER, LOWER):
+        fast = FastErrors([record], 500, 'measured', near=hint)
+        difference = log_likelihood(fast, fast(near)) - log_likelihood(fast, fast.exact(near))
+        assert np.abs(difference).max() < 1e-5
+        if hint is theta:
+            assert fast.fallbacks == 0
+
+
 def test_ten_times_the_length_is_as_accurate():
     fast = FastErrors(problem_r.records(duration=600.0))
     theta = posterior_draws(300, 1)
