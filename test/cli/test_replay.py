@@ -1,0 +1,138 @@
+"""replay: the estimator over a bag, and held against what it published live."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from actuator_glue.io import messages
+from actuator_glue.io.bag_records import read_records, write_record
+from actuator_glue.io.bag_writer import BagWriter
+from actuator_glue.online import wire
+from actuator_glue.online.fitting import choose_model
+from actuator_glue.online.job import WindowResult
+from actuator_glue.online.replay import replay, stream
+from actuator_glue.online.settings import EstimatorSettings
+
+SETTINGS = EstimatorSettings(window=4.0, hop=2.0, evaluations=6000, start_evaluations=12_000)
+
+
+def put(writer: BagWriter, topic: str, name: str, head: wire.Head, fields: wire.Fields) -> None:
+    """Write one message the way a node publishes it."""
+    content = messages.message(name, header=messages.header(*head), **completed(name, fields))
+    writer.write(topic, content, head.stamp_ns)
+
+
+def completed(name: str, fields: wire.Fields) -> wire.Fields:
+    """Return fields with zeros where nothing was said, as ROS does, and arrays as arrays."""
+    kinds = messages.typestore().fielddefs[messages.full_name(name)][1]
+    arrays = {'float64': np.float64, 'bool': np.bool_}
+    values = {}
+    for field, kind in kinds:
+        value = fields.get(field, 0.0)
+        if kind[0] == 4 and kind[1][0][1][0] in arrays:
+            value = np.asarray(value, arrays[kind[1][0][1][0]])
+        if field != 'header':
+            values[field] = value
+    return values
+
+
+@pytest.fixture(scope='module')
+def estimated(short_bag: Path, tmp_path_factory: pytest.TempPathFactory) -> Callable[..., Path]:
+    """Return a function that makes a bag with samples and an estimator's messages."""
+    (record,) = read_records(short_bag)
+    model = choose_model()
+    results = [r for r in replay(stream(record), SETTINGS, model) if isinstance(r, WindowResult)]
+    assert len(results) == 3
+
+    def make(name: str, change: Callable[[wire.Fields], Any] = lambda fields: None) -> Path:
+        bag = tmp_path_factory.mktemp('live') / name
+        with BagWriter(bag) as writer:
+            write_record(writer, record)
+            for topic, kind in (
+                ('/estimator_setup', 'EstimatorSetup'),
+                ('/posterior', 'PosteriorMoments'),
+                ('/prediction_band', 'PredictionBand'),
+            ):
+                writer.add_topic(topic, kind)
+            head = wire.Head(record.start_ns, record.actuator)
+            setup = wire.estimator_setup(SETTINGS, model, 0, 0)
+            put(writer, '/estimator_setup', 'EstimatorSetup', head, setup)
+            for result in results:
+                head, fields = wire.posterior(result, 0.1)
+                change(fields)
+                put(writer, '/posterior', 'PosteriorMoments', head, fields)
+                for prediction in result.scored:
+                    band = wire.prediction(prediction, record.actuator)
+                    put(writer, '/prediction_band', 'PredictionBand', *band)
+        return bag
+
+    return make
+
+
+def test_a_replay_is_identical_bit_by_bit(run, estimated: Callable[..., Path]) -> None:
+    """Same bag, same numbers: exit 0 and a count of what was compared."""
+    done = run('replay', estimated('bag'), '--json', '-')
+    assert done.code == 0, done.err
+    content = done.json
+    assert content['schema'] == 'actuator_glue.replay/1'
+    assert content['identical'] is True
+    assert content['compared']['posteriors'] == 3
+    assert content['compared']['bands'] >= 2
+    assert [w['window'] for w in content['windows']] == [0, 1, 2]
+    assert 'identical, bit for bit' in done.err
+
+
+def test_one_other_bit_is_found(run, estimated: Callable[..., Path]) -> None:
+    """The smallest difference in one published number is exit 1 and named."""
+
+    def change(fields: wire.Fields) -> None:
+        if fields['window'] == 1:
+            fields['mean'] = np.nextafter(fields['mean'], np.inf)
+
+    done = run('replay', estimated('bag', change), '--json', '-')
+    assert done.code == 1
+    assert done.json['identical'] is False
+    assert done.json['compared']['differing'] == ['window 1: posterior differs in mean']
+
+
+def test_other_settings_are_not_compared(run, estimated: Callable[..., Path]) -> None:
+    """What is estimated otherwise is no replay: exit 0, nothing compared."""
+    done = run('replay', estimated('bag'), '--window', 5, '--evaluations', 4000, '--json', '-')
+    assert done.code == 0
+    assert done.json['identical'] is None
+    assert done.json['settings']['window'] == 5
+
+
+def test_pictures_of_an_estimate(run, estimated: Callable[..., Path], tmp_path: Path) -> None:
+    """A bag with posteriors and bands gives the two pictures as well."""
+    done = run('plot', estimated('bag'), '--out', tmp_path)
+    assert done.code == 0, done.err
+    names = {p.name for p in tmp_path.iterdir()}
+    assert names == {'bag.png', 'bag_bands.png', 'bag_parameters.png'}
+
+
+def test_a_laboratory_file_is_estimated_window_by_window(run, problem_r: Path) -> None:
+    """No bag is needed to see what the online estimator would have said."""
+    options = ('--window', 20, '--hop', 20, '--evaluations', 4000, '--json', '-')
+    done = run('replay', problem_r / 'r_2.csv', *options)
+    assert done.code == 0, done.err
+    assert len(done.json['windows']) == 3
+    assert done.json['times_real_time'] > 1
+
+
+def test_what_cannot_be_replayed(run, tmp_path: Path, estimated: Callable[..., Path]) -> None:
+    """Two actuators without a choice, absurd settings, a record shorter than a window."""
+    (record,) = read_records(estimated('bag'))
+    bag = tmp_path / 'two'
+    with BagWriter(bag) as writer:
+        for namespace in ('/a', '/b'):
+            write_record(writer, record, namespace=namespace)
+    assert '--namespace' in run('replay', bag).message
+    assert "under '/c'" in run('replay', bag, '--namespace', '/c').message
+    fast = ('--window', 4, '--evaluations', 4000)
+    assert run('replay', bag, '--namespace', '/b', *fast).code == 0
+    assert 'outside' in run('replay', bag, '--namespace', 'a', '--window', -1).message
+    assert 'not one window' in run('replay', bag, '--namespace', 'a', '--window', 60).message

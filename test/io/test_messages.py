@@ -1,0 +1,111 @@
+"""Wire types without ROS agree with what rosidl generates and rclpy puts on the wire."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import actuator_glue
+from actuator_glue.errors import InputError
+from actuator_glue.io import messages
+
+ROOT = Path(__file__).resolve().parents[2]
+GENERATED = ROOT / 'install' / messages.PACKAGE / 'share' / messages.PACKAGE / 'msg'
+NAMES = sorted(p.stem for p in messages.definition_folder().glob('*.msg'))
+
+
+@pytest.mark.ros
+@pytest.mark.skipif(not GENERATED.is_dir(), reason='the interface package is not built')
+@pytest.mark.parametrize('name', NAMES)
+def test_type_hash_is_rosidls(name: str) -> None:
+    """The hash in our bags is the one ROS computes, so `ros2 bag play` publishes them."""
+    hashes = json.loads((GENERATED / f'{name}.json').read_text())['type_hashes']
+    generated = {h['type_name']: h['hash_string'] for h in hashes}
+    assert messages.message_type(name).rihs01 == generated[f'{messages.PACKAGE}/msg/{name}']
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize('forces', [0, 1, 2])
+@pytest.mark.parametrize('count', [1, 2, 7])
+@pytest.mark.parametrize('actuator', ['a', 'abcd', 'abcdefg'])
+def test_rclpy_and_we_read_each_other(count: int, forces: int, actuator: str) -> None:
+    """What rclpy sends we read, and what we write rclpy reads, arrays empty or not.
+
+    With an empty last array rclpy sends some bytes more than the message needs.
+    """
+    rclpy = pytest.importorskip('rclpy.serialization')
+    ours = pytest.importorskip('actuator_glue_msgs.msg', reason='install/ is not sourced')
+    sent = ours.SampleBlock(period=1e-3, index=2**40)
+    sent.header.stamp.sec, sent.header.stamp.nanosec = 1_700_000_000, 123_456_789
+    sent.header.frame_id = actuator
+    sent.command = np.linspace(-1, 1, count)
+    sent.measured = np.linspace(0, 3, count)
+    sent.force = np.linspace(1, 2, forces)
+    got = messages.deserialize('SampleBlock', bytes(rclpy.serialize_message(sent)))
+    assert messages.stamp_ns(got.header) == 1_700_000_000_123_456_789
+    back = rclpy.deserialize_message(messages.serialize('SampleBlock', got), ours.SampleBlock)
+    assert back == sent
+    for name in ('command', 'measured', 'force'):
+        assert getattr(got, name).tobytes() == getattr(sent, name).tobytes()
+
+
+@pytest.mark.parametrize('name', NAMES)
+def test_definitions_carry_their_comments(name: str) -> None:
+    """The text in a bag is the .msg file itself, then the types it uses, each once."""
+    text = messages.message_type(name).definition
+    own = (messages.definition_folder() / f'{name}.msg').read_text()
+    assert text.startswith(own.rstrip('\n'))
+    titles = [line for line in text.splitlines() if line.startswith('MSG: ')]
+    assert len(titles) == len(set(titles))
+
+
+def test_standard_and_unknown_types() -> None:
+    """Types of ROS 2 Jazzy are known by their full name, others are refused."""
+    assert messages.message_type('diagnostic_msgs/msg/DiagnosticArray').rihs01.startswith(
+        'RIHS01_'
+    )
+    with pytest.raises(InputError, match='unknown'):
+        messages.message_type('Nothing')
+
+
+@pytest.mark.parametrize('data', [b'', b'\x00\x01\x00\x00', b'\x00\x07\x00\x00' + bytes(80)])
+def test_bytes_that_are_no_message(data: bytes) -> None:
+    """Too short, or of an unknown encapsulation."""
+    with pytest.raises(InputError, match='SampleBlock'):
+        messages.deserialize('SampleBlock', data)
+
+
+@pytest.mark.parametrize('way', ['package', 'checkout', 'workspace', 'nowhere'])
+def test_definitions_are_found_wherever_we_are_installed(tmp_path: Path, way: str) -> None:
+    """Inside the package, beside it in a checkout, in a sourced workspace; else one message."""
+    package = tmp_path / 'lib' / 'actuator_glue'
+    ignore = shutil.ignore_patterns('__pycache__', 'interfaces')
+    shutil.copytree(Path(actuator_glue.__file__).parent, package, ignore=ignore)
+    source = messages.definition_folder()
+    target = {
+        'package': package / 'interfaces' / 'msg',
+        'checkout': tmp_path / 'lib' / 'msg_defs' / 'msg',
+        'workspace': tmp_path / 'ws' / 'share' / messages.PACKAGE / 'msg',
+    }.get(way)
+    if target is not None:
+        shutil.copytree(source, target)
+    environment = os.environ | {'PYTHONPATH': str(tmp_path / 'lib')}
+    environment['AMENT_PREFIX_PATH'] = str(tmp_path / 'ws')
+    code = 'from actuator_glue.io.messages import definition_folder; print(definition_folder())'
+    done = subprocess.run(
+        [sys.executable, '-c', code],
+        env=environment,
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    if target is None:
+        assert 'make setup' in done.stderr
+    else:
+        assert Path(done.stdout.strip()) == target, done.stderr
