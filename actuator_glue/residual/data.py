@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from actuator_glue.model.exact import Initial
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.records import Array, Record
 
@@ -23,7 +24,7 @@ class Model(Protocol):
     def parameters(self) -> tuple[Parameter, ...]:
         """Parameters in the order of theta's columns."""
 
-    def simulate(self, theta: Array, record: Record) -> Array:
+    def simulate(self, theta: Array, record: Record, *, initial: Initial = 'rest') -> Array:
         """Free-run sensor output (m, n) [m] of theta (m, p)."""
 
 
@@ -34,20 +35,30 @@ class Data:
     Attributes:
         records: the records, simulated whole.
         masks: per record, which samples count, (n,) bool.
+        initials: per record, the state it starts from: 'rest' or 'measured'.
+        strides: per record, how many samples lie between counted ones.
     """
 
     records: tuple[Record, ...]
     masks: tuple[Mask, ...]
+    initials: tuple[Initial, ...]
+    strides: tuple[int, ...]
 
     @classmethod
-    def whole(cls, records: Sequence[Record], settle: int = 0) -> Data:
-        """Count all samples but the first `settle` of each record."""
-        masks = []
-        for record in records:
-            mask = np.ones(len(record), dtype=np.bool_)
-            mask[:settle] = False
-            masks.append(mask)
-        return cls(tuple(records), tuple(masks))
+    def whole(cls, records: Sequence[Record]) -> Data:
+        """Count all samples; every record starts from rest."""
+        ones = tuple(np.ones(len(r), dtype=np.bool_) for r in records)
+        return cls(tuple(records), ones, ('rest',) * len(ones), (1,) * len(ones))
+
+    @cached_property
+    def periods(self) -> tuple[float, ...]:
+        """Time between counted samples of each record [s]."""
+        return tuple(r.period * s for r, s in zip(self.records, self.strides, strict=True))
+
+    @cached_property
+    def times(self) -> tuple[Array, ...]:
+        """Times of the counted samples of each record [s]."""
+        return tuple(r.time[m] for r, m in zip(self.records, self.masks, strict=True))
 
     @cached_property
     def target(self) -> Array:
@@ -67,8 +78,9 @@ class Data:
         """Simulate all records free-run and return the counted samples (m, N) [m]."""
         table = np.atleast_2d(theta)
         out = np.empty((len(table), self.target.size))
-        for record, mask, part in zip(self.records, self.masks, self.parts, strict=True):
-            out[:, part] = np.atleast_2d(model.simulate(table, record))[:, mask]
+        rows = zip(self.records, self.initials, self.masks, self.parts, strict=True)
+        for record, initial, mask, part in rows:
+            out[:, part] = model.simulate(table, record, initial=initial)[:, mask]
         return out
 
     def split(self, errors: Array) -> list[Array]:

@@ -2,12 +2,33 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 
-from actuator_glue.records import Record
-from actuator_glue.residual.diagnosis import Diagnosis
+import numpy as np
+
+from actuator_glue.model.effects import CATALOGUE
+from actuator_glue.model.parameters import BASE
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Array, Record
+from actuator_glue.residual import advice, measurement, posterior
+from actuator_glue.residual.attribute import Attribution, Attributor
+from actuator_glue.residual.decide import Decision, decide
+from actuator_glue.residual.detect import alarm_of
+from actuator_glue.residual.diagnosis import Candidate, Diagnosis, Estimate, Finding
+from actuator_glue.residual.hygiene import prepare
+from actuator_glue.residual.measurement import Measured
+from actuator_glue.residual.search import Search
+from actuator_glue.residual.settings import Settings
+from actuator_glue.residual.verify import Side, traces, verify
 
 Progress = Callable[[str, float], None]
+Clock = Callable[[], float]
+
+# Effects with a mean response; the others are found by measurement.py.
+MEAN_EFFECTS = tuple(
+    name for name, effect in CATALOGUE.items() if effect.variance is None and name != 'hum'
+)
 
 
 def diagnose(
@@ -17,6 +38,8 @@ def diagnose(
     seed: int = 0,
     jobs: int = 1,
     progress: Progress | None = None,
+    settings: Settings | None = None,
+    clock: Clock | None = None,
 ) -> Diagnosis:
     """Diagnose records whose specimen stiffness is known.
 
@@ -27,8 +50,145 @@ def diagnose(
         seed: seed of every random step; the same seed gives the same diagnosis.
         jobs: worker threads for the refits of candidates.
         progress: called with (stage, share done in [0, 1]).
+        settings: thresholds.
+        clock: gives seconds, for the duration reported (NaN without one).
 
     Raises:
         InputError: stiffness not known, records too short, or nothing moves.
     """
-    raise NotImplementedError
+    start = clock() if clock else math.nan
+    settings = settings or Settings()
+    tell = progress or (lambda stage, share: None)
+    held = [holdout] if isinstance(holdout, Record) else list(holdout or ())
+    tell('check', 0.0)
+    prepared = prepare(records, held)
+    search = Search(prepared.fit, MEAN_EFFECTS, jobs)
+    tell('base fit', 0.0)
+    found = Attributor(search, settings, tell).run()
+    seen = measurement.find(prepared.fit, found.final.fit.error, found.material)
+    decision = decide(found, seen, prepared.fit, settings)
+    assert search.scorer is not None
+    rng = np.random.default_rng([seed, 1])
+    sides = []
+    for stage, trial in (('posterior before', found.base), ('posterior', decision.final)):
+        if sides and not decision.final.effects:
+            sides.append(sides[0])
+            break
+        draws = posterior.sample(
+            prepared.fit,
+            trial.effects,
+            trial.fit,
+            search.scorer,
+            rng=rng,
+            evaluations=settings.evaluations if trial.effects else 0,
+            progress=lambda share, stage=stage: tell(stage, share),
+        )
+        sides.append(Side(trial.effects, trial.fit.theta, draws))
+    before, after = sides
+    tell('held-out', 0.0)
+    error, coverage, curves = verify(
+        prepared.fit, prepared.held, before, after, found.base.fit.error, decision.noise, seed
+    )
+    estimates = _estimates(after)
+    tell('done', 1.0)
+    return Diagnosis(
+        verdict=decision.verdict,
+        effects=_findings(decision, found, estimates),
+        error=error,
+        candidates=_candidates(found, seen),
+        coverage=coverage,
+        alarm=alarm_of(found, seen, decision, prepared.fit, seed),
+        advice=(*advice.of(decision, found, prepared.fit), *prepared.notes),
+        base={p.name: estimates[p.name] for p in BASE},
+        structure=after.effects,
+        names=Structure(after.effects).names,
+        posterior=after.draws,
+        best=after.theta,
+        traces=(
+            *traces(prepared.fit, False, curves),
+            *traces(prepared.held, True, curves),
+        ),
+        remaining=decision.remaining,
+        seconds=clock() - start if clock else math.nan,
+    )
+
+
+def _estimates(side: Side) -> dict[str, Estimate]:
+    out = {}
+    for parameter, column in zip(Structure(side.effects).parameters, side.draws.T, strict=True):
+        low, high = np.quantile(column, [0.025, 0.975])
+        out[parameter.name] = Estimate(
+            float(column.mean()), float(column.std(ddof=1)), float(low), float(high),
+            parameter.unit, parameter.neutral,
+        )  # fmt: skip
+    return out
+
+
+def _measured_estimates(effect: Measured) -> dict[str, Estimate]:
+    rows = zip(CATALOGUE[effect.name].parameters, effect.values, effect.stddev, strict=True)
+    return {
+        p.name: Estimate(v, s, v - 1.96 * s, v + 1.96 * s, p.unit, p.neutral) for p, v, s in rows
+    }
+
+
+def _findings(
+    decision: Decision, found: Attribution, estimates: dict[str, Estimate]
+) -> tuple[Finding, ...]:
+    out = []
+    for name in decision.names:
+        rivals = found.rivals[name]
+        tied = [r for r in rivals if r.tied]
+        own = {p.name: estimates[p.name] for p in CATALOGUE[name].parameters}
+        first = next(iter(own.values()))
+        gained = found.removed[name]
+        out.append(
+            Finding(
+                name=name,
+                alternatives=tuple(r.name for r in tied if r.name != name),
+                probability=next(r.probability for r in rivals if r.name == name),
+                place=CATALOGUE[name].place,
+                parameters=own,
+                error_without=float(np.sqrt(found.final.mean_square + gained**2)),
+                error_with=found.final.fit.rms,
+                evidence=found.evidence[name],
+                plausible=_excludes_neutral(first),
+            )
+        )
+    for effect in decision.measured:
+        total = float(np.sqrt(found.final.mean_square))
+        out.append(
+            Finding(
+                name=effect.name,
+                alternatives=(),
+                probability=1.0,
+                place=CATALOGUE[effect.name].place,
+                parameters=_measured_estimates(effect),
+                error_without=total,
+                error_with=float(np.sqrt(max(0.0, total**2 - effect.rms**2))),
+                evidence=effect.nats,
+            )
+        )
+    return tuple(sorted(out, key=lambda f: -(f.error_without**2 - f.error_with**2)))
+
+
+def _excludes_neutral(estimate: Estimate) -> bool:
+    if estimate.neutral is None:
+        return True
+    return not estimate.lower <= estimate.neutral <= estimate.upper
+
+
+def _candidates(found: Attribution, seen: tuple[Measured, ...]) -> tuple[Candidate, ...]:
+    base = float(found.base.scores.sum())
+    scores: Array = np.array([float(t.scores.sum()) - base for t in found.singles])
+    weights = np.exp(np.clip(scores - scores.max(), -700.0, 0.0))
+    weights /= weights.sum()
+    rows = [
+        Candidate(t.added, float(s), t.fit.rms, float(w))
+        for t, s, w in zip(found.singles, scores, weights, strict=True)
+    ]
+    base_rms = found.base.fit.rms
+    rows += [
+        Candidate(m.name, m.nats, float(np.sqrt(max(0.0, base_rms**2 - m.rms**2))), 0.0)
+        for m in seen
+    ]
+    return tuple(sorted(rows, key=lambda c: c.error))

@@ -196,14 +196,14 @@ class Alarm:
 
 @dataclass(frozen=True, slots=True)
 class Trace:
-    """Curves of one record for pictures: command, measurement and simulations (n,) [m].
+    """Curves of one record for pictures: time [s], command, measurement, simulations (n,) [m].
 
     `lower_*` and `upper_*` are the 95 % predictive band before and after.
     """
 
     source: str
     held_out: bool
-    period: float
+    time: Array
     stiffness: float
     command: Array
     measured: Array

@@ -18,7 +18,7 @@ from actuator_glue.residual.data import Data, Model
 _P = len(BASE)
 # The prior of Table 3 belongs to the paper's plant; other machines lie outside it.
 _LOG_LOWER = np.log([1.0, 1e5, 1e2, 1e-4])
-_LOG_UPPER = np.log([1e4, 1e14, 1e10, 1e4])
+_LOG_UPPER = np.log([2e3, 1e14, 1e10, 1e3])
 _DAMPINGS = np.array([1e-2, 1.0, 1e2])
 
 
@@ -47,11 +47,14 @@ class Fit:
 class Space:
     """Working coordinates of a structure: logs of Eq. (2)'s parameters, the effects' as they are."""
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Model, duration: float) -> None:
         extra = model.parameters[_P:]
         self.lower = np.concatenate([_LOG_LOWER, [p.lower for p in extra]])
         self.upper = np.concatenate([_LOG_UPPER, [p.upper for p in extra]])
         self._steps = np.concatenate([np.full(_P, 1e-3), 1e-4 * (self.upper - self.lower)[_P:]])
+        # A line's phase runs away with its frequency: its step is a part of the resolution.
+        self._line = np.array([False] * _P + [p.unit == 'Hz' for p in extra])
+        self._steps[self._line] = 0.02 / duration
 
     def theta(self, z: Array) -> Array:
         """Physical parameters of working coordinates (..., p)."""
@@ -68,7 +71,8 @@ class Space:
     def steps(self, z: Array) -> Array:
         """Finite-difference steps (..., p): 1 % of an effect's size, so that kinks average out."""
         steps = np.broadcast_to(self._steps, z.shape).copy()
-        steps[..., _P:] = np.maximum(0.01 * np.abs(z[..., _P:]), steps[..., _P:])
+        larger = np.maximum(0.01 * np.abs(z), steps)
+        steps = np.where(self._line | (np.arange(z.shape[-1]) < _P), steps, larger)
         # Step inwards at an upper bound.
         return np.where(z + steps > self.upper, -steps, steps)
 
@@ -135,7 +139,7 @@ def fit(
     Returns:
         The best of all starts.
     """
-    space = Space(model)
+    space = Space(model, max(r.duration for r in data.records))
     z = space.z(np.atleast_2d(starts))
     output = data.simulate(model, space.theta(z))
     error = data.target - output
@@ -156,7 +160,10 @@ def fit(
             break
         jac = jacobian(data, model, space, z[rows], output[rows])
         tries = np.stack(
-            [_proposals(j, error[r], z[r], damping[r], space) for j, r in zip(jac, rows)]
+            [
+                _proposals(j, error[r], z[r], damping[r], space)
+                for j, r in zip(jac, rows, strict=True)
+            ]
         )
         tried = data.simulate(model, space.theta(tries.reshape(-1, z.shape[1])))
         tried = tried.reshape(len(rows), len(_DAMPINGS), -1)
@@ -166,12 +173,8 @@ def fit(
             best = int(np.argmin(sums))
             if sums[best] < sse[r]:
                 gain = (sse[r] - sums[best]) / sse[r]
-                z[r], output[r], error[r], sse[r] = (
-                    tries[i, best],
-                    tried[i, best],
-                    errors[best],
-                    sums[best],
-                )
+                z[r], output[r] = tries[i, best], tried[i, best]
+                error[r], sse[r] = errors[best], sums[best]
                 damping[r] = min(max(damping[r] * _DAMPINGS[best] * 0.3, 1e-9), 1e6)
                 active[r] = gain > tolerance
             else:

@@ -1,0 +1,106 @@
+"""The verdict: none, missing-effect or unexplained, and where an unexplained rest sits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuator_glue.records import Array
+from actuator_glue.residual.attribute import Attribution
+from actuator_glue.residual.data import Data
+from actuator_glue.residual.diagnosis import Json, Verdict
+from actuator_glue.residual.measurement import Measured
+from actuator_glue.residual.score import splits_of
+from actuator_glue.residual.search import Trial
+from actuator_glue.residual.settings import Settings
+
+
+@dataclass(frozen=True)
+class Decision:
+    """Verdict on the fitting part.
+
+    Attributes:
+        verdict: see Diagnosis.
+        final: structure to go on with.
+        names: its effects, named as findings.
+        measured: measurement effects, named as findings.
+        noise: rms of what no structure explains [m].
+        left: rms structure that remains, without what measurement effects cause [m].
+        limit: rms structure above which a model counts as unexplained [m].
+        remaining: where the rest sits, for the JSON.
+    """
+
+    verdict: Verdict
+    final: Trial
+    names: tuple[str, ...]
+    measured: tuple[Measured, ...]
+    noise: float
+    left: float
+    limit: float
+    remaining: Json
+
+
+def decide(
+    found: Attribution, seen: tuple[Measured, ...], data: Data, settings: Settings
+) -> Decision:
+    """Weigh what was found against what remains."""
+    variance = sum(m.rms**2 for m in seen if m.name != 'hum')
+    left = float(np.sqrt(max(0.0, found.left**2 - variance)))
+    limit = max(
+        settings.left_noise * found.noise,
+        found.material,
+        settings.left_share * found.structure,
+    )
+    if left > limit:
+        verdict: Verdict = 'unexplained'
+        final, names, measured = found.base, (), ()
+    elif found.final.effects or seen:
+        verdict = 'missing-effect'
+        final, names, measured = found.final, found.final.effects, seen
+    else:
+        verdict = 'none'
+        final, names, measured = found.base, (), ()
+    return Decision(
+        verdict, final, names, measured, found.noise, left, limit,
+        remaining(data, final.fit.error),
+    )  # fmt: skip
+
+
+def _band(frequency: Array, excess: Array) -> list[float]:
+    """Return the band that holds the middle 80 % of the structure's power [Hz]."""
+    power = np.cumsum(np.maximum(excess, 0.0))
+    if power[-1] <= 0.0:
+        return []
+    low, high = np.searchsorted(power, [0.1 * power[-1], 0.9 * power[-1]])
+    return [round(float(frequency[low]), 2), round(float(frequency[high]), 2)]
+
+
+def remaining(data: Data, error: Array) -> Json:
+    """Say where in time, frequency, amplitude and velocity a residual sits, per record."""
+    rows = []
+    splits, errors = splits_of(data, error), data.split(error)
+    outputs = data.split(data.target - error)
+    for i, (record, part, e, y, t, period) in enumerate(
+        zip(data.records, splits, errors, outputs, data.times, data.periods, strict=True)
+    ):
+        excess = np.maximum(e**2 - part.noise**2, 0.0)
+        total = float(excess.sum()) or 1.0
+        cumulated = np.cumsum(excess)
+        inner = np.searchsorted(cumulated, [0.1 * cumulated[-1], 0.9 * cumulated[-1]])
+        velocity = np.abs(np.gradient(y, period))
+        slow = velocity < np.median(velocity)
+        large = np.abs(y - np.median(y)) > np.median(np.abs(y - np.median(y)))
+        rows.append(
+            {
+                'source': record.source or f'record {i + 1}',
+                'stiffness': record.known_stiffness(),
+                'structure': part.structure,
+                'noise': part.noise,
+                'frequency_hz': _band(part.frequency, part.excess),
+                'time_s': [round(float(t[min(j, len(t) - 1)]), 2) for j in inner],
+                'share_at_low_velocity': round(float(excess[slow].sum()) / total, 3),
+                'share_at_large_displacement': round(float(excess[large].sum()) / total, 3),
+            }
+        )
+    return {'unit': 'm', 'records': rows}

@@ -1,0 +1,95 @@
+"""Posterior of base and effect parameters by DREAM(ZS) around the best fit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from actuator_glue.inference import dream
+from actuator_glue.model.parameters import BASE
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Array
+from actuator_glue.residual.data import Data
+from actuator_glue.residual.fit import Fit, Space
+from actuator_glue.residual.score import Scorer
+
+_P = len(BASE)
+_REACH = 8.0  # prior half width in standard deviations of the Laplace approximation
+
+
+def laplace(data: Data, scorer: Scorer, fit: Fit) -> tuple[Array, float]:
+    """Covariance of the working coordinates at the best fit and the noise inflation.
+
+    The inflation is the mean square of the whitened error: where structure remains, every
+    parameter is known less well than the noise alone says (Kennedy & O'Hagan 2001).
+    """
+    jac = scorer.whiten(fit.jacobian)
+    error = scorer.whiten(fit.error)
+    inflation = max(1.0, float(np.mean(error**2)))
+    scale = np.sqrt(np.maximum(np.einsum('pn,pn->p', jac, jac), 1e-300))
+    normal = (jac / scale[:, None]) @ (jac / scale[:, None]).T
+    covariance = np.linalg.pinv(normal, rcond=1e-10, hermitian=True) / np.outer(scale, scale)
+    return np.asarray(inflation * covariance), inflation
+
+
+def sample(
+    data: Data,
+    effects: tuple[str, ...],
+    fit: Fit,
+    scorer: Scorer,
+    *,
+    rng: np.random.Generator,
+    evaluations: int,
+    progress: Callable[[float], None],
+) -> Array:
+    """Draw (m, p) from the posterior, physical units.
+
+    Args:
+        data: the fitting part.
+        effects: effects of the structure.
+        fit: its best fit.
+        scorer: whitening filters of the noise.
+        rng: random numbers.
+        evaluations: likelihood evaluations; 0 returns draws of the Laplace approximation.
+        progress: called with the share done.
+    """
+    model = Structure(effects)
+    space = Space(model, max(r.duration for r in data.records))
+    covariance, inflation = laplace(data, scorer, fit)
+    spread = np.sqrt(np.diag(covariance))
+    spread[:_P] = np.minimum(spread[:_P], 1.0)
+    lower = np.maximum(space.lower, fit.z - _REACH * spread)
+    upper = np.minimum(space.upper, fit.z + _REACH * spread)
+    # A parameter at its bound or without curvature still needs room to move.
+    width = np.maximum(upper - lower, 1e-6 * (space.upper - space.lower))
+    lower, upper = np.maximum(space.lower, upper - width), np.minimum(space.upper, lower + width)
+    values, vectors = np.linalg.eigh(covariance)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+
+    def gaussian(count: int) -> Array:
+        z = fit.z + rng.standard_normal((count, len(fit.z))) @ root.T
+        inside = np.clip(z, lower + 1e-3 * width, upper - 1e-3 * width)
+        return np.asarray(inside)
+
+    if evaluations <= 0:
+        return space.theta(gaussian(500))
+
+    def log_density(z: Array) -> Array:
+        error = scorer.whiten(data.target - data.simulate(model, space.theta(z)))
+        sums = np.einsum('mn,mn->m', error, error)
+        return np.where(np.isfinite(sums), -0.5 * sums / inflation, -np.inf)
+
+    settings = dream.Settings(chains=32, population=128, sweeps=2, adaptation=20)
+    chains = dream.sample(
+        rng,
+        log_density,
+        lower,
+        upper,
+        evaluations=evaluations,
+        settings=settings,
+        archive=gaussian(320),
+        progress=lambda done, all_: progress(done / all_),
+    )
+    draws = chains.draws[chains.burn :].reshape(-1, len(fit.z))
+    return space.theta(draws)
