@@ -16,7 +16,7 @@ from typing import Any
 from actuator_glue.errors import InputError
 from actuator_glue.io.bag_metadata import Metadata, Qos, Topic
 from actuator_glue.io.mcap_file import McapFile, disk_error
-from actuator_glue.io.messages import message_type, serialize
+from actuator_glue.io.messages import PACKAGE, message_type, serialize, trimmed
 
 FLUSH_PERIOD = 0.2  # s
 # A file's index is kept in memory until the file is finished (about 0.6 kB per chunk); a new
@@ -123,15 +123,11 @@ class BagWriter:
         Raises:
             InputError: topic not declared, disk full, bag closed.
         """
-        if self._closed:
-            raise InputError(f'{self.path}: the bag is closed')
-        if topic not in self._topics:
-            raise InputError(f'{self.path}: topic {topic} was not declared with add_topic')
-        log_time = max(int(log_time), self._last_time + 1, 0)
-        self._last_time = log_time
-        published = log_time if publish_time is None else max(int(publish_time), 0)
-        self._file.write(self._topics[topic], data, log_time, published)
-        self.flush_if_due()
+        declared = self._declared(topic)
+        if declared.type.startswith(PACKAGE):
+            # Spare bytes at the end are harmless to ROS, but rosbags refuses such messages.
+            data = trimmed(declared.type, data)
+        self._write(declared, data, log_time, publish_time)
 
     def write(self, topic: str, content: Any, log_time: int) -> None:
         """Serialize and write a message object made by `messages.message`.
@@ -139,9 +135,22 @@ class BagWriter:
         Raises:
             InputError: as write_raw.
         """
+        declared = self._declared(topic)
+        self._write(declared, serialize(declared.type, content), log_time, None)
+
+    def _declared(self, topic: str) -> Topic:
+        if self._closed:
+            raise InputError(f'{self.path}: the bag is closed')
         if topic not in self._topics:
             raise InputError(f'{self.path}: topic {topic} was not declared with add_topic')
-        self.write_raw(topic, serialize(self._topics[topic].type, content), log_time)
+        return self._topics[topic]
+
+    def _write(self, topic: Topic, data: bytes, log_time: int, publish_time: int | None) -> None:
+        log_time = max(int(log_time), self._last_time + 1, 0)
+        self._last_time = log_time
+        published = log_time if publish_time is None else max(int(publish_time), 0)
+        self._file.write(topic, data, log_time, published)
+        self.flush_if_due()
 
     def flush_if_due(self) -> None:
         """Flush where the last flush is older than `flush_period`; call it also when idle.

@@ -148,10 +148,26 @@ def deserialize(name: str, data: bytes) -> Any:
     Raises:
         InputError: the bytes are no message of that type.
     """
-    name = full_name(name)
+    return _decode(full_name(name), data)[0]
+
+
+def trimmed(name: str, data: bytes) -> bytes:
+    """Return CDR bytes without what an rmw implementation sent beyond the message's end.
+
+    Bytes that are no message of that type are returned as they are.
+    """
     try:
-        if data[:2] not in (b'\x00\x00', b'\x00\x01'):
-            raise InputError(f'{len(data)} bytes are not a {name} (not plain CDR)')
+        used = _decode(full_name(name), data)[1]
+    except InputError:
+        return data
+    return data if len(data) - used <= 3 else data[:used]
+
+
+def _decode(name: str, data: bytes) -> tuple[Any, int]:
+    """Return the message and how many bytes it takes, encapsulation included."""
+    if data[:2] not in (b'\x00\x00', b'\x00\x01'):
+        raise InputError(f'{len(data)} bytes are not a {name} (not plain CDR)')
+    try:
         definition = typestore().get_msgdef(name)
         decode = definition.deserialize_cdr_le if data[1] else definition.deserialize_cdr_be
         content, used = decode(data[4:], 0, definition.cls, typestore())
@@ -160,4 +176,4 @@ def deserialize(name: str, data: bytes) -> Any:
     spare = len(data) - 4 - used
     if not 0 <= spare <= MAX_SPARE:
         raise InputError(f'{len(data)} bytes are not a {name} ({spare} bytes too many)')
-    return content
+    return content, 4 + used

@@ -380,6 +380,27 @@ def test_foreign_types_are_recorded_raw(tmp_path: Path) -> None:
     assert summary.definitions['lab_msgs/msg/Pump'] == 'float64 pressure\n'
 
 
+@pytest.mark.parametrize('spare', [0, 3, 4, 8])
+def test_rosbags_reads_blocks_with_spare_bytes(tmp_path: Path, spare: int) -> None:
+    """What rclpy sends for an empty force array is stored so that rosbags can read it."""
+    ones = np.ones(3)
+    block = messages.message(
+        'SampleBlock',
+        header=messages.header(1, 'a'),
+        period=1e-3,
+        index=0,
+        command=ones,
+        measured=ones,
+        force=ones[:0],
+    )
+    with BagWriter(tmp_path / 'bag') as writer:
+        writer.add_topic('/samples', 'SampleBlock')
+        writer.write_raw('/samples', messages.serialize('SampleBlock', block) + bytes(spare), 1)
+    with AnyReader([tmp_path / 'bag']) as reader:
+        ((connection, _, raw),) = reader.messages()
+        assert len(reader.deserialize(raw, connection.msgtype).measured) == 3
+
+
 def test_what_is_no_bag(tmp_path: Path) -> None:
     """Missing path, empty folder, sqlite3 bag, bag without samples: one message each."""
     with pytest.raises(InputError, match='no such bag'):
