@@ -8,12 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.model.parameters import TABLE_2, Parameter
+from actuator_glue.model.parameters import TABLE_2, Parameter, bounds
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
+from actuator_glue.reproduction.physical import least
 from actuator_glue.reproduction.shaping import blocks
-from actuator_glue.residual.data import Data
-from actuator_glue.residual.fit import fit
 
 BIN = 0.5  # Hz, width of the ranges that residuals are shown by
 SWEEP_RATE = 10.0 / 60.0  # Hz/s
@@ -85,11 +84,17 @@ def _refit(
 ) -> Refit:
     chosen = tuple(records[t] for t in tests)
     masks = tuple(_kept(r) for r in chosen)
-    data = Data(chosen, masks)
-    extra = len(model.parameters) - 4
-    start = np.concatenate([TABLE_2, np.ones(extra)])
-    theta = fit(data, model, start).theta
-    residual = tuple(r.measured - np.ravel(model.simulate(theta[None], r)) for r in chosen)
+    lower, upper = bounds(model.parameters)
+
+    def residuals(theta: Array) -> list[Array]:
+        return [r.measured - np.ravel(model.simulate(theta[None], r)) for r in chosen]
+
+    def error(theta: Array) -> Array:
+        return np.concatenate([e[m] for e, m in zip(residuals(theta), masks, strict=True)])
+
+    start = np.concatenate([TABLE_2, np.ones(len(model.parameters) - len(TABLE_2))])
+    theta, _, _ = least(error, start, lower, upper)
+    residual = tuple(residuals(theta))
 
     def rms(error: Array) -> float:
         return float(np.sqrt(np.mean(error**2)))

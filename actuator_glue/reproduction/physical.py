@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -64,27 +64,48 @@ def fit_physical(records: Sequence[Record]) -> PhysicalFit:
         InputError: a record's specimen stiffness is not known.
     """
     errors = ExactErrors(records)
-    scale = TABLE_2.copy()
     lower, upper = bounds()
 
-    def error(relative: Array) -> Array:
-        parts = np.concatenate([r[0] for r in errors.residuals((relative * scale)[None])])
-        return np.asarray((parts - parts.mean()) * 1e3)
+    def error(theta: Array) -> Array:
+        parts = np.concatenate([r[0] for r in errors.residuals(theta[None])])
+        return np.asarray(parts - parts.mean())
 
-    solution = least_squares(
-        error, np.ones(4), jac='3-point', bounds=(lower / scale, upper / scale),
-        xtol=1e-14, ftol=1e-14, gtol=1e-14,
-    )  # fmt: skip
-    theta = np.clip(solution.x * scale, lower, upper)
+    theta, jacobian, misfit = least(error, TABLE_2, lower, upper)
     # On a bound within what a posterior could see: a millionth of the prior's width.
     at_bound = np.minimum(theta - lower, upper - theta) < 1e-6 * (upper - lower)
     theta = np.where(at_bound & (theta - lower < upper - theta), lower, theta)
     stddev = np.full(4, np.nan)
     free = ~at_bound
-    jacobian = np.asarray(solution.jac)[:, free]
-    variance = 2.0 * solution.cost / (len(solution.fun) - free.sum())
-    stddev[free] = np.sqrt(np.diag(np.linalg.inv(jacobian.T @ jacobian)) * variance) * scale[free]
+    slopes = jacobian[:, free] * TABLE_2[free]  # scaled, so that the inverse is well conditioned
+    variance = float(misfit @ misfit) / (len(misfit) - free.sum())
+    stddev[free] = np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)) * variance) * TABLE_2[free]
     return PhysicalFit(theta, stddev, at_bound, _rms(errors, theta), _rms(errors, TABLE_2))
+
+
+def least(
+    error: Callable[[Array], Array], scale: Array, lower: Array, upper: Array
+) -> tuple[Array, Array, Array]:
+    """Minimise a sum of squares within bounds.
+
+    Args:
+        error: simulation error (n,) [m] of theta (p,).
+        scale: starting point and typical size of each parameter, shape (p,), not zero.
+        lower: lower bounds, shape (p,).
+        upper: upper bounds, shape (p,).
+
+    Returns:
+        theta (p,), Jacobian (n, p) and error (n,) at the minimum.
+    """
+
+    def in_mm(relative: Array) -> Array:
+        return 1e3 * error(relative * scale)
+
+    solution = least_squares(
+        in_mm, np.ones(len(scale)), jac='3-point', bounds=(lower / scale, upper / scale),
+        xtol=1e-14, ftol=1e-14, gtol=1e-14,
+    )  # fmt: skip
+    theta = np.clip(solution.x * scale, lower, upper)
+    return theta, 1e-3 * np.asarray(solution.jac) / scale, 1e-3 * np.asarray(solution.fun)
 
 
 def _rms(errors: ExactErrors, theta: Array) -> Array:

@@ -24,6 +24,8 @@ class Spread:
         mean, cov, skewness: of the four parameters, shape (r, 4).
         matched: posterior at the residual where our COVs of the first three parameters agree
             best with Table 4 (least squares of log ratios).
+        literal: posterior without added residual at the shaping factor that should be
+            equivalent by `equivalent_shaping_factor`.
     """
 
     rms: Array
@@ -31,6 +33,7 @@ class Spread:
     cov: Array
     skewness: Array
     matched: Posterior
+    literal: Posterior
 
     @property
     def difference(self) -> Array:
@@ -70,12 +73,14 @@ def against_residual(
     cov = np.array([p.moments.cov for p in posteriors])
     matched_mm = match(np.asarray(added_mm), cov)
     matched = one((seed, 41), matched_mm, final_evaluations, total - final_evaluations)
+    small = equivalent_shaping_factor(matched.best_rms, posteriors[0].best_rms)
     return Spread(
         rms=np.array([p.best_rms for p in posteriors]),
         mean=np.array([p.moments.mean for p in posteriors]),
         cov=cov,
         skewness=np.array([p.moments.skewness for p in posteriors]),
         matched=matched,
+        literal=run((seed, 43), errors, small, evaluations),
     )
 
 

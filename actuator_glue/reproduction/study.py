@@ -59,9 +59,9 @@ FULL = Effort(
     seeds=20,
 )
 QUICK = Effort(
-    evaluations=40_000,
-    short=16_000,
-    published=12_000,
+    evaluations=30_000,
+    short=14_000,
+    published=10_000,
     draws=300,
     shaping_factors=tuple(SHOWN.values()),
     added_mm=(0.0, 0.2, 0.4, 0.6, 0.7, 0.8),

@@ -1,0 +1,1 @@
+"""Sections of the report: text, tables and figures from the study's numbers."""
