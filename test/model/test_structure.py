@@ -1,0 +1,276 @@
+"""Structures: neutral is Eq. (2), batches, error sums, derivatives, extremes, streams."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from actuator_glue.errors import InputError
+from actuator_glue.model import linear
+from actuator_glue.model.commands import sweep
+from actuator_glue.model.effects import CATALOGUE, scale
+from actuator_glue.model.exact import ExactErrors
+from actuator_glue.model.parameters import TABLE_2
+from actuator_glue.model.stream import Stream
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Record
+
+RATE = 256.0
+U = sweep(RATE, duration=8.0, f0=0.0, f1=10.0, amplitude=2e-3)
+EVERY = tuple(CATALOGUE)
+MANY = (
+    'delay',
+    'gain',
+    'valve-lag',
+    'valve-deadband',
+    'flow-asymmetry',
+    'supply-droop',
+    'stribeck-friction',
+    'specimen-yield',
+    'sensor-lag',
+    'backlash',
+    'clock-skew',
+    'bias',
+    'hum',
+)
+
+
+def record(stiffness: float = 250e3, hold: str = 'zoh', rate: float = RATE) -> Record:
+    """Return a record whose measured displacement is Eq. (2)'s."""
+    step = round(rate / RATE) if rate > RATE else 1
+    u = np.repeat(U, step) if step > 1 else U
+    x = linear.simulate(TABLE_2, u, stiffness=stiffness, period=1.0 / rate, hold=hold)
+    return Record(u, x, 1.0 / rate, stiffness, hold=hold)
+
+
+def typical(names: tuple[str, ...], r: Record, which: int = 0) -> np.ndarray:
+    """Return theta with every named effect at one of its typical sizes."""
+    structure = Structure(names)
+    theta = structure.neutral(TABLE_2)
+    size = scale([r], TABLE_2)
+    for name in names:
+        starts = Structure((name,)).starts(TABLE_2, size)
+        theta[structure.columns(name)] = starts[which % len(starts), 4:]
+    return theta
+
+
+@pytest.mark.parametrize('hold', ['zoh', 'linear'])
+@pytest.mark.parametrize('stiffness', [0.0, 250e3])
+def test_neutral_is_eq_2_by_scipy(hold: str, stiffness: float) -> None:
+    """Every effect, alone and all at once, switched off: scipy's response of Eq. (2)."""
+    r = record(stiffness, hold)
+    n0, d2, d1, d0 = (float(c) for c in linear.coefficients(TABLE_2, stiffness))
+    method = 'zoh' if hold == 'zoh' else 'foh'
+    num, den, _ = signal.cont2discrete(([n0], [d2, d1, d0]), r.period, method)
+    expected = signal.lfilter(np.ravel(num), den, U)
+    for names in [(), *((name,) for name in EVERY), EVERY]:
+        structure = Structure(names)
+        y = structure.simulate(structure.neutral(TABLE_2), r)
+        assert np.abs(y - expected).max() < 1e-13, names
+
+
+def test_no_effect_is_the_linear_kernel() -> None:
+    """Structure(()) dispatches to Eq. (2): same bits, same error sums."""
+    r = record(rate=256.0)
+    theta = np.random.default_rng(1).uniform(0.7, 1.3, (5, 4)) * TABLE_2
+    x = linear.simulate(theta, r.command, stiffness=250e3, period=r.period)
+    assert np.array_equal(Structure(()).simulate(theta, r), x)
+    assert np.array_equal(Structure(()).errors([r])(theta), ExactErrors([r])(theta))
+
+
+@pytest.mark.parametrize('names', [('coulomb-friction',), ('delay',), MANY, EVERY])
+def test_batch_equals_single(names: tuple[str, ...]) -> None:
+    """A parameter set's answer does not depend on its neighbours, bit for bit."""
+    r = record()
+    structure = Structure(names)
+    rng = np.random.default_rng(2)
+    theta = np.repeat(typical(names, r)[np.newaxis], 37, axis=0)
+    # Fast poles in some rows need shorter sub-steps than others: lanes are grouped.
+    theta[:, :4] *= rng.uniform(0.5, 8.0, (37, 4))
+    batch = structure.simulate(theta, r)
+    assert batch.shape == (37, len(U))
+    for i in (0, 11, 36):
+        assert np.array_equal(batch[i], structure.simulate(theta[i], r), equal_nan=True)
+
+
+@pytest.mark.parametrize('name', EVERY)
+def test_half_the_step_changes_little(name: str) -> None:
+    """Typical sizes: sub-steps four times finer move the response by far less than 1 um rms."""
+    r = record()
+    structure = Structure((name,))
+    theta = structure.starts(TABLE_2, scale([r], TABLE_2))
+    change = structure.simulate(theta, r) - structure.simulate(theta, r, rate=4)
+    limit = {'stribeck-friction': 1.0e-6, 'payload-inertia': 0.4e-6}.get(name, 0.15e-6)
+    assert np.sqrt(np.mean(change**2, axis=1)).max() < limit
+
+
+@pytest.mark.parametrize('initial', ['rest', 'measured'])
+@pytest.mark.parametrize('names', [('gain', 'bias'), ('valve-deadband', 'drift'), MANY])
+def test_error_sums_are_those_of_the_simulation(names: tuple[str, ...], initial: str) -> None:
+    """Sums over counted samples of two records, from the simulation itself."""
+    records = [record(0.0), record(250e3).slice(300, 1900)]
+    settle = (0, 1100)
+    structure = Structure(names)
+    theta = np.stack([typical(names, records[0]), structure.neutral(TABLE_2)])
+    errors = structure.errors(records, settle, initial)
+    assert errors.sizes.tolist() == [len(U), 500]
+    sums = errors(theta)
+    for i, (r, skip) in enumerate(zip(records, settle, strict=True)):
+        e = (r.measured - structure.simulate(theta, r, initial=initial))[:, skip:]
+        assert np.allclose(sums[:, i, 0], e.sum(axis=1), rtol=1e-9, atol=1e-15)
+        assert np.allclose(sums[:, i, 1], (e**2).sum(axis=1), rtol=1e-9, atol=1e-20)
+        assert np.array_equal(errors.residuals(theta)[i], e)
+    assert errors(theta[0]).shape == (2, 2)
+
+
+def test_measured_start_needs_no_settling() -> None:
+    """A window cut from a running test is simulated from its own first samples."""
+    r = record(250e3, rate=1024.0).slice(3000, 5000)
+    for names in [(), ('backlash', 'valve-deadband')]:
+        structure = Structure(names)
+        theta = structure.neutral(TABLE_2)
+        late = structure.simulate(theta, r, initial='measured') - r.measured
+        assert np.abs(late).max() < 40e-6  # of 2 mm; from rest the error is 1 mm
+        assert np.abs(late[-200:]).max() < 1e-9
+
+
+def test_jacobian_against_what_is_known() -> None:
+    """Columns that are known exactly, and smooth ones against a finer difference."""
+    names = ('gain', 'bias', 'drift', 'valve-lag', 'flow-asymmetry')
+    r = record()
+    structure = Structure(names)
+    theta = typical(names, r)
+    size = scale([r], TABLE_2)
+    jacobian = structure.jacobian(theta, r, scale=size)
+    assert jacobian.shape == (len(theta), len(U))
+    column = {name: jacobian[i] for i, name in enumerate(structure.names)}
+    assert np.allclose(column['bias'], 1.0, atol=1e-9)
+    assert np.allclose(column['drift'], r.time, atol=1e-6)
+    for name in ('beta_1', 'alpha_1_beta_0', 'alpha_2', 'gain', 'valve_lag', 'asymmetry'):
+        i = structure.names.index(name)
+        h = 1e-4 * theta[i]
+        up, down = theta.copy(), theta.copy()
+        up[i] += h
+        down[i] -= h
+        fine = (structure.simulate(up, r) - structure.simulate(down, r)) / (2.0 * h)
+        assert np.abs(jacobian[i] - fine).max() < 2e-3 * np.abs(fine).max(), name
+    # At a bound the difference is one-sided and stays inside.
+    neutral = Structure(('backlash',)).neutral(TABLE_2)
+    one_sided = Structure(('backlash',)).jacobian(neutral, r, scale=size)
+    assert np.isfinite(one_sided).all() and np.abs(one_sided[-1]).max() > 0.5
+
+
+def test_noise_like_effects_leave_the_mean_and_add_variance() -> None:
+    """quantisation d^2/12, timing-jitter (s v)^2; the expected record stays."""
+    r = record()
+    names = ('quantisation', 'timing-jitter')
+    structure = Structure(names)
+    theta = np.array([*TABLE_2, 12e-6, 3e-4])
+    y = structure.simulate(theta, r)
+    assert np.array_equal(y, Structure(()).simulate(TABLE_2, r))
+    variance = structure.variance(theta, r, y)
+    velocity = np.gradient(y, r.period)
+    assert np.allclose(variance, 12e-6**2 / 12.0 + (3e-4 * velocity) ** 2)
+    assert not Structure(('delay',)).variance(np.array([*TABLE_2, 1e-3]), r, y).any()
+    # The simulator's record has that variance: mean square over many samples, 5-sigma bounds.
+    stream = Stream(
+        structure, theta, stiffness=250e3, period=r.period, rng=np.random.default_rng(5)
+    )
+    recorded, _ = stream.step(U)
+    ratio = np.sum((recorded - y) ** 2) / np.sum(variance)
+    assert abs(ratio - 1.0) < 5.0 * np.sqrt(2.0 * np.sum(variance**2)) / np.sum(variance)
+    assert np.allclose(recorded / 12e-6, np.round(recorded / 12e-6), atol=1e-6)
+
+
+@pytest.mark.parametrize('name', EVERY)
+def test_bounds_are_survived(name: str) -> None:
+    """All corners of an effect's box at awkward base parameters: finite or cleanly not."""
+    r = record().slice(0, 600)
+    structure = Structure((name,))
+    lower, upper = structure.bounds()
+    columns = structure.columns(name)
+    corners = np.stack(np.meshgrid(*zip(lower[columns], upper[columns], strict=True)), axis=-1)
+    corners = corners.reshape(-1, columns.stop - columns.start)
+    bases = np.array([TABLE_2, lower[:4], upper[:4], [400.0, 2e10, 10.0, 0.0], [1e-3] * 4])
+    theta = np.array([[*b, *c] for b in bases for c in corners])
+    with np.errstate(all='ignore'):
+        y = structure.simulate(theta, r)
+        sums = structure.errors([r])(theta)
+    assert y.shape == (len(theta), 600)
+    assert sums.shape == (len(theta), 1, 2)
+    if name not in ('payload-inertia', 'specimen-hardening'):  # these may truly diverge
+        assert np.isfinite(y[: len(corners)]).all()
+
+
+def test_bad_input_is_named() -> None:
+    """Unknown, repeated, wrong shapes, unknown stiffness."""
+    with pytest.raises(InputError, match="'slack' is not in the catalogue"):
+        Structure(('slack',))
+    with pytest.raises(InputError, match='named twice'):
+        Structure(('delay', 'delay'))
+    with pytest.raises(InputError, match=r'takes \(5,\) or \(m, 5\)'):
+        Structure(('delay',)).simulate(TABLE_2, record())
+    with pytest.raises(InputError, match='stiffness is not known'):
+        Structure(('delay',)).simulate(np.zeros(5), Record(U, U, 1.0 / RATE))
+    with pytest.raises(InputError, match='does not have the effect'):
+        Structure(('delay',)).columns('gain')
+
+
+@pytest.mark.parametrize('hold', ['zoh', 'linear'])
+@pytest.mark.parametrize('names', [(), ('delay',), ('hum', 'drift'), MANY, EVERY])
+def test_stream_is_the_simulation_in_any_blocks(names: tuple[str, ...], hold: str) -> None:
+    """Blocks of any length give the same bits, and those of Structure.simulate."""
+    r = record(hold=hold)
+    quiet = tuple(n for n in names if CATALOGUE[n].variance is None)
+    structure = Structure(quiet)
+    theta = typical(quiet, r)
+    stream = Stream(structure, theta, stiffness=250e3, period=r.period, hold=hold)
+    whole, force = stream.step(U)
+    expected = structure.simulate(theta, r)
+    assert np.abs(whole - expected).max() < 1e-15 + 1e-9 * np.abs(expected).max()
+    assert np.isfinite(force).all() and np.abs(force).max() > 100.0
+
+    noisy = Structure(names)
+    theta = typical(names, r)
+    first, second = (
+        Stream(
+            noisy,
+            theta,
+            stiffness=250e3,
+            period=r.period,
+            hold=hold,
+            rng=np.random.default_rng(3),
+            noise_stddev=1e-6,
+        )
+        for _ in range(2)
+    )
+    whole, force = first.step(U)
+    rng, at, parts = np.random.default_rng(4), 0, []
+    while at < len(U):
+        block = U[at : at + int(rng.integers(0, 60))]
+        parts.append(second.step(block))
+        at += len(block)
+    assert np.array_equal(np.concatenate([p[0] for p in parts]), whole)
+    assert np.array_equal(np.concatenate([p[1] for p in parts]), force)
+
+
+def test_stream_refuses_what_it_cannot_do() -> None:
+    """Look-ahead, missing generator, bad blocks: said, and the state stays."""
+    period = 1.0 / RATE
+    with pytest.raises(InputError, match='ahead of its command'):
+        Stream(Structure(('clock-skew',)), [*TABLE_2, -1e-4], stiffness=0.0, period=period)
+    with pytest.raises(InputError, match='random generator'):
+        Stream(Structure(()), TABLE_2, stiffness=0.0, period=period, noise_stddev=1e-6)
+    with pytest.raises(InputError, match='theta'):
+        Stream(Structure(()), [*TABLE_2, 1.0], stiffness=0.0, period=period)
+    stream = Stream(Structure(('delay',)), [*TABLE_2, 1e-3], stiffness=0.0, period=period)
+    before, _ = stream.step(U[:500])
+    with pytest.raises(InputError, match='finite'):
+        stream.step([0.0, np.nan])
+    after, _ = stream.step(U[500:])
+    r = record(0.0)
+    expected = Structure(('delay',)).simulate([*TABLE_2, 1e-3], r)
+    assert np.array_equal(np.concatenate([before, after]), expected)
+    stream.reset()
+    assert np.array_equal(stream.step(U)[0], expected)
