@@ -1,18 +1,20 @@
 """Laboratory files: what is read, and one clear message for what is not."""
 
 import os
-from dataclasses import replace
+import re
+from dataclasses import fields, replace
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.io import savemat
 
 from actuator_glue.errors import InputError
-from actuator_glue.io.channel_map import parse_channel_map, read_channel_map
+from actuator_glue.io.channel_map import Channel, ChannelMap, parse_channel_map, read_channel_map
 from actuator_glue.io.export import write_csv, write_mat
 from actuator_glue.io.laboratory import read
 from actuator_glue.io.load import load_records
@@ -269,6 +271,20 @@ def test_a_wrong_column_and_a_moving_rest(tmp_path: Path) -> None:
     far = parse_channel_map({**MAP, 'command': {'column': 9, 'unit': 'mm'}}, 'map')
     with pytest.raises(InputError, match='cannot read the samples'):
         read(path, channels=far)
+
+
+def test_the_how_to_says_what_is_true(tmp_path: Path) -> None:
+    """Its channel map is the shipped one, its CSV is read, its table names every entry."""
+    text = (ROOT / 'docs' / 'howto_your_data.md').read_text()
+    blocks = re.findall(r'```(\w*)\n(.*?)```', text, flags=re.DOTALL)
+    (described,) = [yaml.safe_load(body) for kind, body in blocks if kind == 'yaml']
+    shipped = read_channel_map(MTS_MAP)
+    assert parse_channel_map(described, shipped.source) == shipped
+    (example,) = [body for kind, body in blocks if body.startswith('time_s')]
+    (tmp_path / 'a.csv').write_text(example)
+    assert len(read(tmp_path / 'a.csv')) == 2
+    for entry in (*fields(ChannelMap), *fields(Channel)):
+        assert f'`{entry.name}`' in text or entry.name == 'source', entry.name
 
 
 @pytest.mark.skipif(not MTS.is_dir(), reason=f'measured MTS records are not at {MTS}')
