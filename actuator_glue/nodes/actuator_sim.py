@@ -80,7 +80,7 @@ class SimulatorNode(streamer.Streamer):
         if values['command'] == 'file' and not values['command_file']:
             raise InputError("command 'file' needs command_file")
         if values['command'] != 'file':
-            _command(values | {'duration': min(values['duration'], 1.0)})
+            _command({**values, 'duration': min(values['duration'], 1.0)})
 
     def do_configure(self) -> None:
         """Make the command and the publishers."""

@@ -33,7 +33,7 @@ COMMON = (
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 
 
-class SuiteNode(LifecycleNode):  # type: ignore[misc]
+class SuiteNode(LifecycleNode):
     """A lifecycle node of the suite; subclasses fill in the `do_` methods.
 
     Publishers are made on configure, subscriptions and timers on activate. A callback that

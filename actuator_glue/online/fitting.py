@@ -8,6 +8,7 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference.likelihood import Errors
+from actuator_glue.model.fast import FastErrors
 from actuator_glue.model.structure import Structure
 from actuator_glue.online.settings import ModelChoice
 from actuator_glue.records import Array, Record
@@ -55,8 +56,17 @@ def choose_model(
     )
 
 
-def errors(model: ModelChoice, record: Record, settle: int) -> Errors:
-    """Return the error sums of a window, started from its first measured samples."""
+def errors(model: ModelChoice, record: Record, settle: int, near: Array | None = None) -> Errors:
+    """Return the error sums of a window, started from its first measured samples.
+
+    Args:
+        model: the model.
+        record: the window.
+        settle: samples that only let the initial state be forgotten.
+        near: parameters (p,) near the best fit, where known; they save time and change nothing.
+    """
+    if not model.effects:
+        return FastErrors([record], settle, 'measured', near=near)
     return Structure(model.effects).errors([record], settle=settle, initial='measured')
 
 

@@ -12,9 +12,10 @@ from actuator_glue.errors import InputError
 from actuator_glue.inference import dream
 from actuator_glue.inference.evaluate import LogDensity
 from actuator_glue.inference.likelihood import GaussianLikelihood, GlueLikelihood
-from actuator_glue.online._moments import Moments, moments
+from actuator_glue.inference.moments import Moments, moments
 from actuator_glue.inference.predictive import fit_residual
 from actuator_glue.online import fitting
+from actuator_glue.online.coordinates import Coordinates
 from actuator_glue.online.forecast import Frozen, Prediction, predictions, sensor_noise
 from actuator_glue.online.response import ResponseBand, response_band
 from actuator_glue.online.settings import EstimatorSettings, ModelChoice
@@ -126,12 +127,14 @@ def _estimate(job: Job, expired: Callable[[], bool] | None) -> WindowResult:
     noise = sensor_noise(record.measured)
     _check_excited(record, settle, noise)
 
-    errors = fitting.errors(model, record, settle)
-    density: LogDensity = (
+    near = None if job.archive is None else np.median(job.archive, axis=0)
+    errors = fitting.errors(model, record, settle, near)
+    likelihood: LogDensity = (
         GlueLikelihood(errors, settings.shaping_factor)
         if settings.likelihood == 'glue'
         else GaussianLikelihood(errors)
     )
+    coordinates = Coordinates(model, record.known_stiffness())
 
     def stop(state: dream.State) -> bool:
         if job.stop_at is not None:
@@ -139,15 +142,17 @@ def _estimate(job: Job, expired: Callable[[], bool] | None) -> WindowResult:
         return expired is not None and expired()
 
     seed = (settings.seed, record.first_index)
-    chains = dream.sample(
+    sampled = dream.sample(
         np.random.default_rng((*seed, 0)),
-        density,
-        *model.bounds,
+        coordinates.density(likelihood),
+        coordinates.lower,
+        coordinates.upper,
         evaluations=job.evaluations,
         settings=dream.Settings(chains=settings.chains),
-        archive=job.archive,
+        archive=None if job.archive is None else coordinates.coordinates(job.archive),
         stop=stop,
     )
+    chains = coordinates.chains(sampled)
     posterior = chains.posterior()
     summary = moments(posterior, *model.bounds)
     residual = (record.measured - fitting.simulate(model, chains.best[None], record)[0])[settle:]

@@ -47,7 +47,8 @@ def response_band(draws: Array, stiffness: float, settings: EstimatorSettings) -
     response = frequency_response(draws[:, : len(BASE)], stiffness, order)
     response = response[np.isfinite(response).all(axis=1)]
     amplitude = band(np.abs(response), settings.levels)
-    phase = band(np.unwrap(np.angle(response), axis=1), settings.levels)
+    angle = np.unwrap(np.angle(response), axis=1).astype(np.float64)
+    phase = band(angle, settings.levels)
     keep = np.delete(np.arange(len(order)), at)
     head = settings.headline_frequency
     lag = float(phase.median[at])

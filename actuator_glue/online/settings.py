@@ -71,7 +71,7 @@ class EstimatorSettings:
     settle: float = 0.5
     time_budget: float = 0.5
     shaping_factor: float = 256.0
-    evaluations: int = 8000
+    evaluations: int = 20_000
     start_evaluations: int = 30_000
     chains: int = 20
     draws: int = 200
