@@ -21,7 +21,7 @@ def rng_seed(request: pytest.FixtureRequest) -> int:
 
 @pytest.fixture
 def overlapping_texts() -> Callable[..., list[tuple[str, str]]]:
-    """Return a function: pairs of texts of a figure that are printed over each other."""
+    """Return a function: pairs of texts printed over each other, and texts cut off."""
     import matplotlib as mpl
     from matplotlib.text import Text
 
@@ -51,7 +51,13 @@ def overlapping_texts() -> Callable[..., list[tuple[str, str]]]:
             ]
         # A text box has slack around its letters; a tenth of its height is no collision.
         boxes = [(s, b.padded(-0.1 * b.height)) for s, b in boxes]
-        return [
+        page = figure.bbox
+        cut = [
+            (s, 'beyond the page')
+            for s, b in boxes
+            if b.x0 < page.x0 or b.x1 > page.x1 or b.y0 < page.y0 or b.y1 > page.y1
+        ]
+        return cut + [
             (one, other)
             for i, (one, a) in enumerate(boxes)
             for other, b in boxes[i + 1 :]

@@ -162,7 +162,7 @@ def band_at_zooms(
     rows[0, 0].set_ylabel('displacement [mm]')
     rows[1, 0].set_ylabel('less median [mm]')
     handles, names = rows[0, 0].get_legend_handles_labels()
-    figure.legend(handles, names, loc='outside lower center', ncols=len(names))
+    figure.legend(handles, names, loc='outside lower center', ncols=3)
     if title:
         figure.suptitle(title)
     return figure

@@ -80,7 +80,7 @@ def displacement(results: Results) -> Section:
                 results.time['total'][test], simulate(TABLE_2[None], results.records[test])[0],
             ),
             f'Fig. {8 + test} of the paper: displacement near 1, 5 and 10 Hz, '
-            f'{stiffness_name(test)}. Bottom: the same less the measured displacement. '
+            f'{stiffness_name(test)}. Bottom: the same less the total band\'s median. '
             'Deterministic: Eq. (2) with Table 2.',
         )
         for test in (0, 1)

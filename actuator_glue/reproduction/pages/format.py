@@ -14,12 +14,12 @@ UNITS = ('1/s', 'N/(m s²)', 'N/m', '1/s')
 def num(value: float, digits: int = 4) -> str:
     """Return a number with so many significant digits, as 1.26 × 10⁹ where it is long.
 
-    Zero, NaN and infinity are '0', '–' and 'never'.
+    Zero, NaN and infinity are '0', '–' and 'not reached'.
     """
     if math.isnan(value):
         return '–'
     if math.isinf(value):
-        return 'never'
+        return 'not reached'
     if value == 0.0:
         return '0'
     power = math.floor(math.log10(abs(float(f'{value:.{digits - 1}e}'))))
@@ -34,7 +34,7 @@ def percent(share: float, digits: int = 1, *, sign: bool = False) -> str:
     """Return a share as per cent; '–' for NaN."""
     if math.isnan(share):
         return '–'
-    return f'{100 * share:{"+" if sign else ""}.{digits}f} %'.replace('-', MINUS)
+    return f'{100 * share:{"+" if sign else ""}.{digits}f}\xa0%'.replace('-', MINUS)
 
 
 def power_of_two(value: float) -> str:

@@ -49,7 +49,7 @@ def overview(results: Results) -> Section:
                 f'{num(s.published_trace.converged_at(), 3)} ({power_of_two(s.shaping_factor)})'
                 for s in chains.values()
             ) + ' evaluations',
-            'G₈ converges',
+            'G₈ is converged',
             'the G₈ posterior fills the priors: the oscillation is the posterior',
         ),
         (
