@@ -20,13 +20,11 @@ BLOCK = 8  # terms that stand together; where there are two banks, their blocks 
 TAIL = 2 * BLOCK  # terms beyond the basis that are summed one by one for the truncation bound
 _SAMPLES = 256  # samples per pass of the filter bank: the bank's outputs stay in the cache
 _ROUNDING = 1e-15  # of the quadratic form, relative to the largest of what it adds up
-_FAR = 1e4  # misfit, relative to the reference's, up to which the tolerance grows with it
 
 # One row per record: numbers, then reference coefficients, column sums, cross products, Gram.
-(TERMS, FREE, STIFFNESS, PERIOD, FOH, POLE, DELTA, X0, V0, U0, NORM, COUNT, SUM, SQUARES) = range(
-    14
-)
-HEADER = 14
+(TERMS, FREE, STIFFNESS, PERIOD, FOH, POLE, DELTA, X0, V0, U0) = range(10)
+NORM, COUNT, SUM, SQUARES, BEYOND = range(10, 15)
+HEADER = 15
 
 
 @njit
@@ -208,7 +206,9 @@ def prepare(t: Array, c: Array, measured: Array, command: Array, settle: int) ->
     N, dims = K + TAIL, K * banks
     start = np.empty(9)
     expand(c, t, start)
-    _series(start, banks, 1.0, t[HEADER : HEADER + N * banks].reshape(-1, BLOCK))
+    t[NORM] = np.sqrt(np.sum(command * command))
+    reference = t[HEADER : HEADER + N * banks].reshape(-1, BLOCK)
+    t[BEYOND] = _series(start, banks, t[NORM], reference)
     state = np.zeros(kernel.STREAM)
     state[1], state[2] = t[X0], t[V0]
     at = HEADER + N * banks
@@ -228,7 +228,6 @@ def prepare(t: Array, c: Array, measured: Array, command: Array, settle: int) ->
         kernel.stream(c, state, command[first:last], e[:size])
         for i in range(size):
             e[i] = measured[first + i] - e[i]
-            t[NORM] += command[first + i] ** 2
         if first >= settle:
             for i in range(size):
                 t[SUM] += e[i]
@@ -239,7 +238,6 @@ def prepare(t: Array, c: Array, measured: Array, command: Array, settle: int) ->
         gram[i, i] *= 0.5
         gram[i, i + 1 :] = 0.0
     t[COUNT] = n - settle
-    t[NORM] = np.sqrt(t[NORM])
 
 
 @njit
@@ -271,18 +269,17 @@ def evaluate(t: Array, theta: Array, tolerance: float, out: Array, exact: Flags)
     Args:
         t: the record's row.
         theta: shape (m, 4).
-        tolerance: bound on the relative error of the sum of squares about the mean, times the
-            ratio of that sum to the reference's where it is larger than one.
+        tolerance: bound on the relative error of the sum of squares about the mean.
         out: shape (m, 2) [m, m^2].
         exact: shape (m,), True where the bound is not met (or the system does not exist).
     """
     banks, norm = 1 + int(t[FREE]), t[NORM]
     dims, N = int(t[TERMS]) * banks, (int(t[TERMS]) + TAIL) * banks
-    reference, sums = t[HEADER : HEADER + N], t[HEADER + N : HEADER + N + dims]
+    reference = t[HEADER : HEADER + N].reshape(-1, BLOCK)
+    sums = t[HEADER + N : HEADER + N + dims]
     cross = t[HEADER + N + dims : HEADER + N + 2 * dims]
     gram = t[HEADER + N + 2 * dims : HEADER + N + (2 + dims) * dims].reshape(dims, dims)
-    least = t[SQUARES] - t[SUM] * t[SUM] / t[COUNT]
-    enough = 0.1 * tolerance * np.sqrt(least)
+    enough = 0.4 * tolerance * np.sqrt(t[SQUARES] - t[SUM] * t[SUM] / t[COUNT])
     row, start, size = np.empty(kernel.COLUMNS), np.empty(9), np.empty(N // BLOCK)
     z = np.empty(N)
     blocks = z.reshape(-1, BLOCK)
@@ -290,12 +287,11 @@ def evaluate(t: Array, theta: Array, tolerance: float, out: Array, exact: Flags)
         n0, d2, d1, d0 = kernel.equation_2a(theta[m], t[STIFFNESS])
         kernel.discretise_one(d1 / d2, d0 / d2, n0 / d2, t[PERIOD], t[FOH] > 0.0, row)
         expand(row, t, start)
-        tail = _series(start, banks, norm, blocks)
-        for i in range(N):
-            z[i] -= reference[i]
+        tail = t[BEYOND] + _series(start, banks, norm, blocks)
         for block in range(len(size)):
             total = 0.0
             for i in range(BLOCK):
+                blocks[block, i] -= reference[block, i]
                 total += abs(blocks[block, i])
             size[block] = total * (norm if banks == 1 or block % 2 == 0 else 1.0)
         count = len(size)
@@ -314,9 +310,7 @@ def evaluate(t: Array, theta: Array, tolerance: float, out: Array, exact: Flags)
         out[m, 0], out[m, 1] = s, q
         about_mean = q - s * s / t[COUNT]
         bound = (2.0 * np.sqrt(max(about_mean, 0.0)) + tail) * tail + _ROUNDING * near * near
-        # Far from the best fit less accuracy does: L itself is lower by G ln(misfit).
-        misfit = min(max(about_mean / least, 1.0), _FAR)
-        exact[m] = not bound <= tolerance * misfit * about_mean
+        exact[m] = not bound <= tolerance * about_mean
 
 
 @njit
