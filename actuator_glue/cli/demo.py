@@ -1,4 +1,4 @@
-"""Run simulator, estimator and recorder as real nodes for a minute, then replay and report."""
+"""Run the suite as real nodes for a minute; replay, report, and diagnose what the model lacks."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from actuator_glue.cli._output import write_json
 from actuator_glue.cli._records import number
 from actuator_glue.errors import InputError
 
@@ -79,10 +80,11 @@ def run(args: argparse.Namespace) -> int:
     console = demo.terminal()
     started = time.monotonic()
     with Display(console) as display:
-        watch = demo.stream(source, settings, folder, display)
-        outcome = demo.finish(source, watch, folder, display, started)
+        demo.stream(source, settings, folder, display)
+        outcome = demo.finish(source, folder, display, args.seed, diagnose=not args.no_diagnosis)
+    outcome.seconds = time.monotonic() - started
+    write_json(outcome.to_json(), str(folder / 'summary.json'))
     outcome.show(console)
-    demo.write_summary(outcome, folder)
     console.print(f'results   {folder}')
     return 0 if outcome.lossless and outcome.comparison.identical else 1
 

@@ -11,9 +11,11 @@ from rich.console import Console
 from rich.table import Table
 
 from actuator_glue.demo.bag import Content
+from actuator_glue.demo.diagnosis import verdict
 from actuator_glue.io.bag_reader import decoded
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.replay import Comparison, compare, items, published, replay
+from actuator_glue.residual.diagnosis import Diagnosis
 
 SCHEMA = 'actuator_glue.demo/1'
 BANDS = {
@@ -55,16 +57,16 @@ class Outcome:
         sent: samples published by the source.
         content: the bag.
         comparison: the replay held against the live run.
-        seconds: time from the first sample to the last picture [s].
-        diagnosis: JSON object of the diagnosis, None where none was made.
+        diagnosis: what the model lacks, None where nobody asked.
+        seconds: time from the first process to the last picture [s].
     """
 
     source: str
     sent: int
     content: Content
     comparison: Comparison
-    seconds: float
-    diagnosis: dict[str, Any] | None = None
+    diagnosis: Diagnosis | None = None
+    seconds: float = float('nan')
 
     def count(self, key: str) -> int:
         """Return one of the estimator's counters on /diagnostics."""
@@ -123,7 +125,7 @@ class Outcome:
                 'bands': self.comparison.bands,
                 'differing': self.comparison.differing[:20],
             },
-            'diagnosis': self.diagnosis,
+            'diagnosis': None if self.diagnosis is None else self.diagnosis.to_json(),
             'seconds': self.seconds,
         }
 
@@ -144,10 +146,12 @@ class Outcome:
                 f'{found.headline_amplitude:.3f} at {found.headline_frequency:g} Hz'
             )
         found = self.comparison
-        verdict = 'identical, bit for bit' if found.identical else 'NOT identical'
-        console.print(f'replay    {verdict} ({found.windows} posteriors, {found.bands} bands)')
+        answer = 'identical, bit for bit' if found.identical else 'NOT identical'
+        console.print(f'replay    {answer} ({found.windows} posteriors, {found.bands} bands)')
         for line in found.differing[:5]:
             console.print(f'          {line}')
+        for line in [] if self.diagnosis is None else verdict(self.diagnosis):
+            console.print(line)
 
     def _table_of_moments(self) -> Table:
         last = self.content.posteriors[-1]

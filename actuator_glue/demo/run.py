@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import shutil
@@ -13,7 +12,7 @@ from typing import Any
 from rich.console import Console
 
 from actuator_glue.demo import bag as demo_bag
-from actuator_glue.demo import pictures
+from actuator_glue.demo import diagnosis, pictures
 from actuator_glue.demo.outcome import Outcome, replay_bag
 from actuator_glue.demo.processes import Node, Nodes
 from actuator_glue.demo.progress import Display
@@ -24,6 +23,7 @@ from actuator_glue.errors import InputError
 READY_SECONDS = 180.0  # the first start on a machine compiles the kernels
 DRAIN_SECONDS = 15.0  # for the last window to be computed after the last sample
 POLL_SECONDS = 0.25
+STAGES = 8  # of a diagnosis, about
 # What a run leaves in its folder; only these are removed by the next one.
 LEAVINGS = ('bag', 'nodes', 'summary.json', 'truth.json')
 
@@ -49,7 +49,7 @@ def prepare(folder: Path) -> None:
         raise InputError(f'{folder}: cannot be written ({error.strerror})') from error
 
 
-def stream(source: Source, settings: dict[str, Any], folder: Path, display: Display) -> Watch:
+def stream(source: Source, settings: dict[str, Any], folder: Path, display: Display) -> None:
     """Run recorder, estimator and source as processes until the last window is in the bag.
 
     Raises:
@@ -64,8 +64,6 @@ def stream(source: Source, settings: dict[str, Any], folder: Path, display: Disp
         sender = nodes.start(source.node, source.parameters, logs)
         _wait_until_sent(nodes, sender, source, watch, display)
         _wait_until_drained(nodes, watch)
-    watch.update()
-    return watch
 
 
 def _wait_until_ready(nodes: Nodes, watch: Watch, display: Display) -> None:
@@ -113,9 +111,16 @@ def _wait_until_drained(nodes: Nodes, watch: Watch) -> None:
 
 
 def finish(
-    source: Source, watch: Watch, folder: Path, display: Display, started: float
+    source: Source, folder: Path, display: Display, seed: int, *, diagnose: bool
 ) -> Outcome:
-    """Read the bag, replay it, draw the pictures, write `summary.json`.
+    """Read the bag, replay it, draw the pictures, diagnose what was recorded.
+
+    Args:
+        source: what was streamed.
+        folder: holds the bag and gets the pictures.
+        display: shows the progress.
+        seed: seed of the diagnosis.
+        diagnose: whether to.
 
     Raises:
         InputError: the bag is damaged or holds no window.
@@ -129,9 +134,25 @@ def finish(
     display.advance(stage, 1)
     pictures.parameters(content, folder / 'parameters.png', source.truth)
     display.advance(stage, 2)
-    return Outcome(
-        source.title, _sent(source, folder), content, comparison, time.monotonic() - started
-    )
+    outcome = Outcome(source.title, _sent(source, folder), content, comparison)
+    if diagnose:
+        _diagnose(outcome, folder, display, seed)
+    return outcome
+
+
+def _diagnose(outcome: Outcome, folder: Path, display: Display, seed: int) -> None:
+    stage = display.stage('diagnosing', total=STAGES)
+    seen: list[str] = []
+
+    def tell(name: str, share: float) -> None:
+        if name not in seen:
+            seen.append(name)
+        # The number of stages depends on what is found; the bar never runs full before the end.
+        display.advance(stage, min(len(seen) - 1 + share, STAGES - 0.1))
+
+    outcome.diagnosis = diagnosis.find(outcome.content.record, seed, tell)
+    diagnosis.picture(outcome.diagnosis, folder / 'diagnosis.png')
+    display.advance(stage, STAGES)
 
 
 def _sent(source: Source, folder: Path) -> int:
@@ -139,15 +160,6 @@ def _sent(source: Source, folder: Path) -> int:
     log = (folder / 'nodes' / f'{source.node}.log').read_text(encoding='utf-8', errors='replace')
     found = re.findall(r'stream ended after (\d+) samples', log)
     return int(found[-1]) if found else 0
-
-
-def write_summary(outcome: Outcome, folder: Path) -> Path:
-    """Write `summary.json` in one step and return its path."""
-    path = folder / 'summary.json'
-    part = path.with_suffix('.part')
-    part.write_text(json.dumps(outcome.to_json(), indent=2) + '\n', encoding='utf-8')
-    part.replace(path)
-    return path
 
 
 def own_domain() -> None:
