@@ -40,14 +40,22 @@ def table(
     from rich.markup import escape
     from rich.table import Table
 
-    shown = Table(title=title or None, box=box.SIMPLE_HEAD, title_justify='left', pad_edge=False)
+    shown = Table(
+        title=title or None,
+        box=box.SIMPLE_HEAD,
+        title_justify='left',
+        pad_edge=False,
+        padding=(0, 1, 0, 0),
+    )
     for i, column in enumerate(columns):
-        shown.add_column(escape(column), justify='left' if i == 0 else 'right', no_wrap=i > 0)
+        shown.add_column(escape(column), justify='left' if i == 0 else 'right', no_wrap=True)
     for row in rows:
         shown.add_row(*map(escape, row))
     file = sys.stderr if getattr(args, 'json', None) == '-' else sys.stdout
-    # A pipe has no width of its own: do not fold the table there.
-    Console(file=file, width=None if file.isatty() else 160, highlight=False).print(shown)
+    console = Console(file=file, highlight=False)
+    # A number that is cut off is worse than a line that the terminal folds.
+    needed = console.measure(shown, options=console.options.update(max_width=500)).maximum
+    Console(file=file, highlight=False, width=max(console.width, needed)).print(shown)
 
 
 def clean(value: Any) -> Any:

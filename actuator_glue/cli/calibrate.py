@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 # R-hat above which draws are not yet the posterior (Vehtari et al. 2021).
 CONVERGED = 1.01
+TIED = 0.99  # correlation above which two parameters are only known together
 # Share of its range that a record may be away from zero at its first sample and still count as
 # starting at rest.
 REST_SHARE = 0.05
@@ -103,11 +104,7 @@ def run(args: argparse.Namespace) -> int:
     parameters = _parameters(structure, chains, args.likelihood)
     converged = all(p['rhat'] is not None and p['rhat'] <= CONVERGED for p in parameters.values())
     _show(args, records, parameters, chains, fit, seconds)
-    if not chains.annealed or not converged:
-        note(f'not converged (R-hat above {CONVERGED}); give more --evaluations')
-    for name, parameter in parameters.items():
-        if parameter['prior_dominated']:
-            note(f'{name}: these records say little more than its prior bounds{_advice(records)}')
+    _warn(records, parameters, chains, converged)
     if args.draws is not None:
         _save_draws(args.draws, chains, tuple(parameters))
     content = {
@@ -256,6 +253,7 @@ def _show(
     fit: dict[str, Any],
     seconds: float,
 ) -> None:
+    prior = any(p['prior_dominated'] for p in parameters.values())
     rows = [
         (
             name,
@@ -266,26 +264,41 @@ def _show(
             f'{p["cov"]:.3g}',
             f'{p["rhat"]:.4f}',
             f'{p["ess"]:.0f}',
-            'prior' if p['prior_dominated'] else '',
+            *(['prior' if p['prior_dominated'] else ''] if prior else []),
         )
         for name, p in parameters.items()
     ]
-    columns = ('parameter', 'unit', 'mean', 'sd', 'skewness', 'COV', 'R-hat', 'ESS', '')
+    columns = ['parameter', 'unit', 'mean', 'sd', 'skew', 'COV', 'R-hat', 'ESS']
+    columns += ['mostly'] * prior
     how = f'G = {args.shaping_factor:g}' if args.likelihood == 'glue' else args.likelihood
     table(f'Posterior moments, {len(records)} record(s), {how}', columns, rows, args)
     percent = '-' if fit['nrmse'] is None else f'{100 * fit["nrmse"]:.2f} %'
     say(
-        f'error of the best draw {1e3 * fit["rms_m"]:.4g} mm rms ({percent} of the measured '
-        f'spread); {chains.evaluations} evaluations in {seconds:.1f} s',
+        f'error of the best draw: {1e3 * fit["rms_m"]:.4g} mm rms, {percent} of the spread '
+        'measured',
         args,
     )
+    say(f'{chains.evaluations} evaluations in {seconds:.1f} s', args)
 
 
-def _advice(records: list[Record]) -> str:
-    stiffnesses = {r.stiffness for r in records}
-    if len(stiffnesses) < 2:
-        return '; a second record with another specimen stiffness would tell it'
-    return ''
+def _warn(
+    records: list[Record], parameters: dict[str, dict[str, Any]], chains: Chains, converged: bool
+) -> None:
+    """Say what these records cannot tell, and what would."""
+    import numpy as np
+
+    if not chains.annealed or not converged:
+        note(f'not converged (R-hat above {CONVERGED}); give more --evaluations')
+    names = list(parameters)
+    told = [f'{n}: little more than its prior' for n in names if parameters[n]['prior_dominated']]
+    correlation = np.corrcoef(chains.posterior(), rowvar=False)
+    for i, j in zip(*np.triu_indices(len(names), 1), strict=True):
+        if abs(correlation[i, j]) > TIED:
+            told.append(f'{names[i]} and {names[j]}: only a combination of them is known')
+    if told and len({r.stiffness for r in records}) < 2:
+        told.append('a second record with another specimen stiffness would tell more')
+    for line in told:
+        note(line)
 
 
 def _save_draws(out: str, chains: Chains, names: tuple[str, ...]) -> None:

@@ -197,16 +197,21 @@ def _show(results: list[WindowResult], args: argparse.Namespace) -> None:
             (
                 str(r.window.number),
                 f'{end:.2f}',
-                *(f'{mean:.4g} +- {sd:.2g}' for mean, sd in moments),
-                f'{r.rhat.max():.3f}',
-                f'{1e3 * r.rms_error:.4f}',
+                *(f'{mean:.4g} {_percent(sd, mean)}' for mean, sd in moments),
+                f'{r.rhat.max():.2f}',
+                f'{1e6 * r.rms_error:.1f}',
                 f'{100 * coverage[-1]:.0f} %' if coverage else '-',
             )
         )
     if len(rows) > ROWS:
         rows = [rows[i * (len(rows) - 1) // (ROWS - 1)] for i in range(ROWS)]
-    columns = ('window', 'to [s]', *names, 'R-hat', 'rms [mm]', 'coverage')
-    table('Posterior mean and standard deviation of each window, SI units', columns, rows, args)
+    columns = ('window', 'end [s]', *names, 'R-hat', 'rms [um]', 'cover')
+    title = 'Posterior mean (SI units) and standard deviation (% of it) of each window'
+    table(title, columns, rows, args)
+
+
+def _percent(stddev: float, mean: float) -> str:
+    return f'{100 * stddev / abs(mean):3.0f}%' if mean else '  -%'
 
 
 def _verdict(comparison: Comparison | None, args: argparse.Namespace) -> None:
