@@ -1,0 +1,121 @@
+"""The pieces between data and report: residual, shaping factor, misfit, coverage."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from actuator_glue.inference.likelihood import GlueLikelihood
+from actuator_glue.model import problem_r
+from actuator_glue.model.exact import ExactErrors
+from actuator_glue.model.parameters import TABLE_2
+from actuator_glue.reproduction import calibration, misfit, shaping, spread
+from actuator_glue.reproduction.pages.format import num, percent, power_of_two
+from actuator_glue.reproduction.posterior import AddedResidual, run
+from actuator_glue.reproduction.published import CHOSEN, TABLE_4
+
+
+def test_added_residual_is_what_white_noise_does_on_average(rng_seed: int) -> None:
+    # Mean of 30 noise realisations of Var[E]: relative sd sqrt(2/24002/30) = 0.0017; 6 sd allowed.
+    rng = np.random.default_rng(rng_seed)
+    records = problem_r.records(1)
+    theta, size = TABLE_2[None], 0.3e-3
+    expected = GlueLikelihood(AddedResidual(ExactErrors(records), size), 1.0)(theta)[0]
+    variances = []
+    for _ in range(30):
+        noisy = spread.altered(records, lambda r: r.measured + size * rng.standard_normal(len(r)))
+        variances.append(np.exp(-GlueLikelihood(noisy, 1.0)(theta)[0]))
+    assert np.mean(variances) == pytest.approx(np.exp(-expected), rel=0.01)
+
+
+def test_spread_of_table_4_is_met_at_about_0_7_mm(rng_seed: int) -> None:
+    # The COV of one run of 60 000 evaluations scatters by about 3 % here; 15 % is asked.
+    errors = ExactErrors(problem_r.records(1))
+    posterior = run((rng_seed,), errors, CHOSEN, 60_000, added_rms=0.69e-3)
+    assert (posterior.chains.rhat < 1.05).all()
+    np.testing.assert_allclose(posterior.moments.cov[:3], TABLE_4.cov[:3], rtol=0.15)
+    narrow = run((rng_seed, 1), errors, CHOSEN, 30_000)
+    assert (narrow.moments.cov[:3] < 0.05 * TABLE_4.cov[:3]).all()
+
+
+def test_match_finds_the_residual_between_grid_points() -> None:
+    added = np.array([0.2, 0.5, 0.9])
+    cov = np.exp(np.array([[-1.0], [0.0], [1.0]])) * TABLE_4.cov
+    assert spread.match(added, cov) == pytest.approx(0.5, abs=1e-3)
+    assert spread.match(added, cov * np.exp(-0.5)) == pytest.approx(0.7, abs=1e-3)
+
+
+def entry(factor: float, held_out: float, *, converged=True, informative=True) -> SimpleNamespace:
+    return SimpleNamespace(
+        shaping_factor=factor, held_out=held_out, converged=converged, informative=informative
+    )
+
+
+def test_choice_takes_the_usable_factor_that_covers_best() -> None:
+    shaped = [
+        entry(8192.0, 0.3), entry(512.0, 0.93), entry(256.0, 0.97),
+        entry(128.0, 0.95, informative=False), entry(64.0, 0.95, converged=False),
+    ]  # fmt: skip
+    choice = shaping.choose(shaped)
+    assert choice.shaping_factor == 512.0  # as near as 256, and the narrower band
+    assert choice.covers
+    assert '128' in choice.reason and '64' in choice.reason
+    far = shaping.choose([entry(8192.0, 0.1), entry(64.0, 0.3)])
+    assert far.shaping_factor == 64.0 and not far.covers and 'not a predictive' in far.reason
+    none = shaping.choose([entry(64.0, 0.95, converged=False), entry(128.0, 0.9, converged=False)])
+    assert none.shaping_factor == 128.0 and not none.covers
+
+
+def test_blocks_share_a_record_out_evenly_and_wholly() -> None:
+    record = problem_r.records(1)[0]
+    fit, held = shaping.blocks(record)
+    covered = np.zeros(len(record), dtype=int)
+    for part in held:
+        covered[part] += 1
+    for part in fit:
+        covered[part.first_index : part.first_index + len(part)] += 1
+    assert covered.max() == 1
+    assert covered.sum() >= len(record) - 1  # the sweep's last sample falls off
+    assert sum(len(p) for p in fit) == pytest.approx(len(record) / 2, rel=0.01)
+
+
+def test_trace_says_when_r_hat_stays_below() -> None:
+    rhat = np.array([[3.0, 1.1], [1.1, 1.1], [1.3, 1.0], [1.1, 1.1], [1.0, 1.0]])
+    trace = shaping.Trace(np.arange(5) * 100.0, rhat)
+    assert trace.converged_at() == 300.0
+    assert shaping.Trace(trace.evaluations, rhat + 1).converged_at() == np.inf
+
+
+def test_gain_with_the_specimen_removes_the_papers_residual() -> None:
+    refits = {r.name: r for r in misfit.study(problem_r.records(1))}
+    before = refits['Eq. (2), both tests']
+    after = refits['Eq. (2) + gain with the specimen only, both tests']
+    alone = refits['Eq. (2) + gain, spring test alone']
+    assert alone.gain == pytest.approx(1.051, abs=0.005)
+    assert before.held_out[1] > 35e-6
+    assert max(after.held_out) < 20.6e-6  # the noise is 20 um
+    centres, rms = misfit.by_frequency(problem_r.records(1)[1], before.residual[1])
+    assert rms[centres < 1].min() > 2.5 * rms[centres > 9].max()
+
+
+def test_total_band_covers_what_it_says_and_the_glue_band_is_reported(rng_seed: int) -> None:
+    """The 95 % total band covers 93-97 % of held-out samples over 20 simulated tests.
+
+    Coverage of one case scatters by 0.8 % (white noise) to 1.6 % (phi = 0.8), the mean of 20 by
+    less than 0.3 %: outside 93-97 % by chance in fewer than 1 of 10^9 runs.
+    """
+    cases = calibration.study([rng_seed + i for i in range(20)], lambda share: None)
+    total = np.array([c.total for c in cases])
+    assert 0.93 <= total.mean() <= 0.97
+    assert np.mean((total >= 0.90) & (total <= 0.99)) >= 0.85
+    # A parameter band is no predictive band: at G = 2^8 it covers a tenth, not 95 %.
+    assert 0.0 < np.mean([c.glue for c in cases]) < 0.5
+
+
+def test_numbers_are_written_for_people() -> None:
+    assert num(1.26e9, 3) == '1.26 × 10⁹'
+    assert num(-0.2, 2) == '−0.20'
+    assert num(9.9996e5, 3) == '1.00 × 10⁶'
+    assert num(0.0) == '0' and num(float('nan')) == '–' and num(float('inf')) == 'not reached'
+    assert percent(-0.0372, 1, sign=True) == '−3.7\xa0%'
+    assert power_of_two(8192.0) == '2¹³'
