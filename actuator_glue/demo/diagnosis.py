@@ -40,6 +40,11 @@ def verdict(diagnosis: Diagnosis) -> list[str]:
             for name, p in effect.parameters.items()
         )
         lines.append(f'          {effect.name} ({effect.place}): {sizes}')
+    if diagnosis.effects:
+        base = [
+            f'{name} {p.mean:.4g} +- {p.stddev:.2g} {p.unit}' for name, p in diagnosis.base.items()
+        ]
+        lines.append(f'          with it {", ".join(base)}')
     low, high = error.after_ci
     lines.append(
         f'error     {UM * error.before:.2f} um before, {UM * error.after:.2f} um after '
