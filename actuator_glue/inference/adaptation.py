@@ -1,4 +1,8 @@
-"""What the sampler tunes during burn-in, and never afterwards."""
+"""What the sampler tunes: all of it in burn-in; after that only what follows the archive.
+
+Crossover probabilities and outlier handling stop with burn-in. Fits and shares of the moves are
+renewed whenever the archive has doubled, that is ever more rarely, from ever more points.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +15,10 @@ from actuator_glue.inference.moves import INDEPENDENCE, NAMES, PARALLEL, indepen
 from actuator_glue.inference.settings import Settings
 from actuator_glue.records import Array
 
-# Every crossover class and the parallel move keep at least this share while something is tuned.
+# Every crossover class keeps at least this weight, and the independence move this share, so that
+# what failed early can still prove itself.
 _FLOOR = 0.1
+_LEAST = 0.05
 
 
 class Tuning(NamedTuple):
@@ -38,36 +44,30 @@ def empty_counts(settings: Settings) -> Array:
     return np.zeros((len(NAMES) + settings.crossovers, 3))
 
 
-def tune(points: Array, counts: Array, settings: Settings) -> Tuning:
+def tune(
+    points: Array, counts: Array, settings: Settings, crossover_cdf: Array | None = None
+) -> Tuning:
     """Fit the proposals to points (m, p) and the shares to what the moves achieved.
 
-    Crossover classes get probabilities proportional to their mean squared jump (Vrugt 2016,
-    section 3.2.1); the independence and parallel moves share what the snooker move leaves by the
-    same measure.
+    The measure is the mean squared jump (Vrugt 2016, section 3.2.1): the independence and parallel
+    moves share by it what the snooker move leaves, and so do the crossover classes, unless
+    `crossover_cdf` says what they have.
     """
     reach = _mean_jumps(counts)
-    crossover = reach[len(NAMES) :]
-    if crossover.sum() > 0.0:
-        crossover = np.maximum(crossover / crossover.sum(), _FLOOR)
-    else:
-        crossover = np.ones(settings.crossovers)
     both = reach[INDEPENDENCE] + reach[PARALLEL]
-    share = reach[INDEPENDENCE] / both if both > 0.0 else 0.5
-    share = settings.independence * share if settings.independence > 0.0 else 0.0
+    share = settings.independence * (reach[INDEPENDENCE] / both if both > 0.0 else 0.5)
+    if settings.independence > 0.0:
+        share = max(share, min(_LEAST, settings.independence))
     free = 1.0 - settings.snooker
     moves = np.array([free * (1.0 - share), settings.snooker, free * share])
-    return _fitted(points, np.cumsum(moves), np.cumsum(crossover / crossover.sum()))
-
-
-def refit(points: Array, tuning: Tuning) -> Tuning:
-    """Fit the proposals to points (m, p); the shares stay as they are."""
-    return _fitted(points, tuning.move_cdf, tuning.crossover_cdf)
-
-
-def _fitted(points: Array, move_cdf: Array, crossover_cdf: Array) -> Tuning:
+    if crossover_cdf is None:
+        crossover = reach[len(NAMES) :]
+        crossover = crossover / crossover.sum() if crossover.sum() > 0.0 else crossover
+        crossover = np.maximum(crossover, _FLOOR)
+        crossover_cdf = np.cumsum(crossover / crossover.sum())
     centre, factor = independence.fit(points)
     scale = np.sqrt((factor**2).sum(axis=1))
-    return Tuning(move_cdf, crossover_cdf, scale, centre, factor)
+    return Tuning(np.cumsum(moves), crossover_cdf, scale, centre, factor)
 
 
 def _mean_jumps(counts: Array) -> Array:

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference import generation
-from actuator_glue.inference.adaptation import Tuning, empty_counts, outliers, refit, tune
+from actuator_glue.inference.adaptation import Tuning, empty_counts, outliers, tune
 from actuator_glue.inference.anneal import Population, anneal, archive_reference, prior_reference
 from actuator_glue.inference.archive import Archive
 from actuator_glue.inference.chains import Chains
@@ -37,7 +37,7 @@ class State(NamedTuple):
         archive: past states Z in unbounded coordinates.
         tuning: proposal distributions of the moves.
         fitted: size of the archive when they were last fitted.
-        counts: uses, acceptances and squared jumps since adaptation began.
+        counts: uses, acceptances and squared jumps since burn-in began or the last fit.
         mean_log_density: sum of log_density since the last look at outliers, (n,).
         generation: generations since the chains started.
         evaluations: likelihood evaluations so far, annealing included.
@@ -206,48 +206,49 @@ def step(rng: np.random.Generator, state: State, log_density: LogDensity) -> tup
         width=state.width,
         settings=s,
     )
+    counts = state.counts.copy()
+    generation.tally(state.z, z, accepted, label, state.tuning.scale, counts)
+    new = new._replace(counts=counts)
     if state.adapting:
-        new = _adapt(rng, state, new, accepted, label, keep)
+        new = _burn(rng, new, keep)
     elif keep and new.archive.size >= 2 * state.fitted:
-        # The moves that draw on the archive follow it, ever more rarely; the shares stay.
         new = new._replace(
-            tuning=refit(new.archive.newest_half, new.tuning), fitted=new.archive.size
+            tuning=tune(new.archive.newest_half, counts, s, state.tuning.crossover_cdf),
+            fitted=new.archive.size,
+            counts=empty_counts(s),
         )
     return new, Info(accepted, label[:, 0], label[:, 1])
 
 
-def _adapt(
-    rng: np.random.Generator,
-    old: State,
-    new: State,
-    accepted: NDArray[np.bool_],
-    label: NDArray[np.int64],
-    look: bool,
-) -> State:
-    """Burn-in: count jumps; when the archive has grown, refit the moves and rescue outliers."""
-    counts = old.counts.copy()
-    generation.tally(old.z, new.z, accepted, label, old.tuning.scale, counts)
-    mean = old.mean_log_density + new.log_density
-    new = new._replace(counts=counts, mean_log_density=mean)
+def _burn(rng: np.random.Generator, new: State, look: bool) -> State:
+    """Burn-in: when the archive has grown, fit the moves and rescue outlier chains."""
+    mean = new.mean_log_density + new.log_density
     if not look:
-        return new
+        return new._replace(mean_log_density=mean)
     new = new._replace(
-        tuning=tune(new.archive.newest_half, counts, new.settings),
+        tuning=tune(new.archive.newest_half, new.counts, new.settings),
         fitted=new.archive.size,
         mean_log_density=np.zeros(len(mean)),
     )
     lost = outliers(mean)
     if lost.size == 0:
         return new
-    well = np.setdiff1d(np.arange(len(mean)), lost)
     source = np.arange(len(mean))
-    source[lost] = rng.choice(well, size=lost.size)
+    source[lost] = rng.choice(np.setdiff1d(source, lost), size=lost.size)
     return new._replace(
         x=new.x[source],
         z=new.z[source],
         log_density=new.log_density[source],
         log_target=new.log_target[source],
     )
+
+
+def _burn_in(settings: Settings, generations: int, warm: bool) -> int:
+    """Generations to discard: the adaptation; half of them where nothing led the chains in."""
+    half = generations // 2
+    if settings.start == 'prior' and not warm:
+        return max(min(settings.adaptation, generations - 1), half)
+    return min(settings.adaptation, half)
 
 
 def sample(
@@ -312,6 +313,6 @@ def sample(
         log_density=log_densities[:done],
         evaluations=state.evaluations,
         start_evaluations=spent,
-        burn=min(settings.adaptation, done // 2),
+        burn=_burn_in(settings, done, archive is not None),
         annealed=state.power == 1.0,
     )
