@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import queue
 import signal
 import threading
 import time
@@ -45,14 +46,16 @@ class Worker:
         self._warm = warm
         self._nice = nice
         self._closed = False
-        self._lock = threading.Lock()
+        self._tasks: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self.ready = threading.Event()
         self._start()
 
     def submit(self, function: Callable[..., Any], *args: Any) -> None:
-        """Have `function(*args, tell)` computed; `tell` sends a PROGRESS answer."""
-        with self._lock:
-            self._pipe.send((function, args))
+        """Have `function(*args, tell)` computed; `tell` sends a PROGRESS answer.
+
+        Returns at once; a pipe that is full holds up a thread, not the caller.
+        """
+        self._tasks.put((function, args))
 
     def restart(self) -> None:
         """End the process whatever it does and start another."""
@@ -73,19 +76,28 @@ class Worker:
         )
         self._process.start()
         theirs.close()
-        threading.Thread(
-            target=self._listen, args=(self._pipe, self._process), daemon=True, name='answers'
-        ).start()
+        # The tasks of an ended process are not the next one's.
+        self._tasks = queue.SimpleQueue()
+        for name, target, args in (
+            ('answers', self._listen, (self._pipe, self._process)),
+            ('tasks', self._hand_over, (self._pipe, self._tasks)),
+        ):
+            threading.Thread(target=target, args=args, daemon=True, name=name).start()
 
     def _end(self, patience: float) -> None:
         process, pipe = self._process, self._pipe
-        with suppress(OSError):
-            pipe.send(None)
+        self._tasks.put(None)
         process.join(patience)
         if process.is_alive():
             process.kill()
             process.join(2.0)
         pipe.close()
+
+    def _hand_over(self, pipe: Connection, tasks: queue.SimpleQueue[Any]) -> None:
+        with suppress(OSError):
+            while (task := tasks.get()) is not None:
+                pipe.send(task)
+            pipe.send(None)
 
     def _listen(self, pipe: Connection, process: Any) -> None:
         while True:

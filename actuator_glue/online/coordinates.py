@@ -15,6 +15,7 @@ Jacobian (d0/d2) alpha_2.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import replace
 
@@ -22,12 +23,39 @@ import numpy as np
 
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.evaluate import LogDensity
+from actuator_glue.jit import njit
 from actuator_glue.online.settings import ModelChoice
 from actuator_glue.records import Array
 
 # No servo-hydraulic actuator has its natural frequency outside 0.05 .. 1000 Hz; the logarithm
 # needs limits, since the prior reaches alpha_2 = 0.
 _STIFFNESS = tuple(float(np.log((2.0 * np.pi * f) ** 2)) for f in (0.05, 1000.0))
+
+
+@njit
+def _physical(phi, k, low, high, theta, log_jacobian):  # type: ignore[no-untyped-def]
+    """Fill theta (m, p) and the log Jacobian (m,), minus infinity outside low..high.
+
+    Returns whether all are inside.
+    """
+    all_inside = True
+    for i in range(len(phi)):
+        theta[i] = phi[i]
+        oil = k + phi[i, 2]
+        rate = math.exp(phi[i, 1])
+        log_jacobian[i] = phi[i, 1] + (2.0 if k > 0.0 else 1.0) * math.log(oil)
+        if k > 0.0:
+            s = phi[i, 3]
+            theta[i, 0] = phi[i, 0] - s
+            rate -= theta[i, 0] * s
+            theta[i, 3] = s * oil / k
+        theta[i, 1] = rate * oil
+        for j in range(phi.shape[1]):
+            if not low[j] <= theta[i, j] <= high[j]:
+                log_jacobian[i] = -np.inf
+                all_inside = False
+                break
+    return all_inside
 
 
 class Coordinates:
@@ -51,16 +79,10 @@ class Coordinates:
 
     def physical(self, phi: Array) -> Array:
         """Return physical parameters of coordinates, (..., p)."""
-        theta = np.array(phi, dtype=np.float64)
-        oil = self._k + theta[..., 2]
-        rate = np.exp(theta[..., 1])
-        if self._k > 0.0:
-            s = theta[..., 3].copy()
-            theta[..., 0] -= s
-            rate -= theta[..., 0] * s
-            theta[..., 3] *= oil / self._k
-        theta[..., 1] = rate * oil
-        return theta
+        flat = np.ascontiguousarray(phi).reshape(-1, len(self._low))
+        theta = np.empty_like(flat)
+        _physical(flat, self._k, self._low, self._high, theta, np.empty(len(flat)))
+        return theta.reshape(phi.shape)
 
     def coordinates(self, theta: Array) -> Array:
         """Return coordinates of physical parameters, (..., p), moved inside their bounds."""
@@ -84,12 +106,14 @@ class Coordinates:
         """Return the log posterior density of coordinates (m, p) -> (m,)."""
 
         def log_density(phi: Array) -> Array:
-            theta = self.physical(phi)
-            inside = ((theta >= self._low) & (theta <= self._high)).all(axis=1)
-            values = np.full(len(theta), -np.inf)
+            theta, values = np.empty_like(phi), np.empty(len(phi))
+            if _physical(phi, self._k, self._low, self._high, theta, values):
+                values += log_likelihood(theta)
+                return values
+            # Outside the prior's box the likelihood may be slow, and is not needed.
+            inside = np.isfinite(values)
             if inside.any():
-                there = np.ascontiguousarray(theta[inside])
-                values[inside] = log_likelihood(there) + self.log_jacobian(phi[inside])
+                values[inside] += log_likelihood(np.ascontiguousarray(theta[inside]))
             return values
 
         return log_density

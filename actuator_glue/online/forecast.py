@@ -8,8 +8,9 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from actuator_glue.inference.bands import Band, band
-from actuator_glue.inference.predictive import ResidualModel, total_band
+from actuator_glue.inference.predictive import ResidualModel
 from actuator_glue.inference.scores import coverage, mean_width
+from actuator_glue.online.mixture import mixture_band
 from actuator_glue.online.settings import ModelChoice
 from actuator_glue.records import Array
 
@@ -18,6 +19,7 @@ from actuator_glue.records import Array
 # fall out of it as soon as the model lacks something, which is what raises an alarm.
 Kind: TypeAlias = Literal['parameter', 'total', 'noise']
 
+TINY = 1e-12  # m; a residual is never exactly nothing
 _DIFFERENCES = 4
 _DIFFERENCE_GAIN = 70.0  # variance of the 4th difference of white noise of unit variance
 
@@ -112,13 +114,14 @@ def predictions(
     if len(simulated) < 2:
         return []
     rng = np.random.default_rng(seed)
+    mean, sd = frozen.residual.levels(rng, len(simulated))
     bands: list[tuple[Kind, Band]] = [
         ('parameter', band(simulated, levels)),
-        ('total', total_band(rng, simulated, frozen.residual, levels)),
+        ('total', mixture_band(simulated, mean, np.maximum(sd, TINY), levels)),
     ]
     if measured is not None:
-        sensor = ResidualModel(frozen.residual.mean, frozen.noise, 0.0, frozen.residual.samples)
-        bands.append(('noise', total_band(rng, simulated, sensor, levels)))
+        sensor = np.full(len(simulated), max(frozen.noise, TINY))
+        bands.append(('noise', mixture_band(simulated, mean, sensor, levels)))
     found = []
     for kind, limits in bands:
         rows = list(zip(limits.lower, limits.upper, strict=True))

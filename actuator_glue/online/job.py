@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.errors import InputError
-from actuator_glue.inference import dream
+from actuator_glue.inference import convergence, dream
 from actuator_glue.inference.evaluate import LogDensity
 from actuator_glue.inference.likelihood import GaussianLikelihood, GlueLikelihood
 from actuator_glue.inference.moments import Moments, moments
@@ -24,6 +24,8 @@ from actuator_glue.records import Array, Record
 
 # A command that moves less than this many noise standard deviations calibrates nothing.
 EXCITATION = 3.0
+# Generations that R-hat and ESS are computed from.
+DIAGNOSED = 150
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -154,6 +156,9 @@ def _estimate(job: Job, expired: Callable[[], bool] | None) -> WindowResult:
     )
     chains = coordinates.chains(sampled)
     posterior = chains.posterior()
+    # R-hat and ESS cost more than the sampling if all draws are ranked.
+    thin = max(1, len(chains.kept) // DIAGNOSED)
+    rhat, ess = convergence.rhat(chains.kept[::thin]), convergence.ess_bulk(chains.kept[::thin])
     summary = moments(posterior, *model.bounds)
     residual = (record.measured - fitting.simulate(model, chains.best[None], record)[0])[settle:]
     rms = float(residual.std())
@@ -175,14 +180,14 @@ def _estimate(job: Job, expired: Callable[[], bool] | None) -> WindowResult:
         moments=summary,
         prior_dominated=tuple(bool(f) for f in summary.prior_dominated),
         best=chains.best,
-        rhat=chains.rhat,
-        ess=chains.ess,
+        rhat=rhat,
+        ess=ess,
         rms_error=rms,
         nrmse=rms / float(record.measured[settle:].std()),
         noise=noise,
         evaluations=chains.evaluations,
         stopped_early=chains.evaluations + settings.chains <= job.evaluations,
-        converged=bool(chains.annealed and chains.rhat.max() <= settings.rhat_limit),
+        converged=bool(chains.annealed and rhat.max() <= settings.rhat_limit),
         response=response_band(draws, record.known_stiffness(), settings),
         scored=tuple(p for old in job.frozen for p in _score(job, old, seed)),
         forecast=tuple(_forecast(job, frozen, seed)),
@@ -207,16 +212,25 @@ def _spread(count: int, wanted: int) -> NDArray[np.intp]:
 def _score(job: Job, old: Frozen, seed: tuple[int, int]) -> list[Prediction]:
     """Hold an earlier posterior against the samples of this window that it forecast."""
     record = job.window.record
-    part = slice(old.start - record.first_index, old.stop - record.first_index)
+    start, stop = old.start - record.first_index, old.stop - record.first_index
     return predictions(
         old,
-        fitting.simulate(old.model, old.draws, record)[:, part],
-        stamp_ns=record.stamp_ns(part.start),
+        _respond(job, old, record, start, stop),
+        stamp_ns=record.stamp_ns(start),
         period=record.period,
         levels=job.settings.levels,
         seed=(*seed, 1, old.number),
-        measured=record.measured[part],
+        measured=record.measured[start:stop],
     )
+
+
+def _respond(job: Job, frozen: Frozen, record: Record, start: int, stop: int) -> Array:
+    """Response of frozen draws over start:stop, its initial state forgotten, shape (m, n) [m]."""
+    settle = round(job.settings.settle / record.period)
+    # Eq. (2) forgets; an effect may remember the whole window (yield, drift).
+    begin = 0 if frozen.model.effects or settle == 0 else max(0, start - settle)
+    part = record.slice(begin, stop)
+    return fitting.simulate(frozen.model, frozen.draws, part)[:, start - begin :]
 
 
 def _forecast(job: Job, frozen: Frozen, seed: tuple[int, int]) -> list[Prediction]:
@@ -235,7 +249,7 @@ def _forecast(job: Job, frozen: Frozen, seed: tuple[int, int]) -> list[Predictio
     start = frozen.start - record.first_index
     return predictions(
         frozen,
-        fitting.simulate(frozen.model, frozen.draws, longer)[:, start:],
+        _respond(job, frozen, longer, start, len(longer)),
         stamp_ns=record.stamp_ns(start),
         period=record.period,
         levels=job.settings.levels,
