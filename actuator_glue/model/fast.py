@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from actuator_glue.model import kernel, laguerre, linear
+from actuator_glue.model import kernel, laguerre, linear, quadratic
 from actuator_glue.model.exact import ExactErrors, Initial
 from actuator_glue.records import Array, Record
 
@@ -79,7 +79,7 @@ class FastErrors:
         count = len(self._rows)
         out = np.empty((len(table), count, 2))
         exact = np.empty((count, len(table)), dtype=np.bool_)
-        if laguerre.evaluate_all(self._rows, table, self.tolerance, out, exact):
+        if quadratic.evaluate_all(self._rows, table, self.tolerance, out, exact):
             self.fallbacks += int(exact.sum())
             for r in range(count):
                 which = np.flatnonzero(exact[r])
@@ -124,7 +124,7 @@ def _row(exact: ExactErrors, r: int, near: ArrayLike | None) -> Array:
     for column, value in header.items():
         row[column] = value
     c = kernel.discretise(system[np.newaxis], record.period, foh)[0]
-    laguerre.prepare(row, c, record.measured, record.command, exact.settle[r])
+    quadratic.prepare(row, c, record.measured, record.command, exact.settle[r])
     return row
 
 

@@ -131,7 +131,8 @@ def start_increment(c: Array, x0: float, v0: float, u0: float, u1: float) -> flo
 STREAM = 5
 
 
-@njit(fastmath=False)  # strict order of operations: results must not depend on how a block is cut
+# Strict order of operations: the result must not depend on how a command is cut into blocks.
+@njit(nogil=True, fastmath=False)
 def stream(c: Array, state: Array, command: Array, out: Array) -> None:
     """Step one system through a block of commands, going on from `state`.
 
@@ -218,7 +219,7 @@ def _advance(S: Array, measured: Array, padded: Array, start: int, stop: int, fo
         n += 1
 
 
-@njit
+@njit(nogil=True)
 def error_sums(
     table: Array,
     starts: Array,

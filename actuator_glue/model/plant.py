@@ -87,7 +87,8 @@ class LinearPlant:
         return x, self.stiffness * x
 
 
-@njit(fastmath=False)  # strict order of operations: results must not depend on how a block is cut
+# Strict order of operations: the result must not depend on how a command is cut into blocks.
+@njit(fastmath=False)
 def _state_space(
     A: Array, B0: Array, B1: Array, C: Array, x: Array, previous: Array, u: Array, out: Array
 ) -> None:

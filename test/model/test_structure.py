@@ -162,7 +162,7 @@ def test_jacobian_against_what_is_known() -> None:
 
 
 def test_noise_like_effects_leave_the_mean_and_add_variance() -> None:
-    """quantisation d^2/12, timing-jitter (s v)^2; the expected record stays."""
+    """Quantisation d^2/12, timing-jitter (s v)^2; the expected record stays."""
     r = record()
     names = ('quantisation', 'timing-jitter')
     structure = Structure(names)
