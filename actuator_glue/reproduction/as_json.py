@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 
 from actuator_glue import __version__
+from actuator_glue.inference.moments import Moments
 from actuator_glue.inference.scores import Scores
 from actuator_glue.model.parameters import BASE, NAMES, TABLE_2
 from actuator_glue.model.problem_r import EQUATION_3, NOISE, STIFFNESS
 from actuator_glue.records import Array
 from actuator_glue.reproduction.identify import NAMES as COEFFICIENTS
 from actuator_glue.reproduction.posterior import Posterior
-from actuator_glue.reproduction.published import SOURCE, TABLE_4, Moments
+from actuator_glue.reproduction.published import SOURCE, TABLE_4, Table4
 from actuator_glue.reproduction.study import Results
 
 SCHEMA = 'actuator_glue.reproduction/1'
@@ -129,8 +130,13 @@ def _named(values: Array) -> dict[str, float]:
     return {name: float(value) for name, value in zip(NAMES, values, strict=True)}
 
 
-def _moments(moments: Moments) -> Json:
-    return {name: _named(values) for name, values in moments._asdict().items()}
+def _moments(moments: Moments | Table4) -> Json:
+    return {
+        'mean': _named(moments.mean),
+        'stddev': _named(moments.stddev),
+        'skewness': _named(moments.skewness),
+        'cov': _named(moments.cov),
+    }
 
 
 def _posterior(p: Posterior) -> Json:

@@ -7,14 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import skew
 
 from actuator_glue.inference.dream import Chains, Settings, sample
 from actuator_glue.inference.likelihood import Errors, GlueLikelihood
+from actuator_glue.inference.moments import Moments, moments
 from actuator_glue.model.exact import ExactErrors
 from actuator_glue.model.parameters import bounds
 from actuator_glue.records import Array, Record
-from actuator_glue.reproduction.published import Moments
 
 # The sampler the paper cites, as Vrugt (2016) runs it: three chains, from the prior.
 AS_PUBLISHED = Settings(chains=3, start='prior', independence=0.0)
@@ -67,10 +66,8 @@ class Posterior:
 
     @property
     def moments(self) -> Moments:
-        """Table 4 for these draws (standard deviation and skewness with divisor m)."""
-        draws = self.chains.posterior()
-        mean, stddev = draws.mean(axis=0), draws.std(axis=0)
-        return Moments(mean, stddev, np.asarray(skew(draws, axis=0)), stddev / mean)
+        """Table 4 for these draws."""
+        return moments(self.chains.posterior(), *bounds())
 
     def thinned(self, size: int) -> Array:
         """Return at most `size` draws spread evenly over the posterior ones, shape (m, 4)."""

@@ -21,7 +21,7 @@ THRESHOLD = 1.2  # R-hat, dashed line of Fig. 6
 CLOSE_UPS = (1.0, 5.0, 10.0)  # Hz, Figs. 3, 4, 8-11
 
 
-class Moments(NamedTuple):
+class Table4(NamedTuple):
     """Table 4, in the order of `model.parameters.BASE` (SI units)."""
 
     mean: Array
@@ -30,7 +30,7 @@ class Moments(NamedTuple):
     cov: Array
 
 
-TABLE_4 = Moments(
+TABLE_4 = Table4(
     mean=np.array([146.27, 1.26e9, 2.84e5, 1.77]),
     stddev=np.array([34.74, 3.61e8, 6.38e4, 1.52]),
     skewness=np.array([1.28, 1.13, 0.99, 1.52]),

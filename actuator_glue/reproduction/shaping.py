@@ -18,7 +18,7 @@ from actuator_glue.reproduction.published import THRESHOLD
 
 BLOCK = 6.0  # s; blocks alternate between fit and held out, so that both see every frequency
 SETTLE = 0.5  # s; ten time constants of the slower test
-PRIOR_DOMINATED = 0.5  # posterior over prior standard deviation
+WIDEST = 0.5  # posterior over prior standard deviation
 LEVEL = 0.95
 NEAR = 0.03  # coverage this near to the level counts as covering
 STRICT = 1.05  # rank-normalised R-hat of the runs that carry results
@@ -73,7 +73,7 @@ class Shaped:
     @property
     def informative(self) -> bool:
         """Whether every parameter is narrower than half its prior."""
-        return bool((self.ours.prior_share() < PRIOR_DOMINATED).all())
+        return bool((self.ours.prior_share() < WIDEST).all())
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from actuator_glue.report.html import Note, Picture, Section, Table, Text
 from actuator_glue.reproduction.figures import shaping as figures
 from actuator_glue.reproduction.pages.format import SYMBOLS, UNITS, num, percent, power_of_two
 from actuator_glue.reproduction.published import CHOSEN, SHAPING_FACTORS
-from actuator_glue.reproduction.shaping import PRIOR_DOMINATED, STRICT, Shaped
+from actuator_glue.reproduction.shaping import STRICT, WIDEST, Shaped
 from actuator_glue.reproduction.study import Results
 
 KINDS = {'sensor': 'sensor noise', 'matched': 'matched residual'}
@@ -123,5 +123,5 @@ def _choice(results: Results, kind: str) -> Note:
         f'Automatic choice with {KINDS[kind]}: G = {power_of_two(choice.shaping_factor)} '
         f'(G{_index(choice.shaping_factor)}); {beside}. Reason: {choice.reason}. Candidates must '
         f'reach a rank-normalised R-hat below {STRICT} and narrow every parameter to less than '
-        f'{percent(PRIOR_DOMINATED, 0)} of its prior.'
+        f'{percent(WIDEST, 0)} of its prior.'
     )  # fmt: skip
