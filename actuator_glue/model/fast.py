@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from actuator_glue.model import kernel, laguerre, linear, quadratic
 from actuator_glue.model.exact import ExactErrors, Initial
+from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array, Record
 
 TOLERANCE = 3e-9  # relative error of the sum of squares; times G = 256 it is 8e-7 in L
@@ -25,6 +26,7 @@ _ENOUGH = 1e-11  # what the terms should leave of the response
 # Grid that looks for the reference system: points per axis, refinements, range in s and in Hz.
 _GRID, _LEVELS = 8, 8
 _LAG, _FREQUENCY = (3e-4, 3.0), (0.5, 150.0)
+_DAMPING = BASE[0].upper + BASE[3].upper  # the largest a1 of the prior [1/s]
 
 
 class FastErrors:
@@ -171,7 +173,9 @@ def _reference(exact: ExactErrors, r: int) -> Array:
             mx = 0.5 * (m2 + x[:, 1] - e[:, 1]) + m1 * x[:, 0] / n
             xx = x[:, 1] - x[:, 0] ** 2 / n
             gain = np.where((mx > 0.0) & (xx > 0.0), mx / xx, 1.0)
-            misfit = gain * (gain * xx - 2.0 * mx)
+            # Eq. (2a) has no static gain above one, and one exactly without a specimen.
+            gain = np.minimum(gain, 1.0) if exact.stiffness[r] > 0.0 else np.ones(len(gain))
+            misfit = np.where(lag * a0 <= _DAMPING, gain * (gain * xx - 2.0 * mx), np.inf)
         at = int(np.argmin(np.where(np.isfinite(misfit), misfit, np.inf)))
         best = systems[at] * np.array([1.0, 1.0, gain[at]])
         # Where the best point lies inside the grid, the next one is drawn closer around it.
