@@ -6,23 +6,19 @@ import argparse
 import time
 from typing import TYPE_CHECKING, Any
 
-from actuator_glue.cli._output import add_json, note, progress, say, table, write_json
+from actuator_glue.cli._calibration import fit_error, initial_state, sample, sampled_model
+from actuator_glue.cli._output import add_json, note, say, table, write_json
 from actuator_glue.cli._records import add_records, load, number
 from actuator_glue.errors import InputError
-from actuator_glue.records import Array, Record
+from actuator_glue.records import Record
 
 if TYPE_CHECKING:
     from actuator_glue.inference.chains import Chains
-    from actuator_glue.inference.evaluate import LogDensity
-    from actuator_glue.model.parameters import Parameter
     from actuator_glue.model.structure import Structure
 
 # R-hat above which draws are not yet the posterior (Vehtari et al. 2021).
 CONVERGED = 1.01
 TIED = 0.99  # correlation above which two parameters are only known together
-# Share of its range that a record may be away from zero at its first sample and still count as
-# starting at rest.
-REST_SHARE = 0.05
 SETTLE = 0.5  # s
 
 
@@ -88,7 +84,7 @@ def run(args: argparse.Namespace) -> int:
     records = load(args)
     for record in records:
         record.known_stiffness()
-    initial = _initial(args.initial, records)
+    initial = initial_state(args.initial, records)
     settle = args.settle if args.settle is not None else (SETTLE if initial == 'measured' else 0.0)
     if settle < 0.0:
         raise InputError(f'--settle {settle:g} s is negative')
@@ -97,10 +93,10 @@ def run(args: argparse.Namespace) -> int:
 
     structure = Structure(args.effect)
     started = time.perf_counter()
-    chains = _sample(args, structure, records, initial, settle)
+    chains = sample(args, structure, records, initial, settle)
     seconds = time.perf_counter() - started
     errors = structure.errors(records, [round(settle / r.period) for r in records], initial)
-    fit = _fit(errors.residuals(chains.best[: len(structure.names)]), records, settle)
+    fit = fit_error(errors.residuals(chains.best[: len(structure.names)]), records, settle)
     parameters = _parameters(structure, chains, args.likelihood)
     converged = all(p['rhat'] is not None and p['rhat'] <= CONVERGED for p in parameters.values())
     _show(args, records, parameters, chains, fit, seconds)
@@ -135,85 +131,6 @@ def run(args: argparse.Namespace) -> int:
     return 0
 
 
-def _initial(asked: str, records: list[Record]) -> Any:
-    """Return 'rest' or 'measured'; 'auto' is rest where every record starts near zero."""
-    if asked != 'auto':
-        return asked
-    for record in records:
-        span = float(record.measured.max() - record.measured.min())
-        start = max(abs(float(record.measured[0])), abs(float(record.command[0])))
-        if start > REST_SHARE * span:
-            return 'measured'
-    return 'rest'
-
-
-def _sample(
-    args: argparse.Namespace,
-    structure: Structure,
-    records: list[Record],
-    initial: Any,
-    settle: float,
-) -> Chains:
-    import numpy as np
-
-    from actuator_glue.inference import dream
-    from actuator_glue.inference.likelihood import (
-        Ar1Likelihood,
-        GaussianLikelihood,
-        GlueLikelihood,
-    )
-    from actuator_glue.model.fast import FastErrors
-
-    counts = [round(settle / r.period) for r in records]
-    errors = structure.errors(records, counts, initial)
-    sums = errors if structure.effects else FastErrors(records, counts, initial)
-    density: LogDensity
-    if args.likelihood == 'glue':
-        density = GlueLikelihood(sums, args.shaping_factor)
-    elif args.likelihood == 'gaussian':
-        density = GaussianLikelihood(sums)
-    else:
-        density = Ar1Likelihood(errors)
-    estimated = _estimated(structure, args.likelihood)
-    with progress('calibrating', args.evaluations) as done:
-        return dream.sample(
-            np.random.default_rng(args.seed),
-            density,
-            [p.lower for p in estimated],
-            [p.upper for p in estimated],
-            evaluations=args.evaluations,
-            progress=lambda made, _: done(made),
-        )
-
-
-def _fit(residuals: list[Array], records: list[Record], settle: float) -> dict[str, Any]:
-    """Return the error of the best draw over all records and of each."""
-    import numpy as np
-
-    measured = [r.measured[round(settle / r.period) :] for r in records]
-    every, spread = np.concatenate(residuals), np.concatenate(measured).std()
-    rms = float(np.sqrt(np.mean(every**2)))
-    return {
-        'rms_m': rms,
-        'nrmse': rms / float(spread) if spread > 0.0 else None,
-        'records': [
-            {
-                'source': r.source,
-                'rms_m': float(np.sqrt(np.mean(e**2))),
-                'nrmse': float(np.sqrt(np.mean(e**2)) / y.std()) if y.std() > 0.0 else None,
-            }
-            for r, e, y in zip(records, residuals, measured, strict=True)
-        ],
-    }
-
-
-def _estimated(structure: Structure, likelihood: str) -> tuple[Parameter, ...]:
-    """Return what is sampled: the model's parameters, and the errors' where they have one."""
-    from actuator_glue.inference.likelihood import PHI
-
-    return (*structure.parameters, *((PHI,) if likelihood == 'ar1' else ()))
-
-
 def _parameters(
     structure: Structure, chains: Chains, likelihood: str
 ) -> dict[str, dict[str, Any]]:
@@ -222,15 +139,14 @@ def _parameters(
 
     from actuator_glue.inference.moments import moments
 
-    parameters = _estimated(structure, likelihood)
-    bounds = np.array([(p.lower, p.upper) for p in parameters])
-    found = moments(chains.posterior(), *bounds.T)
+    model = sampled_model(structure, likelihood)
+    found = moments(chains.posterior(), *model.bounds)
     # arviz wants (chain, draw, parameter).
     kept = np.swapaxes(chains.kept, 0, 1)
     data = az.convert_to_dataset({'theta': kept})
     rhat, ess = az.rhat(data)['theta'].values, az.ess(data)['theta'].values
     return {
-        p.name: {
+        name: {
             'mean': float(found.mean[i]),
             'stddev': float(found.stddev[i]),
             'skewness': float(found.skewness[i]),
@@ -238,10 +154,10 @@ def _parameters(
             'rhat': float(rhat[i]),
             'ess': float(ess[i]),
             'best': float(chains.best[i]),
-            'unit': p.unit,
+            'unit': unit,
             'prior_dominated': bool(found.prior_dominated[i]),
         }
-        for i, p in enumerate(parameters)
+        for i, (name, unit) in enumerate(zip(model.names, model.units, strict=True))
     }
 
 

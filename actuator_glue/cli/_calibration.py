@@ -1,0 +1,131 @@
+"""Joint calibration of several records, as `calibrate` runs it."""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
+
+from actuator_glue.cli._output import progress
+from actuator_glue.records import Array, Record
+
+if TYPE_CHECKING:
+    from actuator_glue.inference.chains import Chains
+    from actuator_glue.inference.evaluate import LogDensity
+    from actuator_glue.model.exact import Initial
+    from actuator_glue.model.structure import Structure
+    from actuator_glue.online.settings import ModelChoice
+
+# Share of its range that a record may be away from zero at its first sample, or move within a
+# moment, and still count as starting at rest.
+REST_SHARE = 0.05
+MOMENT = 0.02  # s
+
+
+def initial_state(asked: str, records: list[Record]) -> Initial:
+    """Return 'rest' or 'measured'; 'auto' is rest where every record starts near zero and still."""
+    if asked != 'auto':
+        return 'rest' if asked == 'rest' else 'measured'
+    for record in records:
+        span = float(record.measured.max() - record.measured.min())
+        soon = min(max(round(MOMENT / record.period), 1), len(record) - 1)
+        moved = abs(float(record.measured[soon] - record.measured[0]))
+        start = max(abs(float(record.measured[0])), abs(float(record.command[0])), moved)
+        if start > REST_SHARE * span:
+            return 'measured'
+    return 'rest'
+
+
+def sample(
+    args: argparse.Namespace,
+    structure: Structure,
+    records: list[Record],
+    initial: Initial,
+    settle: float,
+) -> Chains:
+    """Draw from the joint posterior of all records.
+
+    Args:
+        args: likelihood, shaping factor, evaluations and seed.
+        structure: the model.
+        records: the tests, each with its stiffness.
+        initial: state at each record's first sample.
+        settle: uncounted start of each record [s].
+
+    Raises:
+        InputError: settings or records that cannot be used.
+    """
+    import numpy as np
+
+    from actuator_glue.inference import dream
+    from actuator_glue.inference.likelihood import (
+        Ar1Likelihood,
+        GaussianLikelihood,
+        GlueLikelihood,
+    )
+    from actuator_glue.model.fast import FastErrors
+    from actuator_glue.online.coordinates import Coordinates
+
+    counts = [round(settle / r.period) for r in records]
+    errors = structure.errors(records, counts, initial)
+    sums = errors if structure.effects else FastErrors(records, counts, initial)
+    density: LogDensity
+    if args.likelihood == 'glue':
+        density = GlueLikelihood(sums, args.shaping_factor)
+    elif args.likelihood == 'gaussian':
+        density = GaussianLikelihood(sums)
+    else:
+        density = Ar1Likelihood(errors)
+    model = sampled_model(structure, args.likelihood)
+    lower, upper = model.bounds
+    stiffnesses = {r.known_stiffness() for r in records}
+    # One stiffness alone leaves a bent ridge, on which no sampler moves in physical parameters.
+    single = Coordinates(model, stiffnesses.pop()) if len(stiffnesses) == 1 else None
+    with progress('calibrating', args.evaluations) as done:
+        chains = dream.sample(
+            np.random.default_rng(args.seed),
+            density if single is None else single.density(density),
+            lower if single is None else single.lower,
+            upper if single is None else single.upper,
+            evaluations=args.evaluations,
+            progress=lambda made, _: done(made),
+        )
+    return chains if single is None else single.chains(chains)
+
+
+def sampled_model(structure: Structure, likelihood: str) -> ModelChoice:
+    """Return what is sampled: the model's parameters, and the errors' where they have one."""
+    from actuator_glue.inference.likelihood import PHI
+    from actuator_glue.online.fitting import choose_model
+
+    model = choose_model(structure.effects)
+    if likelihood != 'ar1':
+        return model
+    return replace(
+        model,
+        names=(*model.names, PHI.name),
+        units=(*model.units, PHI.unit),
+        lower=(*model.lower, PHI.lower),
+        upper=(*model.upper, PHI.upper),
+    )
+
+
+def fit_error(residuals: list[Array], records: list[Record], settle: float) -> dict[str, Any]:
+    """Return the error of the best draw over all records and of each."""
+    import numpy as np
+
+    measured = [r.measured[round(settle / r.period) :] for r in records]
+    every, spread = np.concatenate(residuals), np.concatenate(measured).std()
+    rms = float(np.sqrt(np.mean(every**2)))
+    return {
+        'rms_m': rms,
+        'nrmse': rms / float(spread) if spread > 0.0 else None,
+        'records': [
+            {
+                'source': r.source,
+                'rms_m': float(np.sqrt(np.mean(e**2))),
+                'nrmse': float(np.sqrt(np.mean(e**2)) / y.std()) if y.std() > 0.0 else None,
+            }
+            for r, e, y in zip(records, residuals, measured, strict=True)
+        ],
+    }

@@ -1,0 +1,164 @@
+"""Diagnose records: is Eq. (2) enough; if not, which effect is missing, error before and after.
+
+Exit code 0: the model is enough, or the missing effect was named. 1: the residual cannot be
+explained by the catalogue. 2: the input cannot be used.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from actuator_glue.cli._output import add_json, note, progress, say, table, write_json
+from actuator_glue.cli._records import add_records, load
+from actuator_glue.errors import InputError
+from actuator_glue.records import Record
+
+if TYPE_CHECKING:
+    from actuator_glue.residual.diagnosis import Diagnosis
+
+# Share of the whole work that is done when a stage begins.
+_STAGES = {
+    'check': 0.0,
+    'base fit': 0.01,
+    'effect 1': 0.05,
+    'effect 2': 0.35,
+    'effect 3': 0.5,
+    'effect 4': 0.6,
+    'effect 5': 0.65,
+    'effect 6': 0.7,
+    'posterior before': 0.75,
+    'posterior': 0.78,
+    'held-out': 0.95,
+    'done': 1.0,
+}
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    add_records(parser)
+    parser.add_argument(
+        '--holdout',
+        action='append',
+        default=[],
+        metavar='RECORD',
+        help='record that decides nothing and gives the error before and after; repeatable '
+        '(default: every fourth block of each record)',
+    )
+    parser.add_argument('--report', metavar='OUT.html', help='also write a report, one HTML file')
+    parser.add_argument('--seed', type=int, default=1, metavar='S', help='seed (default 1)')
+    parser.add_argument(
+        '--jobs', type=int, default=2, metavar='N', help='threads for the refits (default 2)'
+    )
+    add_json(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Diagnose, print, and write what was asked for.
+
+    Raises:
+        InputError: a record or option cannot be used.
+    """
+    if args.seed < 0:
+        raise InputError(f'--seed {args.seed} is negative')
+    if args.jobs < 1:
+        raise InputError(f'--jobs {args.jobs} is below 1')
+    records, held = _load(args)
+
+    from actuator_glue.residual.diagnose import diagnose
+
+    at = 0.0
+    with progress('diagnose', 1.0) as done:
+
+        def tell(stage: str, share: float) -> None:
+            nonlocal at
+            later = [v for v in _STAGES.values() if v > _STAGES[stage]] or [1.0]
+            at = max(at, _STAGES[stage] + share * (min(later) - _STAGES[stage]))
+            done(at)
+
+        found = diagnose(
+            records,
+            held or None,
+            seed=args.seed,
+            jobs=args.jobs,
+            progress=tell,
+            clock=time.perf_counter,
+        )
+    _show(found, args)
+    write_json(found.to_json(), args.json)
+    if args.report is not None:
+        _report(found, args.report)
+    return 1 if found.verdict == 'unexplained' else 0
+
+
+def _load(args: argparse.Namespace) -> tuple[list[Record], list[Record]]:
+    """Load the fitting and the held-out records.
+
+    A stiffness for each record and each held-out one, or for the records alone: a held-out
+    record whose file does not say then has that of the last record.
+    """
+    given = list(args.stiffness or ())
+    own: list[float] = []
+    if args.holdout and len(given) > 1 and len(given) == len(args.records) + len(args.holdout):
+        own = given[len(args.records) :]
+        args.stiffness = given[: len(args.records)]
+    records = load(args)
+    if not args.holdout:
+        return records, []
+    last = records[-1].stiffness
+    args.records, args.stiffness = args.holdout, own or (given if len(given) == 1 else None)
+    held = load(args)
+    return records, [replace(r, stiffness=last) if r.stiffness is None else r for r in held]
+
+
+def _show(found: Diagnosis, args: argparse.Namespace) -> None:
+    say(found.summary(), args)
+    e = found.error
+    micro = [f'{1e6 * v:.2f}' for v in (e.before, *e.before_ci, e.after, *e.after_ci)]
+    table(
+        'Free-run error on held-out data',
+        ['', 'rms um', '95 % from', 'to', 'in band %'],
+        [
+            ['before (Eq. 2, refitted)', *micro[:3], f'{100 * found.coverage[0]:.1f}'],
+            ['after', *micro[3:], f'{100 * found.coverage[1]:.1f}'],
+            ['sham effect (control)', f'{1e6 * e.sham:.2f}', '', '', ''],
+            ['noise floor', f'{1e6 * e.noise_floor:.2f}', '', '', ''],
+        ],
+        args,
+    )
+    if found.effects:
+        rows = []
+        for effect in found.effects:
+            for i, (name, p) in enumerate(effect.parameters.items()):
+                rows.append(
+                    [
+                        effect.name if i == 0 else '',
+                        name,
+                        f'{p.mean:.4g}',
+                        f'{p.stddev:.2g}',
+                        p.unit,
+                        ', '.join(effect.alternatives) if i == 0 else '',
+                    ]
+                )
+        table('Missing effects', ['effect', 'parameter', 'mean', 'sd', 'unit', 'or'], rows, args)
+    table(
+        'Candidates, Eq. (2) + one effect, refitted',
+        ['effect', 'rms um', 'score nats'],
+        [[c.name, f'{1e6 * c.error:.2f}', f'{c.score:.1f}'] for c in found.candidates[:8]],
+        args,
+    )
+    for line in found.advice:
+        note(line)
+
+
+def _report(found: Diagnosis, out: str) -> None:
+    from pathlib import Path
+
+    from actuator_glue.report.diagnosis import write_report
+
+    try:
+        write_report(found, Path(out))
+    except OSError as error:
+        raise InputError(f'{out}: cannot be written ({error.strerror or error})') from error
