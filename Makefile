@@ -49,8 +49,9 @@ bench: $(ROS_STAMP) ## speed, side by side with peers; results in out/bench
 reproduce: $(VENV_STAMP) ## the paper beside our numbers; report in out/reproduce
 	@$(BIN)/actuator-glue reproduce --out out/reproduce $(REPRODUCE_ARGS)
 
-docs: $(VENV_STAMP) ## renew docs/messages.md from the interface texts
+docs: $(VENV_STAMP) ## renew docs/messages.md and the table of docs/effects.md
 	@$(BIN)/python scripts/write_message_reference.py
+	@$(BIN)/python scripts/write_effect_table.py
 
 clean: ## remove everything that make has made
 	rm -rf .venv build install log out *.egg-info

@@ -13,7 +13,7 @@ DELAY = Effect(
     parameters=(Parameter('delay', 's', 0.0, 0.03, 'transport delay of the command', 0.0),),
     group='lag',
     signature='linear; phase error proportional to frequency',
-    source='Horiuchi et al. 1999, Earthq. Eng. Struct. Dyn. 28:1121-1141',
+    source='Horiuchi et al. 1999',
     starts=lambda s: ((0.001,), (0.004,), (0.01,)),
     switches=(kernel.ON_LAG,),
 )
@@ -25,7 +25,7 @@ GAIN = Effect(
     parameters=(Parameter('gain', '1', 0.7, 1.3, 'static gain of the command channel', 1.0),),
     group='gain',
     signature='linear; relative residual constant down to zero frequency',
-    source='Jelali & Kroll 2003, Hydraulic Servo-systems, ch. 4',
+    source='Jelali & Kroll 2003',
     starts=lambda s: ((1.01,), (0.99,), (1.05,), (0.95,)),
 )
 

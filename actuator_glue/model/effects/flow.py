@@ -23,7 +23,7 @@ SATURATION = Effect(
     ),
     group='saturation',
     signature='odd harmonics above an onset in velocity',
-    source='Merritt 1967, sec. 7.3; Jelali & Kroll 2003, ch. 4',
+    source='Merritt 1967; Jelali & Kroll 2003',
     starts=lambda s: ((0.95 * s.velocity,), (0.75 * s.velocity,), (0.5 * s.velocity,)),
     switches=(kernel.ON_SATURATION,),
 )
@@ -34,14 +34,14 @@ PRESSURE = Effect(
     equation='Q = q sqrt(max(1 - sign(q) f/F_s, 0))',
     parameters=(
         Parameter(
-            'inverse_stall_force', '1/N', 0.0, 5e-3, '1/F_s: one over supply pressure x area', 0.0
+            'inverse_stall_force', '1/N', 0.0, 1e-2, '1/F_s: one over supply pressure x area', 0.0
         ),
     ),
     group='pressure-flow',
     signature='odd harmonics that grow with the load; none without a specimen',
-    source='Merritt 1967, sec. 5.4 (orifice equation, load pressure p_L = f/A)',
+    source='Merritt 1967 (orifice equation, load pressure p_L = f/A)',
     starts=lambda s: tuple(
-        (share / max(s.stiffness * s.stroke, 0.02 * s.oil * s.stroke),) for share in (0.1, 0.4)
+        (share / max(s.stiffness * s.stroke, 0.2 * s.oil * s.stroke),) for share in (0.1, 0.4)
     ),
     switches=(kernel.ON_PRESSURE,),
 )
@@ -57,7 +57,7 @@ ASYMMETRY = Effect(
     ),
     group='asymmetry',
     signature='even harmonics and a mean that follows the velocity',
-    source='Jelali & Kroll 2003, ch. 4 (single-rod cylinder)',
+    source='Jelali & Kroll 2003 (single-rod cylinder)',
     starts=lambda s: ((0.03,), (-0.03,), (0.15,), (-0.15,)),
     switches=(kernel.ON_ASYMMETRY,),
 )
@@ -72,7 +72,7 @@ DROOP = Effect(
     ),
     group='flow-time',
     signature='gain follows the envelope of the flow',
-    source='Merritt 1967, ch. 11 (constant-pressure supplies with accumulator)',
+    source='Merritt 1967 (constant-pressure supplies with accumulator)',
     starts=lambda s: tuple(
         (share / s.velocity, time) for share in (0.05, 0.25) for time in (0.2, 1.0, 5.0)
     ),
@@ -85,12 +85,12 @@ DRIFT = Effect(
     equation='Q = q max(1 + r t, 0), t from the start of the record',
     parameters=(
         Parameter(
-            'gain_drift', '1/s', -0.02, 0.02, 'relative change of flow gain with oil heating', 0.0
+            'gain_drift', '1/s', -0.05, 0.05, 'relative change of flow gain with oil heating', 0.0
         ),
     ),
     group='flow-time',
     signature='parameters trend with time, not with amplitude',
-    source='Jelali & Kroll 2003, ch. 3 (viscosity and bulk modulus against temperature)',
+    source='Jelali & Kroll 2003 (viscosity and bulk modulus against temperature)',
     starts=lambda s: ((0.05 / s.duration,), (-0.05 / s.duration,), (0.2 / s.duration,)),
     switches=(kernel.ON_DRIFT,),
 )

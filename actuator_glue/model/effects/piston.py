@@ -13,8 +13,7 @@ COULOMB = Effect(
     parameters=(Parameter('coulomb_force', 'N', 0.0, 2e4, 'dry friction of the seals', 0.0),),
     group='friction',
     signature='odd harmonics with the sign of the velocity; relative size falls as 1/A',
-    source='Armstrong-Helouvry, Dupont & Canudas de Wit 1994, Automatica 30:1083-1138; '
-    'return mapping: Simo & Hughes 1998, Computational Inelasticity, ch. 1',
+    source='Armstrong-Helouvry et al. 1994; return mapping: Simo & Hughes 1998',
     starts=lambda s: tuple((share * s.oil * s.stroke,) for share in (0.005, 0.02, 0.08)),
 )
 
@@ -30,8 +29,7 @@ STRIBECK = Effect(
     ),
     group='friction',
     signature='as Coulomb friction, with stick-slip at reversals',
-    source='Armstrong-Helouvry, Dupont & Canudas de Wit 1994, Automatica 30:1083-1138 '
-    '(Stribeck curve, frictional memory)',
+    source='Armstrong-Helouvry et al. 1994 (Stribeck curve, frictional memory)',
     starts=lambda s: tuple(
         (share * s.oil * s.stroke, ratio, speed)
         for share in (0.005, 0.02, 0.08)
@@ -49,8 +47,7 @@ BACKLASH = Effect(
     ),
     group='lost-motion',
     signature='rectangular loop against displacement, flat after reversals; size falls as 1/A',
-    source='Tao & Kokotovic 1996, Adaptive Control of Systems with Actuator and Sensor '
-    'Nonlinearities (play operator)',
+    source='Tao & Kokotovic 1996 (play operator)',
     starts=lambda s: ((0.005 * s.stroke,), (0.02 * s.stroke,), (0.06 * s.stroke,)),
     switches=(kernel.ON_BACKLASH,),
 )

@@ -124,14 +124,12 @@ def add_errors(displacement: Array, measured: Array, sums: Array) -> None:
     """Add sum e and sum e^2 of e = measured - displacement to `sums`, shape (2, c).
 
     Args:
-        displacement: (n, c), c at most kernel.LANES [m].
+        displacement: (n, c) [m].
         measured: (n,) [m].
         sums: (2, c), updated [m, m^2].
     """
-    total = np.zeros((2, kernel.LANES))
     for i in range(displacement.shape[0]):
         for n in range(displacement.shape[1]):
             error = measured[i] - displacement[i, n]
-            total[0, n] += error
-            total[1, n] += error * error
-    sums += total[:, : sums.shape[1]]
+            sums[0, n] += error
+            sums[1, n] += error * error

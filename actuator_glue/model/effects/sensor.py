@@ -40,7 +40,7 @@ LAG = Effect(
     ),
     group='lag',
     signature='linear; as a delay with a slight roll-off',
-    source='Jelali & Kroll 2003, ch. 4 (transducers)',
+    source='Jelali & Kroll 2003 (transducers)',
     starts=lambda s: ((0.0005,), (0.002,), (0.008,)),
     switches=(kernel.ON_SENSOR_LAG,),
 )
@@ -102,8 +102,7 @@ QUANTISATION = Effect(
     parameters=(Parameter('quantum', 'm', 0.0, 1e-3, 'step of the converter', 0.0),),
     group='quantisation',
     signature='values on a grid',
-    source='Bennett 1948, Bell Syst. Tech. J. 27:446-472; Widrow & Kollar 2008, '
-    'Quantization Noise',
+    source='Bennett 1948',
     starts=lambda s: ((1e-6,), (1e-5,), (5e-5,)),
     variance=_quantisation,
 )
@@ -117,7 +116,7 @@ SKEW = Effect(
     ),
     group='skew',
     signature='lag grows with time',
-    source='Mills 1991, IEEE Trans. Commun. 39:1482-1493 (frequency error of clocks)',
+    source='Mills 1991 (frequency error of clocks)',
     starts=lambda s: ((5e-5,), (-5e-5,), (3e-4,), (-3e-4,)),
     switches=(kernel.ON_LAG,),
 )
@@ -129,7 +128,7 @@ JITTER = Effect(
     parameters=(Parameter('jitter', 's', 0.0, 5e-3, 'standard deviation of sample times', 0.0),),
     group='jitter',
     signature='variance proportional to velocity squared, no mean',
-    source='Souders, Flach, Hagwood & Yang 1990, IEEE Trans. Instrum. Meas. 39:80-85',
+    source='Souders et al. 1990',
     starts=lambda s: ((1e-4,), (5e-4,)),
     variance=_jitter,
 )

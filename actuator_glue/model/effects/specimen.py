@@ -15,7 +15,7 @@ DAMPING = Effect(
     parameters=(Parameter('damping', 'N s/m', 0.0, 2e5, 'viscous damping', 0.0),),
     group='gain',
     signature='linear; absorbed by the base parameters unless two stiffnesses are known',
-    source='Dyke, Spencer, Quast & Sain 1995, J. Eng. Mech. 121:322-338',
+    source='Dyke et al. 1995',
     starts=lambda s: tuple(
         (share * s.oil * s.stroke / s.velocity,) for share in (0.01, 0.05, 0.3)
     ),
@@ -31,7 +31,7 @@ INERTIA = Effect(
     ),
     group='inertia',
     signature='linear; resonance of the mass on the oil column',
-    source='Dyke, Spencer, Quast & Sain 1995, J. Eng. Mech. 121:322-338; Merritt 1967, sec. 6.1',
+    source='Dyke et al. 1995; Merritt 1967',
     starts=lambda s: tuple(
         (s.oil / (2.0 * math.pi * hz) ** 2, 2.0 * ratio * 2.0 * math.pi * hz)
         for hz in (80.0, 40.0, 20.0)
@@ -46,7 +46,7 @@ GAP = Effect(
     parameters=(Parameter('gap', 'm', 0.0, 1e-2, 'gap at the specimen, half width', 0.0),),
     group='gap',
     signature='odd; stiffness missing around zero displacement',
-    source='Kerschen et al. 2006, Mech. Syst. Signal Process. 20:505-592 (clearance)',
+    source='Kerschen et al. 2006 (clearance)',
     starts=lambda s: ((0.02 * s.stroke,), (0.1 * s.stroke,), (0.3 * s.stroke,)),
     switches=(kernel.ON_GAP,),
 )
@@ -60,7 +60,7 @@ HARDENING = Effect(
     ),
     group='hardening',
     signature='odd harmonics; relative size grows as A^2',
-    source='Kerschen et al. 2006, Mech. Syst. Signal Process. 20:505-592 (Duffing)',
+    source='Kerschen et al. 2006 (Duffing)',
     starts=lambda s: tuple((share / s.stroke**2,) for share in (0.1, -0.1, 0.5)),
     switches=(kernel.ON_HARDENING,),
 )
@@ -77,7 +77,7 @@ YIELD = Effect(
     ),
     group='hysteresis',
     signature='loop with memory, area grows with amplitude; none without a specimen',
-    source='Bouc 1967; Wen 1976, J. Eng. Mech. Div. ASCE 102:249-263 (beta = gamma)',
+    source='Wen 1976 (beta = gamma)',
     starts=lambda s: tuple(
         (ratio, share * s.stroke, sharp)
         for ratio in (0.2, 0.7)

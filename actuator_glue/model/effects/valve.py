@@ -12,7 +12,7 @@ LAG = Effect(
     parameters=(Parameter('valve_lag', 's', 0.0, 0.02, 'second time constant of the valve', 0.0),),
     group='lag',
     signature='linear; residual grows with the square of frequency',
-    source='Merritt 1967, Hydraulic Control Systems, sec. 7.3; Jelali & Kroll 2003, ch. 4',
+    source='Merritt 1967; Jelali & Kroll 2003',
     starts=lambda s: ((0.0005,), (0.002,), (0.006,)),
 )
 
@@ -25,8 +25,7 @@ DEADBAND = Effect(
     ),
     group='lost-motion',
     signature='odd harmonics; flat where the velocity is small; relative size falls as 1/A',
-    source='Merritt 1967, sec. 5.6; Tao & Kokotovic 1996, Adaptive Control of Systems with '
-    'Actuator and Sensor Nonlinearities',
+    source='Merritt 1967; Tao & Kokotovic 1996',
     starts=lambda s: ((0.005 * s.stroke,), (0.02 * s.stroke,), (0.06 * s.stroke,)),
 )
 
@@ -39,7 +38,7 @@ NULL = Effect(
     ),
     group='offset',
     signature='constant offset; with k > 0 and leakage slightly smaller than without',
-    source='Merritt 1967, sec. 7.2',
+    source='Merritt 1967',
     starts=lambda s: ((0.02 * s.stroke,), (-0.02 * s.stroke,)),
 )
 

@@ -1,0 +1,48 @@
+"""The catalogue as the Markdown table of docs/effects.md."""
+
+from __future__ import annotations
+
+from actuator_glue.model.effects import CATALOGUE
+from actuator_glue.model.parameters import Parameter
+
+BEGIN, END = '<!-- catalogue: begin (make docs) -->', '<!-- catalogue: end -->'
+
+
+def _parameter(p: Parameter) -> str:
+    unit = '' if p.unit == '1' else f' {p.unit}'
+    return f'`{p.name}` {p.meaning}: {p.lower:g} .. {p.upper:g}{unit}, neutral {p.neutral:g}'
+
+
+def markdown() -> str:
+    """Return the table, one row per effect, from the entries themselves."""
+    rows = [
+        '| effect | place | equation | parameters: bounds, neutral value | group | signature '
+        '| source |',
+        '|---|---|---|---|---|---|---|',
+    ]
+    for effect in CATALOGUE.values():
+        parameters = '<br>'.join(_parameter(p) for p in effect.parameters)
+        cells = (
+            f'`{effect.name}`',
+            effect.place,
+            effect.equation,
+            parameters,
+            effect.group,
+            effect.signature,
+            effect.source,
+        )
+        rows.append('| ' + ' | '.join(cell.replace('|', '\\|') for cell in cells) + ' |')
+    return '\n'.join(rows)
+
+
+def renewed(page: str) -> str:
+    """Return a page with the table between its marks replaced by the catalogue's.
+
+    Raises:
+        ValueError: the page lacks a mark.
+    """
+    head, found, rest = page.partition(BEGIN)
+    _, end, tail = rest.partition(END)
+    if not found or not end:
+        raise ValueError(f'the page lacks {BEGIN!r} or {END!r}')
+    return f'{head}{BEGIN}\n{markdown()}\n{END}{tail}'
