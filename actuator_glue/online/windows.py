@@ -96,7 +96,7 @@ class Windows:
 
     def setup(self, setup: Setup) -> list[Event]:
         """Take a test set-up; it holds from the sample it names, at once where that is past."""
-        if self._next is None or setup.index <= self._next:
+        if self._next is not None and setup.index <= self._next:
             return self._begin(setup)
         self._announced = [s for s in self._announced if s.index != setup.index]
         self._announced.append(setup)
@@ -106,22 +106,24 @@ class Windows:
 
     def push(self, block: Block) -> tuple[list[Event], list[Window]]:
         """Take one block as it came; return what happened and the windows it completes."""
+        events: list[Event] = []
         try:
             check_block(block)
+            if self._next is None:
+                events += self._announced_until(block.index)
             self._check_period(block)
         except InputError as error:
             self.tally.rejected += 1
-            events: list[Event] = [Rejected(str(error))]
+            events.append(Rejected(str(error)))
             if len(block.command) and self._tail is not None and len(self._tail):
                 events.append(self._restart(block.index, 'bad-input', str(error)))
             self._step_over(block)
             return events, []
-        events = self._follow(block)
+        events += self._follow(block)
         windows: list[Window] = []
         position = 0
         while position < len(block):
-            while self._announced and self._announced[0].index <= block.index + position:
-                events += self._begin(self._announced.pop(0))
+            events += self._announced_until(block.index + position)
             stop = len(block)
             if self._announced:
                 stop = min(stop, self._announced[0].index - block.index)
@@ -136,10 +138,18 @@ class Windows:
 
     def _step_over(self, block: Block) -> None:
         """Count the samples of an unusable block as seen: the next block is no gap as well."""
-        if block.index == self._next and np.isfinite(block.period):
+        if block.index == self._next:
             count = max(len(block.command), len(block.measured))
+            known = self.current.period if self.current is not None else 0.0
             self._next += count
-            self._stamp_ns += round(count * float(np.clip(block.period, 0.0, 10.0)) * 1e9)
+            self._stamp_ns += round(count * known * 1e9)
+
+    def _announced_until(self, index: int) -> list[Event]:
+        """Begin the announced set-ups that hold at a sample."""
+        events: list[Event] = []
+        while self._announced and self._announced[0].index <= index:
+            events += self._begin(self._announced.pop(0))
+        return events
 
     def _check_period(self, block: Block) -> None:
         setup = self.current

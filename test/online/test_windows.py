@@ -1,0 +1,246 @@
+"""Windows: which samples they hold, and what restarts them."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from online_streams import RATE, block, setup
+
+from actuator_glue.errors import InputError
+from actuator_glue.online.settings import EstimatorSettings
+from actuator_glue.online.stream import MAX_BLOCK, Rejected, Restarted
+from actuator_glue.online.windows import Tail, Windows
+
+SETTINGS = EstimatorSettings(window=0.5, hop=0.2, settle=0.0, time_budget=0.1)
+WINDOW, HOP = 100, 40
+
+
+def run(blocks, settings=SETTINGS, setups=()):
+    """Push set-ups, then blocks; return windows and events."""
+    windows = Windows(settings)
+    events, found = [], []
+    for announced in setups or (setup(),):
+        events += windows.setup(announced)
+    for one in blocks:
+        told, complete = windows.push(one)
+        events += told
+        found += complete
+    return found, events, windows
+
+
+def cut(sizes, start=0):
+    """Blocks of the given sizes, one after the other."""
+    index = start
+    for size in sizes:
+        yield block(index, size)
+        index += size
+
+
+@given(st.lists(st.integers(1, 137), min_size=1, max_size=40), st.integers(0, 500))
+def test_windows_do_not_depend_on_how_the_stream_is_cut(sizes, start):
+    found, _, _ = run(cut(sizes, start))
+    whole, _, _ = run([block(start, sum(sizes))])
+    assert [w.record.first_index for w in found] == [w.record.first_index for w in whole]
+    for one, other in zip(found, whole, strict=True):
+        assert np.array_equal(one.record.command, other.record.command)
+        assert one.record.start_ns == pytest.approx(other.record.start_ns, abs=1)
+
+
+@given(st.lists(st.integers(1, 60), min_size=1, max_size=60), st.integers(0, 500))
+def test_windows_hold_the_last_samples_and_end_at_multiples_of_the_hop(sizes, start):
+    found, _, _ = run(cut(sizes, start))
+    stop = start + sum(sizes)
+    ends = [e for e in range(start + WINDOW, stop + 1) if e % HOP == 0]
+    assert [w.end for w in found] == ends
+    for window in found:
+        first = window.record.first_index
+        assert np.array_equal(window.record.command, 1e-6 * np.arange(first, first + WINDOW))
+
+
+@given(
+    st.lists(
+        st.tuples(st.integers(1, 50), st.sampled_from(['ok', 'gap', 'nan', 'empty', 'back'])),
+        min_size=1,
+        max_size=60,
+    )
+)
+def test_no_window_holds_a_gap_or_a_bad_sample(pieces):
+    index, blocks = 0, []
+    for size, kind in pieces:
+        if kind == 'gap':
+            index += 7
+        if kind == 'back':
+            index = max(0, index - 90)
+        if kind == 'empty':
+            blocks.append(block(index, 0))
+            continue
+        one = block(index, size)
+        if kind == 'nan':
+            one.measured[size // 2] = np.nan
+        blocks.append(one)
+        index += size
+    found, _, windows = run(blocks)
+    for window in found:
+        first = window.record.first_index
+        assert np.array_equal(window.record.command, 1e-6 * np.arange(first, first + WINDOW))
+        assert np.isfinite(window.record.measured).all()
+    kinds = [kind for _, kind in pieces]
+    assert windows.tally.rejected == kinds.count('nan') + kinds.count('empty')
+
+
+@given(st.lists(st.integers(1, 30), min_size=1, max_size=200))
+def test_memory_is_bounded_by_the_window(sizes):
+    tail = Tail(50)
+    seen = np.empty(0)
+    for size in sizes:
+        values = np.arange(len(seen), len(seen) + size, dtype=float)
+        seen = np.concatenate([seen, values])
+        tail.append(values, -values)
+    count = min(len(seen), 50)
+    assert len(tail) == count and tail._data.size == 4 * 50
+    command, measured = tail.last(count)
+    assert np.array_equal(command, seen[-count:]) and np.array_equal(measured, -seen[-count:])
+
+
+def test_a_gap_restarts_and_says_how_much_is_missing():
+    found, events, windows = run([block(0, 100), block(150, 100)])
+    assert windows.tally.lost == 50 and windows.tally.gaps == 1
+    (gap,) = [e for e in events if isinstance(e, Restarted) and e.reason == 'gap']
+    assert '50 samples are missing before sample 150' in gap.message
+    assert [w.record.first_index for w in found] == []
+
+
+def test_a_stream_that_begins_again_restarts():
+    _, events, _ = run([block(0, 100), block(100, 10), block(0, 100)])
+    assert [e.reason for e in events if isinstance(e, Restarted)] == ['setup', 'stream']
+
+
+@pytest.mark.parametrize(
+    ('step', 'told'), [(0.0, False), (0.01, False), (0.5, True), (-0.05, False), (-5.0, True)]
+)
+def test_a_jump_of_the_clock_restarts(step, told):
+    stamp = 10**18 + round((100 / RATE + step) * 1e9)
+    _, events, _ = run([block(0, 100), block(100, 100, stamp_ns=stamp)])
+    assert any(isinstance(e, Restarted) and e.reason == 'clock' for e in events) == told
+
+
+def test_equal_stamps_are_a_clock_that_stands():
+    _, events, _ = run([block(0, 1), block(1, 1, stamp_ns=10**18)])
+    assert [e.reason for e in events if isinstance(e, Restarted)] == ['setup', 'clock']
+
+
+@pytest.mark.parametrize(
+    ('channels', 'told'),
+    [
+        ({'measured': np.array([0.0, np.nan, 0.0])}, 'measured is NaN or infinite at sample 41'),
+        ({'command': np.array([np.inf, 0.0, 0.0])}, 'command is NaN or infinite at sample 40'),
+        ({'measured': np.array([0.0, 1e6, 0.0])}, 'beyond 10 m; check the unit'),
+        ({'measured': np.zeros(2)}, 'different lengths'),
+        ({'force': np.array([0.0, 0.0, 1e12])}, 'force is 1e+12 N at sample 42'),
+        ({'period': np.nan}, 'period nan s is outside'),
+        ({'period': -0.001}, 'is outside [1e-6, 10] s'),
+        ({'period': 0.01}, 'but the test set-up says 200 Hz'),
+    ],
+)
+def test_unusable_blocks_are_rejected_and_say_why(channels, told):
+    found, events, windows = run([block(0, 40), block(40, 3, **channels), block(43, 200)])
+    (rejected,) = [e for e in events if isinstance(e, Rejected)]
+    assert told in rejected.message and 'sample 40' in rejected.message
+    # The stream goes on with the next block; nothing before it is used.
+    assert found and all(w.record.first_index >= 43 for w in found)
+    assert windows.tally.lost == 0
+
+
+def test_absurd_blocks_are_rejected():
+    for one, told in (
+        (block(-1, 3), 'index'),
+        (block(2**63, 3), 'index'),
+        (block(0, MAX_BLOCK + 1), 'samples are more than'),
+        (block(0, 0), 'it is empty'),
+    ):
+        _, events, _ = run([one])
+        assert [told in e.message for e in events if isinstance(e, Rejected)] == [True]
+
+
+def test_one_sample_at_a_time_is_fine():
+    found, events, _ = run(cut([1] * 200))
+    assert [w.end for w in found] == [120, 160, 200]
+    assert not [e for e in events if isinstance(e, Rejected)]
+
+
+def test_a_set_up_holds_from_its_sample_on():
+    found, events, _ = run([block(0, 400)], setups=(setup(0.0), setup(250e3, index=170)))
+    assert [(w.end, w.record.stiffness) for w in found] == [
+        (120, 0.0),
+        (160, 0.0),
+        (280, 250e3),
+        (320, 250e3),
+        (360, 250e3),
+        (400, 250e3),
+    ]
+    assert [e.index for e in events if isinstance(e, Restarted)] == [0, 170]
+
+
+def test_the_same_set_up_again_changes_nothing():
+    found, events, _ = run([block(0, 200)], setups=(setup(), setup(index=55)))
+    assert [w.end for w in found] == [120, 160, 200]
+    assert len([e for e in events if isinstance(e, Restarted)]) == 1
+
+
+def test_without_a_known_stiffness_there_are_no_windows():
+    found, events, _ = run([block(0, 400)], setups=(setup(None),))
+    assert not found
+    assert 'specimen stiffness unknown' in events[0].message
+
+
+def test_before_any_set_up_there_are_no_windows():
+    windows = Windows(SETTINGS)
+    assert windows.push(block(0, 400)) == ([], [])
+    windows.setup(setup())
+    _, found = windows.push(block(400, 200))
+    assert [w.record.first_index for w in found] == [420, 460, 500]
+
+
+def test_announced_set_ups_are_bounded():
+    windows = Windows(SETTINGS)
+    windows.setup(setup())
+    windows.push(block(0, 10))
+    for index in range(100, 5100):
+        windows.setup(setup(index=index))
+    assert len(windows._announced) <= 16
+
+
+@pytest.mark.parametrize(
+    ('values', 'told'),
+    [
+        ({'stiffness': -1.0}, 'specimen stiffness -1 N/m is outside'),
+        ({'stiffness': np.nan}, 'specimen stiffness nan'),
+        ({'period': 0.0}, 'sample period 0 s'),
+        ({'hold': 'cubic'}, "use 'zoh' or 'linear'"),
+        ({'index': -3}, 'running index -3'),
+    ],
+)
+def test_unusable_set_ups_say_why(values, told):
+    with pytest.raises(InputError) as error:
+        setup(**values)
+    assert told in str(error.value)
+
+
+@pytest.mark.parametrize(
+    ('values', 'told'),
+    [
+        ({'window': -1.0}, 'window = -1 is outside'),
+        ({'hop': 6.0}, 'longer than the window'),
+        ({'settle': 4.9}, 'less than a fifth'),
+        ({'time_budget': 2.0}, 'windows would pile up'),
+        ({'levels': (0.9, 0.5)}, 'must ascend'),
+        ({'levels': ()}, 'between 0 and 1'),
+        ({'levels': (1.0,)}, 'between 0 and 1'),
+        ({'shaping_factor': np.nan}, 'shaping_factor = nan'),
+        ({'likelihood': 'ols'}, 'use glue or gaussian'),
+    ],
+)
+def test_unusable_settings_say_why(values, told):
+    with pytest.raises(InputError) as error:
+        EstimatorSettings(**values)
+    assert told in str(error.value)
