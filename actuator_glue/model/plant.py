@@ -1,4 +1,8 @@
-"""Simulated actuators that run block by block; their output does not depend on the block size."""
+"""Simulated actuators that run block by block; their output does not depend on the block size.
+
+Eq. (2) with any effects is `model.stream.Stream`; here are what it has in common with others,
+linear plants of any order, and what sensors add.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +13,6 @@ from numpy.typing import ArrayLike
 
 from actuator_glue.errors import InputError
 from actuator_glue.jit import njit
-from actuator_glue.model import kernel, linear
 from actuator_glue.model.sensor import Sensor, SensorSpec
 from actuator_glue.records import MAX_DISPLACEMENT, Array, Hold
 
@@ -45,46 +48,6 @@ def command_block(command: ArrayLike) -> Array:
             'commands are in m'
         )
     return block
-
-
-class LinearPlant:
-    """The paper's actuator, Eq. (2): exact at the samples; the specimen's force is k x.
-
-    Args:
-        theta: beta_1, alpha_1_beta_0, alpha_2, alpha_3, shape (4,).
-        stiffness: specimen stiffness k [N/m].
-        period: sample period [s].
-        hold: how the command runs between its samples.
-
-    Raises:
-        InputError: theta for which Eq. (2) does not exist, or unusable stiffness.
-    """
-
-    def __init__(
-        self, theta: ArrayLike, stiffness: float, period: float, hold: Hold = 'zoh'
-    ) -> None:
-        rows = linear.table(theta, stiffness, period, hold)
-        if len(rows) != 1 or not np.isfinite(rows).all():
-            raise InputError(f'Eq. (2) does not exist at theta {np.asarray(theta).tolist()}')
-        self.period = period
-        self.stiffness = stiffness
-        self._coefficients = rows[0]
-        self.reset()
-
-    def reset(self) -> None:
-        """Return to rest at zero displacement."""
-        self._state = np.zeros(kernel.STREAM)
-
-    def step(self, command: ArrayLike) -> tuple[Array, Array]:
-        """Run through a block; return displacement [m] and force [N], each of shape (n,).
-
-        Raises:
-            InputError: unusable command.
-        """
-        u = command_block(command)
-        x = np.empty(len(u))
-        kernel.stream(self._coefficients, self._state, u, x)
-        return x, self.stiffness * x
 
 
 # Strict order of operations: the result must not depend on how a command is cut into blocks.
