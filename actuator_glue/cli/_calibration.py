@@ -23,7 +23,7 @@ MOMENT = 0.02  # s
 
 
 def initial_state(asked: str, records: list[Record]) -> Initial:
-    """Return 'rest' or 'measured'; 'auto' is rest where every record starts near zero and still."""
+    """Return 'rest' or 'measured'; 'auto' is rest where every record starts at zero and still."""
     if asked != 'auto':
         return 'rest' if asked == 'rest' else 'measured'
     for record in records:

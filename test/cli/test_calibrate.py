@@ -90,7 +90,7 @@ def test_formal_likelihoods(run, problem_r: Path, likelihood: str) -> None:
     """The formal ones run over the same records and are far narrower than G = 256."""
     records = (problem_r / 'r_1.csv', problem_r / 'r_2.csv')
     done = run(
-        'calibrate', *records, '--likelihood', likelihood, '--evaluations', 12_000, '--json', '-'
+        'calibrate', *records, '--likelihood', likelihood, '--evaluations', 8_000, '--json', '-'
     )
     assert done.code == 0, done.err
     assert done.json['parameters']['beta_1']['stddev'] < 0.7 * STDDEV[0]
