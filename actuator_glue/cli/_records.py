@@ -9,7 +9,7 @@ from actuator_glue.records import Record
 
 
 def add_records(parser: argparse.ArgumentParser) -> None:
-    """Add RECORD..., --stiffness, --channels and --hold."""
+    """Add RECORD... and the options of `add_reading`."""
     parser.add_argument(
         'records',
         nargs='+',
@@ -20,7 +20,7 @@ def add_records(parser: argparse.ArgumentParser) -> None:
 
 
 def add_reading(parser: argparse.ArgumentParser) -> None:
-    """Add --stiffness, --channels and --hold."""
+    """Add --stiffness, --channels, --hold and --split."""
     parser.add_argument(
         '--stiffness',
         nargs='+',
@@ -39,6 +39,12 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
         help='how the command runs between its samples; wins over what a file says '
         '(a wrong one is a delay of half a sample)',
     )
+    parser.add_argument(
+        '--split',
+        action='store_true',
+        help='where a bag lacks samples or its clock jumps, take the stretches between as '
+        'records of their own',
+    )
 
 
 def number(text: str) -> float:
@@ -55,7 +61,7 @@ def number(text: str) -> float:
 
 
 def load(args: argparse.Namespace) -> list[Record]:
-    """Return the records that the options name; gaps in bags are told on standard error.
+    """Return the records that the options name; where bags are split is told.
 
     Raises:
         InputError: a record cannot be used.
@@ -67,5 +73,5 @@ def load(args: argparse.Namespace) -> list[Record]:
         stiffness=args.stiffness,
         channels=args.channels,
         hold=args.hold,
-        gap=note,
+        gap=note if args.split else None,
     )

@@ -41,7 +41,7 @@ def run(args: argparse.Namespace) -> int:
                 channels=args.channels,
                 hold=args.hold,
                 note=lambda _: None,
-                gap=note,
+                gap=note if args.split else content['damage'].append,
             )
         except InputError as error:
             content['damage'].append(str(error))

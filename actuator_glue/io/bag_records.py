@@ -19,6 +19,7 @@ from actuator_glue.records import Array, Hold, Record
 
 SAMPLE_BLOCK = full_name('SampleBlock')
 TEST_SETUP = full_name('TestSetup')
+CLOCK_TOLERANCE = 0.1  # s; a step between two blocks beyond this is a jump, not jitter
 BLOCK = 64  # samples per message where nobody says otherwise
 
 
@@ -102,32 +103,43 @@ class _Segment:
     command: array[float] = field(default_factory=lambda: array('d'))
     measured: array[float] = field(default_factory=lambda: array('d'))
     force: array[float] = field(default_factory=lambda: array('d'))
+    next_stamp: int = 0
 
     @property
     def next_index(self) -> int:
         return self.first.index + len(self.command)
 
     def append(self, block: Samples) -> None:
+        self.next_stamp = block.stamp_ns + round(len(block.command) * block.period * 1e9)
         self.command.frombytes(block.command.tobytes())
         self.measured.frombytes(block.measured.tobytes())
         if block.force is not None:
             self.force.frombytes(block.force.tobytes())
 
-    def break_before(self, block: Samples, setup: Setup | None) -> str | None:
-        """Return why a block cannot go on with this segment, None where it can."""
+    def fault_before(self, block: Samples) -> str:
+        """Return what went wrong between this segment and a block, empty where nothing did."""
         at = f'at sample {block.index}'
         if block.index > self.next_index:
             missing = block.index - self.next_index
-            return f'{missing} samples ({missing * block.period:.3g} s) are missing before {at}'
+            seconds = f'{missing * block.period:.3g} s'
+            return f'{missing} samples ({seconds}) are missing before sample {block.index}'
         if block.index < self.next_index:
-            return f'the stream begins again {at} after sample {self.next_index - 1}'
-        if block.period != self.first.period:
-            return f'the period changes from {self.first.period:g} to {block.period:g} s {at}'
-        if (block.force is None) != (self.first.force is None):
-            return f'the force channel comes or goes {at}'
-        if _test(setup) != _test(self.setup):
-            return f'the test set-up changes {at}'
-        return None
+            # A new test begins at 0, and may have a clock of its own.
+            again = f'the stream begins again {at} after sample {self.next_index - 1}'
+            return again if block.index else ''
+        jump = (block.stamp_ns - self.next_stamp) * 1e-9
+        if abs(jump) > CLOCK_TOLERANCE:
+            return f'the clock jumps by {jump:.3g} s {at}'
+        return ''
+
+    def same_test(self, block: Samples, setup: Setup | None) -> bool:
+        """Whether a block belongs to the same test: it goes on under the same set-up."""
+        return (
+            block.index == self.next_index
+            and block.period == self.first.period
+            and (block.force is None) == (self.first.force is None)
+            and _test(setup) == _test(self.setup)
+        )
 
     def record(self, source: str) -> Record:
         setup = self.setup
@@ -157,12 +169,12 @@ def read_records(
     Args:
         path: bag folder or lone .mcap.
         note: called with one line per damage; the default raises it.
-        gap: called with one line where a test is split (samples missing, set-up changed); the
-            default raises for missing samples and says nothing of the rest.
+        gap: called with one line where samples are missing or the clock jumps, and the test is
+            split there; the default raises. A new test or set-up splits without a word.
 
     Raises:
-        InputError: no bag, no samples, damage, NaN or absurd samples, missing samples and nobody
-            to be told.
+        InputError: no bag, no samples, damage, NaN or absurd samples, a gap or clock jump and
+            nobody to be told.
     """
     setups = _setups(path, note)
     open_segments: dict[str, _Segment] = {}
@@ -181,16 +193,10 @@ def read_records(
         setup = _setup_of(item, setups, position)
         segment = open_segments.get(item.topic)
         if segment is not None:
-            reason = segment.break_before(item, setup)
-            if reason is not None:
-                where = f'{path}: topic {item.topic}: '
-                if item.index > segment.next_index and gap is None:
-                    raise InputError(
-                        f'{where}{reason}; cut the bag there, or use the stretches one by one'
-                    )
-                # A new test in the same bag begins at 0: nothing to be told.
-                if item.index and gap is not None:
-                    gap(f'{where}{reason}; the stretches are taken as records of their own')
+            fault = segment.fault_before(item)
+            if fault:
+                _tell(f'{path}: topic {item.topic}: {fault}', gap)
+            if fault or not segment.same_test(item, setup):
                 done.append(segment)
                 segment = None
         if segment is None:
@@ -205,6 +211,12 @@ def read_records(
     if not records:
         raise InputError(_nothing(path))
     return records
+
+
+def _tell(fault: str, gap: Note | None) -> None:
+    if gap is None:
+        raise InputError(f'{fault}; take the stretches as records of their own with --split')
+    gap(f'{fault}; the stretches are taken as records of their own')
 
 
 def _source(path: Path | str, topic: str, topics: int, number: int, records: int) -> str:

@@ -32,8 +32,8 @@ def load_records(
         channels: channel map for the laboratory files.
         hold: how the command runs between its samples; None for what the files say.
         note: called with one line per damage of a bag; the default raises it.
-        gap: called with one line where a bag is split into records; the default raises for
-            missing samples.
+        gap: called with one line where a bag lacks samples or its clock jumps, and is split
+            there; the default raises.
 
     Raises:
         InputError: a path cannot be used, or the number of stiffnesses does not fit.

@@ -168,6 +168,29 @@ def test_a_cut_bag_is_told_mended_and_used(run, tmp_path: Path, short_bag: Path)
     assert 'no such bag' in run('recover', tmp_path / 'nothing').message
 
 
+def test_a_gap_is_refused_unless_it_may_split(run, tmp_path: Path, short_bag: Path) -> None:
+    """Missing samples are one message; --split takes what is left and goes on telling."""
+    from actuator_glue.io.bag_records import write_record
+    from actuator_glue.io.bag_writer import BagWriter
+
+    (record,) = load_records(short_bag)
+    bag = tmp_path / 'gap'
+    with BagWriter(bag) as writer:
+        write_record(writer, record.slice(0, 300))
+        write_record(writer, record.slice(350, 801))
+    for command in (('calibrate', bag), ('plot', bag), ('convert', bag, tmp_path / 'x.csv')):
+        done = run(*command)
+        assert done.code == 2
+        assert '50 samples (0.5 s) are missing before sample 350' in done.message
+    shown = run('info', bag, '--json', '-')
+    assert shown.code == 2
+    assert [r['samples'] for r in shown.json['files'][0]['records']] == [300, 451]
+    done = run('convert', bag, tmp_path / 'x.csv', '--split')
+    assert done.code == 0
+    assert 'missing' in done.err
+    assert sorted(p.name for p in tmp_path.glob('*.csv')) == ['x_1.csv', 'x_2.csv']
+
+
 def test_pictures_of_records(run, tmp_path: Path, short_bag: Path, problem_r: Path) -> None:
     """One picture per record; a bag without posteriors says how to get them."""
     done = run('plot', short_bag, problem_r / 'r_1.csv', '--out', tmp_path / 'pics')

@@ -63,9 +63,7 @@ def test_missing_samples_are_told_or_split(tmp_path: Path, record: Record) -> No
     with open_bag(tmp_path / 'bag') as writer:
         for start in (0, 100, 300, 400):
             writer.write('/samples', samples(record, start, start + 100), start)
-    with pytest.raises(
-        InputError, match=r'100 samples \(0\.1 s\) are missing before at sample 300'
-    ):
+    with pytest.raises(InputError, match=r'100 samples \(0\.1 s\) are missing before sample 300'):
         read_records(tmp_path / 'bag')
     told: list[str] = []
     first, second = read_records(tmp_path / 'bag', gap=told.append)
@@ -73,6 +71,22 @@ def test_missing_samples_are_told_or_split(tmp_path: Path, record: Record) -> No
     assert (len(first), len(second)) == (200, 200)
     assert (second.first_index, second.start_ns) == (300, record.stamp_ns(300))
     assert second.command.tobytes() == record.command[300:].tobytes()
+
+
+def test_a_clock_that_jumps_back_is_told_or_splits(tmp_path: Path, record: Record) -> None:
+    """Stamps that step by more than 0.1 s, though no sample is missing; jitter is nothing."""
+    for name, steps in (('jump', (0, 0, -5e9)), ('jitter', (0, 0.09e9, 0.01e9))):
+        with open_bag(tmp_path / name) as writer:
+            for start, step in zip((0, 100, 200), steps, strict=True):
+                block = samples(record, start, start + 100)
+                block.header = messages.header(record.stamp_ns(start) + int(step) + 10**10, 'mts')
+                writer.write('/samples', block, start)
+    with pytest.raises(InputError, match=r'the clock jumps by -5 s at sample 200.*--split'):
+        read_records(tmp_path / 'jump')
+    told: list[str] = []
+    assert [len(r) for r in read_records(tmp_path / 'jump', gap=told.append)] == [200, 100]
+    assert len(told) == 1
+    assert len(read_records(tmp_path / 'jitter')[0]) == 300
 
 
 def test_a_stream_that_begins_again_is_a_new_record(tmp_path: Path, record: Record) -> None:
