@@ -1,0 +1,271 @@
+"""What the model lacks: diagnosis on request, or by itself when coverage breaks."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections import deque
+from typing import Any
+
+from actuator_glue_msgs.action import Diagnose
+from actuator_glue_msgs.srv import SetModel
+from rclpy.action import ActionServer, CancelResponse, GoalResponse
+
+from actuator_glue.errors import InputError
+from actuator_glue.nodes import base, diagnosing, topics
+from actuator_glue.nodes.health import ERROR
+from actuator_glue.nodes.messages import publish
+from actuator_glue.nodes.parameters import Spec
+from actuator_glue.nodes.worker import DIED, FAILED, PROGRESS, Answer, Worker
+from actuator_glue.online import wire
+from actuator_glue.online.alarm import CoverageAlarm
+from actuator_glue.online.collect import Collector
+from actuator_glue.online.stream import Event, Rejected, Restarted
+
+SPECS = (
+    Spec('automatic', True, 'diagnose when the coverage breaks'),
+    Spec('apply', False, 'have the estimator go on with the augmented model'),
+    Spec('coverage_limit', 0.8, 'coverage of the noise band that raises the alarm', '1', 0.0, 1.0),
+    Spec('coverage_windows', 5, 'windows the coverage is averaged over', '1', 1, 1000, True),
+    Spec('minimum', 20.0, 'data needed before a diagnosis by itself', 's', 5.0, 3600.0),
+    Spec('pause', 60.0, 'shortest time between diagnoses by itself', 's', 0.0, 86_400.0),
+    Spec('keep', 180.0, 'samples kept for a diagnosis', 's', 10.0, 3600.0, True),
+    Spec('seed', 1, 'seed of diagnoses by itself', '1', 0, 2**53),
+    Spec('estimator', 'estimator', 'name of the estimator node', read_only=True),
+)
+
+
+class DiagnoserNode(base.SuiteNode):
+    """Collects samples, watches the coverage, and has a worker process diagnose."""
+
+    def __init__(self) -> None:
+        self._goal: Any = None
+        self._request: diagnosing.Request | None = None
+        super().__init__('diagnoser', SPECS)
+
+    def do_configure(self) -> None:
+        """Start the worker; offer the action."""
+        self._answers: deque[Answer] = deque()
+        self._arrived = self.create_guard_condition(self.guarded(self._take_answers))
+        self.worker = Worker(self._answered, None, nice=5)
+        self._diagnosis = self.publisher(topics.DIAGNOSIS)
+        self._model_client = self.create_client(
+            SetModel, f'{self.parameters["estimator"]}/set_model'
+        )
+        self._action = ActionServer(
+            self,
+            Diagnose,
+            '~/diagnose',
+            execute_callback=self._conclude,
+            goal_callback=self._asked,
+            handle_accepted_callback=self._accepted,
+            cancel_callback=lambda _: CancelResponse.ACCEPT,
+        )
+
+    def do_activate(self) -> None:
+        """Listen to samples and bands."""
+        values = self.parameters.values()
+        self.collector = Collector(values['keep'])
+        self.alarm = CoverageAlarm(values['coverage_limit'], values['coverage_windows'])
+        self._last = float('-inf')
+        self._pending = False
+        self.subscribe(
+            topics.TEST_SETUP, lambda m: self._tell(self.collector.setup(wire.setup(m)))
+        )
+        self.subscribe(topics.SAMPLES, lambda m: self._tell(self.collector.push(wire.block(m))))
+        self.subscribe(topics.BAND, self._band)
+        self.every(0.2, self._check_cancel)
+
+    def do_deactivate(self) -> None:
+        """Give up a running diagnosis."""
+        if self._request is not None:
+            self.worker.restart()
+            self._finish(diagnosing.Outcome(message='the node was deactivated'))
+
+    def do_cleanup(self) -> None:
+        """End the worker, withdraw the action."""
+        self.worker.close()
+        self._action.destroy()
+        self.destroy_client(self._model_client)
+        self.destroy_guard_condition(self._arrived)
+
+    def do_report(self) -> None:
+        """Coverage and what is being done."""
+        if hasattr(self, 'alarm'):
+            self.health.values.update(
+                {
+                    'coverage of the noise band': self.alarm.coverage,
+                    'diagnosing': self._request is not None,
+                    'worker': 'ready' if self.worker.ready.is_set() else 'compiling',
+                }
+            )
+
+    def changed(self, names: set[str]) -> None:
+        """A new limit holds from the next band on."""
+        if self.active:
+            self.alarm.limit = self.parameters['coverage_limit']
+
+    # Watching.
+
+    def _setup(self, message: Any) -> None:
+        self._tell(self.collector.setup(wire.setup(message)))
+
+    def _block(self, message: Any) -> None:
+        self._tell(self.collector.push(wire.block(message)))
+
+    def _tell(self, events: list[Event]) -> None:
+        for event in events:
+            if isinstance(event, Rejected):
+                self.complain('bad input', event.message)
+            elif isinstance(event, Restarted):
+                self.alarm.reset()
+
+    def _band(self, message: Any) -> None:
+        if not message.scored or message.kind != message.NOISE:
+            return
+        if self.alarm.update(message.widest_coverage):
+            self._pending = True
+            self.complain(
+                'coverage',
+                f'the {100 * message.widest_level:g} % band of parameters and sensor noise covers '
+                f'{100 * self.alarm.coverage:.0f} % of the samples: the model lacks something',
+            )
+        if self._pending and self.parameters['automatic'] and self._request is None:
+            self._start_by_itself()
+
+    def _start_by_itself(self) -> None:
+        values = self.parameters.values()
+        if time.monotonic() - self._last < values['pause']:
+            return
+        records = self.collector.records()
+        if sum(r.duration for r in records) < values['minimum']:
+            return
+        self._pending = False
+        self.get_logger().info('diagnosing what was received lately')
+        self._start(
+            diagnosing.Request(records=tuple(records), seed=values['seed'], apply=values['apply'])
+        )
+
+    # Diagnosing.
+
+    def _asked(self, goal: Any) -> GoalResponse:
+        if not self.active or self._request is not None or self._goal is not None:
+            self.get_logger().warning('diagnosis refused: inactive, or one is running')
+            return GoalResponse.REJECT
+        return GoalResponse.ACCEPT
+
+    def _accepted(self, handle: Any) -> None:
+        """Start; the goal is executed, which ends it, when the outcome is there."""
+        self._goal = handle
+        try:
+            live = () if handle.request.records else tuple(self.collector.records())
+            self._start(diagnosing.asked(handle.request, live))
+        except InputError as error:
+            self._finish(diagnosing.Outcome(message=str(error)))
+
+    def _start(self, request: diagnosing.Request) -> None:
+        self._request = request
+        self._last = time.monotonic()
+        self.worker.submit(diagnosing.work, request)
+
+    def _answered(self, answer: Answer) -> None:
+        self._answers.append(answer)
+        self._arrived.trigger()
+
+    def _take_answers(self) -> None:
+        while self._answers:
+            answer = self._answers.popleft()
+            if self._request is None and answer.kind != DIED:
+                continue
+            if answer.kind == PROGRESS:
+                self._progress(*answer.payload)
+            elif answer.kind == DIED:
+                self.complain('worker', f'{answer.payload}; starting another', ERROR)
+                self.worker.restart()
+                self._finish(diagnosing.Outcome(message=str(answer.payload)))
+            elif answer.kind == FAILED:
+                self.complain('diagnosis', str(answer.payload), ERROR)
+                self._finish(diagnosing.Outcome(message=str(answer.payload)))
+            else:
+                self._diagnosed(answer.payload)
+
+    def _progress(self, stage: str, fraction: float) -> None:
+        self.health.values['stage'] = f'{stage} ({100 * fraction:.0f} %)'
+        if self._goal is not None:
+            self._goal.publish_feedback(Diagnose.Feedback(stage=stage, fraction=float(fraction)))
+
+    def _diagnosed(self, outcome: diagnosing.Outcome) -> None:
+        request = self._request
+        if outcome.diagnosis is None or request is None:
+            self.complain('diagnosis', outcome.message)
+            self._finish(outcome)
+            return
+        head = wire.Head(self.get_clock().now().nanoseconds, outcome.actuator)
+        publish(self._diagnosis, head, diagnosing.fields(outcome))
+        self.get_logger().info(outcome.message)
+        if request.apply and outcome.diagnosis.structure:
+            self._apply(outcome)
+        else:
+            self._finish(outcome)
+
+    def _apply(self, outcome: diagnosing.Outcome) -> None:
+        diagnosis = outcome.diagnosis
+        assert diagnosis is not None
+        if not self._model_client.service_is_ready():
+            self.complain('set_model', f'{self._model_client.srv_name} is not there')
+            self._finish(outcome)
+            return
+        request = SetModel.Request(effects=list(diagnosis.structure))
+
+        def answered(future: Any) -> None:
+            response = future.result()
+            if response is not None and response.success:
+                self.get_logger().info(f'estimator: {response.message}')
+                self.alarm.reset()
+                outcome.applied = True
+            else:
+                why = 'no answer' if response is None else response.message
+                self.complain('set_model', f'the estimator refuses: {why}')
+            self._finish(outcome)
+
+        self._model_client.call_async(request).add_done_callback(self.guarded(answered))
+
+    def _check_cancel(self) -> None:
+        if self._goal is not None and self._request is not None and self._goal.is_cancel_requested:
+            self.worker.restart()
+            self._finish(diagnosing.Outcome(message='cancelled'))
+
+    def _finish(self, outcome: diagnosing.Outcome) -> None:
+        self._request = None
+        self._outcome = outcome
+        self.health.values['last diagnosis'] = outcome.message
+        if self._goal is not None:
+            self._goal.execute()
+
+    def _conclude(self, handle: Any) -> Any:
+        """End a goal whose outcome is known."""
+        outcome, self._goal = self._outcome, None
+        result = Diagnose.Result(
+            success=outcome.diagnosis is not None,
+            message=outcome.message,
+            applied=outcome.applied,
+        )
+        if outcome.diagnosis is not None:
+            head = wire.Head(self.get_clock().now().nanoseconds, outcome.actuator)
+            diagnosing.fill_message(result.diagnosis, head, outcome)
+        if handle.is_cancel_requested:
+            handle.canceled()
+        elif outcome.diagnosis is not None:
+            handle.succeed()
+        else:
+            handle.abort()
+        return result
+
+
+def main(args: list[str] | None = None) -> int:
+    """Run the node."""
+    return base.main(DiagnoserNode, args)
+
+
+if __name__ == '__main__':
+    sys.exit(main())

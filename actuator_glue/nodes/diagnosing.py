@@ -1,0 +1,155 @@
+"""What the diagnoser's worker does, and the Diagnosis message of what it finds."""
+
+from __future__ import annotations
+
+import json
+import math
+import time
+from dataclasses import dataclass, replace
+from typing import Any
+
+from actuator_glue_msgs.msg import Candidate, Effect
+
+from actuator_glue.errors import InputError
+from actuator_glue.io.load import load_records
+from actuator_glue.nodes.messages import fill
+from actuator_glue.nodes.worker import Tell
+from actuator_glue.online.wire import Fields, Head
+from actuator_glue.records import Record
+from actuator_glue.residual.diagnose import diagnose
+from actuator_glue.residual.diagnosis import Diagnosis, Finding
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """What is to be diagnosed.
+
+    Attributes:
+        records: records that are at hand.
+        paths: bags or laboratory files to read, where there are none.
+        stiffness: specimen stiffness of each path [N/m]; empty for what they say.
+        holdout: path of the held-out record, empty for none.
+        holdout_stiffness: its specimen stiffness [N/m], NaN for what it says.
+        seed: seed of the random numbers.
+        apply: the estimator is to go on with the augmented model.
+    """
+
+    records: tuple[Record, ...] = ()
+    paths: tuple[str, ...] = ()
+    stiffness: tuple[float, ...] = ()
+    holdout: str = ''
+    holdout_stiffness: float = math.nan
+    seed: int = 1
+    apply: bool = False
+
+
+@dataclass(slots=True)
+class Outcome:
+    """What came of it; `diagnosis` is None where `message` says why not."""
+
+    diagnosis: Diagnosis | None = None
+    message: str = ''
+    sources: tuple[str, ...] = ()
+    actuator: str = ''
+    applied: bool = False
+
+
+def asked(goal: Any, live: tuple[Record, ...]) -> Request:
+    """Return the request of a Diagnose goal.
+
+    Args:
+        goal: the goal.
+        live: the samples received so far, used where the goal names no records.
+
+    Raises:
+        InputError: nothing to diagnose.
+    """
+    if not goal.records and not live:
+        raise InputError(
+            'no stretch of 5 s without a gap has been received and the goal names no records'
+        )
+    return Request(
+        records=live,
+        paths=tuple(goal.records),
+        stiffness=tuple(goal.stiffness),
+        holdout=goal.holdout,
+        holdout_stiffness=float(goal.holdout_stiffness) if goal.holdout else math.nan,
+        seed=int(goal.seed),
+        apply=bool(goal.apply),
+    )
+
+
+def work(request: Request, tell: Tell) -> Outcome:
+    """Diagnose; runs in the worker."""
+    try:
+        records, holdout = list(request.records), None
+        if request.paths:
+            records = load_records(list(request.paths), stiffness=list(request.stiffness) or None)
+        if request.holdout:
+            known = request.holdout_stiffness
+            holdout = load_records(request.holdout, stiffness=None if math.isnan(known) else known)
+        found = diagnose(
+            records,
+            holdout,
+            seed=request.seed,
+            progress=lambda stage, fraction: tell((stage, fraction)),
+            clock=time.monotonic,
+        )
+    except InputError as error:
+        return Outcome(message=str(error))
+    return Outcome(
+        diagnosis=replace(found, traces=()),  # curves are for the report, not for the wire
+        message=found.summary(),
+        sources=tuple(r.source for r in records),
+        actuator=records[0].actuator,
+    )
+
+
+def fields(outcome: Outcome) -> Fields:
+    """Return the fields of a Diagnosis message but its header."""
+    found = outcome.diagnosis
+    assert found is not None
+    error = found.error
+    return {
+        'verdict': found.verdict,
+        'summary': outcome.message,
+        'records': list(outcome.sources),
+        'effects': [_effect(effect) for effect in found.effects],
+        'candidates': [
+            Candidate(name=c.name, score=float(c.score), error=float(c.error))
+            for c in found.candidates
+        ],
+        'advice': list(found.advice),
+        'split': error.split,
+        'error_before': float(error.before),
+        'error_before_lower': float(error.before_ci[0]),
+        'error_before_upper': float(error.before_ci[1]),
+        'error_after': float(error.after),
+        'error_after_lower': float(error.after_ci[0]),
+        'error_after_upper': float(error.after_ci[1]),
+        'noise_floor': float(error.noise_floor),
+        'removable_removed': float(error.removable_removed),
+        'coverage_before': float(found.coverage[0]),
+        'coverage_after': float(found.coverage[1]),
+        'seconds': float(found.seconds),
+        'json': json.dumps(found.to_json()),
+    }
+
+
+def fill_message(message: Any, head: Head, outcome: Outcome) -> Any:
+    """Return a Diagnosis message with everything set."""
+    return fill(message, head, fields(outcome))
+
+
+def _effect(effect: Finding) -> Any:
+    parameters = effect.parameters
+    return Effect(
+        name=effect.name,
+        alternatives=list(effect.alternatives),
+        probability=float(effect.probability),
+        place=effect.place,
+        parameter_names=list(parameters),
+        units=[p.unit for p in parameters.values()],
+        mean=[float(p.mean) for p in parameters.values()],
+        stddev=[float(p.stddev) for p in parameters.values()],
+    )

@@ -1,0 +1,66 @@
+"""The last minutes of a stream as records, one per stretch without a break."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import replace
+
+import numpy as np
+
+from actuator_glue.online.settings import EstimatorSettings
+from actuator_glue.online.stream import Block, Event, Setup, Window
+from actuator_glue.online.windows import Windows
+from actuator_glue.records import Record
+
+PIECE = 0.5  # s; what is kept ends at most this long before the last sample
+
+
+class Collector:
+    """Keeps what was streamed lately; a bounded number of seconds, whatever happens.
+
+    Args:
+        seconds: how much is kept [s].
+    """
+
+    def __init__(self, seconds: float) -> None:
+        self.seconds = seconds
+        pieces = EstimatorSettings(window=PIECE, hop=PIECE, settle=0.0, time_budget=PIECE)
+        self._windows = Windows(pieces)
+        self._kept: deque[Window] = deque(maxlen=max(1, round(seconds / PIECE)))
+
+    def setup(self, setup: Setup) -> list[Event]:
+        """Take a test set-up."""
+        return self._windows.setup(setup)
+
+    def push(self, block: Block) -> list[Event]:
+        """Take a block of samples."""
+        events, windows = self._windows.push(block)
+        if windows and self._kept and windows[0].epoch != self._kept[-1].epoch:
+            self._kept.clear()  # another actuator
+        self._kept.extend(windows)
+        return events
+
+    def forget(self) -> None:
+        """Let go of everything kept."""
+        self._kept.clear()
+
+    def records(self, shortest: float = 5.0) -> list[Record]:
+        """Return what is kept, oldest first.
+
+        Args:
+            shortest: stretches shorter than this are left out [s].
+        """
+        stretches: dict[int, list[Record]] = {}
+        for window in self._kept:
+            stretches.setdefault(window.segment, []).append(window.record)
+        joined = [_join(parts) for parts in stretches.values()]
+        return [r for r in joined if r.duration >= shortest - 1e-9]
+
+
+def _join(parts: list[Record]) -> Record:
+    return replace(
+        parts[0],
+        command=np.concatenate([p.command for p in parts]),
+        measured=np.concatenate([p.measured for p in parts]),
+        source=f'{parts[0].actuator}, samples {parts[0].first_index}..',
+    )
