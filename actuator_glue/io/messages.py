@@ -55,8 +55,12 @@ def _definition_folders() -> Iterator[Path]:
     package = Path(__file__).resolve().parent.parent
     yield package / 'interfaces' / 'msg'
     yield package.parent / 'msg_defs' / 'msg'
+    yield from _workspace_folders(PACKAGE)
+
+
+def _workspace_folders(package: str) -> Iterator[Path]:
     for prefix in filter(None, os.environ.get('AMENT_PREFIX_PATH', '').split(os.pathsep)):
-        yield Path(prefix) / 'share' / PACKAGE / 'msg'
+        yield Path(prefix) / 'share' / package / 'msg'
 
 
 @cache
@@ -91,30 +95,53 @@ def full_name(name: str) -> str:
     return name if '/' in name else f'{PACKAGE}/msg/{name}'
 
 
-def _own_text(name: str) -> str | None:
+def _text(name: str) -> str | None:
+    """Return the .msg file of a type: ours, or one of a sourced workspace."""
     package, _, stem = name.replace('/msg/', '/').partition('/')
-    return (definition_folder() / f'{stem}.msg').read_text('utf-8') if package == PACKAGE else None
+    folders = [definition_folder()] if package == PACKAGE else _workspace_folders(package)
+    for folder in folders:
+        if (folder / f'{stem}.msg').is_file():
+            return (folder / f'{stem}.msg').read_text('utf-8')
+    return None
+
+
+def _learn(name: str) -> None:
+    """Take a type that rosbags does not know, and those it uses, from a sourced workspace."""
+    store = typestore()
+    text = None if name in store.fielddefs else _text(name)
+    if text is None:
+        return
+    types = get_types_from_msg(text, name)
+    for _, kind in types[name][1]:
+        # A field is (code, what), an array of such (code, ((code, what), length)).
+        used = kind[1] if isinstance(kind[1], str) else kind[1][0][1]
+        if isinstance(used, str) and '/' in used:
+            _learn(used)
+    store.register(types)
 
 
 @cache
 def message_type(name: str) -> MessageType:
     """Return definition and hash of a type; ours keep their comments, which carry the units.
 
+    Types of other packages are found where their workspace is sourced.
+
     Raises:
-        InputError: the type is unknown.
+        InputError: the type is unknown, or its .msg file cannot be parsed.
     """
     name = full_name(name)
     store = typestore()
     try:
+        _learn(name)
         text, _ = store.generate_msgdef(name, ros_version=2)
         rihs01 = store.hash_rihs01(name)
     except TypesysError as error:
         raise InputError(f'message type {name} is unknown ({error})') from error
     own, *used = text.split(f'{_RULE}\nMSG: ')
-    parts = [_own_text(name) or own]
+    parts = [_text(name) or own]
     for part in used:
         title, body = part.split('\n', 1)
-        parts.append(f'MSG: {title}\n{_own_text(title) or body}')
+        parts.append(f'MSG: {title}\n{_text(title) or body}')
     definition = f'{_RULE}\n'.join(p if p.endswith('\n') else p + '\n' for p in parts)
     return MessageType(name, definition, rihs01)
 

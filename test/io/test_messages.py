@@ -73,6 +73,26 @@ def test_standard_and_unknown_types() -> None:
         messages.message_type('Nothing')
 
 
+def test_types_of_a_laboratorys_own_packages(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A recorder in a sourced workspace can record them; comments stay."""
+    folder = tmp_path / 'share' / 'lab_msgs' / 'msg'
+    folder.mkdir(parents=True)
+    (folder / 'Pump.msg').write_text(
+        '# pump\nstd_msgs/Header header\nValve[2] valves\nfloat64 oil # [K]\n'
+    )
+    (folder / 'Valve.msg').write_text('float64 spool # [m]\nuint8[] bits\n')
+    (folder / 'Broken.msg').write_text('float64 [')
+    monkeypatch.setenv('AMENT_PREFIX_PATH', str(tmp_path))
+    pump = messages.message_type('lab_msgs/msg/Pump')
+    assert pump.definition.startswith('# pump')
+    assert 'MSG: lab_msgs/Valve\nfloat64 spool # [m]' in pump.definition
+    assert pump.rihs01.startswith('RIHS01_')
+    with pytest.raises(InputError, match='Broken'):
+        messages.message_type('lab_msgs/msg/Broken')
+
+
 @pytest.mark.parametrize('data', [b'', b'\x00\x01\x00\x00', b'\x00\x07\x00\x00' + bytes(80)])
 def test_bytes_that_are_no_message(data: bytes) -> None:
     """Too short, or of an unknown encapsulation."""
