@@ -11,7 +11,7 @@ from actuator_glue.residual.decide import Decision
 _EXPERIMENT = {
     'lag': 'a sweep to a higher frequency (a delay does not roll off, a lag does)',
     'offset': 'a record with leakage to feel it: high stiffness held at a constant offset',
-    'lost-motion': 'a second amplitude (0.5 mm): play keeps its width, a deadband follows the gain',
+    'lost-motion': 'a second amplitude (0.5 mm): play keeps its width',
     'friction': 'a slow triangle wave at a second amplitude; the force channel shows it directly',
     'gain': 'a second specimen stiffness, and a static step',
     'flow-time': 'a down-sweep: time and frequency then run against each other',
@@ -32,7 +32,8 @@ def of(decision: Decision, found: Attribution, data: Data) -> tuple[str, ...]:
     if decision.verdict == 'unexplained':
         best = found.singles[0].added if found.singles else ''
         out.append(
-            f'{1e6 * decision.left:.1f} um of structure remain (limit {1e6 * decision.limit:.1f}); '
+            f'{1e6 * decision.left:.1f} um of structure remain '
+            f'(limit {1e6 * decision.limit:.1f}); '
             f'closest in the catalogue, not enough: {best}; look where `remaining` points, '
             'and record the force channel and a second amplitude'
         )

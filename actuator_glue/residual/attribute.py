@@ -106,11 +106,8 @@ class Attributor:
         for i, current in enumerate(beam):
             names = [n for n in self.search.names if n not in current.effects]
             screened = self.search.screened(current, names)
-            for trial in self.search.additions(
-                current,
-                screened[: self.settings.tried],
-                lambda share, i=i: self.progress(f'effect {stage}', (i + share) / len(beam)),
-            ):
+            self.progress(f'effect {stage}', i / len(beam))
+            for trial in self.search.additions(current, screened[: self.settings.tried]):
                 found.setdefault(trial.effects, trial)
         return sorted(found.values(), key=lambda t: -float(t.scores.sum()))
 

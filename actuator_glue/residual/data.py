@@ -48,7 +48,8 @@ class Data:
     def whole(cls, records: Sequence[Record]) -> Data:
         """Count all samples; every record starts from rest."""
         ones = tuple(np.ones(len(r), dtype=np.bool_) for r in records)
-        return cls(tuple(records), ones, ('rest',) * len(ones), (1,) * len(ones))
+        initials: list[Initial] = ['rest' for _ in ones]
+        return cls(tuple(records), ones, tuple(initials), (1,) * len(ones))
 
     @cached_property
     def periods(self) -> tuple[float, ...]:

@@ -52,19 +52,23 @@ def decide(
         found.material,
         settings.left_share * found.structure,
     )
+    verdict: Verdict = 'none'
     if left > limit:
-        verdict: Verdict = 'unexplained'
-        final, names, measured = found.base, (), ()
+        verdict = 'unexplained'
     elif found.final.effects or seen:
         verdict = 'missing-effect'
-        final, names, measured = found.final, found.final.effects, seen
-    else:
-        verdict = 'none'
-        final, names, measured = found.base, (), ()
+    named = verdict == 'missing-effect'
+    final = found.final if named else found.base
     return Decision(
-        verdict, final, names, measured, found.noise, left, limit,
-        remaining(data, final.fit.error),
-    )  # fmt: skip
+        verdict=verdict,
+        final=final,
+        names=final.effects,
+        measured=seen if named else (),
+        noise=found.noise,
+        left=left,
+        limit=limit,
+        remaining=remaining(data, final.fit.error),
+    )
 
 
 def _band(frequency: Array, excess: Array) -> list[float]:

@@ -31,7 +31,7 @@ def surrogate(part: Split, size: int, period: float, rng: np.random.Generator) -
 
 
 def p_value(data: Data, splits: list[Split], seed: int) -> float:
-    """Bootstrap p-value of the structure of all records under stationary noise of their density."""
+    """Bootstrap p-value of the structure of all records under stationary noise."""
     rng = np.random.default_rng([seed, 2])
     observed = sum(s.mean_square - s.noise**2 for s in splits)
     above = 1

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -69,7 +70,7 @@ def diagnose(
     decision = decide(found, seen, prepared.fit, settings)
     assert search.scorer is not None
     rng = np.random.default_rng([seed, 1])
-    sides = []
+    sides: list[Side] = []
     for stage, trial in (('posterior before', found.base), ('posterior', decision.final)):
         if sides and not decision.final.effects:
             sides.append(sides[0])
@@ -81,7 +82,7 @@ def diagnose(
             search.scorer,
             rng=rng,
             evaluations=settings.evaluations if trial.effects else 0,
-            progress=lambda share, stage=stage: tell(stage, share),
+            progress=partial(tell, stage),
         )
         sides.append(Side(trial.effects, trial.fit.theta, draws))
     before, after = sides

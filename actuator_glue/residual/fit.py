@@ -45,7 +45,7 @@ class Fit:
 
 
 class Space:
-    """Working coordinates of a structure: logs of Eq. (2)'s parameters, the effects' as they are."""
+    """Working coordinates: logarithms of Eq. (2)'s parameters, an effect's as they are."""
 
     def __init__(self, model: Model, duration: float) -> None:
         extra = model.parameters[_P:]

@@ -9,6 +9,7 @@ parameters (Cook 1977).
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -42,7 +43,7 @@ class Scorer:
             size = part.stop - part.start
             count = max(2, round(size * period / BLOCK))
             edges = part.start + np.linspace(0, size, count + 1).astype(int)
-            blocks += [slice(int(a), int(b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+            blocks += [slice(int(a), int(b)) for a, b in pairwise(edges)]
         return cls(data, tuple(whitener([s]) for s in splits), tuple(blocks))
 
     def whiten(self, rows: Array) -> Array:

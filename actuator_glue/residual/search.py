@@ -17,6 +17,8 @@ from actuator_glue.residual.fit import Fit, base_starts, fit
 from actuator_glue.residual.score import Scorer
 
 _P = len(BASE)
+_COARSE = 8  # iterations of every refit; those in the running go on
+_POLISHED = 6
 _STARTS = 4  # starting sizes that survive the screening (the kernel works on 32 at a time)
 
 
@@ -42,6 +44,10 @@ class Trial:
         return float(np.mean(self.fit.error**2))
 
 
+def _by_score(trial: Trial) -> float:
+    return -float(trial.scores.sum())
+
+
 @dataclass
 class Search:
     """All structures tried on one data set, each refitted once.
@@ -58,6 +64,8 @@ class Search:
     jobs: int = 1
     scorer: Scorer | None = None
     _tried: dict[frozenset[str], Fit] = field(default_factory=dict)
+    _signatures: dict[str, tuple[Array, Array]] = field(default_factory=dict)
+    _polished: set[frozenset[str]] = field(default_factory=set)
 
     def base(self) -> Fit:
         """Fit Eq. (2) from a grid of starts."""
@@ -85,9 +93,30 @@ class Search:
         effects = tuple(n for n in CATALOGUE if n in current.effects or n == name)
         key = frozenset(effects)
         if key not in self._tried:
-            model = Structure(effects)
-            self._tried[key] = fit(self.data, model, self.screen(current, name)[1])
+            starts = self.screen(current, name)[1]
+            coarse = fit(self.data, Structure(effects), starts, iterations=_COARSE, tolerance=1e-4)
+            self._tried[key] = coarse
         return self.trial(effects, name)
+
+    def polish(self, trial: Trial) -> Trial:
+        """Finish the refit of a trial that is in the running."""
+        key = frozenset(trial.effects)
+        if key not in self._polished:
+            again = fit(self.data, Structure(trial.effects), self._tried[key].theta)
+            self._tried[key] = again
+            self._polished.add(key)
+        return self.trial(trial.effects, trial.added)
+
+    def _signature(self, name: str) -> tuple[Array, Array]:
+        """Starting sizes of an effect (s, k) and what each adds to Eq. (2) as fitted (s, N)."""
+        if name not in self._signatures:
+            base = self._tried[frozenset()]
+            model = Structure((name,))
+            thetas = model.starts(base.theta, self.scale())
+            output = self.data.simulate(model, thetas)
+            signature = output - (self.data.target - base.error)
+            self._signatures[name] = thetas[:, model.columns(name)], signature
+        return self._signatures[name]
 
     def screen(self, current: Trial, name: str) -> tuple[float, Array]:
         """Project the residual on an effect's signatures, current parameters refitted linearly.
@@ -96,16 +125,15 @@ class Search:
             The largest share of the squared error that one of the effect's starting sizes can
             remove, and the starting parameters that promise most (s, p).
         """
-        model = Structure(tuple(n for n in CATALOGUE if n in current.effects or n == name))
         effect = CATALOGUE[name]
         neutral = np.array(
             [p.neutral if p.neutral is not None else 0.0 for p in effect.parameters]
         )
-        rows = np.array(effect.starts(self.scale()), dtype=np.float64)
+        rows, signature = self._signature(name)
         lower = np.array([p.lower for p in effect.parameters])
         upper = np.array([p.upper for p in effect.parameters])
-        rows = np.clip(rows, lower, upper)
         names = [p.name for p in effect.parameters]
+        model = Structure(tuple(n for n in CATALOGUE if n in current.effects or n == name))
         is_new = np.array([p.name in names for p in model.parameters])
 
         def join(values: Array) -> Array:
@@ -114,10 +142,7 @@ class Search:
             thetas[:, ~is_new] = current.fit.theta
             return thetas
 
-        output = self.data.simulate(model, join(rows))
-        reference = self.data.target - current.fit.error
-        signature = output - reference
-        alive = np.isfinite(signature).all(axis=1)
+        alive = np.asarray(np.isfinite(signature).all(axis=1))
         signature = np.where(alive[:, None], signature, 0.0)
         jac = current.fit.jacobian
         scales = np.sqrt(np.einsum('pn,pn->p', jac, jac))
@@ -160,7 +185,15 @@ class Search:
                 out.append(trial)
                 if progress is not None:
                     progress((i + 1) / len(wanted))
-        return sorted(out, key=lambda t: -float(t.scores.sum()))
+            out.sort(key=_by_score)
+            # Only what is near the best is worth the last digits.
+            near = 1.5 * out[0].mean_square if out else 0.0
+            polished = pool.map(
+                lambda t: self.polish(t[1]) if t[0] < 2 or t[1].mean_square < near else t[1],
+                list(enumerate(out))[:_POLISHED],
+            )
+            out = [*polished, *out[_POLISHED:]]
+        return sorted(out, key=_by_score)
 
     def screened(self, current: Trial, names: Iterable[str]) -> list[str]:
         """Sort effects by what their signatures could remove from the present residual."""
@@ -173,7 +206,8 @@ class Search:
         """Refit a structure with one effect taken away."""
         effects = tuple(n for n in current.effects if n != name)
         key = frozenset(effects)
-        if key not in self._tried:
+        if effects and key not in self._polished:
+            self._polished.add(key)
             model = Structure(current.effects)
             names = {p.name for p in CATALOGUE[name].parameters}
             keep = np.array([p.name not in names for p in model.parameters])

@@ -36,5 +36,5 @@ class Settings:
     hopeless: float = 0.7
     most: int = 6
     beam: int = 3
-    tried: int = 8
+    tried: int = 5
     evaluations: int = 4000

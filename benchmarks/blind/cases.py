@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -89,6 +88,8 @@ class Case:
     ratio: float  # post-refit noise-free residual over noise, fitting records
     colour: float
     sizes: dict[str, float] = field(default_factory=dict)
+    # Post-refit residual over noise of each effect of a pair on its own.
+    shares: dict[str, float] = field(default_factory=dict)
 
 
 def sweep() -> Array:
@@ -326,14 +327,19 @@ def build(seed: int) -> Case:
     theta = draw_plant(rng)
     commands = [sweep(), sweep(), earthquake(rng)]
     sizes: dict[str, float] = {}
+    shares: dict[str, float] = {}
     ratio = 0.0
     if kind == 'none' and rng.random() < 0.4:
         # Background clutter that a healthy machine has: it must not become a finding.
         sizes = {'coulomb-friction': 20.0 / theta[2] if theta[2] > 1e6 else 1e-6, 'backlash': 3e-6}
     elif names:
         target = float(np.exp(rng.uniform(np.log(0.7), np.log(8.0))))
-        target = max(target, 2.5) if kind == 'pair' else target
-        sizes, ratio = _sized(names, theta, commands, target, seed)
+        for name in names:
+            # Each effect of a pair is made visible on its own.
+            own = max(target, 2.0) if kind == 'pair' else target
+            size, shares[name] = _sized((name,), theta, commands, own, seed)
+            sizes |= size
+        ratio = shares[names[0]] if len(names) == 1 else 0.0
     clean = respond(theta, sizes, commands, seed)
     colour = float(rng.choice([0.0, 0.3, 0.6]))
     corner = float(np.exp(rng.uniform(np.log(0.5), np.log(20.0))))
@@ -345,7 +351,4 @@ def build(seed: int) -> Case:
         ratio = base_residual(theta, commands, clean) / NOISE
     if 'quantisation' in sizes or 'timing-jitter' in sizes:
         ratio = base_residual(theta, commands, measured) / NOISE
-    return Case(seed, kind, names, theta, commands, measured, clean, ratio, colour, sizes)
-
-
-Refit = Callable[[Case], float]
+    return Case(seed, kind, names, theta, commands, measured, clean, ratio, colour, sizes, shares)

@@ -1,0 +1,136 @@
+"""The report of a diagnosis: one HTML file, verdict on top."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from actuator_glue.model.effects import CATALOGUE
+from actuator_glue.report import diagnosis_figures as figures
+from actuator_glue.report.html import Block, Note, Picture, Section, Table, Text, write
+from actuator_glue.residual.diagnosis import Diagnosis
+
+
+def _um(value: float) -> str:
+    return f'{1e6 * value:.2f}'
+
+
+def _error(found: Diagnosis) -> Section:
+    e = found.error
+    sides = (
+        ('before: Eq. (2), refitted', e.before, e.before_ci, found.coverage[0]),
+        ('after', e.after, e.after_ci, found.coverage[1]),
+    )
+    rows = [
+        [text, _um(rms), f'{_um(low)} to {_um(high)}', f'{100 * inside:.1f}']
+        for text, rms, (low, high), inside in sides
+    ]
+    rows.append(['sham effect of equal size (control)', _um(e.sham), '', ''])
+    rows.append(['noise floor', _um(e.noise_floor), '', ''])
+    blocks: list[Block] = [
+        Table(
+            ['', 'rms [um]', '95 % interval [um]', 'inside the 95 % band [%]'],
+            rows,
+            'Free-run simulation error on held-out data, looked at once after all decisions.',
+        ),
+        Text(f'Share of the removable error removed: {100 * e.removable_removed:.1f} %.'),
+        Table(
+            ['held-out record', 'before [um]', 'after [um]'],
+            [[source, _um(b), _um(a)] for source, b, a in e.records],
+            'The same for each record.',
+        ),
+        Picture.of(figures.bands(found), '95 % predictive bands where both models differ most.'),
+    ]
+    return Section('Error before and after', blocks)
+
+
+def _effects(found: Diagnosis) -> Section:
+    blocks: list[Block] = []
+    if found.effects:
+        rows = [
+            [
+                e.name,
+                ', '.join(e.alternatives) or '-',
+                CATALOGUE[e.name].equation,
+                e.place,
+                _um(e.error_without),
+                _um(e.error_with),
+                f'{e.evidence:.0f}',
+            ]
+            for e in found.effects
+        ]
+        blocks.append(
+            Table(
+                ['effect', 'or', 'equation', 'place', 'without [um]', 'with [um]', 'nats'],
+                rows,
+                'What the model lacks. Names under "or" cannot be told apart by these records.',
+                prose=True,
+            )
+        )
+        blocks.append(
+            Table(
+                ['effect', 'parameter', 'mean', 'sd', '95 % interval', 'unit'],
+                [
+                    [e.name, name, f'{p.mean:.4g}', f'{p.stddev:.2g}',
+                     f'{p.lower:.4g} to {p.upper:.4g}', p.unit]
+                    for e in found.effects
+                    for name, p in e.parameters.items()
+                ],
+                'Posterior of the effects.',
+            )
+        )  # fmt: skip
+        if len(found.names) > 4:
+            blocks.append(
+                Picture.of(figures.posteriors(found), 'Posterior of the effects (DREAM(ZS)).')
+            )
+    blocks.append(
+        Picture.of(figures.ranking(found), 'Every candidate added alone, everything refitted.')
+    )
+    blocks += [Note(line) for line in found.advice]
+    return Section('What is missing', blocks)
+
+
+def _residual(found: Diagnosis) -> Section:
+    a = found.alarm
+    tests = [[name, f'{value:.3g}'] for name, value in a.tests.items()]
+    rows = [
+        [
+            r['source'], _um(r['structure']), _um(r['noise']),
+            ' to '.join(f'{f:g}' for f in r['frequency_hz']),
+            ' to '.join(f'{t:g}' for t in r['time_s']),
+            f'{100 * r["share_at_low_velocity"]:.0f}',
+            f'{100 * r["share_at_large_displacement"]:.0f}',
+        ]
+        for r in found.remaining['records']
+    ]  # fmt: skip
+    return Section(
+        'The residual',
+        [
+            Text(
+                f'Structure in the residual of Eq. (2): {_um(a.structured)} um rms, against a '
+                f'threshold of {_um(a.threshold)} um; noise {_um(a.noise)} um; '
+                f'bootstrap p-value {a.p_value:.2g}.'
+            ),
+            Picture.of(figures.residuals_in_time(found), 'Residual against time.'),
+            Picture.of(figures.residuals_in_frequency(found), 'Residual against frequency.'),
+            Picture.of(
+                figures.loops(found), 'Residual against displacement and against velocity.'
+            ),
+            Table(['statistic', 'value'], tests, 'Statistics of the residual of Eq. (2).'),
+            Table(
+                ['record', 'structure [um]', 'noise [um]', 'frequency [Hz]', 'time [s]',
+                 'at low velocity [%]', 'at large displacement [%]'],
+                rows,
+                'Where the rest after the diagnosis sits on the fitting part (middle 80 %).',
+            ),
+        ],
+    )  # fmt: skip
+
+
+def write_report(found: Diagnosis, path: Path) -> Path:
+    """Write the report of a diagnosis and return its path.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    sections = [_error(found), _effects(found), _residual(found)]
+    return write(path, 'Diagnosis', found.summary(), sections)

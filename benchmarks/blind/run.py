@@ -1,0 +1,103 @@
+"""Blind benchmark of the diagnosis: `python benchmarks/blind/run.py --cases 60 --jobs 1`.
+
+Every case is built from its seed, diagnosed without its truth, cached in the output folder and
+scored at the end; an interrupted run goes on where it stopped. Seeds 0-999 are for calibration,
+1000 and up for reporting.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import time
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any
+
+HERE = Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE))
+sys.path.insert(0, str(HERE.parents[1]))
+
+
+def one(seed: int, cache: Path) -> dict[str, Any]:
+    """Build, diagnose and cache one case."""
+    path = cache / f'{seed}.json'
+    if path.exists():
+        return dict(json.loads(path.read_text()))
+    import cases
+    import truth
+
+    from actuator_glue.records import Record
+    from actuator_glue.residual.diagnose import diagnose
+    from actuator_glue.residual.settings import Settings
+
+    case = cases.build(seed)
+    records = [
+        Record(u, y, 1.0 / cases.plant.RATE, stiffness=k, source=source)
+        for u, y, k, source in zip(
+            case.commands, case.measured, cases.STIFFNESS, ('sweep-0', 'sweep-250', 'held'),
+            strict=True,
+        )
+    ]  # fmt: skip
+    start = time.perf_counter()
+    found = diagnose(
+        records[:2], records[2], seed=seed, settings=Settings(evaluations=0),
+        clock=time.perf_counter,
+    )  # fmt: skip
+    result = {
+        'seed': seed,
+        'kind': case.kind,
+        'effects': list(case.effects),
+        'sizes': case.sizes,
+        'ratio': case.ratio,
+        'shares': case.shares,
+        'colour': case.colour,
+        'seconds': time.perf_counter() - start,
+        'true_structure_error': truth.refitted(case, records),
+        'clean_floor': truth.floor(case),
+        'diagnosis': found.to_json(),
+    }
+    cache.mkdir(parents=True, exist_ok=True)
+    partial = path.with_suffix('.part')
+    partial.write_text(json.dumps(result))
+    partial.rename(path)
+    return result
+
+
+def main() -> int:
+    """Run the cases that are not cached, then print and write the scores."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('--cases', type=int, default=60)
+    parser.add_argument(
+        '--first', type=int, default=1000, help='first seed (below 1000: calibration)'
+    )
+    parser.add_argument('--jobs', type=int, default=1)
+    parser.add_argument('--out', type=Path, default=Path('out/blind'))
+    args = parser.parse_args()
+    seeds = range(args.first, args.first + args.cases)
+    results = []
+    with ProcessPoolExecutor(args.jobs) as pool:
+        futures = [pool.submit(one, seed, args.out / 'cases') for seed in seeds]
+        for i, future in enumerate(as_completed(futures)):
+            result = future.result()
+            results.append(result)
+            d = result['diagnosis']
+            names = ['|'.join([e['name'], *e['alternatives']]) for e in d['effects']]
+            print(
+                f'[{i + 1}/{args.cases}] {result["seed"]} {result["kind"]} '
+                f'{"+".join(result["effects"]) or "-"} x{result["ratio"]:.1f} -> '
+                f'{d["verdict"]} {" + ".join(names)} ({result["seconds"]:.0f} s)',
+                flush=True,
+            )
+    import score
+
+    summary = score.scores(results)
+    print(score.table(summary))
+    args.out.mkdir(parents=True, exist_ok=True)
+    (args.out / 'blind.json').write_text(json.dumps(summary, indent=1))
+    return 0
+
+
+if __name__ == '__main__':
+    raise SystemExit(main())

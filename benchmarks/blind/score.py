@@ -1,0 +1,119 @@
+"""Scores of the blind benchmark with exact binomial intervals, as issue 4 lists them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from statsmodels.stats.proportion import proportion_confint
+
+from actuator_glue.model.effects import CATALOGUE
+
+Json = dict[str, Any]
+_BINS = ((0.0, 0.5), (0.5, 1.0), (1.0, 2.0), (2.0, 4.0), (4.0, np.inf))
+_CLEAR = 2.0  # post-refit residual over noise from which the bars hold
+
+
+def share(hits: list[bool]) -> Json:
+    """Share of hits with its 95 % Clopper-Pearson interval."""
+    n, k = len(hits), int(sum(hits))
+    if not n:
+        return {'n': 0, 'share': None, 'ci': [None, None]}
+    low, high = proportion_confint(k, n, 0.05, 'beta')
+    return {'n': n, 'share': k / n, 'ci': [float(np.nan_to_num(low)), float(high)]}
+
+
+def _named(result: Json) -> list[list[str]]:
+    d = result['diagnosis']
+    return [[e['name'], *e['alternatives']] for e in d['effects']]
+
+
+def _groups(names: list[str]) -> set[str]:
+    return {CATALOGUE[n].group for n in names}
+
+
+def _wrong(result: Json) -> bool:
+    """A name without alternatives that is not the truth."""
+    return any(len(names) == 1 and names[0] not in result['effects'] for names in _named(result))
+
+
+def scores(results: list[Json]) -> Json:
+    """Score diagnosed cases."""
+    by = {k: [r for r in results if r['kind'] == k] for k in ('none', 'single', 'pair', 'unknown')}
+    clear = [r for r in by['single'] if r['ratio'] >= _CLEAR]
+    first = [(r, (_named(r) or [[]])[0]) for r in clear]
+    detection = {}
+    for low, high in _BINS:
+        inside = [r for r in by['single'] if low <= r['ratio'] < high]
+        detection[f'{low:g}-{high:g}'] = share(
+            [r['diagnosis']['verdict'] != 'none' for r in inside]
+        )
+    known = [r for r in results if r['kind'] != 'unknown']
+    # Jitter and lines cannot be predicted: the aim there is what the true structure leaves.
+    against = [
+        r['diagnosis']['error']['after'] / max(r['true_structure_error'], r['clean_floor'])
+        for r in known
+    ]
+    floors = [r['diagnosis']['error']['after'] / r['clean_floor'] for r in known]
+    clear_pairs = [r for r in by['pair'] if min(r['shares'].values()) >= 1.0]
+    return {
+        'schema': 'actuator_glue.blind/1',
+        'cases': len(results),
+        'false_alarms': share([r['diagnosis']['verdict'] != 'none' for r in by['none']]),
+        'detection_by_ratio': detection,
+        'clear_exact': share([bool(n) and n[0] in r['effects'] for r, n in first]),
+        'clear_group': share([bool(_groups(n[:1]) & _groups(r['effects'])) for r, n in first]),
+        'clear_in_set': share([bool(set(n) & set(r['effects'])) for r, n in first]),
+        'clear_mean_set_size': float(np.mean([len(n) for _, n in first if n] or [0.0])),
+        'clear_wrong_confident': share([_wrong(r) for r in clear]),
+        'all_wrong_confident': share([_wrong(r) for r in results]),
+        'clear_extra_effects': share([len(_named(r)) > 1 for r in clear]),
+        'unknown_unexplained': share(
+            [r['diagnosis']['verdict'] == 'unexplained' for r in by['unknown']]
+        ),
+        'unknown_unexplained_clear': share(
+            [
+                r['diagnosis']['verdict'] == 'unexplained'
+                for r in by['unknown']
+                if r['ratio'] >= _CLEAR
+            ]
+        ),
+        'pair_both': share([_both(r) for r in by['pair']]),
+        'pair_both_clear': share([_both(r) for r in clear_pairs]),
+        'after_over_true_structure': _quantiles(against),
+        'after_over_noise': _quantiles(floors),
+        'seconds_median': float(np.median([r['seconds'] for r in results])),
+    }
+
+
+def _both(result: Json) -> bool:
+    sets = _named(result)
+    return all(any(e in names for names in sets) for e in result['effects'])
+
+
+def _quantiles(values: list[float]) -> Json:
+    if not values:
+        return {'median': None, 'p90': None}
+    return {'median': float(np.median(values)), 'p90': float(np.quantile(values, 0.9))}
+
+
+def table(summary: Json) -> str:
+    """Return the scores as text."""
+    lines = []
+    for key, value in summary.items():
+        if isinstance(value, dict) and 'ci' in value:
+            lines.append(_line(key, value))
+        elif key == 'detection_by_ratio':
+            lines += [_line(f'detected, residual/noise {k}', v) for k, v in value.items()]
+        elif isinstance(value, dict):
+            lines.append(f'{key:34s} median {value["median"]}, 90 % {value["p90"]}')
+        else:
+            lines.append(f'{key:34s} {value}')
+    return '\n'.join(lines)
+
+
+def _line(key: str, value: Json) -> str:
+    if not value['n']:
+        return f'{key:34s} no case'
+    low, high = value['ci']
+    return f'{key:34s} {value["share"]:6.1%}  [{low:.1%}, {high:.1%}]  n = {value["n"]}'

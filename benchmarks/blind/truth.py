@@ -1,0 +1,36 @@
+"""What the true structure, refitted, leaves on the held-out record: the aim of a diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cases
+import numpy as np
+
+from actuator_glue.model.effects import CATALOGUE
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Record
+from actuator_glue.residual.data import Data
+from actuator_glue.residual.score import Scorer, splits_of
+from actuator_glue.residual.search import Search
+
+
+def floor(case: cases.Case) -> float:
+    """Rms of the noise that was added to the held-out record [m]."""
+    return float(np.sqrt(np.mean((case.measured[2] - case.clean[2]) ** 2)))
+
+
+def refitted(case: cases.Case, records: Sequence[Record]) -> float:
+    """Held-out rms error of the true structure, refitted to the sweeps [m]; NaN if not ours."""
+    names = [n for n in case.effects if n in CATALOGUE]
+    if case.kind == 'unknown':
+        return float('nan')
+    fit, held = Data.whole(records[:2]), Data.whole(records[2:])
+    search = Search(fit, tuple(CATALOGUE))
+    search.scorer = Scorer.of(fit, splits_of(fit, search.base().error))
+    trial = search.trial(())
+    for name in names:
+        if CATALOGUE[name].variance is None and name != 'hum':
+            trial = search.polish(search.add(trial, name))
+    error = held.target - held.simulate(Structure(trial.effects), trial.fit.theta)[0]
+    return float(np.sqrt(np.mean(error**2)))
