@@ -97,7 +97,7 @@ def anneal(
         chosen = resample(rng, gain * rise, size)
         archive = np.ascontiguousarray(z[chosen])
         tuning = tune(archive, counts, settings)
-        start = rng.permutation(chosen)[:chains]
+        start = resample(rng, gain * rise, chains)
         now = z[start], x[start], values[start]
         target = _target(reference, power, now[0], values[start], log_jacobian[start])
         history = []
@@ -119,9 +119,11 @@ def anneal(
             now, target = (new_z, new_x, new_values), new_target
             history.append(now)
         evaluations += chains * settings.sweeps
-        z = np.concatenate([h[0] for h in history])
+        # Chain by chain: systematic resampling then treats every chain alike, so that modes which
+        # no move connects keep their shares from temperature to temperature.
+        z = np.stack([h[0] for h in history], axis=1).reshape(-1, dimension)
         x, log_jacobian = bounded_all(z, lower, width)
-        values = np.concatenate([h[2] for h in history])
+        values = np.stack([h[2] for h in history], axis=1).reshape(-1)
         size = len(z)
     return Population(z, x, values, counts, power, evaluations)
 

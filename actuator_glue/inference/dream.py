@@ -14,7 +14,13 @@ from numpy.typing import ArrayLike, NDArray
 from actuator_glue.errors import InputError
 from actuator_glue.inference import generation
 from actuator_glue.inference.adaptation import Tuning, empty_counts, outliers, tune
-from actuator_glue.inference.anneal import Population, anneal, archive_reference, prior_reference
+from actuator_glue.inference.anneal import (
+    Population,
+    anneal,
+    archive_reference,
+    prior_reference,
+    resample,
+)
 from actuator_glue.inference.archive import Archive
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.coordinates import bounded_all, check_bounds, unbounded
@@ -106,9 +112,9 @@ def init(
     settings = settings or Settings()
     low, width = check_bounds(np.asarray(lower, np.float64), np.asarray(upper, np.float64))
     start = _points(rng, log_density, low, width, settings, archive, limit)
-    # Chains start at different points of the population; impossible points are no start.
-    possible = rng.permutation(np.flatnonzero(np.isfinite(start.log_density)))
-    chosen = np.resize(possible, settings.chains)
+    # Chains start at points spread over the population; impossible points are no start.
+    possible = np.where(np.isfinite(start.log_density), 0.0, -np.inf)
+    chosen = resample(rng, possible, settings.chains)
     _, log_jacobian = bounded_all(start.z[chosen], low, width)
     return State(
         x=start.x[chosen],
@@ -144,9 +150,9 @@ def _points(
         old = unbounded(
             _check_archive(np.asarray(archive, np.float64), lower, width), lower, width
         )
-        reference = archive_reference(rng, max(settings.population // 4, 5 * d), old)
+        reference = archive_reference(rng, settings.points(d) // 4, old)
     else:
-        reference = prior_reference(rng, max(settings.population, 10 * d), d)
+        reference = prior_reference(rng, settings.points(d), d)
         if settings.start == 'prior':
             # As Vrugt (2016): only the chains' own points are evaluated.
             x, _ = bounded_all(reference.points, lower, width)
@@ -286,7 +292,9 @@ def sample(
             not even suffice for the start.
     """
     settings = settings or Settings()
-    state = init(rng, log_density, lower, upper, settings, archive, evaluations)
+    # Whatever the start costs, some generations remain to be seen.
+    limit = evaluations - 4 * settings.chains
+    state = init(rng, log_density, lower, upper, settings, archive, limit)
     n, d = state.x.shape
     generations = (evaluations - state.evaluations) // n
     if generations < 2:

@@ -28,7 +28,8 @@ class Settings:
         start: 'annealed' finds the posterior by tempering the likelihood from the prior (or from
             the archive of an earlier run) before the chains start; 'prior' starts the chains at a
             Latin hypercube of the prior as Vrugt (2016) does.
-        population: points per temperature while annealing; the initial archive m_0 is as large.
+        population: points per temperature while annealing, and of the initial archive (m_0); a
+            warm start takes a quarter. None: 100 per parameter, at most 2000.
         sweeps: moves of each point's chain per temperature.
         survivors: share of the population that the weights of the next temperature may leave.
     """
@@ -44,7 +45,7 @@ class Settings:
     thinning: int = 5
     adaptation: int = 60
     start: Literal['annealed', 'prior'] = 'annealed'
-    population: int = 400
+    population: int | None = None
     sweeps: int = 10
     survivors: float = 0.6
 
@@ -66,10 +67,15 @@ class Settings:
             raise InputError(f'sampler setting survivors={self.survivors} is outside (0, 1)')
         if not self.noise > 0.0:
             raise InputError('sampler setting noise must be positive')
-        if self.population < 2 * self.sweeps:
+        if self.population is not None and self.population < 2 * self.sweeps:
             raise InputError(
                 f'sampler setting population={self.population} leaves fewer than two chains of '
                 f'{self.sweeps} sweeps'
             )
         if self.start not in ('annealed', 'prior'):
             raise InputError(f"sampler setting start={self.start!r}; use 'annealed' or 'prior'")
+
+    def points(self, dimension: int) -> int:
+        """Size of the population for so many parameters; never too few for their covariance."""
+        wanted = min(100 * dimension, 2000) if self.population is None else self.population
+        return max(wanted, 10 * dimension)
