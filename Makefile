@@ -1,6 +1,6 @@
 # Each target does its own set-up; stamps keep the second run quick.
 SHELL := bash
-.SHELLFLAGS := -eu -o pipefail -c
+.SHELLFLAGS := -e -o pipefail -c
 
 BIN := .venv/bin
 VENV_STAMP := .venv/stamp
