@@ -8,25 +8,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from actuator_glue.model import kernel, laguerre, linear, quadratic
+from actuator_glue.model import kernel, laguerre, linear, quadratic, reference
 from actuator_glue.model.exact import ExactErrors, Initial
-from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array, Record
 
 TOLERANCE = 3e-9  # relative error of the sum of squares; times G = 256 it is 8e-7 in L
-# Terms of the basis; fewer where the initial state has as many of its own: such a window is one of
-# many, and its preparation counts.
-_FEWEST, _MOST, _MOST_FREE = 16, 64, 48
+# Terms of the basis, and how far from the reference's the damping and frequency may be that they
+# are for. Less where the initial state has as many terms of its own: such a window is one of many,
+# and its preparation counts.
+_FEWEST, _MOST, _MOST_FREE = 16, 128, 96
+_MARGIN, _MARGIN_FREE = 1.4, 1.2
 _ENOUGH = 1e-11  # what the terms should leave of the response
-# Grid that looks for the reference system: points per axis, refinements, range in s and in Hz.
-_GRID, _LEVELS = 8, 8
-_LAG, _FREQUENCY = (3e-4, 3.0), (0.5, 150.0)
-_DAMPING = BASE[0].upper + BASE[3].upper  # the largest a1 of the prior [1/s]
 
 
 class FastErrors:
@@ -104,7 +100,7 @@ def _row(exact: ExactErrors, r: int, near: ArrayLike | None) -> Array:
     foh = record.hold == 'linear'
     system = np.full(3, np.nan) if near is None else linear.systems(near, exact.stiffness[r])[0]
     if not (np.isfinite(system).all() and (system > 0.0).all()):
-        system = _reference(exact, r)
+        system = reference.fit(record, exact.settle[r], exact.starts[r])
     u0 = record.command[0] if foh else 0.0
     free = bool(x0 or v0 or u0)
     delta = -math.expm1(-min(math.sqrt(system[1]) * record.period, 5.0))
@@ -119,7 +115,7 @@ def _row(exact: ExactErrors, r: int, near: ArrayLike | None) -> Array:
         laguerre.V0: v0,
         laguerre.U0: u0,
     }
-    K = _terms(system, _MOST_FREE if free else _MOST)
+    K = _terms(system, _MARGIN_FREE, _MOST_FREE) if free else _terms(system, _MARGIN, _MOST)
     dims = K * (1 + free)
     row = np.zeros(laguerre.HEADER + (K + laguerre.TAIL) * (1 + free) + dims * (2 + dims))
     row[laguerre.TERMS] = K
@@ -130,13 +126,13 @@ def _row(exact: ExactErrors, r: int, near: ArrayLike | None) -> Array:
     return row
 
 
-def _terms(system: Array, most: int) -> int:
+def _terms(system: Array, margin: float, most: int) -> int:
     """Return the number of terms that poles near the reference system's need.
 
-    A pole p leaves |(p - sigma)/(p + sigma)| per term; the worst of systems with 30 % more or less
-    damping and frequency is taken.
+    A pole p leaves |(p - sigma)/(p + sigma)| per term; the worst of systems with damping and
+    frequency within the margin is taken.
     """
-    scale = np.array([0.7, 1.0, 1.4])
+    scale = np.array([1.0 / margin, 1.0, margin])
     sigma = math.sqrt(system[1])
     half, a0 = 0.5 * system[0] * scale[:, np.newaxis], system[1] * scale
     root = np.sqrt(half * half - a0 + 0j)
@@ -144,41 +140,3 @@ def _terms(system: Array, most: int) -> int:
     worst = float(np.abs((poles + sigma) / (poles - sigma)).max())
     wanted = math.log(_ENOUGH) / math.log(worst) if 0.0 < worst < 1.0 else float(most)
     return laguerre.BLOCK * math.ceil(min(max(wanted, _FEWEST), most) / laguerre.BLOCK)
-
-
-def _reference(exact: ExactErrors, r: int) -> Array:
-    """Return a1, a0, b0 near the best fit of one record, by a grid drawn ever closer.
-
-    It only fixes the basis and what the errors are measured from, so a rough fit is enough.
-    """
-    record = exact.records[r]
-    silent = ExactErrors([replace(record, measured=np.zeros(len(record)))], exact.settle[r])
-    n = len(record) - exact.settle[r]
-    counted = record.measured[exact.settle[r] :]
-    m1, m2 = float(counted.sum()), float((counted**2).sum())
-    # Lag a1/a0 [s] and frequency sqrt(a0)/(2 pi) [Hz]: what a slow command leaves uncertain is the
-    # frequency alone, so that the valley of good fits runs along an axis.
-    ends = np.log([_LAG, _FREQUENCY])
-    centre, half = ends.mean(axis=1), 0.5 * (ends[:, 1] - ends[:, 0])
-    best = np.array([1.0, 1.0, 1.0])
-    for _ in range(_LEVELS):
-        axes = centre[:, np.newaxis] + half[:, np.newaxis] * np.linspace(-1.0, 1.0, _GRID)
-        points = np.stack(np.meshgrid(*axes)).reshape(2, -1)
-        lag, frequency = np.exp(points)
-        a0 = np.minimum(2.0 * np.pi * frequency, 2.0 / record.period) ** 2
-        systems = np.ascontiguousarray(np.stack([lag * a0, a0, a0], axis=1))
-        e, x = exact.of_record(r, systems), silent.of_record(0, systems)
-        # Gain profiled out: m'x from (m - x)^2, all about their means.
-        with np.errstate(divide='ignore', invalid='ignore'):
-            mx = 0.5 * (m2 + x[:, 1] - e[:, 1]) + m1 * x[:, 0] / n
-            xx = x[:, 1] - x[:, 0] ** 2 / n
-            gain = np.where((mx > 0.0) & (xx > 0.0), mx / xx, 1.0)
-            # Eq. (2a) has no static gain above one, and one exactly without a specimen.
-            gain = np.minimum(gain, 1.0) if exact.stiffness[r] > 0.0 else np.ones(len(gain))
-            misfit = np.where(lag * a0 <= _DAMPING, gain * (gain * xx - 2.0 * mx), np.inf)
-        at = int(np.argmin(np.where(np.isfinite(misfit), misfit, np.inf)))
-        best = systems[at] * np.array([1.0, 1.0, gain[at]])
-        # Where the best point lies inside the grid, the next one is drawn closer around it.
-        inside = np.abs(points[:, at] - centre) < 0.99 * half
-        centre, half = points[:, at], np.where(inside, 0.4 * half, half)
-    return best
