@@ -111,6 +111,10 @@ def to_json(results: Results) -> Json:
             }
             for r in results.refits
         ],
+        'diagnosis': {
+            name: {key: d.to_json()[key] for key in ('verdict', 'summary', 'effects', 'error')}
+            for name, d in results.diagnoses.items()
+        },
         'simulated_coverage': [
             {'glue': c.glue, 'total': c.total, 'phi': c.phi, 'noise': c.noise}
             for c in results.covered

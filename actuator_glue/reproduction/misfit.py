@@ -12,7 +12,10 @@ from actuator_glue.model.parameters import TABLE_2, Parameter, bounds
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 from actuator_glue.reproduction.physical import least
+from actuator_glue.reproduction.posterior import Progress
 from actuator_glue.reproduction.shaping import blocks
+from actuator_glue.residual.diagnose import diagnose
+from actuator_glue.residual.diagnosis import Diagnosis
 
 BIN = 0.5  # Hz, width of the ranges that residuals are shown by
 SWEEP_RATE = 10.0 / 60.0  # Hz/s
@@ -114,6 +117,19 @@ def _kept(record: Record) -> NDArray[np.bool_]:
     for part in blocks(record)[1]:
         mask[part] = False
     return mask
+
+
+def diagnoses(seed: int, records: Sequence[Record], progress: Progress) -> dict[str, Diagnosis]:
+    """Return what the diagnosis, told nothing, says of the spring test alone and of both tests.
+
+    Args:
+        seed: of the whole study.
+        records: test with k = 0, test with k = 250 kN/m.
+        progress: called with the share done.
+    """
+    alone = diagnose(records[1:], seed=seed, progress=lambda _, share: progress(0.3 * share))
+    both = diagnose(records, seed=seed, progress=lambda _, share: progress(0.3 + 0.7 * share))
+    return {'spring test alone': alone, 'both tests': both}
 
 
 def by_frequency(record: Record, residual: Array) -> tuple[Array, Array]:

@@ -21,6 +21,7 @@ from actuator_glue.reproduction.physical import (
 )
 from actuator_glue.reproduction.posterior import Posterior, run
 from actuator_glue.reproduction.published import CHOSEN, CLOSE_UPS, SHAPING_FACTORS, SHOWN
+from actuator_glue.residual.diagnosis import Diagnosis
 
 # Called with the stage and the share of the whole study that is done.
 Progress = Callable[[str, float], None]
@@ -91,6 +92,7 @@ class Results:
         frequency: bands per posterior ('sensor', 'matched') and test.
         time: displacement bands per posterior and 'total', and test.
         refits: structures refitted with and without gain.
+        diagnoses: what the diagnosis says of the spring test and of both; none in the quick one.
         covered: coverage on simulated tests.
     """
 
@@ -110,6 +112,7 @@ class Results:
     frequency: dict[str, tuple[responses.FrequencyBands, ...]]
     time: dict[str, tuple[responses.TimeBands, ...]]
     refits: list[misfit.Refit]
+    diagnoses: dict[str, Diagnosis]
     covered: list[calibration.Coverage]
 
     @property
@@ -151,8 +154,9 @@ def study(seed: int = 1, *, quick: bool = False, progress: Progress | None = Non
     structures = spread.structures(seed, records, wide.matched.best_rms, effort.short, stage)
 
     shaped, choices = {}, {}
+    share = 0.20 if quick else 0.10
     for name, added in (('sensor', 0.0), ('matched', wide.matched.added_rms)):
-        stage = tell(f'shaping factors, {name} residual', 0.20)
+        stage = tell(f'shaping factors, {name} residual', share)
         shaped[name] = shaping.study(
             seed, records, effort.shaping_factors, effort.short, effort.published,
             added_rms=added, draws=min(effort.draws, 400), progress=stage,
@@ -179,6 +183,8 @@ def study(seed: int = 1, *, quick: bool = False, progress: Progress | None = Non
 
     tell('static gain', 0.04)
     refits = misfit.study(records)
+    stage = tell('diagnosis', 0.0 if quick else 0.20)
+    diagnoses = {} if quick else misfit.diagnoses(seed, records, stage)
 
     stage = tell('coverage on simulated tests', 0.08)
     seeds = [1000 * seed + i for i in range(effort.seeds)]
@@ -187,7 +193,7 @@ def study(seed: int = 1, *, quick: bool = False, progress: Progress | None = Non
     return Results(
         seed, quick, records, readings, identified, physical,
         coefficients_beside(physical.theta), sensor, wide, structures, shaped, choices,
-        curves, frequency, time, refits, covered,
+        curves, frequency, time, refits, diagnoses, covered,
     )  # fmt: skip
 
 
