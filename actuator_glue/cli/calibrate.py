@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import time
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from actuator_glue.cli._calibration import fit_error, initial_state, sample, sampled_model
@@ -68,7 +69,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         f'(default 0 from rest, else {SETTLE} s)',
     )
     parser.add_argument(
-        '--draws', metavar='OUT.npz', help='save the posterior draws: arrays draws, names, best'
+        '--draws',
+        metavar='OUT.npz',
+        help='save the posterior draws (arrays draws, names, units, best, effects, initial) for '
+        '`plot --draws` and for others',
     )
     add_json(parser)
 
@@ -102,7 +106,7 @@ def run(args: argparse.Namespace) -> int:
     _show(args, records, parameters, chains, fit, seconds)
     _warn(records, parameters, chains, converged)
     if args.draws is not None:
-        _save_draws(args.draws, chains, tuple(parameters))
+        _save_draws(args.draws, chains, parameters, args.effect, initial)
     content = {
         'schema': 'actuator_glue.calibration/1',
         'parameters': parameters,
@@ -217,10 +221,21 @@ def _warn(
         note(line)
 
 
-def _save_draws(out: str, chains: Chains, names: tuple[str, ...]) -> None:
+def _save_draws(
+    out: str, chains: Chains, parameters: dict[str, dict[str, Any]], effects: list[str], how: str
+) -> None:
     import numpy as np
 
     try:
-        np.savez_compressed(out, draws=chains.posterior(), names=np.array(names), best=chains.best)
+        with Path(out).open('wb') as file:
+            np.savez_compressed(
+                file,
+                draws=chains.posterior(),
+                best=chains.best,
+                names=np.array(list(parameters)),
+                units=np.array([p['unit'] for p in parameters.values()]),
+                effects=np.array(effects, dtype=np.str_),
+                initial=np.array(how),
+            )
     except OSError as error:
         raise InputError(f'{out}: cannot be written ({error.strerror or error})') from error

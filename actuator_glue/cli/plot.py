@@ -1,4 +1,4 @@
-"""Draw records: command and displacement, and what a bag holds of bands and posteriors."""
+"""Draw records, the bands and posteriors a bag holds, and those of a calibration."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from actuator_glue.cli._draws import Draws
 from actuator_glue.cli._output import note, say
 from actuator_glue.cli._records import add_records, load
 from actuator_glue.errors import InputError
@@ -20,6 +21,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_records(parser)
     parser.add_argument(
         '--out', default='.', metavar='DIR', help='where the pictures go (default: here)'
+    )
+    parser.add_argument(
+        '--draws',
+        metavar='DRAWS.npz',
+        help='posterior draws of `calibrate --draws`: also their picture, and their bands over '
+        'every record',
     )
     parser.add_argument(
         '--format', choices=('png', 'svg', 'pdf'), default='png', help='default png'
@@ -39,9 +46,15 @@ def run(args: argparse.Namespace) -> int:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f'{folder}: cannot be made ({error.strerror or error})') from error
-    for i, record in enumerate(load(args), start=1):
-        name = f'{_stem(record)}_{i}' if len(args.records) > 1 or i > 1 else _stem(record)
+    records = load(args)
+    draws = None if args.draws is None else Draws.read(Path(args.draws))
+    if draws is not None:
+        draws.draw(folder, args)
+    for i, record in enumerate(records, start=1):
+        name = f'{_stem(record)}_{i}' if len(records) > 1 else _stem(record)
         _draw(record, folder / f'{name}.{args.format}', args)
+        if draws is not None:
+            draws.draw_bands(record, folder / f'{name}_bands.{args.format}', args)
     for path in args.records:
         if is_bag(path):
             _draw_estimate(Path(path), folder, args)

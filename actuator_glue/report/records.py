@@ -31,7 +31,7 @@ def record_figure(record: Record) -> Figure:
         axes.plot(time[part], MM * record.command[part], ':', color=style.COMMAND)
         axes.plot(time[part], MM * record.measured[part], color=style.MEASURED)
         axes.margins(x=0)
-        axes.locator_params(axis='x', nbins=4)
+        axes.locator_params(axis='x', nbins=3)
         if i == 0:
             axes.set_ylabel('displacement [mm]')
     error = figure.add_subplot(grid[2, :], sharex=whole)

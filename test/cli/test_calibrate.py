@@ -41,6 +41,12 @@ def test_problem_r_from_csv_files(run, problem_r: Path, tmp_path: Path, rng_seed
     assert content['evaluations'] <= 60_000
     assert 2e-5 < content['error']['rms_m'] < 5e-5
     assert 0 < content['error']['nrmse'] < 0.1
+    pictures = tmp_path / 'pictures'
+    drawn = run('plot', *records, '--draws', tmp_path / 'draws.npz', '--out', pictures)
+    assert drawn.code == 0, drawn.err
+    names = {'draws.png', 'r_1_1.png', 'r_1_1_bands.png', 'r_2_2.png', 'r_2_2_bands.png'}
+    assert {p.name for p in pictures.iterdir()} == names
+    assert 'no draws' in run('plot', *records, '--draws', records[0]).message
     saved = np.load(tmp_path / 'draws.npz')
     np.testing.assert_allclose(saved['draws'].mean(axis=0), got['mean'])
     assert saved['names'].tolist() == list(NAMES)
@@ -90,7 +96,7 @@ def test_formal_likelihoods(run, problem_r: Path, likelihood: str) -> None:
     """The formal ones run over the same records and are far narrower than G = 256."""
     records = (problem_r / 'r_1.csv', problem_r / 'r_2.csv')
     done = run(
-        'calibrate', *records, '--likelihood', likelihood, '--evaluations', 8_000, '--json', '-'
+        'calibrate', *records, '--likelihood', likelihood, '--evaluations', 14_000, '--json', '-'
     )
     assert done.code == 0, done.err
     assert done.json['parameters']['beta_1']['stddev'] < 0.7 * STDDEV[0]
