@@ -17,7 +17,6 @@ from actuator_glue.records import Hold
 RATE = 4096.0  # Hz
 STROKE = 7e-3  # m
 FORCE = 8.9e3  # N, rated
-VELOCITY = 0.3  # m/s, rated
 DISPLACEMENT_SENSOR = SensorSpec(noise=16e-6, bits=18, span=STROKE)
 FORCE_SENSOR = SensorSpec(noise=2.2, bits=18, span=FORCE)
 

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import functools
+import statistics
+import time
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy import signal
 
 from actuator_glue.errors import InputError
 from actuator_glue.model import commands, linear, problem_r
@@ -140,6 +143,27 @@ def test_ten_times_the_length_is_as_accurate():
     difference = log_likelihood(fast, fast(theta)) - log_likelihood(fast, fast.exact(theta))
     assert np.abs(difference).max() < 1e-6
     assert fast.fallbacks == 0
+
+
+def test_cost_does_not_grow_with_the_length():
+    """Processor time of this thread, medians side by side: flat within half, lfilter's is not."""
+    theta, one = posterior_draws(512), posterior_draws(1)[0]
+    short, long = FastErrors(problem_r.records()), FastErrors(problem_r.records(duration=600.0))
+
+    def lfilter():
+        for record in short.exact.records:
+            equation = linear.discretise(one, record.stiffness, record.period)
+            signal.lfilter(*equation, record.command)
+
+    taken = {short: [], long: [], lfilter: []}
+    for _ in range(15):
+        for task, times in taken.items():
+            began = time.thread_time()
+            task() if task is lfilter else task(theta)
+            times.append(time.thread_time() - began)
+    of_short, of_long, of_lfilter = (statistics.median(times) for times in taken.values())
+    assert of_long < 1.5 * of_short
+    assert of_short / len(theta) < of_lfilter / 50
 
 
 def test_result_of_a_theta_does_not_depend_on_its_batch():
