@@ -71,6 +71,11 @@ def _decode(found: BagMessage, path: Path | str) -> Samples | Setup:
         ) from error
     head = content.header
     if found.type == SAMPLE_BLOCK:
+        if not 1e-6 <= content.period <= 10.0:
+            raise InputError(
+                f'{path}: topic {found.topic}: block at sample {content.index} has period '
+                f'{content.period:g} s, outside [1e-6, 10] s'
+            )
         return Samples(
             found.topic,
             head.frame_id,

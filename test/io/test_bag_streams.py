@@ -150,10 +150,36 @@ def test_bad_samples_in_a_bag_are_one_message(tmp_path: Path, record: Record) ->
             writer.write('/samples', block, 0)
         with pytest.raises(InputError, match=words.replace('+', r'\+')):
             read_records(tmp_path / f'bag{i}')
+    for i, period in enumerate((0.0, np.nan, np.inf, -1.0, 1e9)):
+        block = samples(record, 0, 100)
+        block.period = period
+        with open_bag(tmp_path / f'period{i}') as writer:
+            writer.write('/samples', block, 0)
+        with pytest.raises(InputError, match='period'):
+            read_records(tmp_path / f'period{i}')
     with open_bag(tmp_path / 'bag') as writer:
         writer.write_raw('/samples', b'\x00\x01\x00\x00' + b'\xff' * 20, 0)
     with pytest.raises(InputError, match='are not a actuator_glue_msgs/msg/SampleBlock'):
         read_records(tmp_path / 'bag')
+
+
+@pytest.mark.parametrize('stiffness', [-1.0, np.inf, 1e15])
+def test_bad_setups_in_a_bag_are_one_message(
+    tmp_path: Path, record: Record, stiffness: float
+) -> None:
+    """A stiffness that cannot be is refused; so is an unknown hold."""
+    with open_bag(tmp_path / 'bag') as writer:
+        writer.write('/test_setup', setup(record, 0, stiffness), 0)
+        writer.write('/samples', samples(record, 0, 100), 1)
+    with pytest.raises(InputError, match='stiffness'):
+        read_records(tmp_path / 'bag')
+    wrong = setup(record, 0, 0.0)
+    wrong.hold = 'cubic'
+    with open_bag(tmp_path / 'hold') as writer:
+        writer.write('/test_setup', wrong, 0)
+        writer.write('/samples', samples(record, 0, 100), 1)
+    with pytest.raises(InputError, match='cubic'):
+        read_records(tmp_path / 'hold')
 
 
 RECORDER = textwrap.dedent(
