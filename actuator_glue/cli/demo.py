@@ -36,8 +36,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--rate', type=number, default=1000.0, metavar='HZ', help='rate of the simulator (1000)'
     )
-    parser.add_argument('--window', type=number, default=5.0, metavar='S', help='window (5)')
-    parser.add_argument('--hop', type=number, default=1.0, metavar='S', help='hop (1)')
+    parser.add_argument(
+        '--window', type=number, default=5.0, metavar='S', help='length of a window (5)'
+    )
+    parser.add_argument(
+        '--hop', type=number, default=1.0, metavar='S', help='time from one window to the next (1)'
+    )
     parser.add_argument(
         '--effect',
         default='backlash',

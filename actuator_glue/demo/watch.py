@@ -55,8 +55,13 @@ class Watch:
                 self.windows += 1
                 self.stopped_early += bool(content.stopped_early)
             elif name == HEALTH:
-                values = {v.key: v.value for s in content.status for v in s.values}
-                self.ready = self.ready or values.get('worker') == 'ready'
+                said = {
+                    v.key: v.value
+                    for status in content.status
+                    for v in status.values
+                    if status.name.endswith('/estimator')
+                }
+                self.ready = self.ready or said.get('worker') == 'ready'
             elif content.forecast and content.scored and content.kind == 'total':
                 self.forecast = content
                 self.coverages.append(float(content.widest_coverage))
