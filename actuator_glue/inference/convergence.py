@@ -90,31 +90,33 @@ def _potential_reduction(values: Array) -> Array:
 
 
 def _effective(values: Array) -> float:
-    """Effective sample size of (n, chains) by Geyer's initial monotone sequence."""
+    """Effective sample size of (n, chains): Vehtari et al. (2021), Eqs. (10)-(12)."""
     n, chains = values.shape
-    centred = values - values.mean(axis=0)
+    mean = values.mean(axis=0)
     length = next_fast_len(2 * n, real=True)
-    spectrum = rfft(centred, length, axis=0)
+    spectrum = rfft(values - mean, length, axis=0)
     power = (spectrum.real**2 + spectrum.imag**2).sum(axis=1)
     covariance = irfft(power, length)[:n] / (n * chains)
     within = covariance[0] * n / (n - 1)
     if not within > 0.0:
         return float('nan')
-    total = covariance[0] + (values.mean(axis=0).var(ddof=1) if chains > 1 else 0.0)
-    rho = 1.0 - (within - covariance * n / (n - 1)) / total
+    rho = 1.0 - (within - covariance) / (covariance[0] + mean.var(ddof=1))
     rho[0] = 1.0
-    return _geyer(rho, n * chains)
+    return float(n * chains / max(_correlation_time(rho), 1.0 / np.log10(n * chains)))
 
 
-def _geyer(rho: Array, size: int) -> float:
-    """Sum autocorrelations in pairs while positive, made monotone; return the sample size."""
-    n = len(rho)
-    pairs = rho[: n - n % 2].reshape(-1, 2).sum(axis=1)
-    stop = 1
-    while stop < len(pairs) - 1 and pairs[stop] > 0.0:
-        stop += 1
-    monotone = np.minimum.accumulate(pairs[:stop])
-    # As in Stan and arviz: the even term after the last pair sharpens antithetic chains.
-    extra = max(float(rho[2 * stop]), 0.0) if 2 * stop < n else 0.0
-    tau = max(-1.0 + 2.0 * float(monotone.sum()) + extra, 1.0 / np.log10(size))
-    return float(size / tau)
+def _correlation_time(rho: Array) -> float:
+    """Sum of autocorrelations by Geyer's initial monotone sequence of pairs.
+
+    As in Stan and arviz, the even term of the pair after the last one counts once, unless both it
+    and its pair are negative.
+    """
+    pairs = rho[: len(rho) // 2 * 2].reshape(-1, 2).sum(axis=1)
+    last = max((len(rho) - 3) // 2, 0)
+    failing = np.flatnonzero(pairs[:last] <= 0.0)
+    count = int(failing[0]) if failing.size else last
+    monotone = np.minimum.accumulate(pairs[:count]).sum() if count else 0.0
+    extra = rho[2 * count]
+    if extra < 0.0 and pairs[count] < 0.0:
+        extra = 0.0
+    return float(-1.0 + 2.0 * monotone + extra)

@@ -1,4 +1,4 @@
-"""Densities whose moments are known, for tests of the sampler. All have a known uniform prior box."""
+"""Densities whose moments are known, for tests of the sampler."""
 
 from __future__ import annotations
 

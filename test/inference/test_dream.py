@@ -6,11 +6,12 @@ import hashlib
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
-
 import targets
+
 from actuator_glue.errors import InputError
 from actuator_glue.inference.adaptation import outliers
 from actuator_glue.inference.dream import Chains, Settings, init, sample, step
@@ -166,7 +167,7 @@ def test_burn_in_ends_what_must_end() -> None:
             assert np.array_equal(state.tuning.crossover_cdf, old.tuning.crossover_cdf)
             if state.fitted != old.fitted:
                 fits.append(state.fitted)
-    assert fits and all(b >= 2 * a for a, b in zip(fits, fits[1:], strict=False))
+    assert fits and all(b >= 2 * a for a, b in pairwise(fits))
 
 
 def test_outlier_chains_are_found_and_rescued_in_burn_in_only() -> None:
