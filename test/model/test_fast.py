@@ -196,3 +196,38 @@ def test_refusals_are_those_of_the_exact_errors():
         problem()(np.zeros(3))
     with pytest.raises(InputError, match='settle'):
         FastErrors(problem_r.records(), 20_000)
+
+
+def test_records_of_different_rate_hold_and_length_are_fitted_jointly():
+    theta, first = window(200.0, 9.0, 'zoh', 0.0, 1, 'sweep')
+    records = [
+        first,
+        *(
+            Record(
+                r.command,
+                linear.simulate(
+                    theta,
+                    r.command,
+                    stiffness=k,
+                    period=r.period,
+                    hold=r.hold,
+                    initial=(1e-4, 0.0),
+                )
+                + 1e-5 * np.random.default_rng(2).standard_normal(len(r)),
+                r.period,
+                k,
+                hold=r.hold,
+            )
+            for k, r in (
+                (250e3, window(1000.0, 4.0, 'linear', 250e3, 2, 'noise')[1]),
+                (600e3, window(4096.0, 3.0, 'zoh', 600e3, 3, 'earthquake')[1]),
+            )
+        ),
+    ]
+    near = theta * np.exp(0.05 * np.random.default_rng(0).standard_normal((200, 4)))
+    for initial in ('rest', 'measured'):
+        fast = FastErrors(records, [20, 500, 1000], initial)
+        difference = log_likelihood(fast, fast(near)) - log_likelihood(fast, fast.exact(near))
+        assert np.abs(difference).max() < 1e-6
+        counted = [len(r) - s for r, s in zip(records, (20, 500, 1000), strict=True)]
+        np.testing.assert_array_equal(fast.sizes, counted)
