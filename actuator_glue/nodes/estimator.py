@@ -24,8 +24,8 @@ from actuator_glue.online.job import Job, WindowResult, run
 from actuator_glue.online.settings import LIMITS, EstimatorSettings, ModelChoice
 from actuator_glue.online.stream import Dropped, Event, Failed, Rejected, Restarted
 
-# Share of the budget that sampling may use; bands and the way back take the rest.
-SAMPLING_SHARE = 0.6
+# From the worker to the published message [s].
+ON_THE_WAY = 5e-3
 
 
 def _specs() -> list[Spec]:
@@ -167,7 +167,7 @@ class EstimatorNode(base.SuiteNode):
         arrival = self._arrival.get(job.window.number, now)
         self._arrival = {n: t for n, t in self._arrival.items() if n > job.window.number}
         self._started = arrival
-        self.worker.submit(compute, job, arrival + SAMPLING_SHARE * self.settings.time_budget)
+        self.worker.submit(compute, job, arrival + self.settings.time_budget)
 
     def _answered(self, answer: Answer) -> None:
         """Called from the listening thread: hand over to the executor."""
@@ -285,26 +285,53 @@ class EstimatorNode(base.SuiteNode):
         self.health.values.update(values)
 
 
+class _Reserve:
+    """How long a window still takes once its sampling has ended; lives in the worker."""
+
+    seconds = 0.0
+
+
 def compute(job: Job, deadline: float, tell: Tell) -> WindowResult:
-    """Compute a job in the worker, sampling until a monotonic time [s] at the latest."""
-    return run(job, lambda: time.monotonic() > deadline)
+    """Compute a job in the worker so that it is done at a monotonic time [s].
+
+    Sampling ends early enough for what follows it, as long as that took lately.
+    """
+    last = time.monotonic()
+
+    def expired() -> bool:
+        nonlocal last
+        last = time.monotonic()
+        return last > deadline - 1.3 * _Reserve.seconds - ON_THE_WAY
+
+    result = run(job, expired)
+    after = time.monotonic() - last
+    _Reserve.seconds = max(after, 0.8 * _Reserve.seconds)
+    return result
 
 
 def warm_up() -> None:
-    """Compile and import what a window needs, on a short window of noise."""
+    """Compile and import what windows need, by estimating a short stream as a live one."""
     import numpy as np
 
-    from actuator_glue.online.stream import Window
+    from actuator_glue.online.replay import stream
+    from actuator_glue.online.stream import Preview, Setup
     from actuator_glue.records import Record
 
     rng = np.random.default_rng(0)
-    command = 1e-3 * np.sin(2 * np.pi * 2.0 * np.arange(600) / 200.0)
-    measured = command + 1e-5 * rng.standard_normal(600)
-    record = Record(command, measured, 1 / 200.0, 1e5)
-    settings = EstimatorSettings(window=3.0, start_evaluations=4000)
-    model = choose_model()
-    first = run(Job(Window(0, record, 0, 0), settings, model))
-    run(Job(Window(1, record, 0, 0), settings, model, first.archive, afresh=False))
+    command = 1e-3 * np.sin(2 * np.pi * 2.0 * np.arange(1200) / 200.0)
+    measured = command + 1e-5 * rng.standard_normal(1200)
+    settings = EstimatorSettings(
+        window=3.0, time_budget=1.0, evaluations=4000, start_evaluations=8000
+    )
+    estimator = Estimator(settings, choose_model())
+    estimator.preview(Preview(0, 1 / 200.0, command))
+    for item in stream(Record(command, measured, 1 / 200.0, 1e5)):
+        if isinstance(item, Setup):
+            estimator.setup(item)
+        else:
+            estimator.push(item)
+        while (job := estimator.next_job()) is not None:
+            estimator.finish(compute(job, time.monotonic() + 60.0, lambda _: None))
 
 
 def _effects(values: Mapping[str, Any]) -> tuple[str, ...]:

@@ -24,6 +24,8 @@ from actuator_glue.records import Array, Record
 
 # A command that moves less than this many noise standard deviations calibrates nothing.
 EXCITATION = 3.0
+# Generations in which a sampler that starts from the last posterior adapts.
+ADAPT = 20
 # Generations that R-hat and ESS are computed from.
 DIAGNOSED = 150
 
@@ -144,13 +146,14 @@ def _estimate(job: Job, expired: Callable[[], bool] | None) -> WindowResult:
         return expired is not None and expired()
 
     seed = (settings.seed, record.first_index)
+    warm = job.archive is not None
     sampled = dream.sample(
         np.random.default_rng((*seed, 0)),
         coordinates.density(likelihood),
         coordinates.lower,
         coordinates.upper,
         evaluations=job.evaluations,
-        settings=dream.Settings(chains=settings.chains),
+        settings=dream.Settings(chains=settings.chains, adaptation=ADAPT if warm else 50),
         archive=None if job.archive is None else coordinates.coordinates(job.archive),
         stop=stop,
     )
@@ -228,7 +231,7 @@ def _respond(job: Job, frozen: Frozen, record: Record, start: int, stop: int) ->
     """Response of frozen draws over start:stop, its initial state forgotten, shape (m, n) [m]."""
     settle = round(job.settings.settle / record.period)
     # Eq. (2) forgets; an effect may remember the whole window (yield, drift).
-    begin = 0 if frozen.model.effects or settle == 0 else max(0, start - settle)
+    begin = 0 if frozen.model.effects or settle == 0 else max(0, start - 2 * settle)
     part = record.slice(begin, stop)
     return fitting.simulate(frozen.model, frozen.draws, part)[:, start - begin :]
 

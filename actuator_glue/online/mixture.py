@@ -12,47 +12,58 @@ from actuator_glue.inference.bands import Band, check_levels
 from actuator_glue.jit import njit
 from actuator_glue.records import Array
 
-_NEWTON = 4
+_STEPS, _PRECISION = 60, 1e-5
+_REACH = 9.0  # standard deviations beyond which there is nothing
 
 
 @njit
 def _quantiles(draws, mean, sd, probability, normal, out):  # type: ignore[no-untyped-def]
     """Solve F(x) = probability, F the mean of the components' distribution functions.
 
-    Starts from the third-order Cornish-Fisher expansion, which is exact for normal draws, and
-    takes Newton steps, none longer than a standard deviation.
+    Newton's steps from the third-order Cornish-Fisher expansion, which is exact for normal draws;
+    a step that leaves the bracket, or a density that vanishes between draws, is a bisection.
     """
     m, n = draws.shape
-    variance = 0.0
+    variance = widest = 0.0
     for i in range(m):
         variance += sd[i] * sd[i] / m
+        widest = max(widest, sd[i])
     for j in range(n):
         first = 0.0
+        least = most = draws[0, j] + mean[0]
         for i in range(m):
-            first += (draws[i, j] + mean[i]) / m
+            x = draws[i, j] + mean[i]
+            first += x / m
+            least, most = min(least, x), max(most, x)
         second = third = 0.0
         for i in range(m):
             d = draws[i, j] + mean[i] - first
             second += d * d / m
             third += d * d * d / m
         scale = math.sqrt(second + variance)
-        skewness = third / scale**3 if scale > 0.0 else 0.0
+        skewness = third / scale**3
         for q in range(len(probability)):
             z = normal[q]
+            low, high = least - _REACH * widest, most + _REACH * widest
             x = first + scale * (z + (z * z - 1.0) * skewness / 6.0)
-            for _ in range(_NEWTON):
+            x = min(max(x, low), high)
+            for _ in range(_STEPS):
                 below = density = 0.0
                 for i in range(m):
                     u = (x - draws[i, j] - mean[i]) / sd[i]
                     below += 0.5 * math.erfc(-u * 0.7071067811865476)
                     density += 0.3989422804014327 * math.exp(-0.5 * u * u) / sd[i]
                 gap = below / m - probability[q]
-                if density <= 0.0:
-                    step = math.copysign(scale, gap)
+                if gap > 0.0:
+                    high = x
                 else:
-                    step = min(max(gap * m / density, -scale), scale)
-                x -= step
-                if abs(step) < 1e-5 * scale:
+                    low = x
+                new = x - gap * m / density if density > 0.0 else low
+                if not low < new < high:
+                    new = 0.5 * (low + high)
+                step = abs(new - x)
+                x = new
+                if step < _PRECISION * scale:
                     break
             out[q, j] = x
 

@@ -69,7 +69,7 @@ class EstimatorSettings:
     window: float = 5.0
     hop: float = 1.0
     settle: float = 0.5
-    time_budget: float = 0.5
+    time_budget: float = 0.8
     shaping_factor: float = 256.0
     evaluations: int = 20_000
     start_evaluations: int = 30_000

@@ -1,0 +1,152 @@
+"""Coordinates, bands, noise, alarm, collector: the parts of the estimator one by one."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from online_streams import RATE, THETA, block, record, setup
+from scipy.stats import norm
+
+from actuator_glue.inference.predictive import ResidualModel, total_band
+from actuator_glue.model import linear
+from actuator_glue.model.parameters import bounds
+from actuator_glue.online.alarm import CoverageAlarm
+from actuator_glue.online.collect import PIECE, Collector
+from actuator_glue.online.coordinates import Coordinates
+from actuator_glue.online.fitting import choose_model
+from actuator_glue.online.forecast import sensor_noise
+from actuator_glue.online.mixture import mixture_band
+from actuator_glue.online.replay import stream
+from actuator_glue.online.response import response_band
+from actuator_glue.online.settings import EstimatorSettings
+from actuator_glue.online.stream import Setup
+
+LOWER, UPPER = bounds()
+
+
+@given(st.integers(0, 2**32), st.sampled_from([0.0, 1e3, 250e3, 1e9]))
+def test_coordinates_are_a_bijection_inside_the_box(seed, stiffness):
+    theta = np.random.default_rng(seed).uniform(LOWER, UPPER, (50, 4))
+    there = Coordinates(choose_model(), stiffness)
+    phi = there.coordinates(theta)
+    inside = (phi > there.lower).all(axis=1) & (phi < there.upper).all(axis=1)
+    assert np.allclose(there.physical(phi)[inside], theta[inside], rtol=1e-9)
+
+
+@pytest.mark.parametrize('stiffness', [0.0, 250e3])
+def test_the_jacobian_is_the_derivative(stiffness):
+    there = Coordinates(choose_model(), stiffness)
+    for theta in np.random.default_rng(0).uniform(LOWER + 0.1 * UPPER, 0.9 * UPPER, (20, 4)):
+        phi = there.coordinates(theta[None])[0]
+        step = 1e-6 * np.maximum(np.abs(phi), 1e-3)
+        columns = [
+            (there.physical(phi + h) - there.physical(phi - h)) / (2 * step[j])
+            for j, h in enumerate(np.diag(step))
+        ]
+        determinant = np.linalg.slogdet(np.array(columns) / theta)[1] + np.log(theta).sum()
+        density = there.density(lambda t: np.zeros(len(t)))
+        reference = there.density(lambda t: np.zeros(len(t)))(there.coordinates(THETA[None]))
+        # Up to a constant, the same at every point.
+        got = density(phi[None])[0] - reference[0]
+        at = there.coordinates(THETA[None])[0]
+        step = 1e-6 * np.maximum(np.abs(at), 1e-3)
+        columns = [
+            (there.physical(at + h) - there.physical(at - h)) / (2 * step[j])
+            for j, h in enumerate(np.diag(step))
+        ]
+        zero = np.linalg.slogdet(np.array(columns) / THETA)[1] + np.log(THETA).sum()
+        assert got == pytest.approx(determinant - zero, abs=1e-4)
+
+
+def test_outside_the_prior_the_density_is_zero():
+    there = Coordinates(choose_model(), 250e3)
+    density = there.density(lambda t: np.zeros(len(t)))
+    outside = there.coordinates(THETA[None])
+    outside[0, 2] = UPPER[2]
+    outside[0, 1] = np.log(1e5)  # alpha_1 beta_0 = 1e12
+    assert np.isneginf(density(outside)).all()
+    assert np.isfinite(density(there.coordinates(THETA[None]))).all()
+
+
+def test_a_mixture_of_one_is_a_normal():
+    levels = (0.5, 0.95)
+    draws = np.tile(np.linspace(-1e-3, 1e-3, 7), (20, 1))
+    band = mixture_band(draws, np.full(20, 2e-6), np.full(20, 1e-5), levels)
+    for i, level in enumerate(levels):
+        half = norm.ppf((1 + level) / 2) * 1e-5
+        assert np.allclose(band.upper[i], draws[0] + 2e-6 + half, atol=1e-10)
+        assert np.allclose(band.lower[i], draws[0] + 2e-6 - half, atol=1e-10)
+    assert np.allclose(band.median, draws[0] + 2e-6, atol=1e-10)
+
+
+@pytest.mark.parametrize('share', [1e-3, 0.3, 1.0, 5.0])
+def test_the_mixture_is_what_total_band_samples_from(share):
+    """Skewed draws from far narrower to far wider than the residual."""
+    rng = np.random.default_rng(1)
+    sd = 1e-5
+    draws = share * sd * rng.exponential(size=(400, 5))
+    residual = ResidualModel(mean=1e-6, sd=sd, phi=0.0, samples=10**6)
+    ours = mixture_band(draws, np.full(400, 1e-6), np.full(400, sd), (0.5, 0.95))
+    parts = [total_band(rng, draws, residual, (0.5, 0.95)) for _ in range(60)]
+    for name in ('lower', 'median', 'upper'):
+        theirs = np.array([getattr(p, name) for p in parts])
+        # 60 bands of 1000 rows; the mean's standard error is 0.4 % of the spread.
+        error = np.abs(getattr(ours, name) - theirs.mean(axis=0)) / theirs.std(axis=0)
+        assert error.max() < 1.0
+
+
+@pytest.mark.parametrize('sd', [1e-6, 2e-5])
+def test_sensor_noise_is_seen_through_the_motion(sd):
+    whole = record(20.0, rate=1000.0, sd=sd)
+    assert sensor_noise(whole.measured) == pytest.approx(sd, rel=0.05)
+    assert sensor_noise(np.zeros(3)) == 0.0
+
+
+def test_the_frequency_response_band_holds_the_truth():
+    draws = THETA * (1 + 0.02 * np.random.default_rng(0).standard_normal((300, 4)))
+    settings = EstimatorSettings(headline_frequency=5.0)
+    found = response_band(draws, 250e3, settings)
+    assert len(found.frequency) == settings.frequencies
+    truth = linear.frequency_response(THETA, 250e3, found.frequency)
+    inside = (found.amplitude.lower[-1] <= abs(truth)) & (abs(truth) <= found.amplitude.upper[-1])
+    assert inside.all()
+    at = int(np.abs(found.frequency - 5.0).argmin())
+    assert found.headline[1] == pytest.approx(found.amplitude.median[at], rel=1e-9)
+    assert found.headline[3] == pytest.approx(-np.angle(truth[at]) / (10 * np.pi), rel=0.02)
+
+
+def test_the_alarm_is_raised_once_and_armed_again():
+    alarm = CoverageAlarm(0.8, 3)
+    told = [alarm.update(c) for c in (0.9, 0.9, 0.95, 0.7, 0.7, 0.5, 0.4, 0.95, 0.95, 0.95, 0.1)]
+    assert told == [False, False, False, False, True, False, False, False, False, False, True]
+    alarm.reset()
+    assert np.isnan(alarm.coverage)
+
+
+@given(st.lists(st.tuples(st.integers(1, 120), st.booleans()), min_size=1, max_size=80))
+def test_the_collector_is_bounded_and_joins_only_what_is_contiguous(pieces):
+    collector = Collector(4.0)
+    collector.setup(setup())
+    index = 0
+    for size, gap in pieces:
+        index += 13 * gap
+        collector.push(block(index, size))
+        index += size
+    found = collector.records(shortest=PIECE)
+    assert sum(r.duration for r in found) <= 4.0 + 1e-9
+    for part in found:
+        first = part.first_index
+        assert np.array_equal(part.command, 1e-6 * np.arange(first, first + len(part)))
+
+
+def test_the_collector_gives_back_the_record():
+    collector = Collector(60.0)
+    whole = record(10.0)
+    for item in stream(whole):
+        (collector.setup if isinstance(item, Setup) else collector.push)(item)
+    (found,) = collector.records()
+    assert len(found) > len(whole) - PIECE * RATE
+    assert np.array_equal(found.measured, whole.measured[: len(found)])
+    assert found.stiffness == whole.stiffness and found.start_ns == whole.start_ns
+    collector.forget()
+    assert collector.records() == []
