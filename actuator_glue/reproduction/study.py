@@ -65,7 +65,7 @@ QUICK = Effort(
     published=10_000,
     draws=300,
     shaping_factors=tuple(SHOWN.values()),
-    added_mm=(0.0, 0.2, 0.4, 0.6, 0.7, 0.8),
+    added_mm=(0.0, 0.2, 0.4, 0.5, 0.6, 0.65, 0.7, 0.75, 0.8),
     seeds=4,
 )
 NOISE_FREE, NOISY = 'noise-free', 'with sensor noise'

@@ -45,6 +45,14 @@ def test_match_finds_the_residual_between_grid_points() -> None:
     assert spread.match(added, cov * np.exp(-0.5)) == pytest.approx(0.7, abs=1e-3)
 
 
+def test_match_is_steady_against_the_scatter_of_short_runs(rng_seed: int) -> None:
+    # COVs of slope 3 per mm with 5 % scatter at nine residuals: sd of the match below 0.02 mm.
+    rng = np.random.default_rng(rng_seed)
+    added = np.linspace(0.4, 0.9, 9)
+    cov = TABLE_4.cov * np.exp(3 * (added - 0.69) + 0.05 * rng.standard_normal(9))[:, None]
+    assert spread.match(added, cov) == pytest.approx(0.69, abs=0.08)
+
+
 def entry(factor: float, held_out: float, *, converged=True, informative=True) -> SimpleNamespace:
     return SimpleNamespace(
         shaping_factor=factor, held_out=held_out, converged=converged, informative=informative
