@@ -50,7 +50,7 @@ def ranks(rng: np.random.Generator) -> np.ndarray:
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(1800)
+@pytest.mark.timeout(3600)
 def test_ranks_of_the_truth_are_uniform(rng_seed: int) -> None:
     rng = np.random.default_rng(rng_seed)
     found = np.array([ranks(rng) for _ in range(CASES)])
