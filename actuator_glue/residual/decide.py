@@ -67,7 +67,7 @@ def decide(
         noise=found.noise,
         left=left,
         limit=limit,
-        remaining=remaining(data, final.fit.error),
+        remaining={'left': left, 'limit': limit, **remaining(data, final.fit.error)},
     )
 
 

@@ -53,9 +53,9 @@ def check(record: Record, number: int) -> None:
             f'diagnosis; give at least {_SHORTEST:g} s and 500 samples'
         )
     moved, measured = float(np.std(record.command)), float(np.std(record.measured))
-    if moved == 0.0:
+    if np.ptp(record.command) == 0.0:
         raise InputError(f'{where}: the command is constant; nothing can be identified from it')
-    if measured == 0.0:
+    if np.ptp(record.measured) == 0.0:
         raise InputError(
             f'{where}: the measured displacement is constant; check that its channel is connected'
         )

@@ -18,7 +18,7 @@ from actuator_glue.residual.score import Scorer
 
 _P = len(BASE)
 _COARSE = 8  # iterations of every refit; those in the running go on
-_POLISHED = 6
+_POLISHED = 4
 _STARTS = 4  # starting sizes that survive the screening (the kernel works on 32 at a time)
 
 

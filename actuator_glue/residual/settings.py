@@ -27,7 +27,7 @@ class Settings:
 
     noise_share: float = 0.4
     stroke_share: float = 1e-3
-    later_share: float = 0.2
+    later_share: float = 0.15
     nats: float = 10.0
     tie_nats: float = 4.0
     tie_share: float = 0.1

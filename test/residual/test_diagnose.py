@@ -1,0 +1,110 @@
+"""Whole diagnoses of short simulated tests: effect named, healthy machine left alone."""
+
+import json
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from actuator_glue.errors import InputError
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Record
+from actuator_glue.residual.diagnose import diagnose
+from actuator_glue.residual.settings import Settings
+
+RATE = 128.0
+THETA = np.array([235.0, 5.0e10, 4.23e6, 3.3])
+T = np.arange(int(24 * RATE)) / RATE
+SWEEP = 2e-3 * np.sin(np.pi * (10.0 / 24.0) * T**2)
+QUICK = Settings(evaluations=0)
+
+
+def make(effects: Sequence[str], sizes: Sequence[float], seed: int) -> list[Record]:
+    """Two sweeps and a held-out record of another kind, 10 um of noise."""
+    rng = np.random.default_rng(seed)
+    shaking = np.cumsum(rng.standard_normal(len(T)))
+    shaking = np.convolve(shaking - np.convolve(shaking, np.ones(129) / 129, 'same'), [0.5, 0.5])
+    shaking = 2e-3 * np.sin(T / 4) * shaking[: len(T)] / np.abs(shaking).max()
+    model = Structure(effects)
+    out = []
+    for command, k in ((SWEEP, 0.0), (SWEEP, 250e3), (shaking, 250e3)):
+        silent = Record(command, command, 1 / RATE, stiffness=k)
+        y = model.simulate(np.append(THETA, sizes), silent)
+        out.append(Record(command, y + 1e-5 * rng.standard_normal(len(T)), 1 / RATE, stiffness=k))
+    return out
+
+
+def test_a_healthy_machine_is_left_alone() -> None:
+    """Noise alone, with 20 N of friction: immaterial."""
+    a, b, held = make(['coulomb-friction'], [20.0], 11)
+    found = diagnose([a, b], held, settings=QUICK)
+    assert found.verdict == 'none'
+    assert found.effects == ()
+    assert found.structure == ()
+    assert found.error.before == found.error.after
+    assert found.error.after == pytest.approx(1e-5, rel=0.1)
+
+
+def test_play_is_named_and_removed() -> None:
+    """60 um of play: the name, its size within 3 %, and the error down to the noise."""
+    a, b, held = make(['backlash'], [6e-5], 12)
+    stages: list[str] = []
+    found = diagnose([a, b], held, progress=lambda s, x: stages.append(s), settings=QUICK)
+    assert found.verdict == 'missing-effect'
+    assert [e.name for e in found.effects] == ['backlash']
+    assert found.effects[0].alternatives == ()
+    estimate = found.effects[0].parameters['backlash']
+    assert estimate.mean == pytest.approx(6e-5, rel=0.03)
+    assert estimate.lower > 0.0
+    assert found.error.before > 1.5 * found.error.after
+    assert found.error.after == pytest.approx(1e-5, rel=0.1)
+    assert found.coverage[1] == pytest.approx(0.95, abs=0.03)
+    assert found.coverage[0] < 0.85
+    # A sham effect of equal size must not do what the real one does.
+    assert found.error.sham > 1.4 * found.error.after
+    assert {'base fit', 'effect 1', 'held-out', 'done'} <= set(stages)
+    out = json.loads(json.dumps(found.to_json(), allow_nan=False))
+    assert out['schema'] == 'actuator_glue.diagnosis/1'
+    assert set(out) >= {
+        'verdict', 'effects', 'error', 'candidates', 'coverage', 'advice', 'seconds'
+    }  # fmt: skip
+    assert set(out['error']) >= {
+        'unit', 'split', 'before', 'before_ci', 'after', 'after_ci', 'noise_floor',
+        'removable_removed',
+    }  # fmt: skip
+    assert out['candidates'][0]['name'] == 'backlash'
+
+
+def test_unknown_stiffness_is_refused() -> None:
+    """The stiffness decides what is identified."""
+    record = Record(SWEEP, SWEEP, 1 / RATE)
+    with pytest.raises(InputError, match='stiffness'):
+        diagnose([record])
+
+
+@pytest.mark.slow
+def test_the_same_seed_gives_the_same_diagnosis() -> None:
+    """Bit for bit, with one thread or two, posterior included."""
+    a, b, held = make(['delay'], [8e-3], 13)
+    settings = Settings(evaluations=3000)
+    one = diagnose([a, b], held, seed=4, jobs=1, settings=settings).to_json()
+    two = diagnose([a, b], held, seed=4, jobs=2, settings=settings).to_json()
+    assert one == two
+
+
+@pytest.mark.slow
+def test_what_the_catalogue_lacks_is_unexplained() -> None:
+    """A reading that freezes at random has no name."""
+    a, b, held = make([], [], 14)
+    rng = np.random.default_rng(15)
+    broken = []
+    for record in (a, b):
+        y = np.array(record.measured)
+        for at in rng.integers(0, len(y) - 20, 40):
+            y[at : at + 12] = y[at]
+        broken.append(Record(record.command, y, 1 / RATE, stiffness=record.stiffness))
+    found = diagnose(broken, held, settings=QUICK)
+    assert found.verdict == 'unexplained'
+    assert found.effects == ()
+    assert found.remaining['left'] > found.remaining['limit']
+    assert any('remain' in line for line in found.advice)

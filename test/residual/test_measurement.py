@@ -1,0 +1,64 @@
+"""Quantisation, hum and jitter are found on what remains, and nothing is found in noise."""
+
+import numpy as np
+import pytest
+
+from actuator_glue.records import Record
+from actuator_glue.residual.data import Data
+from actuator_glue.residual.measurement import find, grid, hum, jitter, quantisation
+
+RATE = 256.0
+T = np.arange(int(30 * RATE)) / RATE
+Y = 2e-3 * np.sin(np.pi / 3 * T**2)
+SIGMA = 1e-5
+
+
+def data(error: np.ndarray) -> Data:
+    """One record whose model is exact."""
+    return Data.whole([Record(Y, Y + error, 1 / RATE, stiffness=0.0)])
+
+
+def test_noise_alone_gives_nothing() -> None:
+    """Twenty records of noise; each test's false alarm rate is below 10^-4."""
+    rng = np.random.default_rng(1)
+    for _ in range(20):
+        e = SIGMA * rng.standard_normal(len(T))
+        assert find(data(e), e, 0.4 * SIGMA) == ()
+
+
+def test_a_grid_is_found_with_its_step() -> None:
+    """Values rounded to 50 um lie on a grid, whatever its offset."""
+    rng = np.random.default_rng(2)
+    y = Y + SIGMA * rng.standard_normal(len(T))
+    step = 5e-5
+    record = Record(Y, step * np.round(y / step) + 1.3e-5, 1 / RATE, stiffness=0.0)
+    assert grid(record) == pytest.approx(step, rel=1e-6)
+    found = quantisation(Data.whole([record]))
+    assert found is not None
+    assert found.rms == pytest.approx(step / np.sqrt(12))
+
+
+def test_a_line_is_found_in_every_phase() -> None:
+    """Amplitude and frequency of hum, its phase being another in each record."""
+    rng = np.random.default_rng(3)
+    records, errors = [], []
+    for phase in (0.3, 2.0):
+        e = SIGMA * rng.standard_normal(len(T)) + 2e-5 * np.sin(2 * np.pi * 50.03 * T + phase)
+        records.append(Record(Y, Y + e, 1 / RATE, stiffness=0.0))
+        errors.append(e)
+    found = hum(Data.whole(records), np.concatenate(errors))
+    assert found is not None
+    assert found.values[2] == pytest.approx(50.03, abs=2e-3)
+    assert found.rms == pytest.approx(2e-5 / np.sqrt(2), rel=0.1)
+
+
+def test_jitter_is_variance_with_velocity() -> None:
+    """Independent errors of the sample times; the estimate scatters by 3 %."""
+    rng = np.random.default_rng(4)
+    late = 5e-4
+    y = 2e-3 * np.sin(np.pi / 3 * (T + late * rng.standard_normal(len(T))) ** 2)
+    e = y - Y + SIGMA * rng.standard_normal(len(T))
+    found = jitter(data(e), e, Y)
+    assert found is not None
+    assert found.values[0] == pytest.approx(late, rel=0.15)
+    assert found.nats > 25.0
