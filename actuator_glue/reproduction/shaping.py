@@ -92,9 +92,9 @@ class Choice:
 
 
 def trace(posterior: Posterior, points: int = 60) -> Trace:
-    """Return R-hat at evenly spaced lengths of a run."""
+    """Return R-hat at lengths of a run that grow by equal factors."""
     draws = posterior.chains.draws
-    lengths = np.unique(np.linspace(max(8, len(draws) // points), len(draws), points).astype(int))
+    lengths = np.unique(np.geomspace(min(20, len(draws)), len(draws), points).astype(int))
     return Trace(
         np.array([posterior.chains.evaluations_at(n - 1) for n in lengths], dtype=float),
         np.array([gelman_rubin(draws[:n]) for n in lengths]),

@@ -42,6 +42,6 @@ def residual_by_frequency(
         float(by_frequency(records[t], r.residual[t])[1].max()) for r in both for t in (0, 1)
     )
     panels[0].set_ylim(0, 1.05 * UM * top)
-    panels[0].set_ylabel('residual rms [um]')
+    panels[0].set_ylabel('residual rms [µm]')
     figure.legend(*panels[0].get_legend_handles_labels(), loc='outside lower center', ncols=2)
     return figure

@@ -66,8 +66,8 @@ def convergence(shaped: Sequence[Shaped]) -> Figure:
                     label=style.SYMBOL[parameter.name],
                 )  # fmt: skip
             axes.axhline(THRESHOLD, color='black', lw=0.8, ls=(0, (6, 3)), label='1.2')
-            axes.set(ylim=(0.95, 3.0), xlabel='evaluations')
-            axes.locator_params(axis='x', nbins=3)
+            axes.set(ylim=(0.95, 3.0), xlabel='evaluations', xscale='log')
+            axes.set_xlim(100, trace.evaluations[-1])
         power = round(np.log2(entry.shaping_factor))
         panels[0, column].set_title(f'${name}$ = $2^{{{power}}}$', loc='center')
     panels[0, 0].set_ylabel('R-hat, three chains\nfrom the prior')
