@@ -81,11 +81,12 @@ def run(args: argparse.Namespace) -> int:
     demo.own_domain()
     settings = {'window': args.window, 'hop': args.hop, 'seed': args.seed}
     settings['time_budget'] = min(0.5, args.hop)
+    diagnose = not args.no_diagnosis
     console = demo.terminal()
     started = time.monotonic()
     with Display(console) as display:
-        demo.stream(source, settings, folder, display)
-        outcome = demo.finish(source, folder, display, args.seed, diagnose=not args.no_diagnosis)
+        demo.stream(source, settings, folder, display, diagnose=diagnose)
+        outcome = demo.finish(source, folder, display, args.seed, diagnose=diagnose)
     outcome.seconds = time.monotonic() - started
     write_json(outcome.to_json(), str(folder / 'summary.json'))
     outcome.show(console)

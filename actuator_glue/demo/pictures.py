@@ -2,14 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from actuator_glue.demo.bag import Content
 from actuator_glue.errors import InputError
-from actuator_glue.model.parameters import Parameter
+from actuator_glue.inference.scores import instantaneous_frequency
+from actuator_glue.model.parameters import NAMES, Parameter
 from actuator_glue.records import Array, Record
+from actuator_glue.report import style
+from actuator_glue.report.timeseries import (
+    band_at_zooms,
+    even_zooms,
+    frequency_zooms,
+    parameters_against_time,
+)
 
 FREQUENCIES = (1.0, 5.0, 10.0)  # Hz, where the paper looks
 CYCLES = 2.0  # of the command in each zoom
@@ -21,9 +31,6 @@ def bands(content: Content, path: Path) -> Path:
     Raises:
         InputError: the bag holds no scored bands.
     """
-    from actuator_glue.report import style
-    from actuator_glue.report.timeseries import band_at_zooms
-
     total, parameter = content.stitched('total'), content.stitched('parameter')
     if total is None or parameter is None:
         raise InputError('the estimator published no bands; the run was shorter than a window')
@@ -52,40 +59,91 @@ def parameters(content: Content, path: Path, truth: Array | None = None) -> Path
     Raises:
         InputError: the bag holds no posterior.
     """
-    from actuator_glue.report import style
-    from actuator_glue.report.timeseries import parameters_against_time
-
     if not content.posteriors:
         raise InputError('the estimator published no posterior; the run was shorter than a window')
     last = content.posteriors[-1]
-    same = [p for p in content.posteriors if list(p.parameter_names) == list(last.parameter_names)]
     first = content.record.first_index
-    end = [(int(p.index) + int(p.samples) - first) * float(p.period) for p in same]
-    mean, spread = np.array([p.mean for p in same]), np.array([p.stddev for p in same])
+    end = [(int(p.index) + int(p.samples) - first) * float(p.period) for p in content.posteriors]
+    mean, spread = (
+        np.array([_by_name(p, getattr(p, column), last) for p in content.posteriors])
+        for column in ('mean', 'stddev')
+    )
     columns = [
         Parameter(name, unit, 0.0, np.inf, name)
         for name, unit in zip(last.parameter_names, last.units, strict=True)
     ]
+    if truth is not None:
+        truth = np.concatenate([truth, np.full(len(columns) - len(truth), np.nan)])
+    # No parameter of Eq. (2) is negative.
+    least = [0.0 if name in NAMES else -np.inf for name in last.parameter_names]
     figure = parameters_against_time(
         np.array(end),
         mean,
-        np.maximum(mean - 2 * spread, 0.0) if len(columns) == 4 else mean - 2 * spread,
+        np.maximum(mean - 2 * spread, least),
         mean + 2 * spread,
         columns,
         truth=truth,
         # Told by the last windows: the first ones are short of samples.
-        prior_dominated=np.mean([p.prior_dominated for p in same[-5:]], axis=0) > 0.5,
+        prior_dominated=np.mean(
+            [_by_name(p, p.prior_dominated, last) for p in content.posteriors[-5:]], axis=0
+        )
+        > 0.5,
         title='Posterior of each window against the time of its last sample',
         band_name='mean +- 2 standard deviations',
     )
     return style.save(figure, path)
 
 
+def _by_name(posterior: Any, values: Sequence[float], wanted: Any) -> list[float]:
+    """Return values in the order of another posterior's parameters, NaN for those it lacks."""
+    known = dict(zip(posterior.parameter_names, values, strict=True))
+    return [float(known.get(name, np.nan)) for name in wanted.parameter_names]
+
+
+@style.styled
+def live(content: Content, path: Path) -> Path:
+    """Draw how far the forecasts were off, hop by hop, and where the model was changed.
+
+    Raises:
+        InputError: the bag holds no scored bands.
+    """
+    hops = [b for b in content.bands if b.kind == 'noise']
+    if not hops:
+        raise InputError('the estimator published no scored bands')
+    first, period = content.record.first_index, content.record.period
+    time = [(int(b.index) - first + len(b.median) / 2) * period for b in hops]
+    figure = style.new_figure(3.8)
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    upper.plot(time, [1e6 * b.rms_error for b in hops], '-o', color=style.BAND)
+    upper.set(ylabel='rms error of the\nforecast [um]', ylim=(0, None))
+    lower.plot(time, [100 * b.widest_coverage for b in hops], '-o', color=style.BAND)
+    lower.axhline(100 * float(hops[-1].widest_level), ls=':', color=style.COMMAND)
+    lower.set(ylabel='samples in the band of\nparameters and noise [%]', ylim=(0, 103))
+    lower.set_xlabel('time [s]')
+    for start, name in _changes(content):
+        for axes in (upper, lower):
+            axes.axvline((start - first) * period, ls='--', color=style.TRUTH)
+        upper.annotate(
+            f' {name}', ((start - first) * period, 0.97), xycoords=('data', 'axes fraction'),
+            color=style.TRUTH, va='top',
+        )  # fmt: skip
+    figure.suptitle('Forecasts before and after the model was augmented, live')
+    return style.save(figure, path)
+
+
+def _changes(content: Content) -> list[tuple[int, str]]:
+    """Return first forecast sample and effects of each model after the first."""
+    found = []
+    pairs = zip(content.posteriors, content.posteriors[1:], strict=False)
+    for before, after in pairs:
+        if list(before.effects) != list(after.effects):
+            name = ' + '.join(['Eq. (2)', *after.effects])
+            found.append((int(after.index) + int(after.samples), name))
+    return found
+
+
 def _zooms(record: Record, start: int, stop: int) -> tuple[list[tuple[float, float]], list[str]]:
     """Return three time spans [s] between two samples, and their titles."""
-    from actuator_glue.inference.scores import instantaneous_frequency
-    from actuator_glue.report.timeseries import even_zooms, frequency_zooms
-
     part = record.slice(start, stop)
     offset = start * record.period
     try:

@@ -49,8 +49,17 @@ def prepare(folder: Path) -> None:
         raise InputError(f'{folder}: cannot be written ({error.strerror})') from error
 
 
-def stream(source: Source, settings: dict[str, Any], folder: Path, display: Display) -> None:
-    """Run recorder, estimator and source as processes until the last window is in the bag.
+def stream(
+    source: Source, settings: dict[str, Any], folder: Path, display: Display, *, diagnose: bool
+) -> None:
+    """Run the nodes as processes until the last window is in the bag.
+
+    Args:
+        source: publishes the samples.
+        settings: parameters of the estimator.
+        folder: gets the bag, parameter files and logs.
+        display: shows the progress.
+        diagnose: whether the diagnoser watches and swaps the model, live.
 
     Raises:
         InputError: a node dies or does not get ready.
@@ -60,14 +69,17 @@ def stream(source: Source, settings: dict[str, Any], folder: Path, display: Disp
     with Nodes() as nodes:
         nodes.start('recorder', {'bag': str((folder / 'bag').resolve())}, logs)
         nodes.start('estimator', settings, logs)
+        if diagnose:
+            nodes.start('diagnoser', {'apply': True, 'seed': settings['seed']}, logs)
         _wait_until_ready(nodes, watch, display)
-        sender = nodes.start(source.node, source.parameters, logs)
+        listeners = {'wait_for': 3 if diagnose else 2}
+        sender = nodes.start(source.node, source.parameters | listeners, logs)
         _wait_until_sent(nodes, sender, source, watch, display)
         _wait_until_drained(nodes, watch)
 
 
 def _wait_until_ready(nodes: Nodes, watch: Watch, display: Display) -> None:
-    stage = display.stage('starting recorder, estimator', total=READY_SECONDS)
+    stage = display.stage('starting the nodes', total=READY_SECONDS)
     start = time.monotonic()
     while not watch.ready:
         elapsed = time.monotonic() - start
@@ -129,11 +141,13 @@ def finish(
     content = demo_bag.read(folder / 'bag')
     comparison = replay_bag(folder / 'bag')
     display.advance(stage, 1)
-    stage = display.stage('drawing', total=2)
+    stage = display.stage('drawing', total=3)
     pictures.bands(content, folder / 'bands.png')
     display.advance(stage, 1)
     pictures.parameters(content, folder / 'parameters.png', source.truth)
     display.advance(stage, 2)
+    pictures.live(content, folder / 'live.png')
+    display.advance(stage, 3)
     outcome = Outcome(source.title, _sent(source, folder), content, comparison)
     if diagnose:
         _diagnose(outcome, folder, display, seed)

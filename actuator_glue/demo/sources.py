@@ -14,7 +14,6 @@ from actuator_glue.records import Array, Hold
 PREVIEW = 2.0  # s
 REST = 1.0  # s of rest before the simulated command
 BLOCKS_PER_SECOND = 50.0
-LISTENERS = 2  # estimator and recorder
 # The simulated actuator: near the paper's Table 2, not equal to it.
 TRUTH = {'beta_1': 134.0, 'alpha_1_beta_0': 1.1e9, 'alpha_2': 2.5e5, 'alpha_3': 0.5}
 STIFFNESS = 250e3  # N/m, the paper's second test
@@ -62,7 +61,6 @@ def simulator(
         'seed': seed,
         'preview': PREVIEW,
         'exit_at_end': True,
-        'wait_for': LISTENERS,
         **TRUTH,
     }
     if effect:
@@ -98,7 +96,6 @@ def laboratory(
         'file': str(path.resolve()),
         'block': max(1, round(records[0].rate / BLOCKS_PER_SECOND)),
         'preview': PREVIEW,
-        'wait_for': LISTENERS,
     }
     if channels is not None:
         parameters['channels'] = str(channels.resolve())
