@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import shutil
 from pathlib import Path
 
 from actuator_glue.cli._output import progress, say
@@ -86,14 +87,21 @@ def _bag(records: list[Record], out: Path, block: int) -> None:
     from actuator_glue.io.bag_writer import BagWriter
 
     names = list(dict.fromkeys(r.actuator for r in records))
-    with progress('writing', sum(len(r) for r in records)) as done, BagWriter(out) as writer:
-        written = 0
+    written = 0
 
-        def count(samples: int) -> None:
-            nonlocal written
-            written += samples
-            done(written)
+    def count(samples: int) -> None:
+        nonlocal written
+        written += samples
+        done(written)
 
-        for record in records:
-            namespace = '' if len(names) == 1 else f'/actuator_{names.index(record.actuator) + 1}'
-            write_record(writer, record, namespace=namespace, block=block, progress=count)
+    writer = BagWriter(out)
+    try:
+        with progress('writing', sum(len(r) for r in records)) as done, writer:
+            for record in records:
+                place = names.index(record.actuator) + 1
+                namespace = '' if len(names) == 1 else f'/actuator_{place}'
+                write_record(writer, record, namespace=namespace, block=block, progress=count)
+    except BaseException:
+        # Half a conversion looks like a whole test; it can be made again.
+        shutil.rmtree(out, ignore_errors=True)
+        raise

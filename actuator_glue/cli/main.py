@@ -61,8 +61,9 @@ def build_parser(chosen: str | None) -> argparse.ArgumentParser:
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command and return its exit code."""
     argv = list(sys.argv[1:] if argv is None else argv)
-    chosen = next((a for a in argv if not a.startswith('-')), None)
     debug = '--debug' in argv
+    argv = [a for a in argv if a != '--debug']  # wherever it stands
+    chosen = next((a for a in argv if not a.startswith('-')), None)
     if not debug:
         # Deprecations inside libraries are nothing a user can act on.
         warnings.simplefilter('ignore')

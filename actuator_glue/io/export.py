@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -63,6 +64,9 @@ def write_csv(
         temporary.replace(path)
     except OSError as error:
         raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def write_mat(path: Path | str, record: Record, *, unit: str = 'mm') -> None:
@@ -85,3 +89,6 @@ def write_mat(path: Path | str, record: Record, *, unit: str = 'mm') -> None:
         temporary.replace(path)
     except OSError as error:
         raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)

@@ -101,6 +101,24 @@ def test_outputs_are_never_overwritten(run, tmp_path: Path, short_bag: Path) -> 
     assert 'folders' in run('convert', short_bag, tmp_path / 'a.mcap').message
 
 
+@pytest.mark.parametrize('name', ['bag', 'x.csv', 'x.mat'])
+@pytest.mark.parametrize('error', [KeyboardInterrupt, OSError])
+def test_half_a_conversion_is_not_left_behind(
+    run, tmp_path: Path, short_bag: Path, monkeypatch: pytest.MonkeyPatch, name: str, error: type
+) -> None:
+    """An interrupted conversion leaves nothing that looks like a test."""
+    from actuator_glue.io import export, mcap_file
+
+    def fail(*_: object) -> None:
+        raise error
+
+    monkeypatch.setattr(mcap_file.McapFile, 'finish', fail)
+    monkeypatch.setattr(export.Path, 'replace', fail)
+    done = run('convert', short_bag, tmp_path / name)
+    assert done.code in (2, 130)
+    assert list(tmp_path.iterdir()) == []
+
+
 @pytest.mark.parametrize('suffix', ['csv', 'mat'])
 def test_there_and_back(run, tmp_path: Path, short_bag: Path, suffix: str) -> None:
     """Bag to file to bag loses nothing where the unit is m."""

@@ -111,7 +111,7 @@ def test_errors_become_one_line(
     assert words in done.message
     if isinstance(error, ZeroDivisionError):
         with pytest.raises(ZeroDivisionError):
-            run('--debug', 'info', 'x')
+            run('info', 'x', '--debug')
 
 
 def test_a_closed_pipe_is_no_error(short_bag: Path) -> None:
