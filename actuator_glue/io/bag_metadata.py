@@ -41,6 +41,41 @@ class Qos:
 
 LATCHED = Qos(durability='transient_local')
 
+# Numbers of the policies in rmw, which bags before version 9 (before Jazzy) hold.
+_POLICIES = {
+    'history': ('system_default', 'keep_last', 'keep_all', 'unknown'),
+    'reliability': ('system_default', 'reliable', 'best_effort', 'unknown', 'best_available'),
+    'durability': ('system_default', 'transient_local', 'volatile', 'unknown', 'best_available'),
+    'liveliness': ('system_default', 'automatic', 'manual_by_node', 'manual_by_topic', 'unknown'),
+}
+
+
+def qos_profiles(text: str) -> list[dict[str, Any]]:
+    """Return QoS profiles from the text inside an .mcap, of any version, as version 9 has them.
+
+    What cannot be understood is left out: a bag is worth reading without it.
+    """
+    try:
+        loaded = yaml.safe_load(text)
+    except yaml.YAMLError:
+        return []
+    profiles = []
+    for entry in loaded if isinstance(loaded, list) else []:
+        if not isinstance(entry, dict):
+            continue
+        profile = Qos().as_dict()
+        for name, default in profile.items():
+            value = entry.get(name)
+            if name in _POLICIES:
+                names = _POLICIES[name]
+                if isinstance(value, int) and 0 <= value < len(names):
+                    value = names[value]
+                profile[name] = value if value in names else 'unknown'
+            elif type(value) is type(default):
+                profile[name] = value
+        profiles.append(profile)
+    return profiles
+
 
 @dataclass(slots=True)
 class Topic:

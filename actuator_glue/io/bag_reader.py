@@ -8,8 +8,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
 
-import yaml
-
 from actuator_glue.errors import InputError
 from actuator_glue.io import bag_metadata
 from actuator_glue.io.bag_metadata import Part, Topic
@@ -144,7 +142,9 @@ def messages(
                         channel.topic,
                         schema.name,
                         channel.metadata.get('topic_type_hash', ''),
-                        _qos(channel.metadata.get('offered_qos_profiles', '')),
+                        bag_metadata.qos_profiles(
+                            channel.metadata.get('offered_qos_profiles', '')
+                        ),
                     )
                     summary.definitions[schema.name] = schema.data.decode('utf-8', 'replace')
                 summary.topics[channel.topic].count += 1
@@ -178,14 +178,6 @@ def summarise(path: Path | str) -> Summary:
         if not summary.damage:
             summary.damage.append(f'{path}: {bag_metadata.NAME} is missing')
     return summary
-
-
-def _qos(text: str) -> list[dict[str, object]]:
-    try:
-        loaded = yaml.safe_load(text)
-    except yaml.YAMLError:
-        return []
-    return [q for q in loaded if isinstance(q, dict)] if isinstance(loaded, list) else []
 
 
 def decoded(

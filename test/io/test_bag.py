@@ -17,7 +17,7 @@ from rosbags.highlevel import AnyReader
 
 from actuator_glue.errors import InputError
 from actuator_glue.io import messages
-from actuator_glue.io.bag_metadata import LATCHED, Qos
+from actuator_glue.io.bag_metadata import LATCHED, Qos, qos_profiles
 from actuator_glue.io.bag_reader import is_bag, summarise
 from actuator_glue.io.bag_reader import messages as bag_messages
 from actuator_glue.io.bag_records import read_records, write_record
@@ -310,6 +310,23 @@ def test_recover_writes_a_lost_metadata_file(bag: Path) -> None:
     (bag / 'metadata.yaml').unlink()
     assert recover(bag).rewritten == []
     assert yaml.safe_load((bag / 'metadata.yaml').read_text()) == before
+
+
+@pytest.mark.parametrize(
+    ('text', 'expected'),
+    [
+        ('', []),
+        ('[not: a: list', []),
+        ('- {history: 1, depth: 7, reliability: 2, durability: 1, liveliness: 1}', None),
+        ('- {history: keep_last, depth: 7, reliability: best_effort, durability: '
+         'transient_local, liveliness: automatic}', None),
+        ('- 5', []),
+    ],
+)  # fmt: skip
+def test_qos_of_older_bags_is_understood(text: str, expected: list[object] | None) -> None:
+    """Numbers of bags before Jazzy become the names that version 9 has."""
+    wanted = [Qos('best_effort', 'transient_local', 'keep_last', 7).as_dict()]
+    assert qos_profiles(text) == (wanted if expected is None else expected)
 
 
 def test_recover_refuses_what_holds_nothing(tmp_path: Path) -> None:
