@@ -38,25 +38,25 @@ class ReplayNode(streamer.Streamer):
         if not is_bag(self.path):
             raise InputError(f'parameter bag = {self.path!r} is neither a bag nor an .mcap file')
         chosen = INPUTS + (RESULTS if self.parameters['results'] else ())
-        self._publishers = {base.type_name(t.type): self.publisher(t) for t in chosen}
+        self._outputs = {base.type_name(t.type): self.publisher(t) for t in chosen}
         clock = topics.Topic('/clock', Clock, topics.PREVIEW.qos)
-        self._clock: Any = self.publisher(clock) if self.parameters['clock'] else None
+        self._time: Any = self.publisher(clock) if self.parameters['clock'] else None
 
     def stream(self) -> Iterator[Step]:
         """Yield the messages of the bag in the order they were recorded."""
         first: int | None = None
         note = partial(self.complain, 'bag')
-        for found in messages(self.path, types=tuple(self._publishers), note=note):
+        for found in messages(self.path, types=tuple(self._outputs), note=note):
             first = found.log_time if first is None else first
             due = (found.log_time - first) * 1e-9
             yield Step(due, partial(self._publish, found.type, found.data, found.log_time))
 
     def _publish(self, kind: str, data: bytes, log_time: int) -> None:
-        if self._clock is not None:
+        if self._time is not None:
             message = Clock()
             message.clock.sec, message.clock.nanosec = divmod(log_time, 1_000_000_000)
-            self._clock.publish(message)
-        self._publishers[kind].publish(data)
+            self._time.publish(message)
+        self._outputs[kind].publish(data)
         if kind == base.type_name(topics.SAMPLES.type):
             self.samples.add(len(deserialize(kind, data).command))
 

@@ -1,0 +1,48 @@
+"""Real nodes in processes of their own, on a ROS domain of their own."""
+
+import os
+
+import pytest
+
+# Before anything of DDS starts; the domain differs between test processes.
+os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
+os.environ['ROS_DOMAIN_ID'] = str(1 + os.getpid() % 100)
+
+rclpy = pytest.importorskip('rclpy', reason='ROS 2 is not installed: run `make setup`')
+pytest.importorskip(
+    'actuator_glue_msgs', reason='interfaces are not built: `. install/setup.bash` first'
+)
+
+from ros_nodes import Probe, Process  # noqa: E402
+
+
+def pytest_collection_modifyitems(items):
+    """Everything here needs ROS."""
+    for item in items:
+        if 'test/ros/' in str(item.path):
+            item.add_marker(pytest.mark.ros)
+
+
+@pytest.fixture
+def start(tmp_path):
+    """Start nodes; whatever still runs at the end is killed."""
+    running = []
+
+    def begin(executable, name=None, **parameters):
+        process = Process(executable, name or executable, parameters, tmp_path)
+        running.append(process)
+        return process
+
+    yield begin
+    for process in running:
+        process.kill()
+
+
+@pytest.fixture
+def probe():
+    """A node of the test: publishes, listens, calls services."""
+    rclpy.init()
+    node = Probe()
+    yield node
+    node.destroy_node()
+    rclpy.shutdown()

@@ -1,0 +1,200 @@
+"""Processes of nodes, and a node of the test that watches them."""
+
+import os
+import signal
+import subprocess
+import time
+from collections import defaultdict
+from pathlib import Path
+
+import numpy as np
+import rclpy
+import yaml
+from actuator_glue_msgs.msg import SampleBlock, TestSetup
+from diagnostic_msgs.msg import DiagnosticArray
+from lifecycle_msgs.srv import ChangeState, GetState
+from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
+from rclpy.node import Node
+from rclpy.qos import DurabilityPolicy, QoSProfile
+
+RATE = 200.0
+# Estimator settings for short tests at RATE.
+QUICK = {
+    'window': 2.0,
+    'hop': 0.5,
+    'settle': 0.3,
+    'time_budget': 0.5,
+    'evaluations': 4000,
+    'start_evaluations': 12_000,
+}
+
+
+def executable(name):
+    """The installed executable, where `ros2 run` looks for it."""
+    for prefix in os.environ['AMENT_PREFIX_PATH'].split(os.pathsep):
+        path = Path(prefix, 'lib', 'actuator_glue', name)
+        if path.is_file():
+            return path
+    raise AssertionError(f'{name} is not installed below AMENT_PREFIX_PATH')
+
+
+class Process:
+    """One node in a process of its own."""
+
+    def __init__(self, name, node, parameters, folder):
+        self.name = node
+        self.log = folder / f'{node}.log'
+        file = folder / f'{node}.yaml'
+        file.write_text(yaml.safe_dump({'/**': {'ros__parameters': parameters}}))
+        command = [str(executable(name)), '--ros-args', '--params-file', str(file)]
+        if node != name:
+            command += ['-r', f'__node:={node}']
+        with self.log.open('wb') as log:
+            self.process = subprocess.Popen(
+                command, stdout=log, stderr=subprocess.STDOUT, cwd=folder, start_new_session=True
+            )
+
+    @property
+    def alive(self):
+        return self.process.poll() is None
+
+    @property
+    def text(self):
+        return self.log.read_text(errors='replace')
+
+    def end(self, number=signal.SIGINT, timeout=20.0):
+        """Send a signal; return the exit status."""
+        self.process.send_signal(number)
+        return self.process.wait(timeout)
+
+    def wait(self, timeout):
+        """Wait for its own end; return the exit status."""
+        return self.process.wait(timeout)
+
+    def kill(self):
+        """End the process and its children, whatever they do."""
+        try:
+            os.killpg(self.process.pid, signal.SIGKILL)
+        except ProcessLookupError:
+            pass
+        self.process.wait()
+
+
+class Probe(Node):
+    """Watches /diagnostics, publishes samples, calls services."""
+
+    def __init__(self):
+        super().__init__('probe')
+        self.health = {}
+        self.faults = defaultdict(str)
+        self.create_subscription(DiagnosticArray, '/diagnostics', self._diagnosed, 50)
+        self.index = 0
+
+    def _diagnosed(self, message):
+        for status in message.status:
+            node = status.name.strip('/')
+            self.health[node] = {v.key: v.value for v in status.values}
+            self.faults[node] += ''.join(
+                f'{v.key}: {v.value}\n' for v in status.values if v.key.endswith('(last)')
+            )
+
+    def until(self, condition, timeout=30.0, what=''):
+        """Spin until a condition holds."""
+        end = time.monotonic() + timeout
+        while not condition():
+            assert time.monotonic() < end, f'timed out: {what or condition}; {self.health}'
+            rclpy.spin_once(self, timeout_sec=0.02)
+
+    def for_a_while(self, seconds):
+        """Spin."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            rclpy.spin_once(self, timeout_sec=0.02)
+
+    def value(self, node, key, default=None):
+        """What a node last said under a key of /diagnostics."""
+        return self.health.get(node, {}).get(key, default)
+
+    def number(self, node, key):
+        return float(self.value(node, key, 'nan'))
+
+    def call(self, service, name, request, timeout=20.0):
+        """Call a service."""
+        client = self.create_client(service, name)
+        self.until(client.service_is_ready, timeout, name)
+        future = client.call_async(request)
+        self.until(future.done, timeout, name)
+        self.destroy_client(client)
+        return future.result()
+
+    def state(self, node):
+        return self.call(GetState, f'{node}/get_state', GetState.Request()).current_state.label
+
+    def transition(self, node, label):
+        """Ask for a lifecycle transition; return whether it succeeded."""
+        request = ChangeState.Request()
+        request.transition.label = label
+        return self.call(ChangeState, f'{node}/change_state', request).success
+
+    def parameters(self, node):
+        """Names of a node's parameters."""
+        return list(
+            self.call(
+                ListParameters, f'{node}/list_parameters', ListParameters.Request()
+            ).result.names
+        )
+
+    def describe(self, node, names):
+        request = DescribeParameters.Request(names=names)
+        return self.call(DescribeParameters, f'{node}/describe_parameters', request).descriptors
+
+    def get(self, node, names):
+        return self.call(
+            GetParameters, f'{node}/get_parameters', GetParameters.Request(names=names)
+        ).values
+
+    def set(self, node, **values):
+        given = [
+            rclpy.parameter.Parameter(n, value=v).to_parameter_msg() for n, v in values.items()
+        ]
+        request = SetParameters.Request(parameters=given)
+        return self.call(SetParameters, f'{node}/set_parameters', request).results
+
+    # Samples.
+
+    def open_stream(self, listeners=1):
+        """Make publishers and wait until they are listened to."""
+        latched = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
+        self._samples = self.create_publisher(SampleBlock, 'samples', QoSProfile(depth=1000))
+        self._setup = self.create_publisher(TestSetup, 'test_setup', latched)
+        self.until(lambda: self._samples.get_subscription_count() >= listeners, 40)
+        self.start_ns = 10**18
+
+    def setup(self, stiffness=250e3, rate=RATE, hold='zoh', index=0):
+        message = TestSetup(
+            actuator='rig',
+            specimen_stiffness=float(stiffness),
+            rate=rate,
+            hold=hold,
+            index=index,
+        )
+        self._setup.publish(message)
+
+    def block(self, command, measured, index=None, stamp_ns=None, period=1.0 / RATE):
+        """Publish a block at the running index."""
+        index = self.index if index is None else index
+        stamp = self.start_ns + round(index / RATE * 1e9) if stamp_ns is None else stamp_ns
+        message = SampleBlock(period=period, index=index)
+        message.header.stamp.sec, message.header.stamp.nanosec = divmod(stamp, 10**9)
+        message.header.frame_id = 'rig'
+        message.command = np.asarray(command, dtype=float)
+        message.measured = np.asarray(measured, dtype=float)
+        self._samples.publish(message)
+        self.index = index + len(command)
+
+    def stream(self, record, size=20, pause=0.005):
+        """Publish a record, going on with the running index."""
+        for start in range(0, len(record), size):
+            part = slice(start, start + size)
+            self.block(record.command[part], record.measured[part])
+            self.for_a_while(pause)

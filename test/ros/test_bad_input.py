@@ -1,0 +1,126 @@
+"""What breaks other nodes: each is logged, shown on /diagnostics, and survived."""
+
+import signal
+
+import numpy as np
+import pytest
+from ros_nodes import QUICK, RATE
+from std_msgs.msg import String
+
+from actuator_glue.io.bag_reader import decoded
+from actuator_glue.model import linear
+from actuator_glue.model.commands import noise
+from actuator_glue.records import Record
+
+
+def good(seconds, seed=0):
+    """A record of the linear plant."""
+    command = noise(RATE, seconds, 0.2, 8.0, seed=seed)
+    theta = np.array([134.0, 1.1e9, 2.5e5, 0.5])
+    clean = linear.simulate(theta, command, stiffness=250e3, period=1 / RATE)
+    measured = clean + 1e-5 * np.random.default_rng(seed).standard_normal(len(clean))
+    return Record(command, measured, 1 / RATE, 250e3)
+
+
+def test_estimator_and_recorder_outlive_every_bad_input(start, probe, tmp_path):
+    bag = tmp_path / 'bag'
+    recorder = start('recorder', bag=str(bag))
+    estimator = start('estimator', **QUICK)
+    probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 120, 'estimator compiled')
+    probe.open_stream(listeners=2)
+    wrong = probe.create_publisher(String, 'samples', 10)
+
+    def tried(told, act):
+        """Do something bad; what is told of it appears on /diagnostics."""
+        act()
+        probe.until(lambda: told in probe.faults['estimator'], 15, told)
+        assert estimator.alive and recorder.alive
+
+    tried('nothing on test_setup yet', lambda: probe.block(np.zeros(3), np.zeros(3)))
+    tried('specimen stiffness -5 N/m', lambda: probe.setup(stiffness=-5.0))
+    tried('rate -1 Hz is not positive', lambda: probe.setup(rate=-1.0))
+    tried("hold 'cubic'", lambda: probe.setup(hold='cubic'))
+    tried('std_msgs/msg/String', lambda: wrong.publish(String(data='hello')))
+    probe.setup(index=probe.index)
+    probe.stream(good(1.0))
+    bad = np.full(5, np.nan)
+    tried('measured is NaN or infinite', lambda: probe.block(np.zeros(5), bad))
+    tried('it is empty', lambda: probe.block([], []))
+    tried('measured is 1e+06 m', lambda: probe.block(np.zeros(3), [0.0, 1e6, 0.0]))
+    tried('channels have different lengths', lambda: probe.block(np.zeros(4), np.zeros(3)))
+    tried('period nan s', lambda: probe.block(np.zeros(3), np.zeros(3), period=np.nan))
+    tried('says 200 Hz', lambda: probe.block(np.zeros(3), np.zeros(3), period=0.5))
+    probe.stream(good(0.5))
+    tried(
+        'samples are missing before', lambda: probe.block([0.0], [0.0], index=probe.index + 1000)
+    )
+    probe.stream(good(0.5))
+    tried(
+        'the clock jumped by -',
+        lambda: probe.block(np.zeros(3), np.zeros(3), stamp_ns=probe.start_ns - 10**9),
+    )
+    probe.stream(good(0.5))
+    tried('sample index went back', lambda: probe.block([0.0], [0.0], index=3))
+    # One sample at a time is not bad; and after all that the estimator estimates.
+    probe.index = 10_000
+    record = good(5.0, seed=3)
+    probe.stream(record.slice(0, 30), size=1, pause=0.0)
+    before = probe.number('estimator', 'windows')
+    probe.stream(record.slice(30, len(record)), pause=0.02)
+    probe.until(lambda: probe.number('estimator', 'windows') >= before + 2, 30, 'windows')
+    assert estimator.end() == 0 and recorder.end(signal.SIGTERM) == 0
+    assert 'Traceback' not in estimator.text + recorder.text
+
+    # Nothing recorded is lost: what was sent is in the bag, good or bad.
+    blocks = [m for _, m in decoded(bag, ('SampleBlock',))]
+    assert sum(np.isnan(m.measured).any() for m in blocks) == 1
+    assert sum(len(m.command) == 0 for m in blocks) == 1
+    assert any(np.abs(m.measured).max(initial=0.0) == 1e6 for m in blocks)
+    assert blocks[-1].index + len(blocks[-1].command) == 10_000 + len(record)
+    setups = [m.specimen_stiffness for _, m in decoded(bag, ('TestSetup',))]
+    assert -5.0 in setups
+
+
+@pytest.mark.parametrize('how', [signal.SIGKILL, signal.SIGTERM])
+def test_a_recorder_that_is_ended_keeps_what_it_recorded(how, start, probe, tmp_path):
+    """SIGKILL loses at most 0.5 s; SIGTERM nothing, and the bag is finished."""
+    bag = tmp_path / 'bag'
+    recorder = start('recorder', bag=str(bag))
+    simulator = start('actuator_sim', rate=RATE, wait_for=1, block=2)
+    probe.until(lambda: probe.number('actuator_sim', 'samples') >= 600, 40, 'samples')
+    simulator.process.send_signal(signal.SIGSTOP)
+    recorder.process.send_signal(how)
+    recorder.process.wait(20)
+    simulator.process.send_signal(signal.SIGCONT)
+    assert simulator.end() == 0
+    lost = []
+    blocks = [m for _, m in decoded(bag, ('SampleBlock',), note=lost.append)]
+    indices = np.concatenate([np.arange(m.index, m.index + len(m.command)) for m in blocks])
+    assert np.array_equal(indices, np.arange(len(indices)))
+    if how == signal.SIGKILL:
+        assert not (bag / 'metadata.yaml').exists()
+        assert len(indices) >= 600 - 0.5 * RATE
+    else:
+        assert recorder.process.returncode == 0
+        assert (bag / 'metadata.yaml').exists() and not lost
+        assert len(indices) >= 600
+
+
+def test_a_killed_worker_is_replaced(start, probe, tmp_path):
+    import os
+    from pathlib import Path
+
+    estimator = start('estimator', **QUICK)
+    probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 120, 'estimator compiled')
+    children = Path(f'/proc/{estimator.process.pid}/task')
+    pids = [p for t in children.iterdir() for p in (t / 'children').read_text().split()]
+    workers = [p for p in pids if b'spawn_main' in Path(f'/proc/{p}/cmdline').read_bytes()]
+    assert len(workers) == 1
+    os.kill(int(workers[0]), signal.SIGKILL)
+    probe.until(lambda: 'the worker process ended' in probe.faults['estimator'], 15)
+    probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 120, 'compiled again')
+    probe.open_stream()
+    probe.setup()
+    probe.stream(good(5.0), pause=0.02)
+    probe.until(lambda: probe.number('estimator', 'windows') >= 1, 30, 'windows')
+    assert estimator.end() == 0
