@@ -56,8 +56,10 @@ def _exact(a1: Array, a0: Array, step: float) -> tuple[Array, Array, Array]:
     return position, velocity, ramp
 
 
-def build(values: Mapping[str, Array], stiffness: float, step: float, period: float) -> Array:
-    """Return the kernel's table of every parameter set, states zero, shape (kernel.ROWS, m).
+def build(
+    values: Mapping[str, Array], stiffness: float, step: float, period: float
+) -> dict[int, Array]:
+    """Return the coefficient rows of the kernel's table, each (m,), by where they begin.
 
     Args:
         values: every base and effect parameter of the compiled stages by name, each (m,).
@@ -67,7 +69,7 @@ def build(values: Mapping[str, Array], stiffness: float, step: float, period: fl
     """
     v = values
     b1, n0, a2, a3 = v['beta_1'], v['alpha_1_beta_0'], v['alpha_2'], v['alpha_3']
-    c = np.zeros((k.ROWS, len(b1)))
+    c: dict[int, Array] = {}
     half = 0.5 * step
 
     c[k.GAIN] = v['gain']
@@ -97,7 +99,7 @@ def build(values: Mapping[str, Array], stiffness: float, step: float, period: fl
     c[k.FORCE_Q] = step / (1.0 + half * a3)
     c[k.FORCE_X] = a2 / (1.0 + half * a3)
 
-    c[k.STIFFNESS] = stiffness
+    c[k.STIFFNESS] = np.full_like(b1, stiffness)
     damping = v['damping'] + v['mass'] * v['mass_damping']
     c[k.DAMPING_2] = 2.0 * damping / step + 4.0 * v['mass'] / step**2
     c[k.MASS_4V] = 4.0 * v['mass'] / step
@@ -121,9 +123,8 @@ def build(values: Mapping[str, Array], stiffness: float, step: float, period: fl
         c[k.INVERSE_YIELD] = 1.0 / v['yield_displacement']
     c[k.YIELD] = v['yield_displacement']
     c[k.YIELD_RATIO] = v['post_yield_ratio']
-    c[k.SHARP_1 : k.SHARP_16 + 1] = np.maximum(
-        0.0, 1.0 - np.abs(v['yield_sharpness'] - np.arange(5.0)[:, None])
-    )
+    for power, row in enumerate((k.SHARP_1, k.SHARP_2, k.SHARP_4, k.SHARP_8, k.SHARP_16)):
+        c[row] = np.maximum(0.0, 1.0 - np.abs(v['yield_sharpness'] - power))
 
     c[k.BACKLASH] = v['backlash']
     c[k.SENSOR_LAG] = v['sensor_lag'] / step
@@ -135,7 +136,7 @@ def build(values: Mapping[str, Array], stiffness: float, step: float, period: fl
 
 
 def _linear(
-    c: Array, b1: Array, n0: Array, a2: Array, a3: Array, stiffness: float, step: float
+    c: dict[int, Array], b1: Array, n0: Array, a2: Array, a3: Array, stiffness: float, step: float
 ) -> None:
     """Write both linear chains: Eq. (2) exactly in (x, v), and by the scheme in (x, q)."""
     d2 = stiffness + a2

@@ -41,7 +41,7 @@ def tables(
     period: float,
     start: tuple[float, float],
 ) -> Array:
-    """Return the kernel's tables at the first sample, shape (blocks, kernel.ROWS, kernel.LANES).
+    """Return the kernel's tables at the first sample, shape (blocks, kernel.SIZE).
 
     The last block is filled up by repeating the last parameter set.
 
@@ -54,17 +54,21 @@ def tables(
     """
     x, v = start
     step = period / substeps
-    table = coefficients.build(values, stiffness, step, period)
-    table[[kernel.X, kernel.X_EXACT, kernel.X_TRAP, kernel.PLAY, kernel.SENSED]] = x
-    table[[kernel.V, kernel.V_EXACT]] = v
-    table[[kernel.DX, kernel.PLAY_DX]] = v * step
-    table[[kernel.F, kernel.R]] = stiffness * x
+    rows = coefficients.build(values, stiffness, step, period)
+    one = np.ones_like(values['beta_1'])
+    for begin in (kernel.X, kernel.X_EXACT, kernel.X_TRAP, kernel.PLAY, kernel.SENSED):
+        rows[begin] = x * one
+    rows[kernel.V] = rows[kernel.V_EXACT] = v * one
+    rows[kernel.DX] = rows[kernel.PLAY_DX] = v * step * one
+    rows[kernel.F] = rows[kernel.R] = stiffness * x * one
     flow = (stiffness + values['alpha_2']) * v + values['alpha_3'] * stiffness * x
-    table[[kernel.Q, kernel.Q_TRAP]] = flow
-    missing = -table.shape[1] % kernel.LANES
-    wide = np.pad(table, ((0, 0), (0, missing)), mode='edge')
-    split = wide.reshape(kernel.ROWS, -1, kernel.LANES).transpose(1, 0, 2)
-    return np.ascontiguousarray(split)
+    rows[kernel.Q] = rows[kernel.Q_TRAP] = flow
+    table = np.zeros((kernel.SIZE // kernel.LANES, len(one)))
+    for begin, row in rows.items():
+        table[begin // kernel.LANES] = row
+    wide = np.pad(table, ((0, 0), (0, -len(one) % kernel.LANES)), mode='edge')
+    split = wide.reshape(len(wide), -1, kernel.LANES).transpose(1, 0, 2)
+    return np.ascontiguousarray(split).reshape(-1, kernel.SIZE)
 
 
 def blocks(

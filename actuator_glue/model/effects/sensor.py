@@ -42,7 +42,7 @@ LAG = Effect(
     signature='linear; as a delay with a slight roll-off',
     source='Jelali & Kroll 2003 (transducers)',
     starts=lambda s: ((0.0005,), (0.002,), (0.008,)),
-    switches=(kernel.ON_SENSOR_LAG,),
+    switches=(kernel.ON_TRANSDUCER,),
 )
 
 BIAS = Effect(
