@@ -41,15 +41,21 @@ def test_problem_r_from_csv_files(run, problem_r: Path, tmp_path: Path, rng_seed
     assert content['evaluations'] <= 60_000
     assert 2e-5 < content['error']['rms_m'] < 5e-5
     assert 0 < content['error']['nrmse'] < 0.1
-    pictures = tmp_path / 'pictures'
-    drawn = run('plot', *records, '--draws', tmp_path / 'draws.npz', '--out', pictures)
-    assert drawn.code == 0, drawn.err
-    names = {'draws.png', 'r_1_1.png', 'r_1_1_bands.png', 'r_2_2.png', 'r_2_2_bands.png'}
-    assert {p.name for p in pictures.iterdir()} == names
-    assert 'no draws' in run('plot', *records, '--draws', records[0]).message
     saved = np.load(tmp_path / 'draws.npz')
     np.testing.assert_allclose(saved['draws'].mean(axis=0), got['mean'])
     assert saved['names'].tolist() == list(NAMES)
+
+
+def test_draws_are_drawn(run, short_bag: Path, tmp_path: Path) -> None:
+    """The posterior, each record and the bands over it; a file of something else is told."""
+    draws, pictures = tmp_path / 'draws.npz', tmp_path / 'pictures'
+    done = run('calibrate', short_bag, '--evaluations', 6000, '--draws', draws)
+    assert done.code == 0, done.err
+    done = run('plot', short_bag, '--draws', draws, '--out', pictures)
+    assert done.code == 0, done.err
+    assert {p.name for p in pictures.iterdir()} == {'draws.png', 'bag.png', 'bag_bands.png'}
+    for wrong in (short_bag / 'metadata.yaml', tmp_path / 'nothing.npz'):
+        assert 'no draws' in run('plot', short_bag, '--draws', wrong).message
 
 
 def test_one_free_test_leaves_parameters_to_the_prior(run, problem_r: Path) -> None:
