@@ -86,6 +86,8 @@ class SimulatorNode(streamer.Streamer):
         """Make the command and the publishers."""
         self._values = self.parameters.values()
         self.command = _command(self._values)
+        # Compiled now: a stream that has begun must not wait for a compiler.
+        self._plant().step(self.command[: self._values['block']])
         self.out = BlockPublisher(self.publisher)
 
     def changed(self, names: set[str]) -> None:

@@ -72,8 +72,10 @@ class Pacer:
         while not self._ready():
             if self._stop.wait(0.02):
                 return
-        start = time.monotonic()
+        start: float | None = None
         for step in self._steps:
+            # The first step is made before the stream begins: whatever it takes is not lateness.
+            start = time.monotonic() if start is None else start
             if self._speed > 0.0:
                 wait = start + step.due / self._speed - time.monotonic()
                 if wait > 0.0:

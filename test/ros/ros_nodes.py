@@ -5,6 +5,7 @@ import signal
 import subprocess
 import time
 from collections import defaultdict
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -73,10 +74,8 @@ class Process:
 
     def kill(self):
         """End the process and its children, whatever they do."""
-        try:
+        with suppress(ProcessLookupError):
             os.killpg(self.process.pid, signal.SIGKILL)
-        except ProcessLookupError:
-            pass
         self.process.wait()
 
 
@@ -198,3 +197,15 @@ class Probe(Node):
             part = slice(start, start + size)
             self.block(record.command[part], record.measured[part])
             self.for_a_while(pause)
+
+
+@contextmanager
+def stranger(kind, topic):
+    """Publisher of another process's message type on a topic."""
+    # A participant may not have two types on one topic: it needs one of its own.
+    context = rclpy.context.Context()
+    rclpy.init(context=context)
+    node = Node('stranger', context=context)
+    yield node.create_publisher(kind, topic, 10)
+    node.destroy_node()
+    context.shutdown()

@@ -4,7 +4,7 @@ import signal
 
 import numpy as np
 import pytest
-from ros_nodes import QUICK, RATE
+from ros_nodes import QUICK, RATE, stranger
 from std_msgs.msg import String
 
 from actuator_glue.io.bag_reader import decoded
@@ -28,7 +28,6 @@ def test_estimator_and_recorder_outlive_every_bad_input(start, probe, tmp_path):
     estimator = start('estimator', **QUICK)
     probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 120, 'estimator compiled')
     probe.open_stream(listeners=2)
-    wrong = probe.create_publisher(String, 'samples', 10)
 
     def tried(told, act):
         """Do something bad; what is told of it appears on /diagnostics."""
@@ -40,7 +39,8 @@ def test_estimator_and_recorder_outlive_every_bad_input(start, probe, tmp_path):
     tried('specimen stiffness -5 N/m', lambda: probe.setup(stiffness=-5.0))
     tried('rate -1 Hz is not positive', lambda: probe.setup(rate=-1.0))
     tried("hold 'cubic'", lambda: probe.setup(hold='cubic'))
-    tried('std_msgs/msg/String', lambda: wrong.publish(String(data='hello')))
+    with stranger(String, 'samples') as wrong:
+        tried('std_msgs/msg/String', lambda: wrong.publish(String(data='hello')))
     probe.setup(index=probe.index)
     probe.stream(good(1.0))
     bad = np.full(5, np.nan)
