@@ -79,6 +79,8 @@ def to_json(results: Results) -> Json:
         'table_4': {
             'published': _moments(TABLE_4),
             'matched_rms': spread.matched.best_rms,
+            'mean_matched_rms': spread.mean_rms,
+            'skewness_matched_rms': spread.skewness_rms,
             'cov_difference': _named(spread.difference),
             'at_equivalent_shaping_factor': _posterior(spread.literal),
         },

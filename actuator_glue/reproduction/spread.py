@@ -13,7 +13,7 @@ from actuator_glue.reproduction.posterior import Posterior, Progress, altered, r
 from actuator_glue.reproduction.published import CHOSEN, TABLE_4
 
 MM = 1e-3
-NEAR = 2.5  # factor from Table 4's COV within which residuals enter the match
+NEAR = 2.5  # factor from Table 4 within which residuals enter the match
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -23,6 +23,8 @@ class Spread:
     Attributes:
         rms: residual rms at the best fit, shape (r,) [m].
         mean, cov, skewness: of the four parameters, shape (r, 4).
+        mean_rms, skewness_rms: residual at which the means, and the skewnesses, of the first three
+            parameters agree best with Table 4 [m].
         matched: posterior at the residual where our COVs of the first three parameters agree
             best with Table 4 (least squares of log ratios).
         literal: posterior without added residual at the shaping factor that should be
@@ -33,6 +35,8 @@ class Spread:
     mean: Array
     cov: Array
     skewness: Array
+    mean_rms: float
+    skewness_rms: float
     matched: Posterior
     literal: Posterior
 
@@ -72,21 +76,30 @@ def against_residual(
         one((seed, 40, i), added, evaluations, i * evaluations) for i, added in enumerate(added_mm)
     ]
     cov = np.array([p.moments.cov for p in posteriors])
-    matched_mm = match(np.asarray(added_mm), cov)
+    mean = np.array([p.moments.mean for p in posteriors])
+    skewness = np.array([p.moments.skewness for p in posteriors])
+    steps = np.asarray(added_mm)
+    matched_mm = match(steps, cov, TABLE_4.cov)
     matched = one((seed, 41), matched_mm, final_evaluations, total - final_evaluations)
     small = equivalent_shaping_factor(matched.best_rms, posteriors[0].best_rms)
     return Spread(
         rms=np.array([p.best_rms for p in posteriors]),
-        mean=np.array([p.moments.mean for p in posteriors]),
+        mean=mean,
         cov=cov,
-        skewness=np.array([p.moments.skewness for p in posteriors]),
+        skewness=skewness,
+        mean_rms=_total(match(steps, mean, TABLE_4.mean, 1.2), posteriors[0]),
+        skewness_rms=_total(match(steps, skewness, TABLE_4.skewness), posteriors[0]),
         matched=matched,
         literal=run((seed, 43), errors, small, evaluations),
     )
 
 
-def match(added_mm: Array, cov: Array) -> float:
-    """Return the residual [mm] whose COVs (r, 4), interpolated, are nearest to Table 4's.
+def _total(added_mm: float, bare: Posterior) -> float:
+    return float(np.hypot(added_mm * MM, bare.best_rms))
+
+
+def match(added_mm: Array, values: Array, published: Array, near_factor: float = NEAR) -> float:
+    """Return the residual [mm] whose moments (r, 4), interpolated, are nearest to published (4,).
 
     Nearest by the sum of squared log ratios over beta_1, alpha_1 beta_0 and alpha_2; alpha_3
     piles up at its bound, where its COV hardly depends on the residual.
@@ -94,14 +107,14 @@ def match(added_mm: Array, cov: Array) -> float:
     fine = np.linspace(float(added_mm[0]), float(added_mm[-1]), 2001)
     miss = np.zeros(len(fine))
     for i in range(3):
-        off = np.log(cov[:, i] / TABLE_4.cov[i])
-        # The COV of a short run scatters by some 5 %: a parabola through all near points is
+        off = np.log(np.maximum(values[:, i], 1e-9) / published[i])
+        # A moment of a short run scatters by some 5 %: a parabola through all near points is
         # steadier than the two next to the crossing.
-        near = np.abs(off) < np.log(NEAR)
+        near = np.abs(off) < np.log(near_factor)
         if near.sum() >= 4:
             curve = np.polyval(np.polyfit(added_mm[near], off[near], 2), fine)
             beyond = (fine < added_mm[near].min()) | (fine > added_mm[near].max())
-            curve = np.where(beyond, np.log(NEAR), curve)
+            curve = np.where(beyond, np.log(near_factor), curve)
         else:
             curve = np.interp(fine, added_mm, off)
         miss += curve**2
