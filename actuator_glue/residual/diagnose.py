@@ -13,6 +13,7 @@ from actuator_glue.model.parameters import BASE
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 from actuator_glue.residual import advice, measurement, posterior
+from actuator_glue.residual.apart import settings_of_records
 from actuator_glue.residual.attribute import Attribution, Attributor
 from actuator_glue.residual.decide import Decision, decide
 from actuator_glue.residual.detect import alarm_of
@@ -86,6 +87,9 @@ def diagnose(
         )
         sides.append(Side(trial.effects, trial.fit.theta, draws))
     before, after = sides
+    apart: tuple[str, ...] = ()
+    if decision.verdict == 'unexplained':
+        apart = settings_of_records(prepared.fit, found.material, settings.nats)
     tell('held-out', 0.0)
     error, coverage, curves = verify(
         prepared.fit, prepared.held, before, after, found.base.fit.error, decision.noise, seed
@@ -99,7 +103,7 @@ def diagnose(
         candidates=_candidates(found, seen),
         coverage=coverage,
         alarm=alarm_of(found, seen, decision, prepared.fit, seed),
-        advice=(*advice.of(decision, found, prepared.fit), *prepared.notes),
+        advice=(*apart, *advice.of(decision, found, prepared.fit), *prepared.notes),
         base={p.name: estimates[p.name] for p in BASE},
         structure=after.effects,
         names=Structure(after.effects).names,
