@@ -311,6 +311,8 @@ def compute(job: Job, deadline: float, tell: Tell) -> WindowResult:
 
 def warm_up() -> None:
     """Compile and import what windows need, by estimating a short stream as a live one."""
+    import pickle
+
     import numpy as np
 
     from actuator_glue.online.replay import stream
@@ -331,6 +333,8 @@ def warm_up() -> None:
         else:
             estimator.push(item)
         while (job := estimator.next_job()) is not None:
+            # As it comes through a pipe: arrays lose their write protection, which numba sees.
+            job = pickle.loads(pickle.dumps(job))
             estimator.finish(compute(job, time.monotonic() + 60.0, lambda _: None))
 
 
