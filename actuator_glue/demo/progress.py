@@ -32,7 +32,7 @@ class Display:
     def __init__(self, console: Console) -> None:
         self.console = console
         self._bar = Progress(
-            TextColumn('{task.description:<28}'),
+            TextColumn('{task.description:<37}'),
             BarColumn(),
             TaskProgressColumn(),
             TimeRemainingColumn(),

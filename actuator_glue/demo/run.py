@@ -79,7 +79,7 @@ def stream(
 
 
 def _wait_until_ready(nodes: Nodes, watch: Watch, display: Display) -> None:
-    stage = display.stage('starting the nodes', total=READY_SECONDS)
+    stage = display.stage('starting (the first time: compiling)', total=READY_SECONDS)
     start = time.monotonic()
     while not watch.ready:
         elapsed = time.monotonic() - start
