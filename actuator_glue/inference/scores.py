@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.stats import norm
 
 from actuator_glue.errors import InputError
-from actuator_glue.inference.bands import Band, check_draws
+from actuator_glue.inference.bands import COLUMNS_AT_ONCE, Band, check_draws
 from actuator_glue.records import Array
 
 
@@ -66,11 +66,22 @@ def crps_ensemble(observed: Array, draws: Array, weights: Array | None = None) -
         raise InputError(f'{draws.shape[1]} predicted samples but {observed.shape} observed')
     count = len(draws)
     weight = np.full(count, 1.0 / count) if weights is None else weights
+    parts = [
+        _crps(
+            observed[start : start + COLUMNS_AT_ONCE],
+            draws[:, start : start + COLUMNS_AT_ONCE],
+            weight,
+        )
+        for start in range(0, len(observed), COLUMNS_AT_ONCE)
+    ]
+    return np.concatenate(parts) if parts else np.empty(0)
+
+
+def _crps(observed: Array, draws: Array, weight: Array) -> Array:
     distance = weight @ np.abs(draws - observed)
     order = np.argsort(draws, axis=0)
     ordered = np.take_along_axis(draws, order, axis=0)
-    share = weight[order]
-    below = np.cumsum(share, axis=0)
+    below = np.cumsum(weight[order], axis=0)
     # E|X - X'| = 2 int F (1 - F) dx, F a staircase with steps at the ordered draws.
     spread = np.sum((below[:-1] * (1.0 - below[:-1])) * np.diff(ordered, axis=0), axis=0)
     return np.asarray(distance - spread)

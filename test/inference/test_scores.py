@@ -28,6 +28,13 @@ def test_crps_of_ensemble_agrees_with_scoringrules(rng_seed: int) -> None:
     np.testing.assert_allclose(crps_ensemble(observed, draws), expected, rtol=1e-10)
 
 
+def test_crps_taken_in_blocks_changes_nothing() -> None:
+    rng = np.random.default_rng(4)
+    observed, draws = rng.normal(size=4100), rng.normal(size=(5, 4100))
+    whole = crps_ensemble(observed, draws)
+    np.testing.assert_array_equal(whole[4090:], crps_ensemble(observed[4090:], draws[:, 4090:]))
+
+
 def test_weighted_crps_is_the_integral_of_its_definition() -> None:
     rng = np.random.default_rng(2)
     draws, weights = rng.normal(size=(6, 1)), rng.random(6)
