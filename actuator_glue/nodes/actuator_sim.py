@@ -18,7 +18,7 @@ from actuator_glue.model.plant import MeasuredPlant, Plant
 from actuator_glue.model.sensor import SensorSpec
 from actuator_glue.model.stream import Stream
 from actuator_glue.model.structure import Structure
-from actuator_glue.nodes import base, streamer, undeclared
+from actuator_glue.nodes import spin, streamer, undeclared
 from actuator_glue.nodes.blocks import BlockPublisher
 from actuator_glue.nodes.pacer import Step
 from actuator_glue.nodes.parameters import Parameters, Spec
@@ -207,7 +207,7 @@ def _command(values: Mapping[str, Any]) -> Array:
 
 def main(args: list[str] | None = None) -> int:
     """Run the node."""
-    return base.main(SimulatorNode, args)
+    return spin.main(SimulatorNode, args)
 
 
 if __name__ == '__main__':

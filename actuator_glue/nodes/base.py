@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import socket
-import sys
-import threading
 import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import rclpy
 from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
 from rclpy.duration import Duration
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
 from rclpy.qos_overriding_options import QoSOverridingOptions
-from rclpy.signals import SignalHandlerOptions
 
 from actuator_glue.errors import InputError
 from actuator_glue.nodes import health
@@ -276,64 +268,3 @@ def type_name(cls: Any) -> str:
     """Return the full name of a message class, `package/msg/Name`."""
     package = cls.__module__.partition('.')[0]
     return f'{package}/msg/{cls.__name__}'
-
-
-def main(make: Callable[[], SuiteNode], args: Sequence[str] | None = None) -> int:
-    """Run a node until SIGINT, SIGTERM or its own end; return the exit code.
-
-    A second signal ends the process at once.
-    """
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
-    try:
-        node = make()
-    except InputError as error:
-        print(f'error: {error}', file=sys.stderr)
-        rclpy.try_shutdown()
-        return 2
-    executor = SingleThreadedExecutor()
-    executor.add_node(node)
-    stop = threading.Event()
-    _on_signal(stop, node.wake)
-    code = 0
-    if node.parameters['autostart']:
-        started = node.trigger_configure() == SUCCESS and node.trigger_activate() == SUCCESS
-        if not started:
-            code = 2
-            stop.set()
-    while not stop.is_set() and not node.finished and rclpy.ok():
-        try:
-            executor.spin_once()
-        except ExternalShutdownException:
-            break
-        except Exception as error:
-            # E.g. a packet that cannot be decoded, or a transition asked for in a wrong state.
-            node.complain_of_bug(error)
-    if node.state in ('unconfigured', 'inactive', 'active'):
-        node.trigger_shutdown()
-    executor.remove_node(node)
-    node.destroy_node()
-    rclpy.try_shutdown()
-    return code
-
-
-def _on_signal(stop: threading.Event, wake: Callable[[], None]) -> None:
-    """Set `stop` on SIGINT or SIGTERM without interrupting whatever callback is running.
-
-    Python's own handlers run in the main thread only, which waits inside the middleware; the
-    wake-up descriptor is written at once, whatever thread the signal reaches.
-    """
-    reader, writer = socket.socketpair()
-    writer.setblocking(False)
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: None)
-    signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
-
-    def wait() -> None:
-        reader.recv(1)
-        stop.set()
-        wake()
-        number = reader.recv(1)[0]
-        writer.close()
-        os._exit(128 + number)
-
-    threading.Thread(target=wait, name='signals', daemon=True).start()

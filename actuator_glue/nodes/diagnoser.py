@@ -12,7 +12,7 @@ from actuator_glue_msgs.srv import SetModel
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 
 from actuator_glue.errors import InputError
-from actuator_glue.nodes import base, diagnosing, topics
+from actuator_glue.nodes import base, diagnosing, spin, topics
 from actuator_glue.nodes.health import ERROR
 from actuator_glue.nodes.messages import publish
 from actuator_glue.nodes.parameters import Spec
@@ -264,7 +264,7 @@ class DiagnoserNode(base.SuiteNode):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node."""
-    return base.main(DiagnoserNode, args)
+    return spin.main(DiagnoserNode, args)
 
 
 if __name__ == '__main__':

@@ -10,7 +10,7 @@ from typing import Any
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.load import load_records
-from actuator_glue.nodes import base, streamer
+from actuator_glue.nodes import spin, streamer
 from actuator_glue.nodes.blocks import BlockPublisher
 from actuator_glue.nodes.pacer import Step
 from actuator_glue.nodes.parameters import Spec
@@ -105,7 +105,7 @@ class LabBridgeNode(streamer.Streamer):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node."""
-    return base.main(LabBridgeNode, args)
+    return spin.main(LabBridgeNode, args)
 
 
 if __name__ == '__main__':

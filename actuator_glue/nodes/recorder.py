@@ -14,7 +14,7 @@ from typing import Any
 from actuator_glue.errors import InputError
 from actuator_glue.io.bag_metadata import LATCHED, Qos
 from actuator_glue.io.bag_writer import BagWriter
-from actuator_glue.nodes import base, topics
+from actuator_glue.nodes import base, spin, topics
 from actuator_glue.nodes.health import ERROR, Rate
 from actuator_glue.nodes.parameters import Spec
 
@@ -161,7 +161,7 @@ def _message(type_name: str) -> Any:
 
 def main(args: list[str] | None = None) -> int:
     """Run the node."""
-    return base.main(RecorderNode, args)
+    return spin.main(RecorderNode, args)
 
 
 if __name__ == '__main__':

@@ -12,7 +12,7 @@ from rosgraph_msgs.msg import Clock
 from actuator_glue.errors import InputError
 from actuator_glue.io.bag_reader import is_bag, messages
 from actuator_glue.io.messages import deserialize
-from actuator_glue.nodes import base, streamer, topics
+from actuator_glue.nodes import base, spin, streamer, topics
 from actuator_glue.nodes.pacer import Step
 from actuator_glue.nodes.parameters import Spec
 
@@ -63,7 +63,7 @@ class ReplayNode(streamer.Streamer):
 
 def main(args: list[str] | None = None) -> int:
     """Run the node."""
-    return base.main(ReplayNode, args)
+    return spin.main(ReplayNode, args)
 
 
 if __name__ == '__main__':
