@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from actuator_glue.cli.main import main
-from actuator_glue.io.bag_reader import summarise
+from actuator_glue.io.bag_reader import decoded, summarise
 from actuator_glue.io.bag_records import read_records
 
 BAGS = Path(__file__).resolve().parent.parent / 'bags'
@@ -22,7 +22,23 @@ TOLERANCE = 5e-8  # m
 
 def test_every_bag_has_its_command() -> None:
     """No bag of unknown origin."""
-    assert {Path(c[1]).name for c in COMMANDS} == {p.name for p in BAGS.iterdir() if p.is_dir()}
+    made = {Path(c[1]).name for c in COMMANDS} | {'session'}
+    assert made == {p.name for p in BAGS.iterdir() if p.is_dir()}
+
+
+def test_session_holds_a_closed_loop() -> None:
+    """The recorded run has what the layouts draw: bands, a diagnosis, a change of the model."""
+    summary = summarise(BAGS / 'session')
+    assert summary.finished and not summary.damage
+    names = ('EstimatorSetup', 'PosteriorMoments', 'PredictionBand', 'Diagnosis')
+    found = {n: [m for _, m in decoded(BAGS / 'session', (n,))] for n in names}
+    assert [list(m.effects) for m in found['EstimatorSetup']] == [[], ['backlash']]
+    assert found['Diagnosis'][0].verdict == 'missing-effect'
+    windows = [p.window for p in found['PosteriorMoments']]
+    assert windows == sorted(set(windows)) and len(windows) > 20
+    noise = [b for b in found['PredictionBand'] if b.scored and b.kind == 'noise']
+    assert noise[-1].widest_coverage > 0.9 > noise[0].widest_coverage
+    assert noise[-1].rms_error < 0.7 * noise[0].rms_error
 
 
 @pytest.mark.parametrize('command', COMMANDS, ids=lambda c: Path(c[1]).name)
