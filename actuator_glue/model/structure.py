@@ -226,6 +226,7 @@ class Structure:
         """Which stages of the kernel act, shape (kernel.SWITCHES,)."""
         return self._on.copy()
 
+    @np.errstate(all='ignore')  # NaN and infinity are the answer where parameters are absurd
     def sensed(self, table: Array, time: Array, displacement: Array) -> Array:
         """Return the displacement (n, m) after the sensor's post-steps (bias, drift, hum)."""
         for effect in self.entries:
@@ -258,7 +259,8 @@ class Structure:
         x = _respond(base, record, record.command, start)
         if 'gain' in self._columns:
             free = _respond(base, record, np.zeros(len(record)), start)
-            x = free + table[:, self._columns['gain']] * (x - free)
+            with np.errstate(all='ignore'):
+                x = free + table[:, self._columns['gain']] * (x - free)
         yield np.arange(len(table)), 0, self.sensed(table, time, x.T)
 
 

@@ -203,6 +203,26 @@ def test_bounds_are_survived(name: str) -> None:
         assert np.isfinite(y[: len(corners)]).all()
 
 
+@pytest.mark.parametrize('hold', ['zoh', 'linear'])
+@pytest.mark.filterwarnings('error')
+def test_absurd_parameters_stay_quiet(hold: str) -> None:
+    """NaN gives NaN; infinity and negative sizes are survived; other rows are not touched."""
+    r = record(hold=hold).slice(0, 300)
+    for name in EVERY:
+        structure = Structure((name,))
+        good = typical((name,), r)
+        rows = [good]
+        for value in (np.nan, np.inf, -np.inf, -1.0, 0.0, 1e300):
+            for i in range(len(good)):
+                rows.append(good.copy())
+                rows[-1][i] = value
+        y = structure.simulate(np.array(rows), r)
+        assert np.array_equal(y[0], structure.simulate(good, r))
+        acts = len(good) if CATALOGUE[name].variance is None else 4
+        assert np.isnan(y[1 : 1 + acts, 2:]).all(), name
+        assert structure.errors([r])(np.array(rows)).shape == (len(rows), 1, 2)
+
+
 def test_bad_input_is_named() -> None:
     """Unknown, repeated, wrong shapes, unknown stiffness."""
     with pytest.raises(InputError, match="'slack' is not in the catalogue"):

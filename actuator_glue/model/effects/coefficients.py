@@ -28,8 +28,7 @@ def _exact(a1: Array, a0: Array, step: float) -> tuple[Array, Array, Array]:
     doubled back (the transition matrix follows from both).
     """
     size = np.maximum(np.abs(a1) * step, np.sqrt(np.abs(a0)) * step)
-    with np.errstate(divide='ignore', invalid='ignore'):
-        doublings = np.clip(np.ceil(np.log2(size / 0.25)), 0, 60)
+    doublings = np.clip(np.ceil(np.log2(size / 0.25)), 0, 60)
     doublings = np.where(np.isfinite(doublings), doublings, 0)
     t = step / 2.0**doublings
     e1, e2 = -a1 * t, a0 * t * t
@@ -92,8 +91,7 @@ def build(
     c[k.DROOP] = v['droop']
     c[k.DROOP_HALF] = half / (v['droop_time'] + half)
     c[k.GAIN_DRIFT] = v['gain_drift']
-    with np.errstate(divide='ignore', invalid='ignore'):
-        c[k.INVERSE_ALPHA_2] = 1.0 / a2
+    c[k.INVERSE_ALPHA_2] = 1.0 / a2
 
     c[k.FORCE_F] = (1.0 - half * a3) / (1.0 + half * a3)
     c[k.FORCE_Q] = step / (1.0 + half * a3)
@@ -106,21 +104,19 @@ def build(
 
     c[k.COULOMB] = v['coulomb_force'] + v['sliding_force']
     rise = v['sliding_force'] * (v['breakaway_ratio'] - 1.0)
-    with np.errstate(divide='ignore', invalid='ignore'):
-        speed = v['stribeck_velocity']
-        c[k.STRIBECK_EXTRA] = rise
-        c[k.STRIBECK_RATE] = 1.0 / (step * speed)
-        memory = np.maximum(FRICTION_MEMORY, MEMORY_MARGIN * rise / ((stiffness + a2) * speed))
-        c[k.STRIBECK_LAG] = np.exp(-step / memory)
+    speed = v['stribeck_velocity']
+    c[k.STRIBECK_EXTRA] = rise
+    c[k.STRIBECK_RATE] = 1.0 / (step * speed)
+    memory = np.maximum(FRICTION_MEMORY, MEMORY_MARGIN * rise / ((stiffness + a2) * speed))
+    c[k.STRIBECK_LAG] = np.exp(-step / memory)
 
     c[k.GAP] = v['gap']
     c[k.HARDENING] = v['hardening']
-    with np.errstate(divide='ignore'):
-        # Past the peak of a softening spring (3 |kappa| x^2 = 1) the secant stays.
-        c[k.HARDENING_CAP] = np.where(
-            v['hardening'] < 0.0, 1.0 / (3.0 * np.abs(v['hardening'])), np.inf
-        )
-        c[k.INVERSE_YIELD] = 1.0 / v['yield_displacement']
+    # Past the peak of a softening spring (3 |kappa| x^2 = 1) the secant stays.
+    c[k.HARDENING_CAP] = np.where(
+        v['hardening'] < 0.0, 1.0 / (3.0 * np.abs(v['hardening'])), np.inf
+    )
+    c[k.INVERSE_YIELD] = 1.0 / v['yield_displacement']
     c[k.YIELD] = v['yield_displacement']
     c[k.YIELD_RATIO] = v['post_yield_ratio']
     for power, row in enumerate((k.SHARP_1, k.SHARP_2, k.SHARP_4, k.SHARP_8, k.SHARP_16)):
@@ -128,8 +124,7 @@ def build(
 
     c[k.BACKLASH] = v['backlash']
     c[k.SENSOR_LAG] = v['sensor_lag'] / step
-    with np.errstate(divide='ignore'):
-        c[k.SENSOR_DECAY] = np.exp(-step / v['sensor_lag'])
+    c[k.SENSOR_DECAY] = np.exp(-step / v['sensor_lag'])
 
     _linear(c, b1, n0, a2, a3, stiffness, step)
     return c
@@ -140,30 +135,29 @@ def _linear(
 ) -> None:
     """Write both linear chains: Eq. (2) exactly in (x, v), and by the scheme in (x, q)."""
     d2 = stiffness + a2
-    with np.errstate(divide='ignore', invalid='ignore', over='ignore'):
-        a1 = (a3 * stiffness + b1 * d2) / d2
-        a0 = (b1 * a3 * stiffness + n0) / d2
-        position, velocity, ramp = _exact(a1, a0, step)
-        c[k.EXACT_XX] = 1.0 - a0 * position
-        c[k.EXACT_XV] = velocity
-        c[k.EXACT_XU] = n0 / d2 * position
-        c[k.EXACT_XR] = n0 / d2 * (ramp / step - 0.5 * position)
-        c[k.EXACT_VX] = -a0 * velocity
-        c[k.EXACT_VV] = c[k.EXACT_XX] - a1 * velocity
-        c[k.EXACT_VU] = n0 / d2 * velocity
-        c[k.EXACT_VR] = n0 / d2 * (position / step - 0.5 * velocity)
+    a1 = (a3 * stiffness + b1 * d2) / d2
+    a0 = (b1 * a3 * stiffness + n0) / d2
+    position, velocity, ramp = _exact(a1, a0, step)
+    c[k.EXACT_XX] = 1.0 - a0 * position
+    c[k.EXACT_XV] = velocity
+    c[k.EXACT_XU] = n0 / d2 * position
+    c[k.EXACT_XR] = n0 / d2 * (ramp / step - 0.5 * position)
+    c[k.EXACT_VX] = -a0 * velocity
+    c[k.EXACT_VV] = c[k.EXACT_XX] - a1 * velocity
+    c[k.EXACT_VU] = n0 / d2 * velocity
+    c[k.EXACT_VR] = n0 / d2 * (position / step - 0.5 * velocity)
 
-        below = 1.0 + 0.5 * step * b1
-        from_e = 0.5 * step * n0 / below
-        from_q = 1.0 - 0.5 * step * b1 / below
-        force_f, force_q = c[k.FORCE_F], c[k.FORCE_Q]
-        stiff = c[k.FORCE_X] + stiffness + 0.5 * force_q * from_e
-        dx_x = ((force_f - 1.0) * stiffness - force_q * from_e) / stiff
-        dx_q = force_q * from_q / stiff
-        dx_u = force_q * from_e / stiff
-        c[k.TRAP_XX] = 1.0 + dx_x
-        c[k.TRAP_XQ] = dx_q
-        c[k.TRAP_XU] = dx_u
-        c[k.TRAP_QX] = -2.0 * from_e * (1.0 + 0.5 * dx_x)
-        c[k.TRAP_QQ] = 2.0 * from_q - 1.0 - from_e * dx_q
-        c[k.TRAP_QU] = 2.0 * from_e * (1.0 - 0.5 * dx_u)
+    below = 1.0 + 0.5 * step * b1
+    from_e = 0.5 * step * n0 / below
+    from_q = 1.0 - 0.5 * step * b1 / below
+    force_f, force_q = c[k.FORCE_F], c[k.FORCE_Q]
+    stiff = c[k.FORCE_X] + stiffness + 0.5 * force_q * from_e
+    dx_x = ((force_f - 1.0) * stiffness - force_q * from_e) / stiff
+    dx_q = force_q * from_q / stiff
+    dx_u = force_q * from_e / stiff
+    c[k.TRAP_XX] = 1.0 + dx_x
+    c[k.TRAP_XQ] = dx_q
+    c[k.TRAP_XU] = dx_u
+    c[k.TRAP_QX] = -2.0 * from_e * (1.0 + 0.5 * dx_x)
+    c[k.TRAP_QQ] = 2.0 * from_q - 1.0 - from_e * dx_q
+    c[k.TRAP_QU] = 2.0 * from_e * (1.0 - 0.5 * dx_u)

@@ -165,7 +165,8 @@ def _transducer(w: Array, n: int) -> None:
     """Play, then the first-order lag of the parabola through the last three positions."""
     corrected = w[X + n] + w[X_EXACT + n] - w[X_TRAP + n]
     before, lag = w[PLAY + n], w[SENSOR_LAG + n]
-    after = min(max(before, corrected - w[BACKLASH + n]), corrected + w[BACKLASH + n])
+    # In this order a position that is not a number goes through.
+    after = min(corrected + w[BACKLASH + n], max(corrected - w[BACKLASH + n], before))
     moved = after - before
     bend = 0.5 * (moved - w[PLAY_DX + n])
     end = after - lag * (moved + bend - 2.0 * lag * bend)

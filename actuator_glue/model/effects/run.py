@@ -34,6 +34,8 @@ def refinement(values: Mapping[str, Array], stiffness: float, step: float) -> Ar
     return np.asarray(np.clip(np.nan_to_num(factor, nan=1.0), 1.0, _MAX_REFINEMENT))
 
 
+# Absurd parameters make NaN or infinite responses, seen by who asked for them, not warnings.
+@np.errstate(all='ignore')
 def tables(
     values: Mapping[str, Array],
     stiffness: float,
@@ -55,7 +57,9 @@ def tables(
     x, v = start
     step = period / substeps
     rows = coefficients.build(values, stiffness, step, period)
-    one = np.ones_like(values['beta_1'])
+    # A limit that is not a number must not pass for no limit: it makes the state not a number.
+    unknown = np.isnan(sum(values.values()))
+    one = np.where(unknown, np.nan, 1.0)
     for begin in (kernel.X, kernel.X_EXACT, kernel.X_TRAP, kernel.PLAY, kernel.SENSED):
         rows[begin] = x * one
     rows[kernel.V] = rows[kernel.V_EXACT] = v * one
