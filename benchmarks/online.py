@@ -1,0 +1,84 @@
+"""The online estimator on one core: 10 s windows of a 1 kHz stream, renewed 20 times a second."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+from actuator_glue.model import commands, linear
+from actuator_glue.online import job as window_job
+from actuator_glue.online.estimator import Estimator
+from actuator_glue.online.fitting import choose_model
+from actuator_glue.online.replay import replay, stream
+from actuator_glue.online.settings import EstimatorSettings
+from actuator_glue.online.stream import Preview, Setup
+from actuator_glue.records import Record
+
+THETA = np.array([134.0, 1.1e9, 2.5e5, 0.5])
+RATE = 1000.0
+SETTINGS = EstimatorSettings(
+    window=10.0, hop=0.05, settle=1.0, time_budget=0.045, evaluations=2000, chains=20, draws=100
+)
+
+
+def _record(seconds: float) -> Record:
+    command = commands.noise(RATE, seconds, 0.2, 8.0, seed=3)
+    clean = linear.simulate(THETA, command, stiffness=250e3, period=1.0 / RATE)
+    noise = 1e-5 * np.random.default_rng(4).standard_normal(len(clean))
+    return Record(command, clean + noise, 1.0 / RATE, 250e3, start_ns=10**18)
+
+
+def live(seconds: float) -> dict[str, float]:
+    """Latency from a window's last sample to its result, if samples came at their own rate.
+
+    Samples are pushed as fast as they can be; a window that is ready while the one before is
+    still computed waits for it, as it would on one core. The clock is the time computing took.
+    """
+    estimator = Estimator(SETTINGS, choose_model())
+    free = 0.0
+    latencies: list[float] = []
+    missed = 0
+    for item in stream(_record(seconds), block=50):
+        began = time.perf_counter()
+        if isinstance(item, Setup):
+            estimator.setup(item)
+            continue
+        if isinstance(item, Preview):
+            estimator.preview(item)
+            continue
+        arrived = (item.index + len(item)) / RATE
+        estimator.push(item)
+        free = max(free, arrived) + time.perf_counter() - began
+        while (job := estimator.next_job()) is not None:
+            began = time.perf_counter()
+            result = window_job.run(job)
+            estimator.finish(result)
+            free += time.perf_counter() - began
+            latencies.append(free - arrived)
+            missed += result.evaluations < SETTINGS.evaluations - SETTINGS.chains
+    settled = np.array(latencies[20:])
+    return {
+        'windows': float(len(latencies)),
+        'latency_p50_ms': float(np.quantile(settled, 0.5) * 1e3),
+        'latency_p99_ms': float(np.quantile(settled, 0.99) * 1e3),
+        'missed': float(missed + (settled > 2.0 * SETTINGS.hop).sum()),
+        'updates_per_second': 1.0 / SETTINGS.hop,
+        'updates_per_second_possible': float(1.0 / np.quantile(np.array(latencies[20:]), 0.5)),
+    }
+
+
+def replayed(seconds: float) -> float:
+    """Replay a stream with the node's default settings; return times real time."""
+    record = _record(seconds)
+    began = time.perf_counter()
+    for _ in replay(stream(record), EstimatorSettings()):
+        pass
+    return seconds / (time.perf_counter() - began)
+
+
+def run(seconds: float = 60.0) -> dict[str, Any]:
+    """Return the `online` figures of bench.json."""
+    live(12.0)  # compiled
+    return {**live(seconds), 'replay_times_real_time': replayed(seconds), 'seconds': seconds}
