@@ -26,6 +26,8 @@ from actuator_glue.records import Array, Record
 EXCITATION = 3.0
 # Generations in which a sampler that starts from the last posterior adapts.
 ADAPT = 20
+# Points that a window hands to the next, at least.
+ARCHIVE = 400
 # Generations that R-hat and ESS are computed from.
 DIAGNOSED = 150
 
@@ -195,8 +197,15 @@ def _estimate(job: Job, expired: Callable[[], bool] | None) -> WindowResult:
         scored=tuple(p for old in job.frozen for p in _score(job, old, seed)),
         forecast=tuple(_forecast(job, frozen, seed)),
         frozen=frozen,
-        archive=chains.archive,
+        archive=_archive(chains.archive, job.archive),
     )
+
+
+def _archive(new: Array, old: Array | None) -> Array:
+    """Points for the next window; few of them, of a window cut short, are joined by older ones."""
+    if old is None or len(new) >= ARCHIVE:
+        return new
+    return np.concatenate([new, old[_spread(len(old), ARCHIVE - len(new))]])
 
 
 def _check_excited(record: Record, settle: int, noise: float) -> None:
