@@ -1,10 +1,13 @@
 """What breaks other nodes: each is logged, shown on /diagnostics, and survived."""
 
+import os
 import signal
+from pathlib import Path
 
 import numpy as np
 import pytest
 from ros_nodes import QUICK, RATE, stranger
+from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
 
 from actuator_glue.io.bag_reader import decoded
@@ -20,6 +23,12 @@ def good(seconds, seed=0):
     clean = linear.simulate(theta, command, stiffness=250e3, period=1 / RATE)
     measured = clean + 1e-5 * np.random.default_rng(seed).standard_normal(len(clean))
     return Record(command, measured, 1 / RATE, 250e3)
+
+
+def children_of(pid):
+    """Process ids of a process's children."""
+    tasks = Path(f'/proc/{pid}/task').iterdir()
+    return [child for task in tasks for child in (task / 'children').read_text().split()]
 
 
 def test_estimator_and_recorder_outlive_every_bad_input(start, probe, tmp_path):
@@ -107,13 +116,9 @@ def test_a_recorder_that_is_ended_keeps_what_it_recorded(how, start, probe, tmp_
 
 
 def test_a_killed_worker_is_replaced(start, probe, tmp_path):
-    import os
-    from pathlib import Path
-
     estimator = start('estimator', **QUICK)
     probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 120, 'estimator compiled')
-    children = Path(f'/proc/{estimator.process.pid}/task')
-    pids = [p for t in children.iterdir() for p in (t / 'children').read_text().split()]
+    pids = children_of(estimator.process.pid)
     workers = [p for p in pids if b'spawn_main' in Path(f'/proc/{p}/cmdline').read_bytes()]
     assert len(workers) == 1
     os.kill(int(workers[0]), signal.SIGKILL)
@@ -124,3 +129,40 @@ def test_a_killed_worker_is_replaced(start, probe, tmp_path):
     probe.stream(good(5.0), pause=0.02)
     probe.until(lambda: probe.number('estimator', 'windows') >= 1, 30, 'windows')
     assert estimator.end() == 0
+
+
+def test_a_simulated_clock_that_jumps_back_is_said_and_survived(start, probe):
+    nodes = {
+        'estimator': start('estimator', use_sim_time=True, **QUICK),
+        'actuator_sim': start('actuator_sim', use_sim_time=True, rate=RATE, wait_for=1),
+    }
+    clock = probe.create_publisher(Clock, '/clock', 10)
+
+    def tick(seconds):
+        message = Clock()
+        message.clock.sec = seconds
+        clock.publish(message)
+
+    for node in nodes:
+        probe.until(lambda node=node: node in probe.health, 60, node)
+    for seconds in (100, 101, 102):
+        tick(seconds)
+        probe.for_a_while(0.3)
+    probe.until(lambda: probe.number('estimator', 'samples') > 0, 60, 'samples')
+    tick(50)
+    for node, process in nodes.items():
+        probe.until(lambda node=node: 'the clock jumped by -' in probe.faults[node], 15, node)
+        assert process.alive
+    # The simulator's stamps follow, and the estimator restarts its window for that reason.
+    probe.until(lambda: 'at sample' in probe.faults['estimator'], 15, 'stamps')
+    assert all(process.end() == 0 for process in nodes.values())
+
+
+def test_a_killed_estimator_leaves_no_worker_behind(start, probe):
+    estimator = start('estimator', **QUICK)
+    probe.until(lambda: 'estimator' in probe.health, 60)
+    children = children_of(estimator.process.pid)
+    assert children
+    estimator.process.send_signal(signal.SIGKILL)
+    estimator.process.wait()
+    probe.until(lambda: not any(Path(f'/proc/{p}').exists() for p in children), 60, 'orphans')
