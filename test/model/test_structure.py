@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 from scipy import signal
@@ -92,6 +94,17 @@ def test_batch_equals_single(names: tuple[str, ...]) -> None:
     assert batch.shape == (37, len(U))
     for i in (0, 11, 36):
         assert np.array_equal(batch[i], structure.simulate(theta[i], r), equal_nan=True)
+
+
+def test_threads_do_not_disturb_each_other() -> None:
+    """The kernel releases the interpreter lock: answers are those of one thread."""
+    r = record()
+    jobs = [(Structure((name,)), typical((name,), r)) for name in EVERY]
+    alone = [structure.simulate(theta, r) for structure, theta in jobs]
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(lambda job: job[0].simulate(job[1], r), jobs * 3))
+    for i, y in enumerate(together):
+        assert np.array_equal(y, alone[i % len(jobs)])
 
 
 @pytest.mark.parametrize('name', EVERY)
