@@ -35,7 +35,7 @@ def _error(found: Diagnosis) -> Section:
         Text(f'Share of the removable error removed: {100 * e.removable_removed:.1f} %.'),
         Table(
             ['held-out record', 'before [um]', 'after [um]'],
-            [[source, _um(b), _um(a)] for source, b, a in e.records],
+            [[Path(source).name, _um(b), _um(a)] for source, b, a in e.records],
             'The same for each record.',
         ),
         Picture.of(figures.bands(found), '95 % predictive bands where both models differ most.'),
@@ -94,7 +94,7 @@ def _residual(found: Diagnosis) -> Section:
     tests = [[name, f'{value:.3g}'] for name, value in a.tests.items()]
     rows = [
         [
-            r['source'], _um(r['structure']), _um(r['noise']),
+            Path(r['source']).name, _um(r['structure']), _um(r['noise']),
             ' to '.join(f'{f:g}' for f in r['frequency_hz']),
             ' to '.join(f'{t:g}' for t in r['time_s']),
             f'{100 * r["share_at_low_velocity"]:.0f}',

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -32,7 +34,7 @@ def _thin(trace: Trace, *columns: Array) -> tuple[Array, ...]:
 
 def _name(trace: Trace) -> str:
     held = ', held out' if trace.held_out else ''
-    return f'{trace.source}: k = {trace.stiffness / 1e3:g} kN/m{held}'
+    return f'{Path(trace.source).name}: k = {trace.stiffness / 1e3:g} kN/m{held}'
 
 
 @styled
@@ -112,7 +114,7 @@ def loops(found: Diagnosis) -> Figure:
         left.set_xlabel('displacement [mm] (slow part)')
         left.set_ylabel('residual [um]')
         right.set_xlabel('velocity [mm/s]')
-    grid[0, 0].legend()
+    grid[0, 1].legend(loc='upper left', markerscale=8)
     return figure
 
 

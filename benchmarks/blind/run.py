@@ -9,11 +9,15 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from pathlib import Path
 from typing import Any
+
+# Cases run side by side; threads of the linear algebra would only wait for each other.
+os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))

@@ -1,0 +1,63 @@
+"""`actuator-glue diagnose`: exit codes, JSON, report."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuator_glue.cli.main import main
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Record
+
+RATE = 128.0
+THETA = np.array([235.0, 5.0e10, 4.23e6, 3.3])
+T = np.arange(int(24 * RATE)) / RATE
+SWEEP = 2e-3 * np.sin(np.pi * (10.0 / 24.0) * T**2)
+
+
+def write(path: Path, stiffness: float, play: float, seed: int) -> str:
+    """Write a test with play as a laboratory file."""
+    silent = Record(SWEEP, SWEEP, 1 / RATE, stiffness=stiffness)
+    y = Structure(['backlash']).simulate(np.append(THETA, play), silent)
+    y = y + 1e-5 * np.random.default_rng(seed).standard_normal(len(T))
+    rows = np.column_stack([T, 1e3 * SWEEP, 1e3 * y])
+    np.savetxt(path, rows, delimiter=',', header='time_s,command_mm,measured_mm', comments='')
+    return str(path)
+
+
+def test_a_record_without_stiffness_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Exit code 2 and what to do."""
+    assert main(['diagnose', write(tmp_path / 'a.csv', 0.0, 0.0, 1)]) == 2
+    assert '--stiffness' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize('option', [['--seed', '-1'], ['--jobs', '0']])
+def test_impossible_options_are_refused(tmp_path: Path, option: list[str]) -> None:
+    """Exit code 2."""
+    path = write(tmp_path / 'a.csv', 0.0, 0.0, 1)
+    assert main(['diagnose', path, '--stiffness', '0', *option]) == 2
+
+
+@pytest.mark.slow
+def test_play_is_diagnosed_with_json_and_report(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """One stiffness per record; a held-out record has that of the last one."""
+    free = write(tmp_path / 'free.csv', 0.0, 6e-5, 1)
+    spring = write(tmp_path / 'spring.csv', 250e3, 6e-5, 2)
+    held = write(tmp_path / 'held.csv', 250e3, 6e-5, 3)
+    out, report = tmp_path / 'd.json', tmp_path / 'd.html'
+    files = ['--json', str(out), '--report', str(report)]
+    code = main(['diagnose', free, spring, '--stiffness', '0', '250e3', '--holdout', held, *files])
+    assert code == 0
+    assert 'missing: backlash' in capsys.readouterr().out
+    content = json.loads(out.read_text())
+    assert content['schema'] == 'actuator_glue.diagnosis/1'
+    assert content['effects'][0]['name'] == 'backlash'
+    assert content['seconds'] > 0.0
+    page = report.read_text()
+    assert page.count('data:image/png') >= 6
+    assert 'missing: backlash' in page
