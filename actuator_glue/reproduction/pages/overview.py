@@ -49,9 +49,8 @@ def overview(results: Results) -> Section:
                 f'{num(s.published_trace.converged_at(), 3)} ({power_of_two(s.shaping_factor)})'
                 for s in chains.values()
             ) + ' evaluations',
-            'G₈ is converged; order of convergence',
-            'the G₈ posterior fills the priors: the oscillation is the posterior; a narrow '
-            'posterior (large G) is harder to find from the prior',
+            'G₈ is converged',
+            'the G₈ posterior fills the priors: the oscillation is the posterior',
         ),
         (
             '6', 'COV ' + ', '.join(num(float(c), 2) for c in TABLE_4.cov),
