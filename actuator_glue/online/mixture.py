@@ -12,7 +12,8 @@ from actuator_glue.inference.bands import Band, check_levels
 from actuator_glue.jit import njit
 from actuator_glue.records import Array
 
-_STEPS, _PRECISION = 60, 1e-5
+# Newton squares its relative error: a last step of 1 % leaves 0.01 % of a standard deviation.
+_STEPS, _PRECISION = 60, 1e-2
 _REACH = 9.0  # standard deviations beyond which there is nothing
 
 
@@ -59,7 +60,7 @@ def _quantiles(draws, mean, sd, probability, normal, out):  # type: ignore[no-un
                 else:
                     low = x
                 new = x - gap * m / density if density > 0.0 else low
-                if not low < new < high:
+                if not low <= new <= high:
                     new = 0.5 * (low + high)
                 step = abs(new - x)
                 x = new

@@ -30,7 +30,8 @@ def test_coordinates_are_a_bijection_inside_the_box(seed, stiffness):
     there = Coordinates(choose_model(), stiffness)
     phi = there.coordinates(theta)
     inside = (phi > there.lower).all(axis=1) & (phi < there.upper).all(axis=1)
-    assert np.allclose(there.physical(phi)[inside], theta[inside], rtol=1e-9)
+    # beta_1 s is up to 10^6 times r, which is what is left of d0/d2 without it.
+    assert np.allclose(there.physical(phi)[inside], theta[inside], rtol=1e-6)
 
 
 @pytest.mark.parametrize('stiffness', [0.0, 250e3])
