@@ -22,7 +22,7 @@ $(VENV_STAMP): requirements.txt requirements-build.txt requirements-dev.txt requ
 	@touch $@
 
 $(ROS_STAMP): $(VENV_STAMP) scripts/build_ros.sh setup.py setup.cfg package.xml \
-		$(wildcard msg_defs/* msg_defs/*/* launch/* config/* config/*/*)
+		$(wildcard msg_defs/*.* msg_defs/*/*.* launch/*.py config/*.yaml config/*/*.yaml)
 	@scripts/build_ros.sh
 	@touch $@
 
