@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from actuator_glue.inference import generation
 from actuator_glue.inference.adaptation import empty_counts, tune
-from actuator_glue.inference.coordinates import bounded_all
+from actuator_glue.inference.coordinates import physical_all, sampling
 from actuator_glue.inference.evaluate import LogDensity, check_values, evaluate, refuse_infinite
 from actuator_glue.inference.moves import independence, uniforms_per_chain
 from actuator_glue.inference.settings import Settings
@@ -46,21 +46,28 @@ class Population(NamedTuple):
     evaluations: int
 
 
-def prior_reference(rng: np.random.Generator, size: int, dimension: int) -> Reference:
+def prior_reference(rng: np.random.Generator, size: int, lower: Array, width: Array) -> Reference:
     """Latin hypercube of the uniform prior: its density in z is the Jacobian itself."""
-    share = (np.arange(size)[:, None] + rng.random((size, dimension))) / size
-    share = rng.permuted(share, axis=0)
-    return Reference(np.log(share) - np.log1p(-share), lambda z, log_jacobian: log_jacobian)
+    share = (np.arange(size)[:, None] + rng.random((size, len(lower)))) / size
+    x = lower + width * rng.permuted(share, axis=0)
+    return Reference(sampling(x, lower, width), lambda z, log_jacobian: log_jacobian)
 
 
-def archive_reference(rng: np.random.Generator, size: int, archive: Array) -> Reference:
-    """Student t fitted to an earlier posterior z (m, p), half as wide again."""
+def archive_reference(
+    rng: np.random.Generator, size: int, archive: Array, lower: Array, width: Array
+) -> Reference:
+    """Student t fitted to an earlier posterior z (m, p), half as wide again.
+
+    Points beyond a bound are replaced by points of the archive: they only start the search.
+    """
     centre, factor = independence.fit(archive)
     factor *= 1.5
     points = np.empty((size, archive.shape[1]))
     uniforms = rng.random((size, archive.shape[1] + 5))
     for point, row in zip(points, uniforms, strict=True):
         independence.draw(row, 0, centre, factor, point)
+    outside = np.isneginf(physical_all(points, lower, width)[1])
+    points[outside] = archive[rng.integers(0, len(archive), int(outside.sum()))]
     return Reference(points, lambda z, _: independence.log_density(z, centre, factor))
 
 
@@ -80,7 +87,7 @@ def anneal(
     """
     z = reference.points
     size, dimension = z.shape
-    x, log_jacobian = bounded_all(z, lower, width)
+    x, log_jacobian = physical_all(z, lower, width)
     values = evaluate(log_density, x)
     check_values(values, x)
     evaluations = size
@@ -122,7 +129,7 @@ def anneal(
         # Chain by chain: systematic resampling then treats every chain alike, so that modes which
         # no move connects keep their shares from temperature to temperature.
         z = np.stack([h[0] for h in history], axis=1).reshape(-1, dimension)
-        x, log_jacobian = bounded_all(z, lower, width)
+        x, log_jacobian = physical_all(z, lower, width)
         values = np.stack([h[2] for h in history], axis=1).reshape(-1)
         size = len(z)
     return Population(z, x, values, counts, power, evaluations)

@@ -1,10 +1,10 @@
-"""Unbounded coordinates: a bounded uniform prior becomes a density on the whole of R^p.
+"""Sampling coordinates: logarithms of what is positive by its prior, the rest on a unit scale.
 
-Every coordinate x in (lower, upper) is carried as z = ln((x - lower) / (upper - x)). Proposals
-made in z can never leave the prior, so no reflection is needed, and parameters that differ by nine
-orders of magnitude all live on the same scale. The density of z is the density of x times the
-Jacobian dx/dz = (x - lower)(upper - x) / (upper - lower); see docs/dream.md for why folding at the
-bounds is not exact for correlated jumps.
+A parameter with lower bound 0 is carried as z = ln(x / upper), any other as z = (x - lower) /
+(upper - lower). Parameters that differ by nine orders of magnitude then live on one scale, a ratio
+that the data fix while they say nothing about its two parts is a straight line, and mass piled up
+at 0 has no wall. A candidate beyond a wall that remains has density zero and is rejected;
+docs/dream.md says why it is not folded back. The density of z is that of x times dx/dz.
 """
 
 from __future__ import annotations
@@ -22,38 +22,38 @@ _EDGE = 1e-12
 
 
 @njit
-def bounded(z, lower, width, x):  # type: ignore[no-untyped-def]
-    """Write the physical point of z into x, both (p,); return its log Jacobian less a constant."""
-    # ln(share (1 - share)) = -|z| - 2 ln(1 + exp(-|z|)); the logarithms wait in one product.
-    far = 0.0
-    product = 1.0
+def physical(z, lower, width, x):  # type: ignore[no-untyped-def]
+    """Write the physical point of z into x, both (p,); return ln |dx/dz| less a constant.
+
+    Beyond a bound the logarithm is minus infinity and x lies on the bound.
+    """
+    log_jacobian = 0.0
     for j in range(z.size):
-        size = abs(z[j])
-        small = math.exp(-size)
-        share = (1.0 if z[j] > 0.0 else small) / (1.0 + small)
+        if lower[j] == 0.0:
+            share = math.exp(min(z[j], 0.0))
+            log_jacobian += z[j] if z[j] < 0.0 else -np.inf
+        else:
+            share = min(max(z[j], 0.0), 1.0)
+            if share != z[j]:
+                log_jacobian = -np.inf
         x[j] = lower[j] + width[j] * share
-        far += size
-        product *= 1.0 + small
-        if product > 1e300:
-            far += 2.0 * math.log(product)
-            product = 1.0
-    return -far - 2.0 * math.log(product)
+    return log_jacobian
 
 
 @njit
-def bounded_all(z, lower, width):  # type: ignore[no-untyped-def]
+def physical_all(z, lower, width):  # type: ignore[no-untyped-def]
     """Return physical points (m, p) and log Jacobians (m,) of the points z (m, p)."""
     x = np.empty_like(z)
     log_jacobian = np.empty(z.shape[0])
     for i in range(z.shape[0]):
-        log_jacobian[i] = bounded(z[i], lower, width, x[i])
+        log_jacobian[i] = physical(z[i], lower, width, x[i])
     return x, log_jacobian
 
 
-def unbounded(x: Array, lower: Array, width: Array) -> Array:
-    """Return the unbounded coordinates of physical points x (m, p) [physical units]."""
+def sampling(x: Array, lower: Array, width: Array) -> Array:
+    """Return the sampling coordinates of physical points x (m, p) inside the prior."""
     share = np.clip((x - lower) / width, _EDGE, 1.0 - _EDGE)
-    return np.ascontiguousarray(np.log(share) - np.log1p(-share))
+    return np.ascontiguousarray(np.where(lower == 0.0, np.log(share), share))
 
 
 def check_bounds(lower: Array, upper: Array) -> tuple[Array, Array]:

@@ -23,7 +23,7 @@ from actuator_glue.inference.anneal import (
 )
 from actuator_glue.inference.archive import Archive
 from actuator_glue.inference.chains import Chains
-from actuator_glue.inference.coordinates import bounded_all, check_bounds, unbounded
+from actuator_glue.inference.coordinates import check_bounds, physical_all, sampling
 from actuator_glue.inference.evaluate import LogDensity, check_values, evaluate, refuse_infinite
 from actuator_glue.inference.moves import uniforms_per_chain
 from actuator_glue.inference.settings import Settings
@@ -37,10 +37,10 @@ class State(NamedTuple):
 
     Attributes:
         x: current points of the chains, (n, p) [physical units].
-        z: the same in unbounded coordinates, (n, p).
+        z: the same in sampling coordinates, (n, p).
         log_density: log likelihood at x, (n,).
         log_target: log density of z, (n,) = log_density + log Jacobian.
-        archive: past states Z in unbounded coordinates.
+        archive: past states Z in sampling coordinates.
         tuning: proposal distributions of the moves.
         fitted: size of the archive when they were last fitted.
         counts: uses, acceptances and squared jumps since burn-in began or the last fit.
@@ -115,7 +115,7 @@ def init(
     # Chains start at points spread over the population; impossible points are no start.
     possible = np.where(np.isfinite(start.log_density), 0.0, -np.inf)
     chosen = resample(rng, possible, settings.chains)
-    _, log_jacobian = bounded_all(start.z[chosen], low, width)
+    _, log_jacobian = physical_all(start.z[chosen], low, width)
     return State(
         x=start.x[chosen],
         z=start.z[chosen],
@@ -147,15 +147,13 @@ def _points(
     """The points that become the first archive and the chains' starts."""
     d = len(lower)
     if archive is not None:
-        old = unbounded(
-            _check_archive(np.asarray(archive, np.float64), lower, width), lower, width
-        )
-        reference = archive_reference(rng, settings.points(d) // 4, old)
+        old = sampling(_check_archive(np.asarray(archive, np.float64), lower, width), lower, width)
+        reference = archive_reference(rng, settings.points(d) // 4, old, lower, width)
     else:
-        reference = prior_reference(rng, settings.points(d), d)
+        reference = prior_reference(rng, settings.points(d), lower, width)
         if settings.start == 'prior':
             # As Vrugt (2016): only the chains' own points are evaluated.
-            x, _ = bounded_all(reference.points, lower, width)
+            x, _ = physical_all(reference.points, lower, width)
             values = np.full(len(x), np.nan)
             values[: settings.chains] = evaluate(log_density, x[: settings.chains])
             check_values(values, x)

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from actuator_glue.inference.coordinates import bounded
+from actuator_glue.inference.coordinates import physical
 from actuator_glue.inference.moves import (
     INDEPENDENCE,
     PARALLEL,
@@ -45,7 +45,7 @@ def propose(  # type: ignore[no-untyped-def]
 ):
     """Return candidates of all chains.
 
-    Returns candidate (n, p) in unbounded coordinates, x (n, p) in physical units, log_jacobian
+    Returns candidate (n, p) in sampling coordinates, x (n, p) in physical units, log_jacobian
     (n,), correction (n,) = log Hastings correction, label (n, 2) = move and crossover class.
     """
     n, d = z.shape
@@ -81,7 +81,7 @@ def propose(  # type: ignore[no-untyped-def]
             correction[i] = snooker.propose(z[i], row, rows, size, scale, indices, candidate[i])
         elif move == INDEPENDENCE:
             correction[i] = independence.propose(z[i], row, centre, factor, residual, candidate[i])
-        log_jacobian[i] = bounded(candidate[i], lower, width, x[i])
+        log_jacobian[i] = physical(candidate[i], lower, width, x[i])
     return candidate, x, log_jacobian, correction, label
 
 

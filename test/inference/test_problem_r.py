@@ -13,6 +13,7 @@ import pytest
 
 from actuator_glue.inference.dream import sample
 from actuator_glue.inference.likelihood import GlueLikelihood
+from actuator_glue.inference.moments import moments
 from actuator_glue.model import problem_r
 from actuator_glue.model.fast import FastErrors
 from actuator_glue.model.parameters import bounds
@@ -70,3 +71,26 @@ def test_mixing_per_evaluation_beats_the_published_sampler(
     first = sample(rng, density, *bounds(), evaluations=20_000)
     warm = sample(rng, density, *bounds(), evaluations=40_000, archive=first.archive)
     assert warm.ess.min() / warm.evaluations > 0.15
+
+
+def test_one_free_test_leaves_a_ridge_that_the_chains_run_along(rng_seed: int) -> None:
+    """With k = 0 only r = alpha_1 beta_0/alpha_2 and beta_1 are fixed; the rest is prior.
+
+    Uniform in both, the density along the ridge is proportional to alpha_2 up to the bound that
+    alpha_1 beta_0 meets: means 2/3 of it, standard deviations sqrt(1/18); alpha_3 stays uniform.
+    Five runs of some 200 effective draws: the limits are six standard errors.
+    """
+    density = GlueLikelihood(FastErrors(problem_r.records()[:1]), 256.0)
+    upper = bounds()[1]
+    runs = [
+        sample(rng, density, *bounds(), evaluations=60_000)
+        for rng in np.random.default_rng(rng_seed).spawn(5)
+    ]
+    draws = np.concatenate([run.posterior() for run in runs])
+    ratio = draws[:, 1] / draws[:, 2]
+    assert ratio.std() / ratio.mean() < 0.01
+    assert abs(draws[:, 1].mean() / upper[1] - 2.0 / 3.0) < 0.05
+    assert abs(draws[:, 1].std() / upper[1] - np.sqrt(1.0 / 18.0)) < 0.04
+    assert abs(draws[:, 3].mean() / upper[3] - 0.5) < 0.06
+    found = moments(draws, *bounds())
+    assert found.prior_dominated.tolist() == [False, True, True, True]

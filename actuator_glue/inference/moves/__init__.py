@@ -1,4 +1,4 @@
-"""Moves of the sampler: one file each, all in unbounded coordinates, all reversible.
+"""Moves of the sampler: one file each, all in sampling coordinates, all reversible.
 
 A move is a compiled function that writes a candidate for one chain and returns the log of its
 Hastings correction q(candidate -> z) / q(z -> candidate). Random numbers come in as a row of
