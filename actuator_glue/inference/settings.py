@@ -82,4 +82,4 @@ class Settings:
             return max(self.population, 10 * dimension)
         # Grows faster than p: what keeps two modes' shares steady is points per stage, of which
         # there are more in more dimensions (2 of 60 runs lost a mode in ten with 100 p points).
-        return max(200, min(int(50 * math.sqrt(dimension) * dimension), 2000))
+        return max(200, 10 * dimension, min(int(50 * math.sqrt(dimension) * dimension), 2000))
