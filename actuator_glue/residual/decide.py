@@ -27,6 +27,8 @@ class Decision:
         measured: measurement effects, named as findings.
         noise: rms of what no structure explains [m].
         left: rms structure that remains, without what measurement effects cause [m].
+        certainty: what the names' probabilities are multiplied with: the share of the structure
+            explained where much remains, else 1.
         limit: rms structure above which a model counts as unexplained [m].
         remaining: where the rest sits, for the JSON.
     """
@@ -37,6 +39,7 @@ class Decision:
     measured: tuple[Measured, ...]
     noise: float
     left: float
+    certainty: float
     limit: float
     remaining: Json
 
@@ -47,17 +50,21 @@ def decide(
     """Weigh what was found against what remains."""
     variance = sum(m.rms**2 for m in seen if m.name != 'hum')
     left = float(np.sqrt(max(0.0, found.left**2 - variance)))
-    limit = max(
-        settings.left_noise * found.noise,
-        found.material,
-        settings.left_share * found.structure,
-    )
+    many = sum(gain >= found.material for gain in found.removed.values()) > 2
+    share = settings.left_share_many if many else settings.left_share
+    limit = max(settings.left_noise * found.noise, found.material, share * found.structure)
     verdict: Verdict = 'none'
     if left > limit:
         verdict = 'unexplained'
     elif found.final.effects or seen:
         verdict = 'missing-effect'
-    named = verdict == 'missing-effect'
+    # Several effects that explain most of it are worth going on with, and what remains is said.
+    partly = (
+        verdict == 'unexplained'
+        and len(found.final.effects) > 1
+        and left < settings.hopeless * found.structure
+    )
+    named = verdict == 'missing-effect' or partly
     final = found.final if named else found.base
     return Decision(
         verdict=verdict,
@@ -66,6 +73,7 @@ def decide(
         measured=seen if named else (),
         noise=found.noise,
         left=left,
+        certainty=1.0 - (left / found.structure) ** 2 if partly else 1.0,
         limit=limit,
         remaining={'left': left, 'limit': limit, **remaining(data, final.fit.error)},
     )

@@ -150,7 +150,8 @@ def _findings(
             Finding(
                 name=name,
                 alternatives=tuple(r.name for r in tied if r.name != name),
-                probability=next(r.probability for r in rivals if r.name == name),
+                probability=decision.certainty
+                * next(r.probability for r in rivals if r.name == name),
                 place=CATALOGUE[name].place,
                 parameters=own,
                 error_without=float(np.sqrt(found.final.mean_square + gained**2)),

@@ -221,7 +221,8 @@ class Diagnosis:
 
     Attributes:
         verdict: 'none' (the model is enough), 'missing-effect' or 'unexplained'.
-        effects: findings in the order of their evidence; empty unless 'missing-effect'.
+        effects: findings in the order of what they remove; with 'unexplained' only where several
+            together explain most of the structure, and then less probable.
         error: held-out error before and after.
         candidates: all effects tried first, best first.
         coverage: share of held-out samples in the 95 % band, before and after.
@@ -278,9 +279,15 @@ class Diagnosis:
         if self.verdict == 'none':
             return f'the model is enough: held-out error {before:.1f} um, noise {floor:.1f} um'
         if self.verdict == 'unexplained':
+            if not self.effects:
+                return (
+                    f'the model is not enough and no catalogued effect explains why: '
+                    f'held-out error {before:.1f} um, noise {floor:.1f} um'
+                )
+            names = ', '.join(e.name for e in self.effects)
             return (
-                f'the model is not enough and no catalogued effect explains why: '
-                f'held-out error {before:.1f} um, noise {floor:.1f} um'
+                f'the model is not enough and the catalogue explains it only in part ({names}): '
+                f'held-out error {before:.1f} -> {after:.1f} um, noise {floor:.1f} um'
             )
         sets = ', '.join(
             e.name + (f' (or {", ".join(e.alternatives)})' if e.alternatives else '')

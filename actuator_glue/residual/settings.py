@@ -17,7 +17,9 @@ class Settings:
         tie_nats: two effects cannot be told apart below this evidence,
         tie_share: or where they differ by less than this share of what the better one removes.
         left_noise: the model is unexplained where structure above this share of the noise
-        left_share: and above this share of the structure found at first remains.
+        left_share: and above this share of the structure found at first remains;
+        left_share_many: this share where three or more effects are material: such a machine
+            lacks more than any search finds, and each finding stands on evidence of its own.
         hopeless: no third effect is sought where two leave this share of the structure.
         most: most effects added.
         beam: structures carried on from one size to the next.
@@ -32,7 +34,8 @@ class Settings:
     tie_nats: float = 4.0
     tie_share: float = 0.1
     left_noise: float = 0.6
-    left_share: float = 0.45
+    left_share: float = 0.3
+    left_share_many: float = 0.45
     hopeless: float = 0.7
     most: int = 6
     beam: int = 3
