@@ -5,10 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+import plant
 from numpy.typing import NDArray
 from scipy import optimize, signal
-
-import plant
 
 Array = NDArray[np.float64]
 NOISE = 1e-5  # m
@@ -205,7 +204,6 @@ def _sense(name: str, size: float, y: Array, rng: np.random.Generator) -> Array:
             w = 2 * np.pi * 6.5
             num = [1.0, 2 * 0.05 * w, w * w]
             den = [1.0, 2 * (0.05 + 0.2 * size) * w * (1 + size), (w * (1 + 0.3 * size)) ** 2]
-            den = [d * (1.0 if i < 2 else 1.0) for i, d in enumerate(den)]
             num = [c * den[2] / num[2] for c in num]
             b, a, _ = signal.cont2discrete((num, den), 1 / plant.RATE, 'bilinear')
             return np.asarray(signal.lfilter(b.ravel(), a, y))

@@ -193,7 +193,7 @@ def respond(command, theta, k, e, substeps, sticks):
             lag = e[DELAY]
             if e[WOBBLE] != 0.0:
                 lag += e[WOBBLE] * (1.0 + math.sin(2.0 * math.pi * e[WOBBLE_HZ] * t))
-            at = i - int(math.ceil(lag * RATE - j / substeps - 1e-9)) if lag > 0.0 else i
+            at = i - math.ceil(lag * RATE - j / substeps - 1e-9) if lag > 0.0 else i
             u = command[at] if at >= 0 else 0.0
             if e[RATE_GAIN] != 0.0 and at > 0:
                 u *= 1.0 + e[RATE_GAIN] * abs(command[at] - command[at - 1]) * RATE
