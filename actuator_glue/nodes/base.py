@@ -180,9 +180,9 @@ class SuiteNode(LifecycleNode):
         """Stop and clean up from whatever state."""
 
         def work() -> None:
+            self.finished = True
             self._stop()
             self._clean()
-            self.finished = True
             self.wake()
 
         return self._transition('shut down', work, super().on_shutdown, state)

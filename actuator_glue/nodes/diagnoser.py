@@ -79,7 +79,8 @@ class DiagnoserNode(base.SuiteNode):
     def do_deactivate(self) -> None:
         """Give up a running diagnosis."""
         if self._request is not None:
-            self.worker.restart()
+            if not self.finished:
+                self.worker.restart()
             self._finish(diagnosing.Outcome(message='the node was deactivated'))
 
     def do_cleanup(self) -> None:

@@ -93,7 +93,7 @@ class EstimatorNode(base.SuiteNode):
     def do_deactivate(self) -> None:
         """Give up the running window."""
         self._answers.clear()
-        if self.estimator.running is not None:
+        if self.estimator.running is not None and not self.finished:
             self.worker.restart()
 
     def do_cleanup(self) -> None:
