@@ -23,7 +23,7 @@ def table(found: Result) -> str:
     if problem:
         ours = problem['ours']
         lines += [
-            '## Problem R, one core, side by side',
+            '## Problem R, one core, side by side, seconds of processor time',
             '',
             '| sampler | ESS/s | ours / theirs | ESS per 1000 evaluations | evaluations to '
             'R-hat 1.01 | ESS/s with lfilter | setting |',
@@ -92,7 +92,7 @@ def _samplers(axes: Axes, found: Result) -> None:
     names = sorted(rates, key=rates.__getitem__)
     axes.barh(names, [rates[name] for name in names])
     axes.set_xscale('log')
-    axes.set_xlabel('effective draws per second')
+    axes.set_xlabel('effective draws per processor second')
     axes.set_title('Problem R, one core')
 
 
