@@ -76,6 +76,10 @@ class Coordinates:
             self.upper[3] *= stiffness / (stiffness + self._low[2])
             self.lower[0] += self.lower[3]
             self.upper[0] += self.upper[3]
+        # The sampler takes logarithms above a lower bound of 0, which straightens a ridge that is
+        # straight already. A bound just below is none; the prior's box is checked all the same.
+        edge = self.lower[:4] == 0.0
+        self.lower[:4][edge] = -1e-6 * self.upper[:4][edge]
 
     def physical(self, phi: Array) -> Array:
         """Return physical parameters of coordinates, (..., p)."""
