@@ -53,7 +53,7 @@ def overhead(settings: Settings, generations: int = 3000) -> float:
 
 
 def run(repeats: int = 5, seeds: int = 20) -> dict[str, Any]:
-    """Return effective draws per processor second and per evaluation, and evaluations to R-hat 1.01.
+    """Return effective draws per processor second and evaluation, evaluations to R-hat 1.01.
 
     Keys: `ess_per_second` of runs of a million evaluations from the prior with 64 chains, all of
     the start and burn-in included (median over repeats); `ess_per_second_default` the same with
