@@ -206,3 +206,9 @@ def test_nothing_of_one_machine_is_committed() -> None:
             continue
         found = machine.search(path.read_text(encoding='utf-8'))
         assert found is None, f'{name}: {found.group()}'
+
+
+def test_test_modules_have_names_of_their_own() -> None:
+    """pytest imports two files of one name only once."""
+    names = [p.name for p in (ROOT / 'test').rglob('test_*.py')]
+    assert sorted(names) == sorted(set(names))
