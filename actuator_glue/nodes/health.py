@@ -12,6 +12,8 @@ OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.E
 
 # A fault stays visible this long after its last occurrence, so that people see it.
 REMEMBER = 10.0  # s
+# A stream of a thousand bad blocks a second must not fill the log; /diagnostics counts them all.
+LOGGED_PER_SECOND = 5
 
 
 @dataclass(slots=True)
@@ -42,13 +44,20 @@ class Health:
     def __init__(self, name: str) -> None:
         self._name = name
         self._faults: dict[str, tuple[int, str, float, int]] = {}
+        self._logged: dict[str, deque[float]] = {}
         self.values: dict[str, Any] = {}
 
     def fault(self, kind: str, message: str, now: float, level: Any = WARN) -> bool:
-        """Note a fault; return whether it is the first of its kind for a while (log it then)."""
+        """Note a fault; return whether to log it: the same one once a second, few in all."""
         before = self._faults.get(kind)
         self._faults[kind] = (level, message, now, 1 + (before[3] if before else 0))
-        return before is None or now - before[2] > 1.0 or before[1] != message
+        if before is not None and before[1] == message and now - before[2] <= 1.0:
+            return False
+        recent = self._logged.setdefault(kind, deque(maxlen=LOGGED_PER_SECOND))
+        if len(recent) == LOGGED_PER_SECOND and now - recent[0] < 1.0:
+            return False
+        recent.append(now)
+        return True
 
     def message(self, now: float, stamp: Any, state: str) -> DiagnosticArray:
         """Return the DiagnosticArray to publish.
