@@ -58,12 +58,8 @@ def decide(
         verdict = 'unexplained'
     elif found.final.effects or seen:
         verdict = 'missing-effect'
-    # Several effects that explain most of it are worth going on with, and what remains is said.
-    partly = (
-        verdict == 'unexplained'
-        and len(found.final.effects) > 1
-        and left < settings.hopeless * found.structure
-    )
+    # Several effects that explain most of it are worth going on with; what remains is said.
+    partly = verdict == 'unexplained' and many and left < settings.hopeless * found.structure
     named = verdict == 'missing-effect' or partly
     final = found.final if named else found.base
     return Decision(

@@ -221,8 +221,8 @@ class Diagnosis:
 
     Attributes:
         verdict: 'none' (the model is enough), 'missing-effect' or 'unexplained'.
-        effects: findings in the order of what they remove; with 'unexplained' only where several
-            together explain most of the structure, and then less probable.
+        effects: findings in the order of what they remove; with 'unexplained' only where three or
+            more together explain most of the structure, and then less probable.
         error: held-out error before and after.
         candidates: all effects tried first, best first.
         coverage: share of held-out samples in the 95 % band, before and after.

@@ -80,6 +80,7 @@ def _sham(
             for record, mask in zip(data.records, data.masks, strict=True):
                 spectrum = np.fft.rfft(record.command)
                 turn = np.exp(2j * np.pi * rng.random(len(spectrum)))
+                turn[0] = 0.0  # a mean would do what a bias does
                 fake = np.fft.irfft(spectrum * turn, len(record))
                 y = model.simulate(side.theta, replace(record, command=fake))
                 parts.append(y[mask])
