@@ -209,6 +209,6 @@ def test_nothing_of_one_machine_is_committed() -> None:
 
 
 def test_test_modules_have_names_of_their_own() -> None:
-    """pytest imports two files of one name only once."""
+    """Pytest imports two files of one name only once."""
     names = [p.name for p in (ROOT / 'test').rglob('test_*.py')]
     assert sorted(names) == sorted(set(names))
