@@ -55,12 +55,22 @@ def _effects(found: Diagnosis) -> Section:
                 _um(e.error_without),
                 _um(e.error_with),
                 f'{e.evidence:.0f}',
+                {True: 'yes', False: 'no', None: 'not known'}[e.agrees_across_windows],
             ]
             for e in found.effects
         ]
         blocks.append(
             Table(
-                ['effect', 'or', 'equation', 'place', 'without [um]', 'with [um]', 'nats'],
+                [
+                    'effect',
+                    'or',
+                    'equation',
+                    'place',
+                    'without [um]',
+                    'with [um]',
+                    'nats',
+                    'same in all halves',
+                ],
                 rows,
                 'What the model lacks. Names under "or" cannot be told apart by these records.',
                 prose=True,
@@ -85,6 +95,14 @@ def _effects(found: Diagnosis) -> Section:
     blocks.append(
         Picture.of(figures.ranking(found), 'Every candidate added alone, everything refitted.')
     )
+    s = found.surrogate
+    blocks.append(
+        Text(
+            f'Left-out blocks of the fitting part: {" + ".join(s["structure"])} leaves '
+            f'{_um(s["structure_error"])} um, a generic regression of as many parameters '
+            f'({", ".join(s["features"])}) {_um(s["error"])} um.'
+        )
+    )
     blocks += [Note(line) for line in found.advice]
     return Section('What is missing', blocks)
 
@@ -97,6 +115,7 @@ def _residual(found: Diagnosis) -> Section:
             Path(r['source']).name, _um(r['structure']), _um(r['noise']),
             ' to '.join(f'{f:g}' for f in r['frequency_hz']),
             ' to '.join(f'{t:g}' for t in r['time_s']),
+            ' to '.join(f'{1e3 * x:.2g}' for x in r['displacement']),
             f'{100 * r["share_at_low_velocity"]:.0f}',
             f'{100 * r["share_at_large_displacement"]:.0f}',
         ]
@@ -118,6 +137,7 @@ def _residual(found: Diagnosis) -> Section:
             Table(['statistic', 'value'], tests, 'Statistics of the residual of Eq. (2).'),
             Table(
                 ['record', 'structure [um]', 'noise [um]', 'frequency [Hz]', 'time [s]',
+                 'displacement [mm]',
                  'at low velocity [%]', 'at large displacement [%]'],
                 rows,
                 'Where the rest after the diagnosis sits on the fitting part (middle 80 %).',

@@ -6,6 +6,9 @@ from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.residual.attribute import Attribution
 from actuator_glue.residual.data import Data
 from actuator_glue.residual.decide import Decision
+from actuator_glue.residual.diagnosis import Json
+from actuator_glue.residual.surrogate import Surrogate
+from actuator_glue.residual.windows import Windows
 
 # The experiment that separates two groups of effects (issue: second amplitude, down-sweep, ...).
 _EXPERIMENT = {
@@ -19,7 +22,24 @@ _EXPERIMENT = {
 _OTHERWISE = 'a second amplitude, a down-sweep or a record with another specimen stiffness'
 
 
-def of(decision: Decision, found: Attribution, data: Data) -> tuple[str, ...]:
+def _where(row: Json) -> str:
+    """Say where the rest of one record sits: frequency, amplitude and time."""
+    f, x, t = row['frequency_hz'], row['displacement'], row['time_s']
+    band = f'{f[0]:g} to {f[1]:g} Hz' if f else 'no one frequency'
+    return (
+        f'{row["source"]}: the rest sits at {band}, displacements of '
+        f'{1e3 * x[0]:.2g} to {1e3 * x[1]:.2g} mm and {t[0]:g} to {t[1]:g} s '
+        f'(middle 80 %), {100 * row["share_at_low_velocity"]:.0f} % of it in the slow half'
+    )
+
+
+def of(
+    decision: Decision,
+    found: Attribution,
+    data: Data,
+    generic: Surrogate,
+    stretches: dict[str, Windows],
+) -> tuple[str, ...]:
     """Advice for a decision."""
     out = []
     for name in decision.names:
@@ -29,6 +49,13 @@ def of(decision: Decision, found: Attribution, data: Data) -> tuple[str, ...]:
             same = all(CATALOGUE[t].group == group for t in tied)
             way = _EXPERIMENT.get(group, _OTHERWISE) if same else _OTHERWISE
             out.append(f'{name} cannot be told from {", ".join(tied)} here; record {way}')
+        if stretches[name].agree is False:
+            sizes = ', '.join(f'{v:.3g}' for v in stretches[name].values)
+            unit = CATALOGUE[name].parameters[0].unit
+            out.append(
+                f'{name} does not agree across the halves of the records ({sizes} {unit}): its '
+                'size changes with time, frequency or stiffness, or it stands for something else'
+            )
     if decision.verdict == 'unexplained':
         best = found.singles[0].added if found.singles else ''
         out.append(
@@ -36,6 +63,17 @@ def of(decision: Decision, found: Attribution, data: Data) -> tuple[str, ...]:
             f'(limit {1e6 * decision.limit:.1f}); '
             f'closest in the catalogue, not enough: {best}; look where `remaining` points, '
             'and record the force channel and a second amplitude'
+        )
+        out += [_where(row) for row in decision.remaining['records']]
+        out.append(
+            f'a generic regression on {len(generic.features)} features of the motion '
+            f'({", ".join(generic.features)}) leaves {1e6 * generic.error:.1f} um out of sample, '
+            f'{" + ".join(generic.structure)} {1e6 * generic.structure_error:.1f} um; '
+            + (
+                f'in the loop it looks like the {generic.place}'
+                if generic.place
+                else 'it follows no simple function of the motion, at no one place in the loop'
+            )
         )
     if decision.verdict == 'none' and found.structure > 0.0:
         out.append(

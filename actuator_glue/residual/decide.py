@@ -14,6 +14,7 @@ from actuator_glue.residual.measurement import Measured
 from actuator_glue.residual.score import splits_of
 from actuator_glue.residual.search import Trial
 from actuator_glue.residual.settings import Settings
+from actuator_glue.residual.surrogate import Surrogate
 
 
 @dataclass(frozen=True)
@@ -45,14 +46,25 @@ class Decision:
 
 
 def decide(
-    found: Attribution, seen: tuple[Measured, ...], data: Data, settings: Settings
+    found: Attribution,
+    seen: tuple[Measured, ...],
+    data: Data,
+    settings: Settings,
+    surrogate: Surrogate,
 ) -> Decision:
-    """Weigh what was found against what remains."""
+    """Weigh what was found against what remains.
+
+    Where material structure remains, names that a generic surrogate of as many parameters
+    clearly beats explain nothing, even if they remove most of the structure.
+    """
     variance = sum(m.rms**2 for m in seen if m.name != 'hum')
     left = float(np.sqrt(max(0.0, found.left**2 - variance)))
     many = sum(gain >= found.material for gain in found.removed.values()) > 2
     share = settings.left_share_many if many else settings.left_share
     limit = max(settings.left_noise * found.noise, found.material, share * found.structure)
+    floor = max(settings.left_noise * found.noise, found.material)
+    if left > floor and found.final.effects and surrogate.beats(found.material, settings.nats):
+        limit = floor
     verdict: Verdict = 'none'
     if left > limit:
         verdict = 'unexplained'
@@ -98,7 +110,11 @@ def remaining(data: Data, error: Array) -> Json:
         inner = np.searchsorted(cumulated, [0.1 * cumulated[-1], 0.9 * cumulated[-1]])
         velocity = np.abs(np.gradient(y, period))
         slow = velocity < np.median(velocity)
-        large = np.abs(y - np.median(y)) > np.median(np.abs(y - np.median(y)))
+        amplitude = np.abs(y - np.median(y))
+        large = amplitude > np.median(amplitude)
+        order = np.argsort(amplitude)
+        ranked = np.cumsum(excess[order])
+        sizes = np.searchsorted(ranked, [0.1 * ranked[-1], 0.9 * ranked[-1]])
         rows.append(
             {
                 'source': record.source or f'record {i + 1}',
@@ -107,6 +123,7 @@ def remaining(data: Data, error: Array) -> Json:
                 'noise': part.noise,
                 'frequency_hz': _band(part.frequency, part.excess),
                 'time_s': [round(float(t[min(j, len(t) - 1)]), 2) for j in inner],
+                'displacement': [float(amplitude[order[min(j, len(y) - 1)]]) for j in sizes],
                 'share_at_low_velocity': round(float(excess[slow].sum()) / total, 3),
                 'share_at_large_displacement': round(float(excess[large].sum()) / total, 3),
             }

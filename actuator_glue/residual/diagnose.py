@@ -12,7 +12,7 @@ from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.parameters import BASE
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
-from actuator_glue.residual import advice, measurement, posterior
+from actuator_glue.residual import advice, measurement, posterior, surrogate, windows
 from actuator_glue.residual.apart import settings_of_records
 from actuator_glue.residual.attribute import Attribution, Attributor
 from actuator_glue.residual.decide import Decision, decide
@@ -23,6 +23,7 @@ from actuator_glue.residual.measurement import Measured
 from actuator_glue.residual.search import Search
 from actuator_glue.residual.settings import Settings
 from actuator_glue.residual.verify import Side, traces, verify
+from actuator_glue.residual.windows import Windows
 
 Progress = Callable[[str, float], None]
 Clock = Callable[[], float]
@@ -68,8 +69,11 @@ def diagnose(
     tell('base fit', 0.0)
     found = Attributor(search, settings, tell).run()
     seen = measurement.find(prepared.fit, found.final.fit.error, found.material)
-    decision = decide(found, seen, prepared.fit, settings)
     assert search.scorer is not None
+    chosen = found.final if found.final.effects else found.singles[0]
+    generic = surrogate.compare(prepared.fit, search.scorer, found.base, chosen)
+    decision = decide(found, seen, prepared.fit, settings, generic)
+    stretches = windows.agreement(decision.final, search.scorer)
     rng = np.random.default_rng([seed, 1])
     sides: list[Side] = []
     for stage, trial in (('posterior before', found.base), ('posterior', decision.final)):
@@ -98,12 +102,16 @@ def diagnose(
     tell('done', 1.0)
     return Diagnosis(
         verdict=decision.verdict,
-        effects=_findings(decision, found, estimates),
+        effects=_findings(decision, found, estimates, stretches),
         error=error,
         candidates=_candidates(found, seen),
         coverage=coverage,
         alarm=alarm_of(found, seen, decision, prepared.fit, seed),
-        advice=(*apart, *advice.of(decision, found, prepared.fit), *prepared.notes),
+        advice=(
+            *apart,
+            *advice.of(decision, found, prepared.fit, generic, stretches),
+            *prepared.notes,
+        ),
         base={p.name: estimates[p.name] for p in BASE},
         structure=after.effects,
         names=Structure(after.effects).names,
@@ -113,6 +121,7 @@ def diagnose(
             *traces(prepared.fit, False, curves),
             *traces(prepared.held, True, curves),
         ),
+        surrogate=generic.to_json(),
         remaining=decision.remaining,
         seconds=clock() - start if clock else math.nan,
     )
@@ -137,7 +146,10 @@ def _measured_estimates(effect: Measured) -> dict[str, Estimate]:
 
 
 def _findings(
-    decision: Decision, found: Attribution, estimates: dict[str, Estimate]
+    decision: Decision,
+    found: Attribution,
+    estimates: dict[str, Estimate],
+    stretches: dict[str, Windows],
 ) -> tuple[Finding, ...]:
     out = []
     for name in decision.names:
@@ -158,6 +170,8 @@ def _findings(
                 error_with=found.final.fit.rms,
                 evidence=found.evidence[name],
                 plausible=_excludes_neutral(first),
+                agrees_across_windows=stretches[name].agree,
+                windows=stretches[name].values,
             )
         )
     for effect in decision.measured:

@@ -64,7 +64,10 @@ class Finding:
         error_without: fit error of the structure without any of the set [m].
         error_with: fit error with `name` in it [m].
         evidence: out-of-sample log score gained, in nats of effectively independent samples.
-        plausible: its interval excludes the neutral value and the blocks agree about its sign.
+        plausible: its interval excludes the neutral value.
+        agrees_across_windows: its leading parameter is the same in all halves of the records
+            that fix it; None where fewer than two do (see residual/windows.py).
+        windows: the leading parameter in each of these halves [unit of the parameter].
     """
 
     name: str
@@ -76,6 +79,8 @@ class Finding:
     error_with: float
     evidence: float
     plausible: bool = True
+    agrees_across_windows: bool | None = None
+    windows: tuple[float, ...] = ()
 
     def to_json(self) -> Json:
         """Return the JSON object of one finding."""
@@ -89,6 +94,8 @@ class Finding:
             'error_with': number(self.error_with),
             'evidence': number(self.evidence),
             'plausible': self.plausible,
+            'agrees_across_windows': self.agrees_across_windows,
+            'windows': [number(v) for v in self.windows],
         }
 
 
@@ -234,6 +241,7 @@ class Diagnosis:
         posterior: draws of base and effect parameters, shape (m, p).
         best: best-fit parameters, shape (p,).
         traces: curves for the report.
+        surrogate: a generic regression of equal flexibility and what it leaves out of sample.
         remaining: where in loop, frequency, amplitude and time the unexplained rest sits.
         seconds: wall time.
     """
@@ -251,6 +259,7 @@ class Diagnosis:
     posterior: Array
     best: Array
     traces: tuple[Trace, ...]
+    surrogate: Json
     remaining: Json
     seconds: float
 
@@ -267,6 +276,7 @@ class Diagnosis:
             'alarm': self.alarm.to_json(),
             'base': {name: p.to_json() for name, p in self.base.items()},
             'structure': list(self.structure),
+            'surrogate': self.surrogate,
             'remaining': self.remaining,
             'advice': list(self.advice),
             'seconds': number(self.seconds),

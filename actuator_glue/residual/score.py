@@ -58,17 +58,39 @@ class Scorer:
         error, jac = self.whiten(fit.error), self.whiten(fit.jacobian)
         scale = np.sqrt(np.einsum('pn,pn->p', jac, jac))
         jac = jac[scale > 0] / scale[scale > 0, None]
-        normal = jac @ jac.T
-        # Prior of the shift, 30 of these nats wide: keeps directions no block fixes at rest.
-        ridge = 1e-3 * np.eye(len(jac))
         out = np.empty(len(self.blocks))
-        for i, block in enumerate(self.blocks):
-            j, e = jac[:, block], error[block]
-            shift = np.linalg.solve(normal - j @ j.T + ridge, j @ e)
-            predicted = e + j.T @ shift
+        for i, (block, shift) in enumerate(
+            zip(self.blocks, self._shifts(error, jac), strict=True)
+        ):
+            e = error[block]
+            predicted = e + jac[:, block].T @ shift
             # A block that alone fixes a parameter must not explode: it is scored as fitted.
             worst = 4.0 * float(e @ e) + 8.0
             out[i] = -0.5 * min(float(predicted @ predicted), worst)
+        return out
+
+    def left_out_error(self, fit: Fit) -> float:
+        """Rms error of all blocks, each under parameters fitted without it [m]."""
+        error, jac = self.whiten(fit.error), self.whiten(fit.jacobian)
+        scale = np.sqrt(np.einsum('pn,pn->p', jac, jac))
+        known = scale > 0
+        jac, raw = jac[known] / scale[known, None], fit.jacobian[known] / scale[known, None]
+        total = 0.0
+        for block, shift in zip(self.blocks, self._shifts(error, jac), strict=True):
+            e = fit.error[block]
+            predicted = e + raw[:, block].T @ shift
+            total += min(float(predicted @ predicted), 4.0 * float(e @ e))
+        return float(np.sqrt(total / len(error)))
+
+    def _shifts(self, error: Array, jac: Array) -> list[Array]:
+        """What each block moves the parameters by (whitened rows of unit length)."""
+        normal = jac @ jac.T
+        # Prior of the shift, 30 of these nats wide: keeps directions no block fixes at rest.
+        ridge = 1e-3 * np.eye(len(jac))
+        out: list[Array] = []
+        for block in self.blocks:
+            j = jac[:, block]
+            out.append(np.asarray(np.linalg.solve(normal - j @ j.T + ridge, j @ error[block])))
         return out
 
 
