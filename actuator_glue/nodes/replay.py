@@ -29,6 +29,8 @@ RESULTS = (topics.POSTERIOR, topics.BAND, topics.RESPONSE, topics.DIAGNOSIS)
 class ReplayNode(streamer.Streamer):
     """Publishes what a bag holds, at the pace it was recorded, under its own topic names."""
 
+    stamps_now = False
+
     def __init__(self) -> None:
         super().__init__('replay', SPECS)
 

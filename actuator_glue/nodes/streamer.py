@@ -21,7 +21,14 @@ def specs(*, exit_at_end: bool) -> tuple[Spec, ...]:
 
 
 class Streamer(base.SuiteNode):
-    """A node that publishes a stream from a thread of its own; subclasses give `stream`."""
+    """A node that publishes a stream from a thread of its own; subclasses give `stream`.
+
+    Attributes:
+        stamps_now: samples are stamped with the node's clock (a replay keeps recorded stamps, and
+            may be what publishes /clock).
+    """
+
+    stamps_now = True
 
     def __init__(self, name: str, specs: Sequence[Spec]) -> None:
         super().__init__(name, specs)
@@ -33,9 +40,11 @@ class Streamer(base.SuiteNode):
         raise NotImplementedError
 
     def ready(self) -> bool:
-        """Whether everybody who was waited for listens."""
+        """Whether everybody who was waited for listens and the clock has begun."""
         listening = self.count_subscribers(topics.SAMPLES.name)
-        return bool(listening >= self.parameters['wait_for'])
+        # Simulated time is 0 until the first /clock: such stamps would jump with it.
+        clock_runs = not self.stamps_now or self.get_clock().now().nanoseconds > 0
+        return bool(listening >= self.parameters['wait_for'] and clock_runs)
 
     def do_activate(self) -> None:
         """Begin the stream."""
