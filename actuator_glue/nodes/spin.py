@@ -7,6 +7,7 @@ import signal
 import socket
 import sys
 import threading
+import time
 from collections.abc import Callable, Sequence
 
 import rclpy
@@ -49,6 +50,9 @@ def main(make: Callable[[], SuiteNode], args: Sequence[str] | None = None) -> in
             node.complain_of_bug(error)
     if node.state in ('unconfigured', 'inactive', 'active'):
         node.trigger_shutdown()
+    else:
+        # Shut down by a service: the answer must leave before the node that gives it is gone.
+        time.sleep(0.3)
     executor.remove_node(node)
     node.destroy_node()
     rclpy.try_shutdown()
