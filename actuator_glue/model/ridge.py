@@ -1,0 +1,114 @@
+"""Coordinates of Eq. (2a) under one specimen stiffness, compiled; why: online/coordinates.py."""
+
+from __future__ import annotations
+
+import math
+from functools import partial
+from typing import Any
+
+from actuator_glue.jit import njit
+
+# Strict floating point: the same bits wherever it is inlined.
+_njit: Any = partial(njit, fastmath=False)
+
+# Logits beyond this are as good as the bound: 1e-7 of the way from it.
+EDGE = 16.0
+
+
+@_njit
+def share(z: float) -> Any:
+    """Logistic function: the share of the way between two bounds."""
+    return 1.0 / (1.0 + math.exp(-z))
+
+
+@_njit
+def log_slope(z: float) -> Any:
+    """Return ln of the derivative of `share`."""
+    return -abs(z) - 2.0 * math.log1p(math.exp(-abs(z)))
+
+
+@_njit
+def oil_range(inertia, s, k, low, high):  # type: ignore[no-untyped-def]
+    """Return between what alpha_2 + k the prior's box lies, given d2/n0 and s; maybe nothing.
+
+    alpha_1 beta_0 and alpha_3 grow in proportion to it, each inside its own bounds.
+    """
+    least = max(k + low[2], low[1] * inertia)
+    most = min(k + high[2], high[1] * inertia)
+    if k > 0.0 and s > 0.0:
+        least = max(least, k * low[3] / s)
+        most = min(most, k * high[3] / s)
+    return least, most
+
+
+@_njit
+def physical(phi, k, low, high, theta):  # type: ignore[no-untyped-def]
+    """Fill theta (p,) from coordinates phi (p,), return the log Jacobian less a constant.
+
+    It is minus infinity where theta lies outside low..high. k is the specimen stiffness [N/m].
+    """
+    inertia = math.exp(phi[1])
+    theta[0] = math.exp(phi[0] - phi[1])
+    s, power = 0.0, 2.0
+    if k > 0.0:
+        s, power = phi[3], 3.0
+        theta[0] -= s
+    least, most = oil_range(inertia, s, k, low, high)
+    if not (0.0 < most > least and low[0] <= theta[0] <= high[0]):
+        return -math.inf
+    log_jacobian = phi[0] - 2.0 * phi[1] + log_slope(phi[2])
+    # Given the other coordinates the prior's density of alpha_2 + k rises with its square (k = 0:
+    # with itself); of its power + 1 it is uniform. In units of `most`, against overflow.
+    rest = (least / most) ** power
+    oil = most * (rest + (1.0 - rest) * share(phi[2])) ** (1.0 / power)
+    log_jacobian += power * math.log(most) + math.log1p(-rest)
+    # Inside the box but for rounding.
+    theta[1] = min(max(oil / inertia, low[1]), high[1])
+    theta[2] = min(max(oil - k, low[2]), high[2])
+    theta[3] = s * oil / k if k > 0.0 else phi[3]
+    if not low[3] <= theta[3] <= high[3]:
+        return -math.inf
+    for j in range(4, len(phi)):
+        theta[j] = low[j] + (high[j] - low[j]) * share(phi[j])
+        log_jacobian += log_slope(phi[j])
+    return log_jacobian
+
+
+@_njit
+def physical_all(phi, k, low, high, theta, log_jacobian):  # type: ignore[no-untyped-def]
+    """Fill theta (m, p) and the log Jacobian (m,); return whether all are inside low..high."""
+    inside = True
+    for i in range(len(phi)):
+        log_jacobian[i] = physical(phi[i], k, low, high, theta[i])
+        inside = inside and log_jacobian[i] > -math.inf
+    return inside
+
+
+@_njit
+def logit(part: float) -> Any:
+    """Return the inverse of `share`, inside +-EDGE."""
+    if not part > 0.0:
+        return -EDGE
+    if not part < 1.0:
+        return EDGE
+    return min(max(math.log(part / (1.0 - part)), -EDGE), EDGE)
+
+
+@_njit
+def coordinates_all(theta, k, low, high, phi):  # type: ignore[no-untyped-def]
+    """Fill phi (m, p) with the coordinates of physical parameters theta (m, p)."""
+    for i in range(len(theta)):
+        oil = max(k + theta[i, 2], 1e-9)
+        inertia = oil / max(theta[i, 1], 1e-300)
+        s, power = 0.0, 2.0
+        phi[i, 3] = theta[i, 3]
+        if k > 0.0:
+            s, power = theta[i, 3] * k / oil, 3.0
+            phi[i, 3] = s
+        phi[i, 0] = math.log(max((theta[i, 0] + s) * inertia, 1e-300))
+        phi[i, 1] = math.log(inertia)
+        least, most = oil_range(inertia, s, k, low, high)
+        rest = (least / most) ** power
+        phi[i, 2] = logit(((oil / most) ** power - rest) / (1.0 - rest))
+        for j in range(4, theta.shape[1]):
+            phi[i, j] = logit((theta[i, j] - low[j]) / (high[j] - low[j]))
