@@ -65,7 +65,7 @@ class Coordinates:
         """Return physical parameters of coordinates, (..., p)."""
         flat = np.ascontiguousarray(phi).reshape(-1, len(self._low))
         theta = np.empty_like(flat)
-        _physical(flat, self._k, self._low, self._high, theta, np.empty(len(flat)))
+        ridge.physical_all(flat, self._k, self._low, self._high, theta, np.empty(len(flat)))
         return theta.reshape(phi.shape)
 
     def coordinates(self, theta: Array) -> Array:
