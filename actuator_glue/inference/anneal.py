@@ -10,29 +10,38 @@ and what the first archive holds; nothing of it enters the posterior draws.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.inference import generation
 from actuator_glue.inference.adaptation import empty_counts, tune
+from actuator_glue.inference.archive import Archive
+from actuator_glue.inference.compiled import compiled
 from actuator_glue.inference.coordinates import physical_all, sampling
-from actuator_glue.inference.evaluate import LogDensity, check_values, evaluate, refuse_infinite
+from actuator_glue.inference.evaluate import LogDensity, check_values, evaluate
+from actuator_glue.inference.generation import UNTEMPERED, Tempering, temper
 from actuator_glue.inference.moves import independence, uniforms_per_chain
 from actuator_glue.inference.settings import Settings
+from actuator_glue.inference.sweep import Around, Walk, many
 from actuator_glue.records import Array
 
 
 class Reference(NamedTuple):
-    """Where annealing starts: points z (m, p) and their log density as a function.
+    """Where annealing starts: points z (m, p) and what they are drawn from.
 
-    `log_density(z, log_jacobian)` gives (m,), less a constant.
+    Centre (p,) and Cholesky factor (p, p) of a Student t; empty for the prior.
     """
 
     points: Array
-    log_density: Callable[[Array, Array], Array]
+    centre: Array
+    factor: Array
+
+    def log_density(self, z: Array, log_jacobian: Array) -> Array:
+        """Return the log density (m,) at points z (m, p), less a constant."""
+        if not self.centre.size:
+            return log_jacobian
+        return np.asarray(independence.log_density(z, self.centre, self.factor))
 
 
 class Population(NamedTuple):
@@ -50,7 +59,7 @@ def prior_reference(rng: np.random.Generator, size: int, lower: Array, width: Ar
     """Latin hypercube of the uniform prior: its density in z is the Jacobian itself."""
     share = (np.arange(size)[:, None] + rng.random((size, len(lower)))) / size
     x = lower + width * rng.permuted(share, axis=0)
-    return Reference(sampling(x, lower, width), lambda z, log_jacobian: log_jacobian)
+    return Reference(sampling(x, lower, width), UNTEMPERED.centre, UNTEMPERED.factor)
 
 
 def archive_reference(
@@ -68,7 +77,7 @@ def archive_reference(
         independence.draw(row, 0, centre, factor, point)
     outside = np.isneginf(physical_all(points, lower, width)[1])
     points[outside] = archive[rng.integers(0, len(archive), int(outside.sum()))]
-    return Reference(points, lambda z, _: independence.log_density(z, centre, factor))
+    return Reference(points, centre, factor)
 
 
 def anneal(
@@ -93,6 +102,7 @@ def anneal(
     evaluations = size
     power = 0.0
     counts = empty_counts(settings)
+    density = compiled(log_density)
     chains = max(size // settings.sweeps, 2)
     columns = uniforms_per_chain(dimension, settings.pairs)
     most = math.inf if limit is None else limit
@@ -102,46 +112,24 @@ def anneal(
         rise = next_rise(gain, 1.0 - power, settings.survivors)
         power = 1.0 if rise >= 1.0 - power else power + rise
         chosen = resample(rng, gain * rise, size)
-        archive = np.ascontiguousarray(z[chosen])
-        tuning = tune(archive, counts, settings)
+        archive = Archive.of(z[chosen])
+        tuning = tune(archive.rows, counts, settings)
         start = resample(rng, gain * rise, chains)
-        now = z[start], x[start], values[start]
-        target = _target(reference, power, now[0], values[start], log_jacobian[start])
-        history = []
+        tempering = Tempering(power, reference.centre, reference.factor)
+        around = Around(lower, width, tuning, settings, tempering)
+        target = temper(values[start], log_jacobian[start], z[start], *tempering)
+        now = Walk(z[start], x[start], values[start], target)
         counts = empty_counts(settings)
-        for _ in range(settings.sweeps):
-            uniforms = rng.random((chains, columns))
-            new_z, new_x, new_jacobian, correction, label = generation.propose(
-                now[0], uniforms, archive, size, lower, width, *tuning,
-                settings.pairs, settings.unit_jump, settings.jitter, settings.noise,
-            )  # fmt: skip
-            new_values = evaluate(log_density, new_x)
-            new_target = _target(reference, power, new_z, new_values, new_jacobian)
-            accepted, infinite = generation.accept(
-                *now, target, new_z, new_x, new_values, new_target, correction, uniforms
-            )
-            if infinite >= 0:
-                refuse_infinite(new_x[infinite])
-            generation.tally(now[0], new_z, accepted, label, tuning.scale, counts)
-            now, target = (new_z, new_x, new_values), new_target
-            history.append(now)
+        uniforms = rng.random((settings.sweeps, chains, columns))
+        _, _, path = many(uniforms, now, archive, 0, around, density, log_density, counts)
         evaluations += chains * settings.sweeps
         # Chain by chain: systematic resampling then treats every chain alike, so that modes which
         # no move connects keep their shares from temperature to temperature.
-        z = np.stack([h[0] for h in history], axis=1).reshape(-1, dimension)
+        z = path.z.swapaxes(0, 1).reshape(-1, dimension)
         x, log_jacobian = physical_all(z, lower, width)
-        values = np.stack([h[2] for h in history], axis=1).reshape(-1)
+        values = path.log_density.swapaxes(0, 1).reshape(-1)
         size = len(z)
     return Population(z, x, values, counts, power, evaluations)
-
-
-def _target(
-    reference: Reference, power: float, z: Array, values: Array, log_jacobian: Array
-) -> Array:
-    posterior = values + log_jacobian
-    if power == 1.0:
-        return posterior
-    return (1.0 - power) * reference.log_density(z, log_jacobian) + power * posterior
 
 
 def next_rise(gain: Array, most: float, survivors: float) -> float:

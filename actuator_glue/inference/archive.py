@@ -48,12 +48,22 @@ class Archive:
 
     def append(self, points: Array) -> Archive:
         """Return the archive with points (m, p) added."""
-        end = self.size + len(points)
-        buffer = self._buffer
-        if buffer.filled != self.size or end > len(buffer.rows):
-            rows = np.empty((max(2 * self.size, end), points.shape[1]))
-            rows[: self.size] = self.rows
-            buffer = _Buffer(rows, self.size)
-        buffer.rows[self.size : end] = points
-        buffer.filled = end
-        return Archive(buffer, end)
+        wide = self.with_room(len(points))
+        wide.capacity_rows[self.size : self.size + len(points)] = points
+        return wide.grown(self.size + len(points))
+
+    def with_room(self, count: int) -> Archive:
+        """Return the same archive, its buffer free for `count` more points and its own to fill."""
+        end = self.size + count
+        if self._buffer.filled == self.size and end <= len(self._buffer.rows):
+            return self
+        rows = np.empty((max(2 * self.size, end), self._buffer.rows.shape[1]))
+        rows[: self.size] = self.rows
+        return Archive(_Buffer(rows, self.size), self.size)
+
+    def grown(self, size: int) -> Archive:
+        """Return the archive of the buffer's first `size` rows, which the caller has filled."""
+        if size == self.size:
+            return self
+        self._buffer.filled = size
+        return Archive(self._buffer, size)

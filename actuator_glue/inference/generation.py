@@ -1,12 +1,13 @@
-"""One generation of all chains in two compiled halves: propose, then accept.
+"""One generation of all chains in compiled pieces: propose, temper, accept, tally.
 
-Between the halves the caller evaluates the likelihood of all candidates in one batch, so no
-function is handed to compiled code.
+After the first the caller evaluates the likelihood of all candidates in one batch, so no function
+is handed to compiled code. `sweep` puts the pieces together.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,6 +24,24 @@ from actuator_glue.inference.moves import (
 )
 from actuator_glue.inference.moves.draw import choose
 from actuator_glue.jit import njit
+from actuator_glue.records import Array
+
+
+class Tempering(NamedTuple):
+    """The target r^(1 - power) p^power between a reference r and the posterior p.
+
+    Attributes:
+        power: 1 is the posterior itself.
+        centre: centre of the reference's Student t, (p,); empty for the prior as reference.
+        factor: its Cholesky factor, (p, p).
+    """
+
+    power: float
+    centre: Array
+    factor: Array
+
+
+UNTEMPERED = Tempering(1.0, np.empty(0), np.empty((0, 0)))
 
 
 @njit
@@ -83,6 +102,28 @@ def propose(  # type: ignore[no-untyped-def]
             correction[i] = independence.propose(z[i], row, centre, factor, residual, candidate[i])
         log_jacobian[i] = physical(candidate[i], lower, width, x[i])
     return candidate, x, log_jacobian, correction, label
+
+
+# Strict floating point: the same bits whatever it is compiled into.
+@njit(fastmath=False)
+def temper(values, log_jacobian, z, power, centre, factor):  # type: ignore[no-untyped-def]
+    """Return the log target (n,) of points z (n, p), docs/dream.md (D1) and (D6).
+
+    Beyond the bounds (log_jacobian minus infinity) it is minus infinity, whatever the likelihood
+    says there.
+    """
+    target = np.empty(len(values))
+    reference = log_jacobian
+    if power != 1.0 and centre.size > 0:
+        reference = independence.log_density(z, centre, factor)
+    for i in range(len(values)):
+        if log_jacobian[i] == -np.inf:
+            target[i] = -np.inf
+            continue
+        target[i] = values[i] + log_jacobian[i]
+        if power != 1.0:
+            target[i] = (1.0 - power) * reference[i] + power * target[i]
+    return target
 
 
 @njit

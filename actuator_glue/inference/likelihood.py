@@ -14,7 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.errors import InputError
-from actuator_glue.jit import njit
+from actuator_glue.inference.compiled import (
+    Compiled,
+    gaussian_likelihood,
+    variance_likelihood,
+)
+from actuator_glue.model.fast import FastErrors
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.records import Array
 
@@ -48,33 +53,10 @@ class RawErrors(Protocol):
         ...
 
 
-@njit
-def _variance_likelihood(sums, size, shaping):  # type: ignore[no-untyped-def]
-    """-shaping ln Var of errors given their sums (m, R, 2) over `size` samples in all."""
-    values = np.empty(sums.shape[0])
-    for i in range(sums.shape[0]):
-        mean = 0.0
-        square = 0.0
-        for r in range(sums.shape[1]):
-            mean += sums[i, r, 0]
-            square += sums[i, r, 1]
-        mean /= size
-        values[i] = -shaping * math.log(square / size - mean * mean)
-    return values
-
-
-@njit
-def _gaussian_likelihood(sums, size, sigma):  # type: ignore[no-untyped-def]
-    values = np.empty(sums.shape[0])
-    for i in range(sums.shape[0]):
-        square = 0.0
-        for r in range(sums.shape[1]):
-            square += sums[i, r, 1]
-        if sigma > 0.0:
-            values[i] = -0.5 * square / (sigma * sigma)
-        else:
-            values[i] = -0.5 * size * math.log(square)
-    return values
+def _compiled(errors: Errors, size: float, shaping: float, sigma: float) -> Compiled | None:
+    if not isinstance(errors, FastErrors):
+        return None
+    return Compiled(errors.rows, errors.tolerance, size, shaping, sigma)
 
 
 class GlueLikelihood:
@@ -100,8 +82,12 @@ class GlueLikelihood:
 
     def __call__(self, theta: Array) -> Array:
         """Return L (m,) of theta (m, p)."""
-        values: Array = _variance_likelihood(self.errors(theta), self._size, self.shaping_factor)
+        values: Array = variance_likelihood(self.errors(theta), self._size, self.shaping_factor)
         return values
+
+    def compiled(self) -> Compiled | None:
+        """Return the same as plain arrays; None where the errors are not `FastErrors`."""
+        return _compiled(self.errors, self._size, self.shaping_factor, 0.0)
 
 
 class GaussianLikelihood:
@@ -128,8 +114,12 @@ class GaussianLikelihood:
     def __call__(self, theta: Array) -> Array:
         """Return the log likelihood (m,) of theta (m, p)."""
         sums = self.errors(theta)
-        values: Array = _gaussian_likelihood(sums, self._size, self.sigma or 0.0)
+        values: Array = gaussian_likelihood(sums, self._size, self.sigma or 0.0)
         return values
+
+    def compiled(self) -> Compiled | None:
+        """Return the same as plain arrays; None where the errors are not `FastErrors`."""
+        return _compiled(self.errors, self._size, 0.0, self.sigma or 0.0)
 
 
 class Ar1Likelihood:

@@ -40,6 +40,7 @@ class FastErrors:
             saves the search for the system that the basis is built around.
 
     Attributes:
+        rows: quadratic forms of the records, one row each, for compiled loops.
         fallbacks: record-theta pairs that the exact kernel did, over all calls.
 
     Raises:
@@ -58,8 +59,8 @@ class FastErrors:
         self.tolerance = tolerance
         self.fallbacks = 0
         rows = [_row(self.exact, r, near) for r in range(len(self.exact.records))]
-        self._rows = np.zeros((len(rows), max(len(row) for row in rows)))
-        for wide, row in zip(self._rows, rows, strict=True):
+        self.rows = np.zeros((len(rows), max(len(row) for row in rows)))
+        for wide, row in zip(self.rows, rows, strict=True):
             wide[: len(row)] = row
 
     @property
@@ -74,10 +75,10 @@ class FastErrors:
             InputError: theta is not (4,) or (m, 4).
         """
         table = linear.thetas(theta)
-        count = len(self._rows)
+        count = len(self.rows)
         out = np.empty((len(table), count, 2))
         exact = np.empty((count, len(table)), dtype=np.bool_)
-        if quadratic.evaluate_all(self._rows, table, self.tolerance, out, exact):
+        if quadratic.evaluate_all(self.rows, table, self.tolerance, out, exact):
             self.fallbacks += int(exact.sum())
             for r in range(count):
                 which = np.flatnonzero(exact[r])

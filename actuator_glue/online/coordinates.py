@@ -20,12 +20,12 @@ uniform.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from actuator_glue.inference.chains import Chains
+from actuator_glue.inference.compiled import Compiled, compiled
 from actuator_glue.inference.evaluate import LogDensity
 from actuator_glue.model import ridge
 from actuator_glue.online.settings import ModelChoice
@@ -82,21 +82,9 @@ class Coordinates:
         ridge.physical_all(flat, self._k, self._low, self._high, np.empty_like(flat), values)
         return values.reshape(phi.shape[:-1])
 
-    def density(self, log_likelihood: LogDensity) -> Callable[[Array], Array]:
+    def density(self, log_likelihood: LogDensity) -> LogDensity:
         """Return the log posterior density of coordinates (m, p) -> (m,)."""
-
-        def log_density(phi: Array) -> Array:
-            theta, values = np.empty_like(phi), np.empty(len(phi))
-            if ridge.physical_all(phi, self._k, self._low, self._high, theta, values):
-                values += log_likelihood(theta)
-                return values
-            # Outside the prior's box the likelihood may be slow, and is not needed.
-            inside = np.isfinite(values)
-            if inside.any():
-                values[inside] += log_likelihood(np.ascontiguousarray(theta[inside]))
-            return values
-
-        return log_density
+        return _Density(log_likelihood, self._k, self._low, self._high)
 
     def chains(self, sampled: Chains) -> Chains:
         """Return chains of coordinates as chains of physical parameters with log likelihoods."""
@@ -105,3 +93,32 @@ class Coordinates:
             draws=self.physical(sampled.draws),
             log_density=sampled.log_density - self.log_jacobian(sampled.draws),
         )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Density:
+    """Log likelihood of the physical parameters plus the log Jacobian."""
+
+    log_likelihood: LogDensity
+    stiffness: float
+    low: Array
+    high: Array
+
+    def __call__(self, phi: Array) -> Array:
+        """Return the log posterior density (m,) of coordinates (m, p)."""
+        theta, values = np.empty_like(phi), np.empty(len(phi))
+        if ridge.physical_all(phi, self.stiffness, self.low, self.high, theta, values):
+            values += self.log_likelihood(theta)
+            return values
+        # Outside the prior's box the likelihood may be slow, and is not needed.
+        inside = np.isfinite(values)
+        if inside.any():
+            values[inside] += self.log_likelihood(np.ascontiguousarray(theta[inside]))
+        return values
+
+    def compiled(self) -> Compiled | None:
+        """Return the same as plain arrays, where the likelihood has such a form."""
+        found = compiled(self.log_likelihood)
+        if found is None:
+            return None
+        return found._replace(mapped=True, stiffness=self.stiffness, low=self.low, high=self.high)

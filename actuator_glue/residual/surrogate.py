@@ -60,6 +60,7 @@ class Surrogate:
             'error': number(self.error),
             'structure': list(self.structure),
             'structure_error': number(self.structure_error),
+            'nats': number(self.nats),
             'explained': self.explained,
             'place': self.place,
         }

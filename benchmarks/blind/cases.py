@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-
 import numpy as np
 import plant
-from numpy.typing import NDArray
-from scipy import optimize, signal
+from case import Case, kinds
+from scipy import signal
+from sizing import NOISE, Array, base_residual, sized
 
-Array = NDArray[np.float64]
-NOISE = 1e-5  # m
 STIFFNESS = (0.0, 250e3, 250e3)
 SAMPLES = int(60 * plant.RATE)
 
@@ -55,42 +52,6 @@ UNKNOWN: dict[str, tuple[float, float]] = {
     'sensor-dropout': (0.1, 4.0),
     'sensor-switch': (5e-6, 200e-6),
 }
-GROUPS = (
-    ('delay', 'sensor-lag', 'valve-lag'),
-    ('coulomb-friction', 'stribeck-friction'),
-    ('backlash', 'valve-deadband'),
-    ('bias', 'valve-null', 'flow-asymmetry'),
-    ('gain-drift', 'supply-droop'),
-    ('drift',),
-    ('pressure-flow', 'specimen-yield'),
-    ('specimen-hardening', 'specimen-gap'),
-    ('gain', 'viscous-damping'),
-)
-
-
-def group(name: str) -> tuple[str, ...]:
-    """Return the names that count as the same group."""
-    return next((g for g in GROUPS if name in g), (name,))
-
-
-@dataclass
-class Case:
-    """One case: what the diagnosis sees and (apart) the truth."""
-
-    seed: int
-    kind: str
-    effects: tuple[str, ...]
-    theta: Array
-    commands: list[Array]
-    measured: list[Array]
-    clean: list[Array]
-    ratio: float  # post-refit noise-free residual over noise, fitting records
-    colour: float
-    sizes: dict[str, float] = field(default_factory=dict)
-    # Post-refit residual over noise of each effect of a pair on its own.
-    shares: dict[str, float] = field(default_factory=dict)
-
-
 def sweep() -> Array:
     """Problem R's sweep at this rate [m]."""
     t = np.arange(SAMPLES) / plant.RATE
@@ -246,52 +207,6 @@ def respond(
     return out
 
 
-def base_response(theta: Array, command: Array, k: float) -> Array:
-    """Eq. (2a) with its command held, exact [m]."""
-    b1, n0, a2, a3 = theta
-    den = [k + a2, a3 * k + b1 * (k + a2), b1 * a3 * k + n0]
-    num, den_z, _ = signal.cont2discrete(([n0], den), 1 / plant.RATE, 'zoh')
-    return np.asarray(signal.lfilter(num.ravel(), den_z, command))
-
-
-def base_residual(theta: Array, commands: list[Array], measured: list[Array]) -> float:
-    """Rms that remains after Eq. (2) is refitted to the first two records [m]."""
-
-    def errors(log_theta: Array) -> Array:
-        p = np.exp(np.clip(log_theta, -20, 40))
-        return np.concatenate(
-            [
-                1e5 * (y[::2] - base_response(p, u, k)[::2])
-                for u, y, k in zip(commands[:2], measured[:2], STIFFNESS[:2], strict=True)
-            ]
-        )
-
-    start = np.log(np.maximum(theta, 1e-3))
-    fit = optimize.least_squares(errors, start, x_scale=0.1, max_nfev=60)
-    return float(1e-5 * np.sqrt(np.mean(fit.fun**2)))
-
-
-def _sized(
-    names: tuple[str, ...], theta: Array, commands: list[Array], target: float, seed: int
-) -> tuple[dict[str, float], float]:
-    """Find sizes whose post-refit residual is about `target` times the noise (log bisection)."""
-    table = SIZES | UNKNOWN
-    low, high, best = 0.0, 1.0, (np.inf, {}, 0.0)
-    share = 0.5
-    for _ in range(7):
-        sizes = {n: float(table[n][0] * (table[n][1] / table[n][0]) ** share) for n in names}
-        clean = respond(theta, sizes, commands, seed)
-        ok = all(np.isfinite(y).all() for y in clean)
-        ratio = base_residual(theta, commands, clean) / NOISE if ok else np.inf
-        if ok and abs(np.log(ratio / target)) < best[0]:
-            best = (abs(float(np.log(ratio / target))), sizes, ratio)
-        if best[0] < 0.15:
-            break
-        low, high = (share, high) if ratio < target else (low, share)
-        share = 0.5 * (low + high)
-    return best[1], best[2]
-
-
 def _noise(rng: np.random.Generator, colour: float, corner: float) -> Array:
     """White plus first-order coloured noise, sd `NOISE` in all [m]."""
     white = rng.standard_normal(SAMPLES)
@@ -300,33 +215,23 @@ def _noise(rng: np.random.Generator, colour: float, corner: float) -> Array:
     return np.asarray(NOISE * (np.sqrt(1 - colour) * white + np.sqrt(colour) * slow))
 
 
-def kinds(seed: int) -> tuple[str, tuple[str, ...]]:
-    """Return kind and effects of a seed: stratified, so that any 20 in a row hold all kinds."""
-    rng = np.random.default_rng([seed, 1])
-    place = seed % 20
-    known, unknown = tuple(SIZES), tuple(UNKNOWN)
-    if place < 4:
-        return 'none', ()
-    if place < 7:
-        return 'unknown', (unknown[(seed // 20 * 3 + place - 4) % len(unknown)],)
-    if place < 9:
-        while True:
-            a, b = rng.choice(len(known), 2, replace=False)
-            pair = (known[a], known[b])
-            if pair[1] not in group(pair[0]):
-                return 'pair', pair
-    return 'single', (known[(seed // 20 * 11 + place - 9) % len(known)],)
-
-
 def build(seed: int) -> Case:
     """Build one case from its seed alone."""
     rng = np.random.default_rng([seed, 2])
-    kind, names = kinds(seed)
+    kind, names = kinds(seed, tuple(SIZES), tuple(UNKNOWN))
     theta = draw_plant(rng)
     commands = [sweep(), sweep(), earthquake(rng)]
     sizes: dict[str, float] = {}
     shares: dict[str, float] = {}
     ratio = 0.0
+
+    def left(outputs: list[Array]) -> float:
+        return base_residual(theta, commands, outputs, STIFFNESS, plant.RATE) / NOISE
+
+    def ratio_of(tried: dict[str, float]) -> float:
+        outputs = respond(theta, tried, commands, seed)
+        return left(outputs) if all(np.isfinite(y).all() for y in outputs) else np.inf
+
     if kind == 'none' and rng.random() < 0.4:
         # Background clutter that a healthy machine has: it must not become a finding.
         sizes = {'coulomb-friction': 20.0 / theta[2] if theta[2] > 1e6 else 1e-6, 'backlash': 3e-6}
@@ -335,7 +240,7 @@ def build(seed: int) -> Case:
         for name in names:
             # Each effect of a pair is made visible on its own.
             own = max(target, 2.0) if kind == 'pair' else target
-            size, shares[name] = _sized((name,), theta, commands, own, seed)
+            size, shares[name] = sized((name,), SIZES | UNKNOWN, ratio_of, own)
             sizes |= size
         ratio = shares[names[0]] if len(names) == 1 else 0.0
     clean = respond(theta, sizes, commands, seed)
@@ -345,8 +250,10 @@ def build(seed: int) -> Case:
     if 'quantisation' in sizes:
         step = sizes['quantisation']
         measured = [step * np.round(y / step) for y in measured]
-    if not ratio:
-        ratio = base_residual(theta, commands, clean) / NOISE
-    if 'quantisation' in sizes or 'timing-jitter' in sizes:
-        ratio = base_residual(theta, commands, measured) / NOISE
-    return Case(seed, kind, names, theta, commands, measured, clean, ratio, colour, sizes, shares)
+    seen = 'quantisation' in sizes or 'timing-jitter' in sizes
+    if seen or not ratio:
+        ratio = left(measured if seen else clean)
+    return Case(
+        seed, kind, names, theta, plant.RATE, STIFFNESS, commands, measured, clean, ratio, colour,
+        sizes, shares,
+    )  # fmt: skip

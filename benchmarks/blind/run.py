@@ -13,6 +13,7 @@ import os
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -24,26 +25,21 @@ sys.path.insert(0, str(HERE))
 sys.path.insert(0, str(HERE.parents[1]))
 
 
-def one(seed: int, cache: Path) -> dict[str, Any]:
+def one(seed: int, cache: Path, generator: str) -> dict[str, Any]:
     """Build, diagnose and cache one case."""
     path = cache / f'{seed}.json'
     if path.exists():
         return dict(json.loads(path.read_text()))
-    import cases
     import truth
 
     from actuator_glue.records import Record
     from actuator_glue.residual.diagnose import diagnose
     from actuator_glue.residual.settings import Settings
 
-    case = cases.build(seed)
-    records = [
-        Record(u, y, 1.0 / cases.plant.RATE, stiffness=k, source=source)
-        for u, y, k, source in zip(
-            case.commands, case.measured, cases.STIFFNESS, ('sweep-0', 'sweep-250', 'held'),
-            strict=True,
-        )
-    ]  # fmt: skip
+    case = import_module(generator).build(seed)
+    names = ('sweep-0', 'sweep-250', 'held')
+    rows = zip(case.commands, case.measured, case.stiffness, names, strict=True)
+    records = [Record(u, y, 1.0 / case.rate, stiffness=k, source=s) for u, y, k, s in rows]
     start = time.perf_counter()
     found = diagnose(
         records[:2], records[2], seed=seed, settings=Settings(evaluations=0),
@@ -77,12 +73,17 @@ def main() -> int:
         '--first', type=int, default=1000, help='first seed (below 1000: calibration)'
     )
     parser.add_argument('--jobs', type=int, default=1)
+    parser.add_argument(
+        '--variant', action='store_true', help='the second generator: other forms, other tests'
+    )
     parser.add_argument('--out', type=Path, default=Path('out/blind'))
     args = parser.parse_args()
     seeds = range(args.first, args.first + args.cases)
+    generator = 'variant' if args.variant else 'cases'
+    out = args.out / 'variant' if args.variant else args.out
     results = []
     with ProcessPoolExecutor(args.jobs) as pool:
-        futures = [pool.submit(one, seed, args.out / 'cases') for seed in seeds]
+        futures = [pool.submit(one, seed, out / 'cases', generator) for seed in seeds]
         for i, future in enumerate(as_completed(futures)):
             result = future.result()
             results.append(result)
@@ -98,8 +99,8 @@ def main() -> int:
 
     summary = score.scores(results)
     print(score.table(summary))
-    args.out.mkdir(parents=True, exist_ok=True)
-    (args.out / 'blind.json').write_text(json.dumps(summary, indent=1))
+    out.mkdir(parents=True, exist_ok=True)
+    (out / 'blind.json').write_text(json.dumps(summary, indent=1))
     return 0
 
 

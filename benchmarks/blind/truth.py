@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import cases
 import numpy as np
+from case import Case
 
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.structure import Structure
@@ -15,12 +15,12 @@ from actuator_glue.residual.score import Scorer, splits_of
 from actuator_glue.residual.search import Search
 
 
-def floor(case: cases.Case) -> float:
+def floor(case: Case) -> float:
     """Rms of the noise that was added to the held-out record [m]."""
     return float(np.sqrt(np.mean((case.measured[2] - case.clean[2]) ** 2)))
 
 
-def refitted(case: cases.Case, records: Sequence[Record]) -> float:
+def refitted(case: Case, records: Sequence[Record]) -> float:
     """Held-out rms error of the true structure, refitted to the sweeps [m]; NaN if not ours."""
     names = [n for n in case.effects if n in CATALOGUE]
     if case.kind == 'unknown':

@@ -11,7 +11,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import targets
-from scipy import stats
+from scipy import integrate, stats
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference.adaptation import outliers
@@ -39,21 +39,25 @@ def _replicates(
     ]
 
 
-def _check_moments(target: targets.Target, runs: list[Chains], slack: float = 0.0) -> None:
-    """Mean and standard deviation over seeds against the truth, by Student's t.
+def _check_moments(target: targets.Target, runs: list[Chains]) -> None:
+    """Mean and standard deviation over seeds against the truth, by Student's t."""
+    scores = np.array([_scores(run, target) for run in runs])
+    estimates = np.concatenate([scores, scores**2], axis=2).mean(axis=1)
+    _check_estimates(estimates, np.repeat((0.0, 1.0), scores.shape[2]))
 
-    slack: what a run that is not infinitely long may be off, in standard deviations.
-    """
-    draws = [run.posterior() for run in runs]
-    means = np.array([(d.mean(axis=0) - target.mean) / target.sd for d in draws])
-    squares = np.array([(((d - target.mean) / target.sd) ** 2).mean(axis=0) for d in draws])
-    limit = targets.t_limit(len(runs), 2 * means.shape[1], FALSE_FAILURE)
-    for estimates, truth in ((means, 0.0), (squares, 1.0)):
-        off = np.abs(estimates.mean(axis=0) - truth)
-        error = estimates.std(axis=0, ddof=1) / np.sqrt(len(runs))
-        assert (off < slack + limit * error).all(), (off / error, limit)
-        # The limit means something only where the error is small.
-        assert (limit * error < 0.5).all(), error
+
+def _scores(run: Chains, target: targets.Target) -> Array:
+    return (run.posterior() - target.mean) / target.sd
+
+
+def _check_estimates(estimates: Array, truth: Array) -> None:
+    """Estimates (seeds, k) of k numbers of order one against the truth, by Student's t."""
+    off = np.abs(estimates.mean(axis=0) - truth)
+    error = estimates.std(axis=0, ddof=1) / np.sqrt(len(estimates))
+    limit = targets.t_limit(*estimates.shape, FALSE_FAILURE)
+    assert (off < limit * error).all(), (off / error, limit)
+    # The limit means something only where the error is small.
+    assert (limit * error < 0.5).all(), error
 
 
 def test_gaussian_whose_parameters_differ_by_nine_orders_of_magnitude(rng_seed: int) -> None:
@@ -93,10 +97,27 @@ def test_two_modes_ten_sigma_apart(rng_seed: int) -> None:
 @pytest.mark.slow
 @pytest.mark.timeout(900)
 def test_banana(rng_seed: int) -> None:
-    target = targets.banana()
-    runs = _replicates(target, rng_seed, 16, 400_000, Settings())
-    # The far tips, visited some hundred times a run, leave the second moment a little short.
-    _check_moments(target, runs, slack=0.05)
+    """Moments of the coordinates that the twist left Gaussian, and the mass of the two tips.
+
+    The variance of the twisted coordinate itself is a fourth moment of the other: its estimates
+    scatter too widely for Student's t.
+    """
+    target, twist, tip = targets.banana(), 0.1, -10.0
+    runs = _replicates(target, rng_seed, 16, 800_000, Settings())
+    beyond, _ = integrate.quad(
+        lambda z: stats.norm.pdf(z) * stats.norm.cdf(tip - 100.0 * twist * (1.0 - z * z)), -8, 8
+    )
+    estimates = []
+    for run in runs:
+        # The first draws know the middle better than the tips: E[x_1^2] is 0.85 in the first
+        # eighth of 1.6 million evaluations and 0.98 +- 0.03 in the last half.
+        draws = run.posterior(burn=len(run.draws) // 2)
+        straight = draws / np.where(np.arange(draws.shape[1]) == 0, 10.0, 1.0)
+        straight[:, 1] = draws[:, 1] + twist * (draws[:, 0] ** 2 - 100.0)
+        mass = (draws[:, 1] < tip).mean() / beyond
+        estimates.append([*straight.mean(axis=0), *(straight**2).mean(axis=0), mass])
+    d = len(target.mean)
+    _check_estimates(np.array(estimates), np.array([0.0] * d + [1.0] * (d + 1)))
 
 
 @pytest.mark.slow
