@@ -1,0 +1,146 @@
+"""The sampler's state between generations, and what is adapted in it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_glue.inference.adaptation import Tuning, empty_counts, outliers, tune
+from actuator_glue.inference.archive import Archive
+from actuator_glue.inference.settings import Settings
+from actuator_glue.inference.sweep import Around, Walk
+from actuator_glue.records import Array
+
+
+class State(NamedTuple):
+    """Everything the next generation depends on, besides the generator.
+
+    Attributes:
+        x: current points of the chains, (n, p) [physical units].
+        z: the same in sampling coordinates, (n, p).
+        log_density: log likelihood at x, (n,).
+        log_target: log density of z, (n,) = log_density + log Jacobian.
+        archive: past states Z in sampling coordinates.
+        tuning: proposal distributions of the moves.
+        fitted: size of the archive when they were last fitted.
+        counts: uses, acceptances and squared jumps since burn-in began or the last fit.
+        sum_log_density: sum of log_density since the last look at outliers, (n,).
+        generation: generations since the chains started.
+        evaluations: likelihood evaluations so far, annealing included.
+        power: likelihood power reached by annealing; below 1 only if the budget ran out.
+    """
+
+    x: Array
+    z: Array
+    log_density: Array
+    log_target: Array
+    archive: Archive
+    tuning: Tuning
+    fitted: int
+    counts: Array
+    sum_log_density: Array
+    generation: int
+    evaluations: int
+    power: float
+    lower: Array
+    width: Array
+    settings: Settings
+
+    @property
+    def adapting(self) -> bool:
+        """Whether the next generation is burn-in."""
+        return self.generation < self.settings.adaptation
+
+    @property
+    def walk(self) -> Walk:
+        """Where the chains stand."""
+        return Walk(self.z, self.x, self.log_density, self.log_target)
+
+    @property
+    def around(self) -> Around:
+        """What the next generation depends on besides chains and archive."""
+        return Around(self.lower, self.width, self.tuning, self.settings)
+
+    @property
+    def until_append(self) -> int:
+        """Generations until the chains next enter the archive."""
+        return self.settings.thinning - self.generation % self.settings.thinning
+
+    @property
+    def until_adaptation(self) -> int:
+        """Generations until `adapted` next does something, or burn-in ends."""
+        if self.adapting:
+            return min(self.until_append, self.settings.adaptation - self.generation)
+        appends = -(-(2 * self.fitted - self.archive.size) // len(self.z))
+        return self.until_append + (max(appends, 1) - 1) * self.settings.thinning
+
+
+class Info(NamedTuple):
+    """What happened in one generation.
+
+    Attributes:
+        accepted: (n,) bool.
+        move: index into `moves.NAMES`, (n,).
+        crossover: crossover class of parallel moves, (n,); -1 for all others and for unit jumps.
+    """
+
+    accepted: NDArray[np.bool_]
+    move: NDArray[np.int64]
+    crossover: NDArray[np.int64]
+
+
+def moved(state: State, walk: Walk, archive: Archive, counts: Array, passed: Array) -> State:
+    """Return the state some generations later.
+
+    Args:
+        state: before.
+        walk: where the chains stand now.
+        archive: with what they have left in it.
+        counts: with what the moves achieved.
+        passed: log likelihoods since, one row per generation, (g, n).
+    """
+    total = state.sum_log_density
+    if state.adapting:
+        for row in passed:  # one by one: the same bits however many come at once
+            total = total + row
+    return state._replace(
+        **walk._asdict(),
+        archive=archive,
+        counts=counts,
+        sum_log_density=total,
+        generation=state.generation + len(passed),
+        evaluations=state.evaluations + passed.size,
+    )
+
+
+def adapted(rng: np.random.Generator, new: State) -> State:
+    """Adapt what is due after a generation.
+
+    In burn-in, whenever the archive has grown: fit the moves and rescue outlier chains; later:
+    renew the fit when the archive has doubled.
+    """
+    s = new.settings
+    if new.generation % s.thinning != 0:
+        return new
+    if new.generation > s.adaptation:
+        if new.archive.size < 2 * new.fitted:
+            return new
+        return new._replace(
+            tuning=tune(new.archive.newest_half, new.counts, s, new.tuning.crossover_cdf),
+            fitted=new.archive.size,
+            counts=empty_counts(s),
+        )
+    total = new.sum_log_density
+    new = new._replace(
+        tuning=tune(new.archive.newest_half, new.counts, s),
+        fitted=new.archive.size,
+        sum_log_density=np.zeros(len(total)),
+    )
+    lost = outliers(total)
+    if lost.size == 0:
+        return new
+    source = np.arange(len(total))
+    source[lost] = rng.choice(np.setdiff1d(source, lost), size=lost.size)
+    return new._replace(**Walk(*(part[source] for part in new.walk))._asdict())

@@ -1,0 +1,129 @@
+"""Compiled generations have the bits of single steps, wherever Python has to step in."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from actuator_glue.errors import InputError
+from actuator_glue.inference.compiled import Compiled, compiled
+from actuator_glue.inference.dream import Settings, State, init, sample, step, stretch
+from actuator_glue.inference.evaluate import LogDensity
+from actuator_glue.inference.likelihood import GaussianLikelihood, GlueLikelihood
+from actuator_glue.model import problem_r
+from actuator_glue.model.fast import FastErrors
+from actuator_glue.model.parameters import bounds
+from actuator_glue.online.coordinates import Coordinates
+from actuator_glue.online.fitting import choose_model
+from actuator_glue.records import Array
+
+RECORDS = [record.slice(0, 4000) for record in problem_r.records()]
+LOWER, UPPER = bounds()
+
+
+def glue() -> GlueLikelihood:
+    return GlueLikelihood(FastErrors(RECORDS), 256.0)
+
+
+def window() -> tuple[LogDensity, Array, Array]:
+    """One record in the coordinates of the online estimator."""
+    record = RECORDS[1].slice(500, 4000)
+    there = Coordinates(choose_model(), record.known_stiffness())
+    errors = FastErrors([record], 200, 'measured')
+    return there.density(GlueLikelihood(errors, 256.0)), there.lower, there.upper
+
+
+def same(one: State, other: State) -> bool:
+    """Whether two states are equal to the last bit."""
+    parts = [
+        (a.rows, b.rows) if hasattr(a, 'rows') else (a, b)
+        for a, b in zip(one[:-1], other[:-1], strict=True)
+        if not isinstance(a, tuple)
+    ]
+    parts += list(zip(one.tuning, other.tuning, strict=True))
+    return all(np.array_equal(a, b) for a, b in parts)
+
+
+CASES = {
+    'glue': (glue, Settings()),
+    'gaussian': (lambda: GaussianLikelihood(FastErrors(RECORDS)), Settings(chains=7, thinning=3)),
+    'sigma': (lambda: GaussianLikelihood(FastErrors(RECORDS), 1e-4), Settings(adaptation=17)),
+    # Half of the prior needs the exact kernel.
+    'fallback': (glue, Settings(start='prior', adaptation=100)),
+    'window': (window, Settings(chains=5)),
+}
+
+
+@pytest.mark.parametrize('case', CASES)
+@pytest.mark.parametrize('most', [7, 50])
+def test_the_bits_are_those_of_steps(case: str, most: int, rng_seed: int) -> None:
+    make, settings = CASES[case]
+    made = make()
+    density, lower, upper = made if isinstance(made, tuple) else (made, LOWER, UPPER)
+    fast = compiled(density)
+    assert fast is not None
+
+    def plain(x: Array) -> Array:
+        return density(x)
+
+    assert compiled(plain) is None
+    # Annealing runs through the same code.
+    one = init(np.random.default_rng(rng_seed), density, lower, upper, settings)
+    other = init(np.random.default_rng(rng_seed), plain, lower, upper, settings)
+    assert same(one, other)
+    rngs = np.random.default_rng(rng_seed), np.random.default_rng(rng_seed)
+    before = 0 if case == 'window' else density.errors.fallbacks  # type: ignore[attr-defined]
+    while one.generation < 250:
+        one, path = stretch(rngs[0], one, density, fast, most)
+        while other.generation < one.generation:
+            other, _ = step(rngs[1], other, plain)
+        assert same(one, other)
+        assert np.array_equal(path.x[-1], one.x) or one.generation <= settings.adaptation
+    assert rngs[0].random() == rngs[1].random()
+    if case == 'fallback':
+        assert density.errors.fallbacks > before  # type: ignore[attr-defined]
+
+
+def test_stretches_from_one_state_do_not_meet(rng_seed: int) -> None:
+    density = glue()
+    fast = compiled(density)
+    state = init(np.random.default_rng(rng_seed), density, LOWER, UPPER, Settings(thinning=1))
+
+    def walk(seed: int) -> State:
+        rng, now = np.random.default_rng(seed), state
+        while now.generation < 100:
+            now, _ = stretch(rng, now, density, fast, 10)
+        return now
+
+    first, other = walk(1), walk(2)
+    assert same(first, walk(1)) and not same(first, other)
+
+
+def test_a_stopped_run_is_repeated_by_stopping_there(rng_seed: int) -> None:
+    density = glue()
+    asked = iter(range(100))
+
+    def run(stop) -> object:  # type: ignore[no-untyped-def]
+        return sample(
+            np.random.default_rng(rng_seed), density, LOWER, UPPER, evaluations=30_000, stop=stop
+        )
+
+    stopped = run(lambda _: next(asked) >= 20)
+    assert stopped.evaluations < 20_000
+    again = run(lambda state: state.evaluations >= stopped.evaluations)
+    assert np.array_equal(stopped.draws, again.draws)
+
+
+def test_plus_infinity_is_refused_from_compiled_code_too() -> None:
+    """A record whose sums of squares are made to vanish."""
+    density = glue()
+    fast = compiled(density)
+    assert fast is not None
+    state = init(np.random.default_rng(0), density, LOWER, UPPER, Settings())
+
+    def infinite(x: Array) -> Array:
+        return np.full(len(x), np.inf)
+
+    nothing = Compiled(fast.rows, fast.tolerance, np.inf, fast.shaping, fast.sigma)
+    with pytest.raises(InputError, match='plus infinity'):
+        stretch(np.random.default_rng(0), state, infinite, nothing, 10)
