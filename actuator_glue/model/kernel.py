@@ -159,6 +159,43 @@ def stream(c: Array, state: Array, command: Array, out: Array) -> None:
     state[0], state[1], state[2], state[3], state[4] = seen, y, d, u1, u2
 
 
+@njit(nogil=True)
+def respond(table: Array, x0: float, v0: float, command: Array, out: Array) -> None:
+    """Step many systems through one command from one initial state.
+
+    Args:
+        table: `discretise` of every system, shape (m, COLUMNS).
+        x0: initial position [m].
+        v0: initial velocity [m/s].
+        command: shape (n,) [m].
+        out: receives the displacements, shape (n, m) [m]: systems side by side, so that vector
+            units step them together.
+    """
+    L, n = LANES, len(command)
+    m = len(table)
+    S = np.zeros(9 * L)
+    for first in range(0, m, L):
+        width = min(L, m - first)
+        for j in range(L):
+            c = table[min(first + j, m - 1)]  # the last block is filled with copies
+            S[_Y * L + j] = x0
+            S[_D * L + j] = start_increment(c, x0, v0, command[0], command[min(1, n - 1)])
+            for row in range(_DECAY, _G2 + 1):
+                S[row * L + j] = c[row - _DECAY + DECAY]
+        for i in range(n):
+            u0, u1, u2 = command[i], command[min(i + 1, n - 1)], command[min(i + 2, n - 1)]
+            for j in range(width):
+                out[i, first + j] = S[_Y * L + j]
+            for j in range(L):
+                y = S[_Y * L + j] + S[_D * L + j]
+                S[_Y * L + j] = y
+                S[_D * L + j] = (
+                    S[_DECAY * L + j] * S[_D * L + j]
+                    - S[_PULL * L + j] * y
+                    + (S[_G0 * L + j] * u2 + S[_G1 * L + j] * u1 + S[_G2 * L + j] * u0)
+                )
+
+
 @njit
 def _advance(S: Array, measured: Array, padded: Array, start: int, stop: int, foh: bool) -> None:
     """Step all lanes through samples start:stop, adding errors and their squares to the sums.

@@ -148,6 +148,8 @@ def respond(
 ) -> Array:
     """Return the response of x'' + a1 x' + a0 x = b0 u, shape (m, n) [m].
 
+    In memory the m responses lie side by side, sample by sample, as bands across them want it.
+
     Args:
         system: a1 [1/s], a0 [1/s^2], b0 [1/s^2], shape (m, 3).
         command: u, shape (n,) [m].
@@ -162,10 +164,9 @@ def respond(
     if u.ndim != 1 or u.size == 0:
         raise InputError(f'command has shape {u.shape}; one row of samples is needed')
     rows = kernel.discretise(np.ascontiguousarray(system), period, hold == 'linear')
-    out = np.empty((len(rows), len(u)))
-    for row, c in zip(out, rows, strict=True):
-        kernel.stream(c, np.array([0.0, initial[0], initial[1], 0.0, 0.0]), u, row)
-    return out
+    out = np.empty((len(u), len(rows)))
+    kernel.respond(rows, float(initial[0]), float(initial[1]), np.ascontiguousarray(u), out)
+    return out.T
 
 
 def initial_state(record: Record) -> tuple[float, float]:
@@ -174,8 +175,10 @@ def initial_state(record: Record) -> tuple[float, float]:
     A straight line is fitted to the first 10 ms of measured displacement, three samples or more.
     """
     n = min(len(record), max(3, 1 + round(_FIT_SPAN / record.period)))
-    velocity, position = np.polyfit(record.period * np.arange(n), record.measured[:n], 1)
-    return float(position), float(velocity)
+    time = record.period * (np.arange(n) - 0.5 * (n - 1))
+    first = record.measured[:n]
+    velocity = float(time @ first / (time @ time))
+    return float(first.mean()) + velocity * float(time[0]), velocity
 
 
 def frequency_response(

@@ -121,7 +121,7 @@ def _polish(record: Record, settle: int, start: Array, held: bool, system: Array
             if damping > 1e6:
                 break
             continue
-        done = np.log(cost / found) < _CHANGE
+        done = found > cost * np.exp(-_CHANGE)
         q, now, cost, damping = trial, new, found, 0.1 * damping
         if done:
             break

@@ -8,6 +8,7 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference.likelihood import Errors
+from actuator_glue.model import linear
 from actuator_glue.model.fast import FastErrors
 from actuator_glue.model.structure import Structure
 from actuator_glue.online.settings import ModelChoice
@@ -72,8 +73,16 @@ def errors(model: ModelChoice, record: Record, settle: int, near: Array | None =
 
 def simulate(model: ModelChoice, theta: Array, record: Record) -> Array:
     """Return the response of each draw (m, p) over a window, shape (m, n) [m]."""
-    response = Structure(model.effects).simulate(theta, record, initial='measured')
-    return np.asarray(response, dtype=np.float64)
+    if model.effects:
+        return Structure(model.effects).simulate(theta, record, initial='measured')
+    return linear.simulate(
+        theta,
+        record.command,
+        stiffness=record.known_stiffness(),
+        period=record.period,
+        hold=record.hold,
+        initial=linear.initial_state(record),
+    )
 
 
 def starting_points(

@@ -1,4 +1,8 @@
-"""Quantiles of a mixture of normals: posterior draws, each with a residual around it."""
+"""Quantiles of a mixture of normals: posterior draws, each with a residual around it.
+
+By a series about the normal distribution of equal mean and variance where its error bound allows
+(docs/online.md, "Band limits"), else component by component.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +10,7 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.stats import norm
+from scipy.special import ndtri
 
 from actuator_glue.inference.bands import Band, check_levels
 from actuator_glue.jit import njit
@@ -15,58 +19,179 @@ from actuator_glue.records import Array
 # Newton squares its relative error: a last step of 1 % leaves 0.01 % of a standard deviation.
 _STEPS, _PRECISION = 60, 1e-2
 _REACH = 9.0  # standard deviations beyond which there is nothing
+_MOST = 24  # terms of the series; where they do not do, components are summed one by one
+_TRUNCATION = 3e-5  # of a standard deviation, what the series may leave out
+_NEAR = 0.02  # standard deviations from the normal's quantile within which one step is enough
+_CRAMER = 1.0864349  # |He_n(u)| <= this sqrt(n!) exp(u^2/4)
 
 
 @njit
-def _quantiles(draws, mean, sd, probability, normal, out):  # type: ignore[no-untyped-def]
-    """Solve F(x) = probability, F the mean of the components' distribution functions.
+def _direct(x, sd, probability, start, out):  # type: ignore[no-untyped-def]
+    """Solve F(out) = probability, F the mean of normal distribution functions.
 
-    Newton's steps from the third-order Cornish-Fisher expansion, which is exact for normal draws;
-    a step that leaves the bracket, or a density that vanishes between draws, is a bisection.
+    Newton's steps; one that leaves the bracket, or a density that vanishes between components, is
+    a bisection.
+
+    Args:
+        x: means of the components, (m,).
+        sd: their standard deviations, (m,).
+        probability: (q,).
+        start: where to begin, (q,).
+        out: (q,).
     """
-    m, n = draws.shape
-    variance = widest = 0.0
+    m = len(x)
+    widest = sd.max()
+    scale = math.sqrt(x.var() + (sd * sd).mean())
+    for q in range(len(probability)):
+        low, high = x.min() - _REACH * widest, x.max() + _REACH * widest
+        at = min(max(start[q], low), high)
+        for _ in range(_STEPS):
+            below = density = 0.0
+            for i in range(m):
+                u = (at - x[i]) / sd[i]
+                below += 0.5 * math.erfc(-u * 0.7071067811865476)
+                density += 0.3989422804014327 * math.exp(-0.5 * u * u) / sd[i]
+            gap = below / m - probability[q]
+            if gap > 0.0:
+                high = at
+            else:
+                low = at
+            new = at - gap * m / density if density > 0.0 else low
+            if not low <= new <= high:
+                new = 0.5 * (low + high)
+            step = abs(new - at)
+            at = new
+            if step < _PRECISION * scale:
+                break
+        out[q] = at
+
+
+@njit
+def _terms(offset, excess, wanted):  # type: ignore[no-untyped-def]
+    """How many terms leave less than `wanted` of sum_k b_k; 0 where even _MOST do not.
+
+    b_k bounds the k-th term at the largest offset and variance excess of any component.
+    """
+    if excess >= 1.0:
+        return 0
+    before, last = 1.0, offset  # b_1 = h_1, and h_0 in its place
+    for k in range(1, _MOST):
+        root = math.sqrt(k)
+        fall = excess * math.sqrt(k * max(k - 1.0, 1.0)) / (k + 1.0)
+        before, last = last, offset * root / (k + 1.0) * last + fall * before
+        p, q = offset * math.sqrt(k + 1.0) / (k + 2.0), excess
+        if k >= 3 and p + q < 1.0 and (p + q) * last + q * before <= wanted * (1.0 - p - q):
+            return k + 1
+    return 0
+
+
+@njit
+def _coefficients(offset, excess, terms, spare, a):  # type: ignore[no-untyped-def]
+    """Write a_k = mean_i h_k(offset_i, excess_i)/k! for k <= terms; spare (2, m) is scratch."""
+    m = len(offset)
+    before, last = spare[0], spare[1]
+    factorial = 1.0
     for i in range(m):
-        variance += sd[i] * sd[i] / m
-        widest = max(widest, sd[i])
+        before[i] = 1.0
+        last[i] = offset[i]
+    for k in range(1, terms):
+        total = 0.0
+        for i in range(m):
+            new = offset[i] * last[i] + k * excess[i] * before[i]
+            before[i] = new
+            total += new
+        before, last = last, before
+        factorial *= k + 1.0
+        a[k + 1] = total / (m * factorial)
+
+
+@njit
+def _hermite(u, he):  # type: ignore[no-untyped-def]
+    """Write the probabilists' Hermite polynomials at u."""
+    he[0] = 1.0
+    he[1] = u
+    for k in range(1, len(he) - 1):
+        he[k + 1] = u * he[k] - k * he[k - 1]
+
+
+@njit
+def _solve(a, terms, normal, he, spare):  # type: ignore[no-untyped-def]
+    """Return u with G(u) = Phi(normal), G(u) = Phi(u) - phi(u) sum_(k>=3) a_k He_(k-1)(u).
+
+    he holds the Hermite polynomials at `normal`; spare is as long.
+    """
+    lower = here = upper = 0.0
+    for k in range(3, terms + 1):
+        lower += a[k] * he[k - 1]
+        here += a[k] * he[k]
+        upper += a[k] * he[k + 1]
+    step = lower / (1.0 + here)
+    if abs(step) < _NEAR and here > -0.5:
+        # One step, with the density's slope: no exponential, no error function.
+        return normal + step + 0.5 * step * step * (normal + upper) / (1.0 + here)
+    wanted = 0.5 * math.erfc(-normal * 0.7071067811865476)
+    u = normal
+    for _ in range(_STEPS):
+        _hermite(u, spare)
+        density = 1.0
+        below = 0.0
+        for k in range(3, terms + 1):
+            below += a[k] * spare[k - 1]
+            density += a[k] * spare[k]
+        phi = 0.3989422804014327 * math.exp(-0.5 * u * u)
+        gap = 0.5 * math.erfc(-u * 0.7071067811865476) - phi * below - wanted
+        step = min(max(gap / (phi * max(density, 0.1)), -0.5), 0.5)
+        u -= step
+        if abs(step) < _PRECISION:
+            return u
+    return np.nan
+
+
+@njit
+def _quantiles(columns, mean, sd, probability, normal, out):  # type: ignore[no-untyped-def]
+    """Write quantiles (q, n) of columns (n, m); return how many columns the series did."""
+    n, m = columns.shape
+    variance = (sd * sd).mean()
+    he = np.empty((len(normal), _MOST + 2))
+    for q in range(len(normal)):
+        _hermite(normal[q], he[q])
+    farthest = np.abs(normal).max()
+    wanted = _TRUNCATION / _CRAMER * math.exp(-0.25 * farthest * farthest)
+    x, offset, excess, spare = np.empty(m), np.empty(m), np.empty(m), np.empty((2, m))
+    a, room = np.zeros(_MOST + 1), np.empty(_MOST + 2)
+    limits = np.empty(len(normal))
+    done = 0
     for j in range(n):
-        first = 0.0
-        least = most = draws[0, j] + mean[0]
+        first = second = 0.0
         for i in range(m):
-            x = draws[i, j] + mean[i]
-            first += x / m
-            least, most = min(least, x), max(most, x)
-        second = third = 0.0
+            x[i] = columns[j, i] + mean[i]
+            first += x[i]
+        first /= m
         for i in range(m):
-            d = draws[i, j] + mean[i] - first
-            second += d * d / m
-            third += d * d * d / m
-        scale = math.sqrt(second + variance)
-        skewness = third / scale**3
-        for q in range(len(probability)):
-            z = normal[q]
-            low, high = least - _REACH * widest, most + _REACH * widest
-            x = first + scale * (z + (z * z - 1.0) * skewness / 6.0)
-            x = min(max(x, low), high)
-            for _ in range(_STEPS):
-                below = density = 0.0
-                for i in range(m):
-                    u = (x - draws[i, j] - mean[i]) / sd[i]
-                    below += 0.5 * math.erfc(-u * 0.7071067811865476)
-                    density += 0.3989422804014327 * math.exp(-0.5 * u * u) / sd[i]
-                gap = below / m - probability[q]
-                if gap > 0.0:
-                    high = x
-                else:
-                    low = x
-                new = x - gap * m / density if density > 0.0 else low
-                if not low <= new <= high:
-                    new = 0.5 * (low + high)
-                step = abs(new - x)
-                x = new
-                if step < _PRECISION * scale:
-                    break
-            out[q, j] = x
+            offset[i] = x[i] - first
+            second += offset[i] * offset[i]
+        square = second / m + variance
+        scale = math.sqrt(square)
+        far = most = 0.0
+        for i in range(m):
+            offset[i] /= scale
+            excess[i] = sd[i] * sd[i] / square - 1.0
+            far = max(far, abs(offset[i]))
+            most = max(most, abs(excess[i]))
+        terms = _terms(far, most, wanted)
+        solved = terms > 0
+        if solved:
+            _coefficients(offset, excess, terms, spare, a)
+            for q in range(len(normal)):
+                limits[q] = first + scale * _solve(a, terms, normal[q], he[q], room)
+                solved = solved and math.isfinite(limits[q])
+        if not solved:
+            for q in range(len(normal)):
+                limits[q] = first + scale * normal[q]
+            _direct(x, sd, probability, limits.copy(), limits)
+        done += solved
+        out[:, j] = limits
+    return done
 
 
 def mixture_band(draws: Array, mean: Array, sd: Array, levels: Sequence[float] | Array) -> Band:
@@ -87,6 +212,7 @@ def mixture_band(draws: Array, mean: Array, sd: Array, levels: Sequence[float] |
     wanted = check_levels(levels)
     probability = np.concatenate([(1.0 - wanted) / 2.0, [0.5], (1.0 + wanted) / 2.0])
     out = np.empty((len(probability), draws.shape[1]))
-    _quantiles(np.ascontiguousarray(draws), mean, sd, probability, norm.ppf(probability), out)
+    columns = np.ascontiguousarray(draws.T)
+    _quantiles(columns, mean, sd, probability, ndtri(probability), out)
     count = len(wanted)
     return Band(wanted, out[:count], out[count], out[count + 1 :])
