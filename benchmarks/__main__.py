@@ -92,10 +92,17 @@ def kernel(out: Path) -> dict[str, Any]:
 
 
 def online(out: Path) -> dict[str, Any]:
-    """Latency and replay of the estimator."""
+    """The estimator's nodes over DDS, its core without them (`core_`), and replay of a bag."""
+    from benchmarks import nodes
     from benchmarks import online as bench
 
-    return bench.run()
+    core = bench.run()
+    replayed = core.pop('replay_times_real_time')
+    return {
+        **nodes.run(),
+        'replay_times_real_time': replayed,
+        **{f'core_{name}': value for name, value in core.items()},
+    }
 
 
 def diagnosis(out: Path) -> dict[str, Any]:

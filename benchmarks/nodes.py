@@ -1,0 +1,202 @@
+"""Real nodes over DDS, each in a process of its own; everything is read from the recorded bag.
+
+One run renews 10 s windows of a 1 kHz stream 20 times a second with the estimator on one core, the
+other carries 10 kHz in blocks and asks what that costs.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import tempfile
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from actuator_glue.demo.processes import Node, Nodes
+from actuator_glue.demo.watch import BAND, HEALTH, POSTERIOR, SAMPLES, Watch
+from actuator_glue.io.bag_reader import messages
+from actuator_glue.io.messages import deserialize
+from actuator_glue.online import wire
+
+# Nodes of a benchmark see each other and nobody else.
+_DOMAIN = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'ROS_DOMAIN_ID': '97'}
+_READY_SECONDS = 120.0
+_LONGEST = 3600.0
+_TICK = float(os.sysconf('SC_CLK_TCK'))
+
+
+@dataclass(slots=True)
+class Run:
+    """What one run of the nodes left.
+
+    Attributes:
+        bag: the recorded bag.
+        seconds: length of the stream [s].
+        cpu: processor time of each node over the stream, its own process alone [s].
+    """
+
+    bag: Path
+    seconds: float
+    cpu: dict[str, float]
+
+
+@contextmanager
+def chain(
+    rate: float, seconds: float, block: int, estimator: Mapping[str, Any], pin: bool
+) -> Iterator[Run]:
+    """Run simulator, estimator and recorder until the stream has ended.
+
+    Args:
+        rate: sample rate [Hz].
+        seconds: length of the stream [s].
+        block: samples per message.
+        estimator: the estimator's parameters.
+        pin: give the estimator and its worker one core of their own choice of the system.
+    """
+    folder = Path(tempfile.mkdtemp(prefix='actuator_glue_bench_'))
+    before = {name: os.environ.get(name) for name in _DOMAIN}
+    os.environ.update(_DOMAIN)
+    try:
+        with Nodes() as nodes:
+            run = _stream(nodes, folder, rate, seconds, block, estimator, pin)
+        yield run
+    finally:
+        shutil.rmtree(folder, ignore_errors=True)
+        for name, value in before.items():
+            if value is None:
+                os.environ.pop(name)
+            else:
+                os.environ[name] = value
+
+
+def _stream(
+    nodes: Nodes,
+    folder: Path,
+    rate: float,
+    seconds: float,
+    block: int,
+    estimator: Mapping[str, Any],
+    pin: bool,
+) -> Run:
+    bag = folder / 'bag'
+    processes = {'recorder': nodes.start('recorder', {'bag': str(bag)}, folder)}
+    processes['estimator'] = nodes.start('estimator', dict(estimator), folder)
+    if pin:
+        # Before its threads and its worker start: they inherit it.
+        os.sched_setaffinity(processes['estimator'].process.pid, {max(os.sched_getaffinity(0))})
+    watch, end = Watch(bag), time.monotonic() + _READY_SECONDS
+    while not watch.ready and time.monotonic() < end:
+        time.sleep(0.2)
+        nodes.check()
+        watch.update()
+    processes['actuator_sim'] = nodes.start(
+        'actuator_sim',
+        {
+            'rate': rate, 'block': block, 'duration': seconds, 'rest': 0.0, 'command': 'noise',
+            'frequency_start': 0.2, 'frequency_end': 8.0, 'preview': 1.0, 'wait_for': 2,
+            'exit_at_end': True,
+        },
+        folder,
+    )  # fmt: skip
+    time.sleep(3.0)  # its start is no part of a stream
+    began = {name: _cpu(node) for name, node in processes.items()}
+    last = began
+    end = time.monotonic() + seconds + _READY_SECONDS
+    while processes['actuator_sim'].running and time.monotonic() < end:
+        time.sleep(0.5)
+        last = {name: _cpu(node) or last[name] for name, node in processes.items()}
+    time.sleep(2.0)
+    nodes.check()
+    return Run(bag, seconds, {name: last[name] - began[name] for name in processes})
+
+
+def _cpu(node: Node) -> float:
+    """Processor time of a node's own process so far [s]; 0 where it has ended."""
+    try:
+        fields = Path(f'/proc/{node.process.pid}/stat').read_text().rpartition(')')[2].split()
+    except OSError:
+        return 0.0
+    return (int(fields[11]) + int(fields[12])) / _TICK
+
+
+def _messages(run: Run) -> Iterator[tuple[str, int, Any]]:
+    """Yield type, time of recording [ns] and content of the messages that matter."""
+    for found in messages(run.bag, types=(SAMPLES, POSTERIOR, BAND, HEALTH)):
+        yield found.type, found.log_time, deserialize(found.type, found.data)
+
+
+def twenty_times_a_second(seconds: float) -> dict[str, float]:
+    """Latency from a window's last sample to its forecast band, both as the recorder got them."""
+    settings = {
+        'window': 10.0, 'hop': 0.05, 'settle': 1.0, 'time_budget': 0.05, 'evaluations': 2000,
+        'draws': 100,
+    }  # fmt: skip
+    with chain(1000.0, seconds, 10, settings, pin=True) as run:
+        arrived: dict[int, int] = {}
+        due: dict[int, int] = {}
+        latency = []
+        said: dict[str, str] = {}
+        for kind, stamp, message in _messages(run):
+            if kind == SAMPLES:
+                end = wire.stamp_ns(message) + round(
+                    (len(message.command) - 1) * message.period * 1e9
+                )
+                arrived[end // 1_000_000] = stamp
+            elif kind == POSTERIOR:
+                due[int(message.window)] = arrived.get(wire.stamp_ns(message) // 1_000_000, 0)
+            elif kind == BAND and not message.scored and message.kind == 'total':
+                if due.get(int(message.window)):
+                    latency.append(stamp - due[int(message.window)])
+            elif kind == HEALTH:
+                said |= _said(message, 'estimator')
+    after = np.array(latency[40:]) * 1e-6
+    return {
+        'seconds': seconds,
+        'windows': float(len(latency)),
+        'latency_p50_ms': float(np.quantile(after, 0.5)),
+        'latency_p99_ms': float(np.quantile(after, 0.99)),
+        'latency_max_ms': float(after.max()),
+        'missed': float(said.get('deadlines missed', 'nan')),
+        'updates_per_second': float((len(latency) - 1) / (seconds - 10.0)),
+    }
+
+
+def _said(message: Any, node: str) -> dict[str, str]:
+    return {
+        v.key: v.value for s in message.status if s.name.endswith('/' + node) for v in s.values
+    }
+
+
+def ten_kilohertz(seconds: float) -> dict[str, float]:
+    """What carrying 10 kHz costs in blocks of 25 ms, and what is lost: nothing should be.
+
+    The cost is the processor time of all three nodes without the estimator's worker: publishing
+    (and simulating), cutting windows, writing the bag.
+    """
+    settings = {'window': 5.0, 'hop': 1.0}
+    with chain(10_000.0, seconds, 250, settings, pin=False) as run:
+        indices = [
+            np.arange(m.index, m.index + len(m.command))
+            for kind, _, m in _messages(run)
+            if kind == SAMPLES
+        ]
+        found = np.concatenate(indices)
+        wanted = round(seconds * 10_000.0)
+        share = {name: cpu / (seconds - 3.0) for name, cpu in run.cpu.items()}
+    return {
+        'samples_10khz': float(wanted),
+        'lost_10khz': float(wanted - len(np.unique(found[found < wanted]))),
+        'core_share_10khz': sum(share.values()),
+        **{f'core_share_10khz_{name}': value for name, value in share.items()},
+    }
+
+
+def run(seconds: float = 60.0) -> dict[str, float]:
+    """Return both runs' figures; the nodes must be installed and sourced."""
+    return {**twenty_times_a_second(seconds), **ten_kilohertz(0.5 * seconds)}
