@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +24,22 @@ def _columns(record: Record, unit: str) -> dict[str, Array]:
     if record.force is not None:
         columns['force_N'] = record.force
     return columns
+
+
+@contextmanager
+def _whole(path: Path) -> Iterator[Path]:
+    """Give a file to write beside `path` that takes its name once it is whole and on the disk."""
+    temporary = path.with_name(path.name + '.tmp')
+    try:
+        yield temporary
+        with temporary.open('rb') as written:
+            os.fsync(written.fileno())
+        temporary.replace(path)
+    except OSError as error:
+        raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def write_csv(
@@ -47,26 +63,16 @@ def write_csv(
     path = Path(path)
     columns = _columns(record, unit)
     table = np.column_stack(list(columns.values()))
-    temporary = path.with_name(path.name + '.tmp')
-    try:
-        with temporary.open('w', encoding='utf-8', newline='\n') as file:
-            if record.stiffness is not None:
-                file.write(f'# stiffness_N_per_m = {record.stiffness!r}\n')
-            file.write(f'# hold = {record.hold}\n# actuator = {record.actuator}\n')
-            file.write(','.join(columns) + '\n')
-            for start in range(0, len(table), _ROWS):
-                rows = table[start : start + _ROWS].tolist()
-                file.writelines(','.join(map(repr, row)) + '\n' for row in rows)
-                if progress is not None:
-                    progress(len(rows))
-            file.flush()
-            os.fsync(file.fileno())
-        temporary.replace(path)
-    except OSError as error:
-        raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error
-    finally:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
+    with _whole(path) as temporary, temporary.open('w', encoding='utf-8', newline='\n') as file:
+        if record.stiffness is not None:
+            file.write(f'# stiffness_N_per_m = {record.stiffness!r}\n')
+        file.write(f'# hold = {record.hold}\n# actuator = {record.actuator}\n')
+        file.write(','.join(columns) + '\n')
+        for start in range(0, len(table), _ROWS):
+            rows = table[start : start + _ROWS].tolist()
+            file.writelines(','.join(map(repr, row)) + '\n' for row in rows)
+            if progress is not None:
+                progress(len(rows))
 
 
 def write_mat(path: Path | str, record: Record, *, unit: str = 'mm') -> None:
@@ -83,12 +89,5 @@ def write_mat(path: Path | str, record: Record, *, unit: str = 'mm') -> None:
     content['actuator'] = record.actuator
     if record.stiffness is not None:
         content['stiffness_N_per_m'] = record.stiffness
-    temporary = path.with_name(path.name + '.tmp')
-    try:
+    with _whole(path) as temporary:
         savemat(str(temporary), content, appendmat=False, do_compression=True)
-        temporary.replace(path)
-    except OSError as error:
-        raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error
-    finally:
-        with suppress(OSError):
-            temporary.unlink(missing_ok=True)
