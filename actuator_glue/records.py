@@ -166,3 +166,30 @@ class Record:
                 f'{where}specimen stiffness is not known; give it with --stiffness N/m'
             )
         return self.stiffness
+
+    def check_channels(self) -> None:
+        """Refuse channels from which no actuator can be identified.
+
+        Raises:
+            InputError: a channel that does not move, measured displacement that is the command
+                itself, or units that cannot belong together.
+        """
+        where = f'{self.source}: ' if self.source else ''
+        if np.ptp(self.command) == 0.0:
+            raise InputError(f'{where}the command is constant; nothing can be identified from it')
+        if np.ptp(self.measured) == 0.0:
+            raise InputError(
+                f'{where}the measured displacement is constant; check that its channel is '
+                'connected'
+            )
+        if np.array_equal(self.command, self.measured):
+            raise InputError(
+                f'{where}measured displacement and command are the same, sample for sample; check '
+                'which columns they are'
+            )
+        ratio = float(np.std(self.measured) / np.std(self.command))
+        if not 0.02 < ratio < 50.0:
+            raise InputError(
+                f'{where}measured displacement has {ratio:.3g} times the spread of the command; '
+                'check the units of both channels'
+            )

@@ -88,6 +88,7 @@ def run(args: argparse.Namespace) -> int:
     records = load(args)
     for record in records:
         record.known_stiffness()
+        record.check_channels()
     initial = initial_state(args.initial, records)
     settle = args.settle if args.settle is not None else (SETTLE if initial == 'measured' else 0.0)
     if settle < 0.0:
@@ -217,6 +218,12 @@ def _warn(
             told.append(f'{names[i]} and {names[j]}: only a combination of them is known')
     if told and len({r.stiffness for r in records}) < 2:
         told.append('a second record with another specimen stiffness would tell more')
+    for record in records:
+        if np.corrcoef(record.command, record.measured)[0, 1] < -0.5:
+            told.append(
+                f'{record.source}: measured displacement moves against the command; where the '
+                'sign of a channel is wrong, give `scale: -1` in a channel map'
+            )
     for line in told:
         note(line)
 

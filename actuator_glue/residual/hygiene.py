@@ -52,18 +52,7 @@ def check(record: Record, number: int) -> None:
             f'{where}: {record.duration:.3g} s ({len(record)} samples) are too short for a '
             f'diagnosis; give at least {_SHORTEST:g} s and 500 samples'
         )
-    moved, measured = float(np.std(record.command)), float(np.std(record.measured))
-    if np.ptp(record.command) == 0.0:
-        raise InputError(f'{where}: the command is constant; nothing can be identified from it')
-    if np.ptp(record.measured) == 0.0:
-        raise InputError(
-            f'{where}: the measured displacement is constant; check that its channel is connected'
-        )
-    if not 0.02 < measured / moved < 50.0:
-        raise InputError(
-            f'{where}: measured displacement has {measured / moved:.3g} times the spread of the '
-            'command; check the units of both channels (metres are expected)'
-        )
+    replace(record, source=where).check_channels()
 
 
 def rest_samples(record: Record) -> int:

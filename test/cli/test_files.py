@@ -244,6 +244,30 @@ def test_bad_records_are_one_message(run, tmp_path: Path, command: str, case: st
     assert str(path) in done.message
 
 
+@pytest.mark.parametrize('command', ['calibrate', 'diagnose'])
+@pytest.mark.parametrize(
+    ('columns', 'words'),
+    [
+        (lambda u, x: (0 * u, x), 'command is constant'),
+        (lambda u, x: (u, 0 * u), 'measured displacement is constant'),
+        (lambda u, x: (u, u), 'the same, sample for sample'),
+        (lambda u, x: (u, 1e3 * x), 'check the units'),
+    ],
+    ids=['still command', 'dead sensor', 'same column', 'metres as mm'],
+)
+def test_channels_that_identify_nothing_are_said(run, tmp_path, command, columns, words) -> None:
+    """The records can be read, but no actuator is in them."""
+    time = np.arange(2000) / 200.0
+    u = np.sin(2.0 * np.pi * 0.7 * time)
+    path = tmp_path / 'odd.csv'
+    table = np.column_stack([time, *columns(u, np.roll(u, 3))])
+    np.savetxt(path, table, delimiter=',', header='time_s,command_mm,measured_mm', comments='')
+    done = run(command, path, '--stiffness', 0)
+    assert done.code == 2
+    assert words in done.message
+    assert 'odd.csv' in done.message
+
+
 def test_stiffness_and_options_that_cannot_be_used(run, tmp_path: Path, problem_r: Path) -> None:
     """Negative, unknown, too many, not a number; a map that is none; an unwritable output."""
     one, two = problem_r / 'r_1.csv', problem_r / 'r_2.csv'
