@@ -49,7 +49,7 @@ class ChannelMap:
         sample_number: column that counts the samples, so that gaps are found.
         header_lines: lines before the first sample; the last of them names the columns.
         delimiter: text between columns; found by itself where left out.
-        decimal: decimal sign, '.' or ','.
+        decimal: decimal sign, '.' or ','; found by itself where left out.
         rest_samples: samples at rest at the start, for `remove_rest_offset`.
         hold: how the command runs between its samples, zoh or linear.
         stiffness: specimen stiffness [N/m].
@@ -65,7 +65,7 @@ class ChannelMap:
     sample_number: Column | None = None
     header_lines: int | None = None
     delimiter: str | None = None
-    decimal: Literal['.', ','] = '.'
+    decimal: Literal['.', ','] | None = None
     rest_samples: int = 0
     hold: Literal['zoh', 'linear'] | None = None
     stiffness: float | None = None

@@ -25,12 +25,14 @@ class Head:
         lines: lines before the first sample.
         delimiter: text between columns, None for blanks.
         notes: `# name = value` lines.
+        decimal: decimal sign of the first sample.
     """
 
     names: list[str]
     lines: int
     delimiter: str | None
     notes: dict[str, str]
+    decimal: str
 
 
 def read_head(path: Path, header_lines: int | None = None, delimiter: str | None = None) -> Head:
@@ -64,11 +66,13 @@ def read_head(path: Path, header_lines: int | None = None, delimiter: str | None
     if len(top) < header_lines:
         raise InputError(f'{path}: {len(top)} lines, but {header_lines} header lines expected')
     line = top[header_lines - 1] if header_lines else ''
+    sample = top[header_lines] if len(top) > header_lines else line
     if delimiter is None:
-        sample = top[header_lines] if len(top) > header_lines else line
         delimiter = next((d for d in _DELIMITERS if d in sample), None)
+    # With both signs in a line the comma can only part thousands, which nobody can read safely.
+    decimal = ',' if delimiter != ',' and ',' in sample and '.' not in sample else '.'
     names = [n.strip().strip('"') for n in line.split(delimiter)] if line.strip() else []
-    return Head(names, header_lines, delimiter, notes)
+    return Head(names, header_lines, delimiter, notes, decimal)
 
 
 def position(column: str | int, names: list[str], where: str) -> int:
@@ -87,14 +91,22 @@ def position(column: str | int, names: list[str], where: str) -> int:
     return hits[0]
 
 
-def read_columns(path: Path, head: Head, positions: list[int], decimal: str = '.') -> Array:
+def read_columns(
+    path: Path, head: Head, positions: list[int], decimal: str | None = None
+) -> Array:
     """Return columns of numbers, shape (n, number of columns).
+
+    Args:
+        path: the file.
+        head: its head.
+        positions: columns wanted, from 0.
+        decimal: decimal sign, the head's where None.
 
     Raises:
         InputError: a value is no number, a row is short, or there is no row.
     """
     convert = None
-    if decimal == ',':
+    if (decimal or head.decimal) == ',':
 
         def convert(text: str) -> float:
             return float(text.replace(',', '.'))

@@ -203,11 +203,12 @@ MAP = {
 }
 
 
-def test_a_map_reads_any_text(tmp_path: Path) -> None:
+@pytest.mark.parametrize('said', [{'decimal': ','}, {}], ids=['said', 'found'])
+def test_a_map_reads_any_text(tmp_path: Path, said: dict[str, str]) -> None:
     """Column by name and number, scale, offset, header lines, decimal comma."""
     path = tmp_path / 'a.txt'
     path.write_text('made by nobody\nx;u;y\n' + ''.join(f'a;{i},5;{i},25\n' for i in range(20)))
-    record = read(path, channels=parse_channel_map({**MAP, 'decimal': ','}, 'map'), hold='linear')
+    record = read(path, channels=parse_channel_map({**MAP, **said}, 'map'), hold='linear')
     i = np.arange(20)
     np.testing.assert_allclose(record.command, (i + 0.5) * 10e-3)
     np.testing.assert_allclose(record.measured, ((i + 0.25) * -10 + 1) * 1e-3, atol=1e-18)
