@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from actuator_glue.model import kernel, laguerre, linear, quadratic, reference
+from actuator_glue.model import gram, kernel, laguerre, linear, quadratic, reference
 from actuator_glue.model.exact import ExactErrors, Initial
 from actuator_glue.records import Array, Record
 
@@ -104,14 +104,14 @@ def _row(exact: ExactErrors, r: int, near: ArrayLike | None) -> Array:
         system = reference.fit(record, exact.settle[r], exact.starts[r])
     u0 = record.command[0] if foh else 0.0
     free = bool(x0 or v0 or u0)
-    delta = -math.expm1(-min(math.sqrt(system[1]) * record.period, 5.0))
+    pole = 1.0 + math.expm1(-min(math.sqrt(system[1]) * record.period, 5.0))
     header = {
         laguerre.FREE: float(free),
         laguerre.STIFFNESS: exact.stiffness[r],
         laguerre.PERIOD: record.period,
         laguerre.FOH: float(foh),
-        laguerre.POLE: 1.0 - delta,
-        laguerre.DELTA: delta,
+        laguerre.POLE: pole,
+        laguerre.DELTA: 1.0 - pole,  # exactly: else the sections would not be lossless
         laguerre.X0: x0,
         laguerre.V0: v0,
         laguerre.U0: u0,
@@ -123,7 +123,7 @@ def _row(exact: ExactErrors, r: int, near: ArrayLike | None) -> Array:
     for column, value in header.items():
         row[column] = value
     c = kernel.discretise(system[np.newaxis], record.period, foh)[0]
-    quadratic.prepare(row, c, record.measured, record.command, exact.settle[r])
+    gram.prepare(row, c, record.measured, record.command, exact.settle[r])
     return row
 
 

@@ -1,6 +1,7 @@
-"""Compiled quadratic form of the fast likelihood: its preparation and its evaluation.
+"""Compiled quadratic form of the fast likelihood, evaluated per theta.
 
-Derivation and error bound: docs/fast_path.md, sections 3 to 5.
+Derivation and error bound: docs/fast_path.md, sections 4 and 5. `gram` computes once per window
+what it is made of.
 """
 
 from __future__ import annotations
@@ -16,20 +17,16 @@ from actuator_glue.model.laguerre import (
     BEYOND,
     BLOCK,
     COUNT,
-    DELTA,
     FOH,
     FREE,
     HEADER,
     NORM,
     PERIOD,
-    POLE,
     SQUARES,
     STIFFNESS,
     SUM,
     TAIL,
     TERMS,
-    V0,
-    X0,
     expand,
     series,
 )
@@ -37,117 +34,7 @@ from actuator_glue.records import Array
 
 Flags: TypeAlias = NDArray[np.bool_]
 
-_SAMPLES = 256  # samples per pass of the filter bank: the bank's outputs stay in the cache
 _ROUNDING = 1e-15  # of the quadratic form, relative to the largest of what it adds up
-
-
-@njit
-def _filter_bank(
-    x: Array, size: int, banks: int, memory: Array, pole: float, delta: float
-) -> None:
-    """Fill each bank's rows of x with its first one passed through (1 - pole z)/(z - pole).
-
-    Written as zeta = delta (z + 1)/(z - pole) - 1, which loses nothing when the pole is near one.
-    `memory` (rows, 2) holds each section's last input and low-pass output across blocks.
-    """
-    for row in range(len(x)):
-        if row < banks * BLOCK and row % BLOCK == 0:
-            continue  # the inputs themselves
-        source = row - 1 if row % BLOCK else row - 1 - (banks - 1) * BLOCK
-        before, low = memory[row, 0], memory[row, 1]
-        for n in range(size):
-            new = x[source, n]
-            low = pole * low + delta * (new + before)
-            x[row, n] = low - new
-            before = new
-        memory[row, 0], memory[row, 1] = before, low
-
-
-@njit
-def _add_products(x: Array, size: int, e: Array, sums: Array, cross: Array, gram: Array) -> None:
-    """Add row sums, products with e and the lower triangle of x x' of one block.
-
-    Rows are taken four by two, so that each number read from the cache is used twice or more;
-    `gram` (dims, dims) is filled a little beyond its triangle.
-    """
-    for i in range(0, len(x), 4):
-        a, b, c, d = x[i], x[i + 1], x[i + 2], x[i + 3]
-        for j in range(0, i + 4, 2):
-            f, g = x[j], x[j + 1]
-            af = ag = bf = bg = cf = cg = df = dg = 0.0
-            for n in range(size):
-                af += a[n] * f[n]
-                ag += a[n] * g[n]
-                bf += b[n] * f[n]
-                bg += b[n] * g[n]
-                cf += c[n] * f[n]
-                cg += c[n] * g[n]
-                df += d[n] * f[n]
-                dg += d[n] * g[n]
-            gram[i, j] += af
-            gram[i, j + 1] += ag
-            gram[i + 1, j] += bf
-            gram[i + 1, j + 1] += bg
-            gram[i + 2, j] += cf
-            gram[i + 2, j + 1] += cg
-            gram[i + 3, j] += df
-            gram[i + 3, j + 1] += dg
-    for i in range(len(x)):
-        total = product = 0.0
-        for n in range(size):
-            total += x[i, n]
-            product += x[i, n] * e[n]
-        sums[i] += total
-        cross[i] += product
-
-
-@njit(nogil=True)
-def prepare(t: Array, c: Array, measured: Array, command: Array, settle: int) -> None:
-    """Fill a record's row behind its header: everything that depends on its samples.
-
-    Args:
-        t: row with TERMS..U0 set.
-        c: `kernel.discretise` of the reference system.
-        measured: shape (n,) [m].
-        command: shape (n,) [m].
-        settle: samples at the beginning that are filtered but not counted.
-    """
-    K, banks = int(t[TERMS]), 1 + int(t[FREE])
-    N, dims = K + TAIL, K * banks
-    start = np.empty(9)
-    expand(c, t, start)
-    t[NORM] = np.sqrt(np.sum(command * command))
-    reference = t[HEADER : HEADER + N * banks].reshape(-1, BLOCK)
-    t[BEYOND] = series(start, banks, t[NORM], reference)
-    state = np.zeros(kernel.STREAM)
-    state[1], state[2] = t[X0], t[V0]
-    at = HEADER + N * banks
-    column_sums, cross = t[at : at + dims], t[at + dims : at + 2 * dims]
-    gram = t[at + 2 * dims : at + (2 + dims) * dims].reshape(dims, dims)
-    x, e = np.zeros((dims, _SAMPLES)), np.empty(_SAMPLES)
-    memory = np.zeros((dims, 2))
-    first, n = 0, len(command)
-    while first < n:
-        last = min(first + _SAMPLES, n if first >= settle else settle)
-        size = last - first
-        x[0, :size] = command[first:last]
-        if banks == 2:
-            x[BLOCK, :size] = 0.0
-            x[BLOCK, 0] = 1.0 if first == 0 else 0.0
-        _filter_bank(x, size, banks, memory, t[POLE], t[DELTA])
-        kernel.stream(c, state, command[first:last], e[:size])
-        for i in range(size):
-            e[i] = measured[first + i] - e[i]
-        if first >= settle:
-            for i in range(size):
-                t[SUM] += e[i]
-                t[SQUARES] += e[i] * e[i]
-            _add_products(x, size, e, column_sums, cross, gram)
-        first = last
-    for i in range(dims):
-        gram[i, i] *= 0.5
-        gram[i, i + 1 :] = 0.0
-    t[COUNT] = n - settle
 
 
 @njit
