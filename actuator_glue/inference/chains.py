@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from actuator_glue.inference.convergence import ess_bulk, rhat
+from actuator_glue.inference.convergence import rhat_and_ess
 from actuator_glue.records import Array
 
 # Points handed to the next run: enough for a covariance of any model here, light enough to pickle.
@@ -53,14 +53,18 @@ class Chains:
         return self.start_evaluations + (generation + 1) * int(self.draws.shape[1])
 
     @cached_property
+    def _diagnostics(self) -> tuple[Array, Array]:
+        return rhat_and_ess(self.kept)
+
+    @property
     def rhat(self) -> Array:
         """Rank-normalised split R-hat of each parameter after burn-in, (p,)."""
-        return rhat(self.kept)
+        return self._diagnostics[0]
 
-    @cached_property
+    @property
     def ess(self) -> Array:
         """Bulk effective sample size of each parameter after burn-in, (p,)."""
-        return ess_bulk(self.kept)
+        return self._diagnostics[1]
 
     @cached_property
     def best(self) -> Array:

@@ -6,11 +6,13 @@ test/inference/test_convergence.py holds them to arviz.
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.special import ndtri
-from scipy.stats import rankdata
 
+from actuator_glue.jit import njit
 from actuator_glue.records import Array
 
 
@@ -26,7 +28,7 @@ def gelman_rubin(draws: Array) -> Array:
         (p,); nan where fewer than two draws or chains remain or nothing moves.
     """
     half = draws[len(draws) // 2 :]
-    return _potential_reduction(np.moveaxis(half, 2, 0))
+    return _potential_reduction(np.ascontiguousarray(half.T))
 
 
 def rhat(draws: Array) -> Array:
@@ -40,62 +42,86 @@ def rhat(draws: Array) -> Array:
     Returns:
         (p,); nan for fewer than 4 generations or constant draws.
     """
-    split = _split(draws)
-    if split.shape[1] < 2:
-        return np.full(draws.shape[2], np.nan)
-    folded = np.abs(split - np.median(split, axis=(1, 2), keepdims=True))
-    return np.asarray(
-        np.maximum(_potential_reduction(_normal(split)), _potential_reduction(_normal(folded)))
-    )
+    return rhat_and_ess(draws)[0]
 
 
 def ess_bulk(draws: Array) -> Array:
     """Bulk effective sample size of each parameter (Vehtari et al. 2021, section 4.2).
 
-    Args:
-        draws: (generations, chains, p).
-
-    Returns:
-        (p,); nan for fewer than 4 generations or constant draws.
+    Arguments and what is returned are as in `rhat`.
     """
+    return rhat_and_ess(draws)[1]
+
+
+def rhat_and_ess(draws: Array) -> tuple[Array, Array]:
+    """Return `rhat` and `ess_bulk`, (p,) each, from one ranking of the draws."""
     split = _split(draws)
-    if split.shape[1] < 2:
-        return np.full(draws.shape[2], np.nan)
-    return np.array([_effective(one) for one in _normal(split)])
+    if split.shape[2] < 2:
+        nothing = np.full(draws.shape[2], np.nan)
+        return nothing, nothing.copy()
+    bulk = _normal(split)
+    folded = _normal(np.abs(split - np.median(split, axis=(1, 2), keepdims=True)))
+    reduction = np.maximum(_potential_reduction(bulk), _potential_reduction(folded))
+    return reduction, np.array([_effective(one) for one in bulk])
 
 
 def _split(draws: Array) -> Array:
-    """(p, generations // 2, 2 chains): each chain's first and last half, the middle dropped."""
+    """(p, 2 chains, generations // 2): each chain's first and last half, the middle dropped."""
     half = len(draws) // 2
     parts = (draws[:half], draws[len(draws) - half :])
-    return np.ascontiguousarray(np.moveaxis(np.concatenate(parts, axis=1), 2, 0))
+    return np.ascontiguousarray(np.concatenate(parts, axis=1).T)
 
 
 def _normal(values: Array) -> Array:
-    """Normal scores of the ranks over all chains, shape kept."""
+    """Normal scores of the ranks over all chains of each parameter, shape kept."""
     flat = values.reshape(len(values), -1)
-    rank = rankdata(flat, axis=1)
-    return np.asarray(ndtri((rank - 0.375) / (flat.shape[1] + 0.25))).reshape(values.shape)
+    scores = np.empty_like(flat)
+    _ranked(flat, np.sort(flat, axis=1), _scores(flat.shape[1]), scores)
+    return scores.reshape(values.shape)
+
+
+@lru_cache(maxsize=8)
+def _scores(count: int) -> Array:
+    """Normal scores of the ranks 1, 1.5, 2, ... count (halves are those of ties)."""
+    rank = 0.5 * np.arange(2, 2 * count + 1)
+    return np.asarray(ndtri((rank - 0.375) / (count + 0.25)))
+
+
+@njit
+def _ranked(values, ordered, scores, out):  # type: ignore[no-untyped-def]
+    """Write the score of each value's rank; equal values share their mean rank."""
+    for row in range(len(values)):
+        up = ordered[row]
+        for i in range(values.shape[1]):
+            value = values[row, i]
+            if i > 0 and value == values[row, i - 1]:  # a chain that stayed
+                out[row, i] = out[row, i - 1]
+                continue
+            below = np.searchsorted(up, value)
+            equal = 1
+            while below + equal < len(up) and up[below + equal] == value:
+                equal += 1
+            out[row, i] = scores[2 * below + equal - 1]
 
 
 def _potential_reduction(values: Array) -> Array:
-    """sqrt(((n - 1)/n W + B/n) / W) for values (p, n, chains)."""
-    n, chains = values.shape[1:]
+    """sqrt(((n - 1)/n W + B/n) / W) for values (p, chains, n)."""
+    chains, n = values.shape[1:]
     if n < 2 or chains < 2:
         return np.full(len(values), np.nan)
-    within = values.var(axis=1, ddof=1).mean(axis=1)
-    between = values.mean(axis=1).var(axis=1, ddof=1)
+    within = values.var(axis=2, ddof=1).mean(axis=1)
+    between = values.mean(axis=2).var(axis=1, ddof=1)
     with np.errstate(divide='ignore', invalid='ignore'):
         return np.asarray(np.sqrt((n - 1) / n + between / within))
 
 
 def _effective(values: Array) -> float:
-    """Effective sample size of (n, chains): Vehtari et al. (2021), Eqs. (10)-(12)."""
-    n, chains = values.shape
-    mean = values.mean(axis=0)
+    """Effective sample size of (chains, n): Vehtari et al. (2021), Eqs. (10)-(12)."""
+    chains, n = values.shape
+    mean = values.mean(axis=1)
     length = next_fast_len(2 * n, real=True)
-    spectrum = rfft(values - mean, length, axis=0)
-    power = (spectrum.real**2 + spectrum.imag**2).sum(axis=1)
+    spectrum = rfft(values - mean[:, np.newaxis], length, axis=1)
+    power = (spectrum.real**2 + spectrum.imag**2).sum(axis=0)
     covariance = irfft(power, length)[:n] / (n * chains)
     within = covariance[0] * n / (n - 1)
     if not within > 0.0:

@@ -64,11 +64,13 @@ def moments(
     for name, values in (('log_density', log_density), ('weights', weights)):
         if values is not None and np.shape(values) != (len(draws),):
             raise InputError(f'{len(draws)} draws but {name} of shape {np.shape(values)}')
-    mean = np.average(draws, axis=0, weights=weights)
-    centred = draws - mean
+    # Parameters as rows: sums then run along memory.
+    columns = np.ascontiguousarray(draws.T)
+    mean = np.average(columns, axis=1, weights=weights)
+    centred = columns - mean[:, np.newaxis]
     square = centred * centred
-    variance = np.average(square, axis=0, weights=weights)
-    third = np.average(square * centred, axis=0, weights=weights)
+    variance = np.average(square, axis=1, weights=weights)
+    third = np.average(square * centred, axis=1, weights=weights)
     stddev = np.sqrt(variance)
     prior = (np.asarray(upper, np.float64) - np.asarray(lower, np.float64)) / np.sqrt(12.0)
     with np.errstate(divide='ignore', invalid='ignore'):

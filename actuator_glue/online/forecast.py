@@ -110,7 +110,8 @@ def predictions(
         seed: seeds the draws of the residual, so that a replay repeats them.
         measured: the samples, shape (n,) [m], where they are known by now.
     """
-    simulated = simulated[np.isfinite(simulated).all(axis=1)]
+    if not np.isfinite(simulated).all():
+        simulated = simulated[np.isfinite(simulated).all(axis=1)]
     if len(simulated) < 2:
         return []
     rng = np.random.default_rng(seed)

@@ -163,7 +163,7 @@ def _estimate(job: Job, expired: Callable[[], bool] | None) -> WindowResult:
     posterior = chains.posterior()
     # R-hat and ESS cost more than the sampling if all draws are ranked.
     thin = max(1, len(chains.kept) // DIAGNOSED)
-    rhat, ess = convergence.rhat(chains.kept[::thin]), convergence.ess_bulk(chains.kept[::thin])
+    rhat, ess = convergence.rhat_and_ess(chains.kept[::thin])
     summary = moments(posterior, *model.bounds)
     residual = (record.measured - fitting.simulate(model, chains.best[None], record)[0])[settle:]
     rms = float(residual.std())
