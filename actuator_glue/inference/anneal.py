@@ -24,6 +24,7 @@ from actuator_glue.inference.generation import UNTEMPERED, Tempering, temper
 from actuator_glue.inference.moves import independence, uniforms_per_chain
 from actuator_glue.inference.settings import Settings
 from actuator_glue.inference.sweep import Around, Walk, many
+from actuator_glue.jit import njit
 from actuator_glue.records import Array
 
 
@@ -71,10 +72,7 @@ def archive_reference(
     """
     centre, factor = independence.fit(archive)
     factor *= 1.5
-    points = np.empty((size, archive.shape[1]))
-    uniforms = rng.random((size, archive.shape[1] + 5))
-    for point, row in zip(points, uniforms, strict=True):
-        independence.draw(row, 0, centre, factor, point)
+    points = independence.draw_all(rng.random((size, archive.shape[1] + 5)), centre, factor)
     outside = np.isneginf(physical_all(points, lower, width)[1])
     points[outside] = archive[rng.integers(0, len(archive), int(outside.sum()))]
     return Reference(points, centre, factor)
@@ -138,24 +136,26 @@ def next_rise(gain: Array, most: float, survivors: float) -> float:
     The share is counted among points whose gain is finite.
     """
     finite = gain[np.isfinite(gain)]
-    finite = finite - finite.max()
+    return float(_rise(finite - finite.max(), most, survivors))
 
-    def share(rise: float) -> float:
-        weights = np.exp(rise * finite)
-        return float(weights.sum() ** 2 / (weights @ weights) / len(finite))
 
-    if share(most) >= survivors:
-        return most
-    low, high = 0.0, most
+@njit
+def _rise(gain, most, survivors):  # type: ignore[no-untyped-def]
+    low, high, middle = 0.0, most, most
     # Bisection on the logarithm first: rises span many decades.
     for _ in range(60):
-        middle = np.sqrt(low * high) if low > 0.0 else high * 1e-3
-        if share(middle) >= survivors:
+        total = squares = 0.0
+        for value in gain:
+            weight = math.exp(middle * value)
+            total += weight
+            squares += weight * weight
+        if total * total >= survivors * squares * len(gain):
             low = middle
         else:
             high = middle
-        if low > 0.0 and high / low < 1.001:
+        if low == most or (low > 0.0 and high / low < 1.001):
             break
+        middle = math.sqrt(low * high) if low > 0.0 else high * 1e-3
     return low if low > 0.0 else high
 
 

@@ -97,7 +97,12 @@ def _ranked(values, ordered, scores, out):  # type: ignore[no-untyped-def]
             if i > 0 and value == values[row, i - 1]:  # a chain that stayed
                 out[row, i] = out[row, i - 1]
                 continue
-            below = np.searchsorted(up, value)
+            # Bisection without a branch to mispredict.
+            below, left = 0, len(up)
+            while left > 1:
+                half = left // 2
+                below += half if up[below + half - 1] < value else 0
+                left -= half
             equal = 1
             while below + equal < len(up) and up[below + equal] == value:
                 equal += 1

@@ -53,7 +53,9 @@ def physical_all(z, lower, width):  # type: ignore[no-untyped-def]
 def sampling(x: Array, lower: Array, width: Array) -> Array:
     """Return the sampling coordinates of physical points x (m, p) inside the prior."""
     share = np.clip((x - lower) / width, _EDGE, 1.0 - _EDGE)
-    return np.ascontiguousarray(np.where(lower == 0.0, np.log(share), share))
+    positive = lower == 0.0
+    share[:, positive] = np.log(share[:, positive])
+    return np.ascontiguousarray(share)
 
 
 def check_bounds(lower: Array, upper: Array) -> tuple[Array, Array]:

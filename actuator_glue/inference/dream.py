@@ -30,9 +30,9 @@ from actuator_glue.inference.state import Info, State, adapted, moved
 from actuator_glue.inference.sweep import Path, many, one
 from actuator_glue.records import Array
 
-# Generations between two questions whether to stop a compiled likelihood: 0.2 ms with 20 chains;
-# and in one go where nobody asks: the uniforms of more would leave the cache.
-_PATIENCE, _MOST = 10, 50
+# Evaluations of a compiled likelihood between two questions whether to stop: 0.2 ms; and in one go
+# where nobody asks: the uniforms of more would leave the cache.
+_PATIENCE, _MOST = 200, 1000
 
 __all__ = ['Chains', 'Info', 'Settings', 'State', 'init', 'sample', 'step']
 
@@ -196,8 +196,8 @@ def sample(
         evaluations: likelihood evaluations at most, the search for the start included.
         settings: see `Settings`.
         archive: points (m, p) of an earlier run (`Chains.archive`) for a warm start.
-        stop: asked after every generation, or every ten where the likelihood has a compiled
-            form (less where something is adapted, always at the same ones); True ends the run.
+        stop: asked after every generation, or about every 200 evaluations where the likelihood
+            has a compiled form, always at the same ones; True ends the run.
         progress: called now and then with (evaluations made, evaluations at most).
 
     Raises:
@@ -219,9 +219,9 @@ def sample(
     draws = np.empty((generations, n, d))
     log_densities = np.empty((generations, n))
     density = compiled(log_density)
-    most = _MOST
+    most = -(-_MOST // n)
     if stop is not None:
-        most = 1 if density is None else _PATIENCE
+        most = 1 if density is None else -(-_PATIENCE // n)
     every = max(generations // 100, 1)
     done = 0
     while done < generations:

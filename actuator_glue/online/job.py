@@ -140,12 +140,9 @@ def _estimate(job: Job, expired: Callable[[], bool] | None) -> WindowResult:
         if settings.likelihood == 'glue'
         else GaussianLikelihood(errors)
     )
-    coordinates = Coordinates(model, record.known_stiffness())
-
-    def stop(state: dream.State) -> bool:
-        if job.stop_at is not None:
-            return state.evaluations >= job.stop_at
-        return expired is not None and expired()
+    # What another model has shown says nothing about this one's bends.
+    shown = None if job.afresh else job.archive
+    coordinates = Coordinates(model, record.known_stiffness(), shown)
 
     seed = (settings.seed, record.first_index)
     warm = job.archive is not None
@@ -155,9 +152,9 @@ def _estimate(job: Job, expired: Callable[[], bool] | None) -> WindowResult:
         coordinates.lower,
         coordinates.upper,
         evaluations=job.evaluations,
-        settings=dream.Settings(chains=settings.chains, adaptation=ADAPT if warm else 50),
+        settings=_sampler(settings, model, warm),
         archive=None if job.archive is None else coordinates.coordinates(job.archive),
-        stop=stop,
+        stop=_stop(job, expired),
     )
     chains = coordinates.chains(sampled)
     posterior = chains.posterior()
@@ -199,6 +196,26 @@ def _estimate(job: Job, expired: Callable[[], bool] | None) -> WindowResult:
         frozen=frozen,
         archive=_archive(chains.archive, job.archive),
     )
+
+
+def _stop(job: Job, expired: Callable[[], bool] | None) -> Callable[[dream.State], bool] | None:
+    """What ends the sampling early: the evaluations of the run that is repeated, or the clock."""
+    if job.stop_at is not None:
+        at = job.stop_at
+        return lambda state: state.evaluations >= at
+    return None if expired is None else lambda _: expired()
+
+
+def _sampler(settings: EstimatorSettings, model: ModelChoice, warm: bool) -> dream.Settings:
+    """Settings of the sampler; effects are simulated in batches, which are filled up."""
+    sampler = dream.Settings(chains=settings.chains, adaptation=ADAPT if warm else 50)
+    if not model.effects:
+        return sampler
+    chains = fitting.batch(settings.chains)
+    if not warm:
+        return replace(sampler, chains=chains)
+    # A warm start takes a quarter of the population, and moves a chain of so many sweeps each.
+    return replace(sampler, chains=chains, population=4 * sampler.sweeps * chains)
 
 
 def _archive(new: Array, old: Array | None) -> Array:

@@ -79,6 +79,15 @@ def draw(uniforms, first, centre, factor, candidate):  # type: ignore[no-untyped
 
 
 @njit
+def draw_all(uniforms, centre, factor):  # type: ignore[no-untyped-def]
+    """Return draws (m, p) of the fitted Student t from uniforms (m, p + 5)."""
+    points = np.empty((len(uniforms), len(centre)))
+    for i in range(len(uniforms)):
+        draw(uniforms[i], 0, centre, factor, points[i])
+    return points
+
+
+@njit
 def propose(z, uniforms, centre, factor, residual, candidate):  # type: ignore[no-untyped-def]
     """Write a candidate that does not depend on z, return the log Hastings correction.
 
