@@ -81,6 +81,9 @@ def sample(
     stiffnesses = {r.known_stiffness() for r in records}
     # One stiffness alone leaves a bent ridge, on which no sampler moves in physical parameters.
     single = Coordinates(model, stiffnesses.pop()) if len(stiffnesses) == 1 else None
+    settings, archive = dream.Settings(), None
+    if single is not None:
+        settings, archive = single.cold(np.random.default_rng((args.seed, 1)), settings)
     with progress('calibrating', args.evaluations) as done:
         chains = dream.sample(
             np.random.default_rng(args.seed),
@@ -88,6 +91,8 @@ def sample(
             lower if single is None else single.lower,
             upper if single is None else single.upper,
             evaluations=args.evaluations,
+            settings=settings,
+            archive=archive,
             progress=lambda made, _: done(made),
         )
     return chains if single is None else single.chains(chains)

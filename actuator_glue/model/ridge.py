@@ -43,7 +43,7 @@ def oil_range(inertia, s, k, low, high):  # type: ignore[no-untyped-def]
 
 @_njit
 def physical(phi, k, low, high, theta):  # type: ignore[no-untyped-def]
-    """Fill theta (p,) from coordinates phi (p,), return the log Jacobian less a constant.
+    """Fill theta (4,) from coordinates phi (4,), return the log Jacobian less a constant.
 
     It is minus infinity where theta lies outside low..high. k is the specimen stiffness [N/m].
     """
@@ -68,15 +68,12 @@ def physical(phi, k, low, high, theta):  # type: ignore[no-untyped-def]
     theta[3] = s * oil / k if k > 0.0 else phi[3]
     if not low[3] <= theta[3] <= high[3]:
         return -math.inf
-    for j in range(4, len(phi)):
-        theta[j] = low[j] + (high[j] - low[j]) * share(phi[j])
-        log_jacobian += log_slope(phi[j])
     return log_jacobian
 
 
 @_njit
 def physical_all(phi, k, low, high, theta, log_jacobian):  # type: ignore[no-untyped-def]
-    """Fill theta (m, p) and the log Jacobian (m,); return whether all are inside low..high."""
+    """Fill theta (m, 4) and the log Jacobian (m,); return whether all are inside low..high."""
     inside = True
     for i in range(len(phi)):
         log_jacobian[i] = physical(phi[i], k, low, high, theta[i])
@@ -96,7 +93,7 @@ def logit(part: float) -> Any:
 
 @_njit
 def coordinates_all(theta, k, low, high, phi):  # type: ignore[no-untyped-def]
-    """Fill phi (m, p) with the coordinates of physical parameters theta (m, p)."""
+    """Fill phi (m, 4) with the coordinates of physical parameters theta (m, 4)."""
     for i in range(len(theta)):
         oil = max(k + theta[i, 2], 1e-9)
         inertia = oil / max(theta[i, 1], 1e-300)
@@ -110,5 +107,3 @@ def coordinates_all(theta, k, low, high, phi):  # type: ignore[no-untyped-def]
         least, most = oil_range(inertia, s, k, low, high)
         rest = (least / most) ** power
         phi[i, 2] = logit(((oil / most) ** power - rest) / (1.0 - rest))
-        for j in range(4, theta.shape[1]):
-            phi[i, j] = logit((theta[i, j] - low[j]) / (high[j] - low[j]))

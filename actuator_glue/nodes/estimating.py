@@ -64,3 +64,5 @@ def warm_up() -> None:
             # As it comes through a pipe: arrays lose their write protection, which numba sees.
             job = pickle.loads(pickle.dumps(job))
             estimator.finish(compute(job, time.monotonic() + 60.0, lambda _: None))
+            # A diagnosis may swap the model in mid-stream; nothing must wait for a compiler then.
+            estimator.set_model(choose_model(('backlash',)))

@@ -9,6 +9,7 @@ import numpy as np
 from actuator_glue.errors import InputError
 from actuator_glue.inference.likelihood import Errors
 from actuator_glue.model import linear
+from actuator_glue.model.effects.kernel import LANES
 from actuator_glue.model.fast import FastErrors
 from actuator_glue.model.structure import Structure
 from actuator_glue.online.settings import ModelChoice
@@ -85,6 +86,11 @@ def simulate(model: ModelChoice, theta: Array, record: Record) -> Array:
     )
 
 
+def batch(wanted: int) -> int:
+    """Return how many parameter sets, `wanted` or more, a model with effects simulates at once."""
+    return -(-wanted // LANES) * LANES
+
+
 def starting_points(
     model: ModelChoice, before: ModelChoice, archive: Array, seed: tuple[int, ...]
 ) -> Array | None:
@@ -125,4 +131,4 @@ def identifiable(stiffness: float) -> str:
     )
 
 
-__all__ = ['choose_model', 'errors', 'identifiable', 'simulate', 'starting_points']
+__all__ = ['batch', 'choose_model', 'errors', 'identifiable', 'simulate', 'starting_points']

@@ -145,15 +145,19 @@ def _estimate(job: Job, expired: Callable[[], bool] | None) -> WindowResult:
     coordinates = Coordinates(model, record.known_stiffness(), shown)
 
     seed = (settings.seed, record.first_index)
-    warm = job.archive is not None
+    sampler = _sampler(job)
+    if job.archive is not None:
+        archive = coordinates.coordinates(job.archive)
+    else:
+        sampler, archive = coordinates.cold(np.random.default_rng((*seed, 3)), sampler)
     sampled = dream.sample(
         np.random.default_rng((*seed, 0)),
         coordinates.density(likelihood),
         coordinates.lower,
         coordinates.upper,
         evaluations=job.evaluations,
-        settings=_sampler(settings, model, warm),
-        archive=None if job.archive is None else coordinates.coordinates(job.archive),
+        settings=sampler,
+        archive=archive,
         stop=_stop(job, expired),
     )
     chains = coordinates.chains(sampled)
@@ -188,7 +192,7 @@ def _estimate(job: Job, expired: Callable[[], bool] | None) -> WindowResult:
         nrmse=rms / float(record.measured[settle:].std()),
         noise=noise,
         evaluations=chains.evaluations,
-        stopped_early=chains.evaluations + settings.chains <= job.evaluations,
+        stopped_early=chains.evaluations + sampler.chains <= job.evaluations,
         converged=bool(chains.annealed and rhat.max() <= settings.rhat_limit),
         response=response_band(draws, record.known_stiffness(), settings),
         scored=tuple(p for old in job.frozen for p in _score(job, old, seed)),
@@ -206,12 +210,14 @@ def _stop(job: Job, expired: Callable[[], bool] | None) -> Callable[[dream.State
     return None if expired is None else lambda _: expired()
 
 
-def _sampler(settings: EstimatorSettings, model: ModelChoice, warm: bool) -> dream.Settings:
+def _sampler(job: Job) -> dream.Settings:
     """Settings of the sampler; effects are simulated in batches, which are filled up."""
-    sampler = dream.Settings(chains=settings.chains, adaptation=ADAPT if warm else 50)
-    if not model.effects:
+    warm = job.archive is not None
+    chains = job.settings.chains
+    sampler = dream.Settings(chains=chains, adaptation=ADAPT if warm else 50)
+    if not job.model.effects:
         return sampler
-    chains = fitting.batch(settings.chains)
+    chains = fitting.batch(chains)
     if not warm:
         return replace(sampler, chains=chains)
     # A warm start takes a quarter of the population, and moves a chain of so many sweeps each.
