@@ -60,11 +60,12 @@ BAND = Topic('prediction_band', PredictionBand, _reliable(200))
 RESPONSE = Topic('frequency_response', FrequencyResponseBand, _reliable(50))
 DIAGNOSTICS = Topic('/diagnostics', DiagnosticArray, _reliable(50))
 
+# What waits on several topics is taken in this order: a set-up before the samples that it is for.
 RECORDED = (
-    SAMPLES,
-    PREVIEW,
     TEST_SETUP,
     ESTIMATOR_SETUP,
+    PREVIEW,
+    SAMPLES,
     POSTERIOR,
     BAND,
     RESPONSE,

@@ -12,6 +12,7 @@ from ros_nodes import QUICK, RATE
 from actuator_glue.io.bag_reader import decoded, summarise
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.replay import compare, items, published, replay
+from actuator_glue.records import Record
 
 ROOT = Path(__file__).resolve().parents[2]
 INPUTS = ('SampleBlock', 'TestSetup')
@@ -151,6 +152,23 @@ def test_a_file_is_streamed_and_replayed_faster_than_real_time(start, probe, tmp
         assert one.header.stamp == other.header.stamp
     (setup,) = [m for _, m in decoded(bags[1], ('TestSetup',))]
     assert setup.specimen_stiffness == 1e5 and setup.rate == pytest.approx(RATE)
+
+
+def test_a_recorder_that_stalls_keeps_the_set_up_before_its_samples(start, probe, tmp_path):
+    """What waits on two topics at once is recorded in the order a replay needs."""
+    bag = tmp_path / 'bag'
+    recorder, estimator = begin(start, probe, bag, **QUICK)
+    probe.open_stream(listeners=2)
+    recorder.process.send_signal(signal.SIGSTOP)
+    probe.setup()
+    time = np.arange(800) / RATE
+    command = 2e-3 * np.sin(2 * np.pi * 1.5 * time)
+    measured = np.roll(command, 4) + 1e-5 * np.random.default_rng(1).standard_normal(800)
+    probe.stream(Record(command, measured, 1.0 / RATE))
+    recorder.process.send_signal(signal.SIGCONT)
+    finish(probe, recorder, estimator, 800)
+    comparison, _ = replayed(bag)
+    assert comparison.identical, comparison.differing
 
 
 def test_an_undeclared_effect_is_told_to_nobody_but_the_sealed_file(start, probe, tmp_path):
