@@ -10,6 +10,7 @@ record fixes:
     damping c:      d2 + c (beta_1 + s), and ln d1/d2 in place of c
     mass m:         the same with c = m (mass_damping + alpha_3)
     Stribeck:       the break-away force in place of the sliding force
+    flow:           velocities count as flow over alpha_2; the record shows flow over k + alpha_2
     supply droop:   logarithm of its time constant
 """
 
@@ -32,17 +33,19 @@ _njit: Any = partial(njit, fastmath=False)
 # Parameters with a coordinate of their own; all others are their own coordinate.
 NAMES = (
     'gain', 'damping', 'mass', 'mass_damping', 'coulomb_force', 'sliding_force', 'breakaway_ratio',
-    'hardening', 'post_yield_ratio', 'droop_time',
+    'hardening', 'post_yield_ratio', 'droop_time', 'droop', 'saturation_velocity',
 )  # fmt: skip
 (
     GAIN, DAMPING, MASS, MASS_DAMPING, COULOMB, SLIDING, BREAKAWAY, HARDENING, POST_YIELD,
-    DROOP_TIME,
+    DROOP_TIME, DROOP, SATURATION,
 ) = range(len(NAMES))  # fmt: skip
 _SHARES: Final = (DAMPING, MASS, COULOMB, SLIDING, HARDENING)
 # No machine's d0/n0 is larger by more: it would lose ten parts in eleven of its static command.
 _STATIC = 10.0
 # No servo-valve is slower.
 _SLOWEST = 0.1  # 1/s
+# No actuator's oil is softer than its specimen by more.
+_LEAST_OIL = 100.0
 
 
 def columns(names: Sequence[str]) -> NDArray[np.int64]:
@@ -71,6 +74,10 @@ def bounds(at: NDArray[np.int64], k: float, low: Array, high: Array) -> tuple[Ar
     for part in (DAMPING, MASS_DAMPING):
         if (j := at[part]) >= 0:
             lower[j], upper[j] = math.log(_SLOWEST), math.log(high[0] + high[3])
+    if (j := at[SATURATION]) >= 0:
+        lower[j] = 0.0
+    if (j := at[DROOP]) >= 0:
+        upper[j] *= _LEAST_OIL
     if (j := at[DROOP_TIME]) >= 0:
         lower[j], upper[j] = math.log(low[j]), math.log(high[j])
     return lower, upper
@@ -141,6 +148,14 @@ def physical(z, k, low, high, at, phi, theta):  # type: ignore[no-untyped-def]
     if j >= 0:
         theta[j] = 1.0 - theta[j] * oil
         log_jacobian += math.log(oil)
+    j = at[SATURATION]
+    if j >= 0:
+        theta[j] *= oil / theta[2]
+        log_jacobian += math.log(oil / theta[2])
+    j = at[DROOP]
+    if j >= 0:
+        theta[j] *= theta[2] / oil
+        log_jacobian += math.log(theta[2] / oil)
     j = at[DROOP_TIME]
     if j >= 0:
         theta[j] = math.exp(z[j])
@@ -177,6 +192,12 @@ def coordinates_all(theta, k, low, high, at, z):  # type: ignore[no-untyped-def]
         j = at[POST_YIELD]
         if j >= 0:
             z[i, j] = (1.0 - theta[i, j]) / oil
+        j = at[SATURATION]
+        if j >= 0:
+            z[i, j] *= theta[i, 2] / oil
+        j = at[DROOP]
+        if j >= 0:
+            z[i, j] *= oil / max(theta[i, 2], 1e-9)
         j = at[DROOP_TIME]
         if j >= 0:
             z[i, j] = math.log(theta[i, j])
