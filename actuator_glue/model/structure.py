@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from actuator_glue.errors import InputError
 from actuator_glue.model import linear
 from actuator_glue.model.effects import CATALOGUE, Effect, Scale, kernel, run
-from actuator_glue.model.exact import ExactErrors, Initial, settle_samples
+from actuator_glue.model.exact import Initial
 from actuator_glue.model.parameters import BASE, Parameter
+from actuator_glue.model.structure_errors import StructureErrors
 from actuator_glue.records import Array, Record
 
 # Effects that Eq. (2)'s exact kernel serves: they scale the command or act on the record.
@@ -115,6 +116,7 @@ class Structure:
         *,
         initial: Initial = 'rest',
         rate: int = 1,
+        origin: float = 0.0,
     ) -> Array:
         """Return the recorded displacement the model expects (free run), (n,) or (m, n) [m].
 
@@ -123,14 +125,17 @@ class Structure:
             record: command, period, hold and known stiffness are used.
             initial: 'rest' at zero, or 'measured': state from the first measured samples.
             rate: how many times finer than usual the integration steps are.
+            origin: time of the first sample since the test began [s]: drift, clock skew and hum
+                count from there. gain-drift counts from the first sample, whatever the origin.
 
         Raises:
             InputError: wrong shape of theta, or the specimen stiffness is not known.
         """
-        table = self._table(theta)
+        table = self.table(theta)
         start = linear.initial_state(record) if initial == 'measured' else (0.0, 0.0)
         out = np.empty((len(table), len(record)))
-        for which, begin, part in self._parts(table, record, start, rate):
+        before = self.before(record) if initial == 'measured' else None
+        for which, begin, part in self.parts(table, record, start, before, origin, rate):
             out[which, begin : begin + len(part)] = part.T
         return out.reshape(*np.shape(theta)[:-1], len(record))
 
@@ -139,13 +144,18 @@ class Structure:
         records: Sequence[Record],
         settle: Sequence[int] | int = 0,
         initial: Initial = 'rest',
+        origin: float = 0.0,
     ) -> StructureErrors:
         """Return the error sums of this structure over records, as ExactErrors for (m, p).
 
         Raises:
             InputError: no record, unknown stiffness or initial, settle too long.
         """
-        return StructureErrors(self, records, settle, initial)
+        return StructureErrors(self, records, settle, initial, origin)
+
+    def before(self, record: Record) -> run.Envelope | None:
+        """Return what is known of the motion before a record, where an effect remembers it."""
+        return run.Envelope(record) if 'supply-droop' in self._columns else None
 
     def jacobian(
         self,
@@ -170,7 +180,7 @@ class Structure:
         Raises:
             InputError: wrong shape of theta, or the specimen stiffness is not known.
         """
-        at = self._table(theta)[0]
+        at = self.table(theta)[0]
         lower, upper = self.bounds()
         step = self.steps(at, scale)
         high = np.minimum(at + step, np.maximum(upper, at))
@@ -205,7 +215,7 @@ class Structure:
             record: gives the period.
             displacement: simulated displacement, shape (n,) or (m, n) [m].
         """
-        table = self._table(theta)
+        table = self.table(theta)
         y = np.atleast_2d(displacement)
         out = np.zeros((len(table), y.shape[1]))
         for effect in self.entries:
@@ -235,7 +245,12 @@ class Structure:
                 displacement = effect.output(part, time[:, np.newaxis], displacement)
         return displacement
 
-    def _table(self, theta: ArrayLike) -> Array:
+    def table(self, theta: ArrayLike) -> Array:
+        """Return theta as (m, p).
+
+        Raises:
+            InputError: another number of parameters.
+        """
         table = np.ascontiguousarray(theta, dtype=np.float64)
         p = len(self.parameters)
         if table.ndim not in (1, 2) or table.shape[-1] != p:
@@ -245,13 +260,23 @@ class Structure:
             )
         return table.reshape(-1, p)
 
-    def _parts(
-        self, table: Array, record: Record, start: tuple[float, float], rate: int = 1
+    def parts(
+        self,
+        table: Array,
+        record: Record,
+        start: tuple[float, float],
+        before: run.Envelope | None,
+        origin: float,
+        rate: int = 1,
     ) -> Iterator[tuple[NDArray[np.intp], int, Array]]:
         """Yield which parameter sets (c,), from which sample, and what they record (n, c)."""
-        time = record.time
+        time = record.time + origin
         if not self._linear:
-            for which, begin, x in run.blocks(self.values(table), self._on, record, start, rate):
+            values = self.values(table)
+            values['delay'] = values['delay'] + values['clock_skew'] * origin
+            if before is not None:
+                values['envelope'] = before(values['droop_time'])
+            for which, begin, x in run.blocks(values, self._on, record, start, rate):
                 now = time[begin : begin + len(x)]
                 yield which, begin, self.sensed(table[which], now, x)
             return
@@ -274,69 +299,3 @@ def _respond(base: Array, record: Record, command: Array, start: tuple[float, fl
         hold=record.hold,
         initial=start,
     )
-
-
-class StructureErrors:
-    """Errors e = measured - simulated of a structure over records; as model.exact.ExactErrors.
-
-    Args:
-        structure: the model.
-        records: tests fitted jointly, each with a known specimen stiffness.
-        settle: samples at each record's beginning that are simulated but not counted.
-        initial: state at the first sample: 'rest', or 'measured' from the first samples.
-
-    Raises:
-        InputError: no record, unknown stiffness or initial, settle too long.
-    """
-
-    def __init__(
-        self,
-        structure: Structure,
-        records: Sequence[Record],
-        settle: Sequence[int] | int = 0,
-        initial: Initial = 'rest',
-    ) -> None:
-        self.structure = structure
-        self._exact = ExactErrors(records, settle, initial)
-        self.records = self._exact.records
-        self.settle = settle_samples(self.records, settle)
-        self.initial = initial
-        self._starts = tuple((float(x), float(v)) for x, v in self._exact.starts)
-
-    @property
-    def sizes(self) -> NDArray[np.int64]:
-        """Counted samples of every record, shape (R,)."""
-        return self._exact.sizes
-
-    def __call__(self, theta: ArrayLike) -> Array:
-        """Return (sum of e, sum of e^2) per theta and record, (R, 2) or (m, R, 2) [m, m^2].
-
-        Thetas whose response does not exist or diverges give NaN or infinity.
-
-        Raises:
-            InputError: theta has the wrong shape.
-        """
-        if not self.structure.effects:
-            return self._exact(theta)
-        table = self.structure._table(theta)
-        out = np.zeros((len(table), len(self.records), 2))
-        for r, record in enumerate(self.records):
-            for which, begin, y in self.structure._parts(table, record, self._starts[r]):
-                first = max(begin, self.settle[r])
-                sums = np.zeros((2, len(which)))
-                run.add_errors(y[first - begin :], record.measured[first : begin + len(y)], sums)
-                out[which, r] += sums.T
-        return out.reshape(*np.shape(theta)[:-1], len(self.records), 2)
-
-    def residuals(self, theta: ArrayLike) -> list[Array]:
-        """Return the counted errors of every record, shape (n_r,) or (m, n_r) each [m].
-
-        Raises:
-            InputError: theta has the wrong shape.
-        """
-        return [
-            (record.measured - self.structure.simulate(theta, record, initial=self.initial))[
-                ..., self.settle[r] :
-            ]
-            for r, record in enumerate(self.records)
-        ]

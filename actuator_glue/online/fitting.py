@@ -69,13 +69,18 @@ def errors(model: ModelChoice, record: Record, settle: int, near: Array | None =
     """
     if not model.effects:
         return FastErrors([record], settle, 'measured', near=near)
-    return Structure(model.effects).errors([record], settle=settle, initial='measured')
+    return Structure(model.effects).errors(
+        [record], settle=settle, initial='measured', origin=_origin(record)
+    )
 
 
-def simulate(model: ModelChoice, theta: Array, record: Record) -> Array:
-    """Return the response of each draw (m, p) over a window, shape (m, n) [m]."""
+def simulate(model: ModelChoice, theta: Array, record: Record, first: int = 0) -> Array:
+    """Return the response of each draw (m, p) from sample `first` of a window on, (m, n) [m]."""
     if model.effects:
-        return Structure(model.effects).simulate(theta, record, initial='measured')
+        response = Structure(model.effects).simulate(
+            theta, record, initial='measured', origin=_origin(record)
+        )
+        return response[:, first:]
     return linear.simulate(
         theta,
         record.command,
@@ -83,7 +88,13 @@ def simulate(model: ModelChoice, theta: Array, record: Record) -> Array:
         period=record.period,
         hold=record.hold,
         initial=linear.initial_state(record),
+        first=first,
     )
+
+
+def _origin(record: Record) -> float:
+    """Time of a window's first sample since the test began [s]: what drifts did so from there."""
+    return record.first_index * record.period
 
 
 def batch(wanted: int) -> int:

@@ -34,6 +34,32 @@ def refinement(values: Mapping[str, Array], stiffness: float, step: float) -> Ar
     return np.asarray(np.clip(np.nan_to_num(factor, nan=1.0), 1.0, _MAX_REFINEMENT))
 
 
+class Envelope:
+    """Speed averaged over the time constant of a supply, at a record's first sample.
+
+    The motion before the record is unknown; what follows its beginning stands for it, seen
+    backwards. That is right where the motion changes little within a time constant.
+
+    Args:
+        record: measured displacement and period are used.
+    """
+
+    _TIMES = np.geomspace(1e-3, 1e3, 61)  # s
+
+    def __init__(self, record: Record) -> None:
+        # Over 20 ms: sensor noise must not pass for speed.
+        gap = min(max(1, round(0.02 / record.period)), len(record) - 1)
+        speed = np.abs(record.measured[gap:] - record.measured[:-gap]) / (gap * record.period)
+        weight = np.exp(-record.time[np.newaxis, : len(speed)] / self._TIMES[:, np.newaxis])
+        self._speeds = (weight @ speed) / weight.sum(axis=1)
+
+    def __call__(self, time_constant: Array) -> Array:
+        """Return the averaged speed [m/s] of each time constant [s], same shape."""
+        with np.errstate(all='ignore'):
+            at = np.log(time_constant)
+        return np.asarray(np.interp(at, np.log(self._TIMES), self._speeds))
+
+
 # Absurd parameters make NaN or infinite responses, seen by who asked for them, not warnings.
 @np.errstate(all='ignore')
 def tables(
@@ -48,7 +74,8 @@ def tables(
     The last block is filled up by repeating the last parameter set.
 
     Args:
-        values: parameters of every compiled stage by name, each (m,).
+        values: parameters of every compiled stage by name, each (m,); 'envelope', where given, is
+            the averaged speed before the first sample [m/s].
         stiffness: specimen stiffness k [N/m].
         substeps: sub-steps per sample.
         period: sample period [s].
@@ -67,6 +94,9 @@ def tables(
     rows[kernel.F] = rows[kernel.R] = stiffness * x * one
     flow = (stiffness + values['alpha_2']) * v + values['alpha_3'] * stiffness * x
     rows[kernel.Q] = rows[kernel.Q_TRAP] = flow
+    if 'envelope' in values:  # of flow over alpha_2, as the kernel has it
+        rows[kernel.ENVELOPE] = values['envelope'] * (stiffness + values['alpha_2']) * one
+        rows[kernel.ENVELOPE] /= values['alpha_2']
     table = np.zeros((kernel.SIZE // kernel.LANES, len(one)))
     for begin, row in rows.items():
         table[begin // kernel.LANES] = row
