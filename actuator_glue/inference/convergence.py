@@ -6,6 +6,7 @@ test/inference/test_convergence.py holds them to arviz.
 
 from __future__ import annotations
 
+import math
 from functools import lru_cache
 
 import numpy as np
@@ -40,7 +41,7 @@ def rhat(draws: Array) -> Array:
         draws: (generations, chains, p).
 
     Returns:
-        (p,); nan for fewer than 4 generations or constant draws.
+        (p,); nan for fewer than 4 generations, draws that are not finite, or constant ones.
     """
     return rhat_and_ess(draws)[0]
 
@@ -56,7 +57,7 @@ def ess_bulk(draws: Array) -> Array:
 def rhat_and_ess(draws: Array) -> tuple[Array, Array]:
     """Return `rhat` and `ess_bulk`, (p,) each, from one ranking of the draws."""
     split = _split(draws)
-    if split.shape[2] < 2:
+    if split.shape[2] < 2 or not np.isfinite(split).all():
         nothing = np.full(draws.shape[2], np.nan)
         return nothing, nothing.copy()
     bulk = _normal(split)
@@ -89,22 +90,35 @@ def _scores(count: int) -> Array:
 
 @njit
 def _ranked(values, ordered, scores, out):  # type: ignore[no-untyped-def]
-    """Write the score of each value's rank; equal values share their mean rank."""
+    """Write the score of each value's rank; equal values share their mean rank.
+
+    A grid over the range tells about where in `ordered` a value stands, bisection exactly.
+    """
+    n = values.shape[1]
+    first = np.empty(n + 2, np.int64)
     for row in range(len(values)):
         up = ordered[row]
-        for i in range(values.shape[1]):
+        wide = up[n - 1] - up[0]
+        fine = n / wide if wide > 0.0 and math.isfinite(n / wide) else 0.0
+        filled = 0
+        for i in range(n):
+            cell = int((up[i] - up[0]) * fine)
+            while filled <= cell:
+                first[filled] = i
+                filled += 1
+        first[filled] = n
+        for i in range(n):
             value = values[row, i]
-            if i > 0 and value == values[row, i - 1]:  # a chain that stayed
-                out[row, i] = out[row, i - 1]
-                continue
-            # Bisection without a branch to mispredict.
-            below, left = 0, len(up)
-            while left > 1:
-                half = left // 2
-                below += half if up[below + half - 1] < value else 0
-                left -= half
+            cell = int((value - up[0]) * fine)
+            below, above = first[cell], first[cell + 1]
+            while below < above:
+                middle = (below + above) // 2
+                if up[middle] < value:
+                    below = middle + 1
+                else:
+                    above = middle
             equal = 1
-            while below + equal < len(up) and up[below + equal] == value:
+            while below + equal < n and up[below + equal] == value:
                 equal += 1
             out[row, i] = scores[2 * below + equal - 1]
 

@@ -160,7 +160,9 @@ def stream(c: Array, state: Array, command: Array, out: Array) -> None:
 
 
 @njit(nogil=True)
-def respond(table: Array, x0: float, v0: float, command: Array, out: Array) -> None:
+def respond(
+    table: Array, x0: float, v0: float, command: Array, first_out: int, out: Array
+) -> None:
     """Step many systems through one command from one initial state.
 
     Args:
@@ -168,8 +170,9 @@ def respond(table: Array, x0: float, v0: float, command: Array, out: Array) -> N
         x0: initial position [m].
         v0: initial velocity [m/s].
         command: shape (n,) [m].
-        out: receives the displacements, shape (n, m) [m]: systems side by side, so that vector
-            units step them together.
+        first_out: samples before this one are stepped through, but not written.
+        out: receives the displacements, shape (n - first_out, m) [m]: systems side by side, so
+            that vector units step them together.
     """
     L, n = LANES, len(command)
     m = len(table)
@@ -184,8 +187,9 @@ def respond(table: Array, x0: float, v0: float, command: Array, out: Array) -> N
                 S[row * L + j] = c[row - _DECAY + DECAY]
         for i in range(n):
             u0, u1, u2 = command[i], command[min(i + 1, n - 1)], command[min(i + 2, n - 1)]
-            for j in range(width):
-                out[i, first + j] = S[_Y * L + j]
+            if i >= first_out:
+                for j in range(width):
+                    out[i - first_out, first + j] = S[_Y * L + j]
             for j in range(L):
                 y = S[_Y * L + j] + S[_D * L + j]
                 S[_Y * L + j] = y

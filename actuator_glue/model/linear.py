@@ -53,8 +53,8 @@ def coefficients(theta: ArrayLike, stiffness: float) -> tuple[Array, Array, Arra
         InputError: wrong shape, or a stiffness that cannot be used.
     """
     k = check_stiffness(stiffness)
-    rows = np.array([kernel.equation_2a(row, k) for row in thetas(theta)]).reshape(-1, 4)
-    n0, d2, d1, d0 = (part.reshape(np.shape(theta)[:-1]) for part in rows.T)
+    parts = kernel.equation_2a.py_func(thetas(theta).T, k)
+    n0, d2, d1, d0 = (part.reshape(np.shape(theta)[:-1]) for part in parts)
     return n0, d2, d1, d0
 
 
@@ -117,6 +117,7 @@ def simulate(
     period: float,
     hold: Hold = 'zoh',
     initial: tuple[float, float] = (0.0, 0.0),
+    first: int = 0,
 ) -> Array:
     """Return the displacement of Eq. (2a) under a sampled command, exact at the samples.
 
@@ -127,14 +128,16 @@ def simulate(
         period: sample period [s].
         hold: how the command runs between its samples.
         initial: position [m] and velocity [m/s] at the first sample.
+        first: samples before this one are simulated but not returned.
 
     Returns:
-        Displacement [m], shape (n,) or (m, n).
+        Displacement [m], shape (n - first,) or (m, n - first).
 
     Raises:
         InputError: wrong shapes, or a stiffness that cannot be used.
     """
-    out = respond(systems(theta, stiffness), command, period=period, hold=hold, initial=initial)
+    system = systems(theta, stiffness)
+    out = respond(system, command, period=period, hold=hold, initial=initial, first=first)
     return out.reshape(*np.shape(theta)[:-1], out.shape[-1])
 
 
@@ -145,6 +148,7 @@ def respond(
     period: float,
     hold: Hold = 'zoh',
     initial: tuple[float, float] = (0.0, 0.0),
+    first: int = 0,
 ) -> Array:
     """Return the response of x'' + a1 x' + a0 x = b0 u, shape (m, n) [m].
 
@@ -156,6 +160,7 @@ def respond(
         period: sample period [s].
         hold: how the command runs between its samples.
         initial: position [m] and velocity [m/s] at the first sample.
+        first: samples before this one are stepped through but not returned.
 
     Raises:
         InputError: the command is not one row of samples.
@@ -164,8 +169,9 @@ def respond(
     if u.ndim != 1 or u.size == 0:
         raise InputError(f'command has shape {u.shape}; one row of samples is needed')
     rows = kernel.discretise(np.ascontiguousarray(system), period, hold == 'linear')
-    out = np.empty((len(u), len(rows)))
-    kernel.respond(rows, float(initial[0]), float(initial[1]), np.ascontiguousarray(u), out)
+    out = np.empty((len(u) - first, len(rows)))
+    x0, v0 = float(initial[0]), float(initial[1])
+    kernel.respond(rows, x0, v0, np.ascontiguousarray(u), first, out)
     return out.T
 
 

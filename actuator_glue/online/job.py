@@ -265,7 +265,7 @@ def _respond(job: Job, frozen: Frozen, record: Record, start: int, stop: int) ->
     # Eq. (2) forgets; an effect may remember the whole window (yield, drift).
     begin = 0 if frozen.model.effects or settle == 0 else max(0, start - 2 * settle)
     part = record.slice(begin, stop)
-    return fitting.simulate(frozen.model, frozen.draws, part)[:, start - begin :]
+    return fitting.simulate(frozen.model, frozen.draws, part, start - begin)
 
 
 def _forecast(job: Job, frozen: Frozen, seed: tuple[int, int]) -> list[Prediction]:

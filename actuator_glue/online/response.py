@@ -41,14 +41,13 @@ def response_band(draws: Array, stiffness: float, settings: EstimatorSettings) -
     frequency = np.linspace(
         settings.frequency_max / settings.frequencies, settings.frequency_max, settings.frequencies
     )
-    # The headline is one more column, so that its phase is unwrapped along with the others.
     order = np.sort(np.append(frequency, settings.headline_frequency))
     at = int(np.searchsorted(order, settings.headline_frequency))
     response = frequency_response(draws[:, : len(BASE)], stiffness, order)
     response = response[np.isfinite(response).all(axis=1)]
     amplitude = band(np.abs(response), settings.levels)
-    angle = np.unwrap(np.angle(response), axis=1).astype(np.float64)
-    phase = band(angle, settings.levels)
+    # Of second order and damped: from 0 to -pi without a jump.
+    phase = band(np.asarray(np.angle(response), np.float64), settings.levels)
     keep = np.delete(np.arange(len(order)), at)
     head = settings.headline_frequency
     lag = float(phase.median[at])
