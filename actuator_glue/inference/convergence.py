@@ -60,10 +60,14 @@ def rhat_and_ess(draws: Array) -> tuple[Array, Array]:
     if split.shape[2] < 2 or not np.isfinite(split).all():
         nothing = np.full(draws.shape[2], np.nan)
         return nothing, nothing.copy()
-    bulk = _normal(split)
-    folded = _normal(np.abs(split - np.median(split, axis=(1, 2), keepdims=True)))
+    values = split.reshape(len(split), -1)
+    ordered = np.sort(values, axis=1)
+    middle = values.shape[1] // 2
+    median = 0.5 * (ordered[:, [middle - 1 + values.shape[1] % 2]] + ordered[:, [middle]])
+    bulk = _normal(values, ordered).reshape(split.shape)
+    folded = _normal(np.abs(values - median), _folded(ordered, median)).reshape(split.shape)
     reduction = np.maximum(_potential_reduction(bulk), _potential_reduction(folded))
-    return reduction, np.array([_effective(one) for one in bulk])
+    return reduction, _effective(bulk)
 
 
 def _split(draws: Array) -> Array:
@@ -73,12 +77,30 @@ def _split(draws: Array) -> Array:
     return np.ascontiguousarray(np.concatenate(parts, axis=1).T)
 
 
-def _normal(values: Array) -> Array:
-    """Normal scores of the ranks over all chains of each parameter, shape kept."""
-    flat = values.reshape(len(values), -1)
-    scores = np.empty_like(flat)
-    _ranked(flat, np.sort(flat, axis=1), _scores(flat.shape[1]), scores)
-    return scores.reshape(values.shape)
+def _normal(values: Array, ordered: Array) -> Array:
+    """Normal scores of the ranks of each row's values, (p, m); `ordered` are the same, sorted."""
+    scores = np.empty_like(values)
+    _ranked(values, ordered, _scores(values.shape[1]), scores)
+    return scores
+
+
+@njit
+def _folded(ordered, median):  # type: ignore[no-untyped-def]
+    """Return the sorted distances of sorted rows from their medians: two sorted halves merged."""
+    folded = np.empty_like(ordered)
+    n = ordered.shape[1]
+    for row in range(len(ordered)):
+        up, centre = ordered[row], median[row, 0]
+        left, right = 0, n - 1
+        for i in range(n - 1, -1, -1):  # the largest distance is at one of the two ends
+            below, above = abs(up[left] - centre), abs(up[right] - centre)
+            if below > above:
+                folded[row, i] = below
+                left += 1
+            else:
+                folded[row, i] = above
+                right -= 1
+    return folded
 
 
 @lru_cache(maxsize=8)
@@ -134,20 +156,24 @@ def _potential_reduction(values: Array) -> Array:
         return np.asarray(np.sqrt((n - 1) / n + between / within))
 
 
-def _effective(values: Array) -> float:
-    """Effective sample size of (chains, n): Vehtari et al. (2021), Eqs. (10)-(12)."""
-    chains, n = values.shape
-    mean = values.mean(axis=1)
+def _effective(values: Array) -> Array:
+    """Effective sample size of (p, chains, n): Vehtari et al. (2021), Eqs. (10)-(12)."""
+    chains, n = values.shape[1:]
+    mean = values.mean(axis=2)
     length = next_fast_len(2 * n, real=True)
-    spectrum = rfft(values - mean[:, np.newaxis], length, axis=1)
-    power = (spectrum.real**2 + spectrum.imag**2).sum(axis=0)
-    covariance = irfft(power, length)[:n] / (n * chains)
-    within = covariance[0] * n / (n - 1)
-    if not within > 0.0:
-        return float('nan')
-    rho = 1.0 - (within - covariance) / (covariance[0] + mean.var(ddof=1))
-    rho[0] = 1.0
-    return float(n * chains / max(_correlation_time(rho), 1.0 / np.log10(n * chains)))
+    spectrum = rfft(values - mean[:, :, np.newaxis], length, axis=2)
+    power = (spectrum.real**2 + spectrum.imag**2).sum(axis=1)
+    covariance = irfft(power, length, axis=1)[:, :n] / (n * chains)
+    between = mean.var(axis=1, ddof=1)
+    found = np.full(len(values), np.nan)
+    for i, one in enumerate(covariance):
+        within = one[0] * n / (n - 1)
+        if within > 0.0:
+            rho = 1.0 - (within - one) / (one[0] + between[i])
+            rho[0] = 1.0
+            least = 1.0 / np.log10(n * chains)
+            found[i] = n * chains / max(_correlation_time(rho), least)
+    return found
 
 
 def _correlation_time(rho: Array) -> float:

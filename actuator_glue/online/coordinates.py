@@ -129,10 +129,11 @@ class Coordinates:
 
     def chains(self, sampled: Chains) -> Chains:
         """Return chains of coordinates as chains of physical parameters with log likelihoods."""
+        draws, log_jacobian = self._map(sampled.draws)
         return replace(
             sampled,
-            draws=self.physical(sampled.draws),
-            log_density=sampled.log_density - self.log_jacobian(sampled.draws),
+            draws=draws.reshape(sampled.draws.shape),
+            log_density=sampled.log_density - log_jacobian.reshape(sampled.log_density.shape),
         )
 
 

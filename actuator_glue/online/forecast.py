@@ -9,7 +9,6 @@ import numpy as np
 
 from actuator_glue.inference.bands import Band, band
 from actuator_glue.inference.predictive import ResidualModel
-from actuator_glue.inference.scores import coverage, mean_width
 from actuator_glue.online.mixture import mixture_band
 from actuator_glue.online.settings import ModelChoice
 from actuator_glue.records import Array
@@ -125,12 +124,12 @@ def predictions(
         bands.append(('noise', mixture_band(simulated, mean, sensor, levels)))
     found = []
     for kind, limits in bands:
-        rows = list(zip(limits.lower, limits.upper, strict=True))
         inside, error = None, float('nan')
         if measured is not None:
-            inside = np.array([coverage(measured, low, high) for low, high in rows])
+            covered = (limits.lower <= measured) & (measured <= limits.upper)
+            inside = np.asarray(covered.mean(axis=1))
             error = float(np.sqrt(np.mean((measured - limits.median) ** 2)))
-        width = np.array([mean_width(low, high) for low, high in rows])
+        width = np.asarray((limits.upper - limits.lower).mean(axis=1))
         found.append(
             Prediction(
                 frozen.number, frozen.start, stamp_ns, period, kind, limits, width, inside, error
