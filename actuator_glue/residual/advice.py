@@ -6,7 +6,7 @@ from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.residual.attribute import Attribution
 from actuator_glue.residual.data import Data
 from actuator_glue.residual.decide import Decision
-from actuator_glue.residual.diagnosis import Json
+from actuator_glue.residual.diagnosis import Estimate, Json
 from actuator_glue.residual.surrogate import Surrogate
 from actuator_glue.residual.windows import Windows
 
@@ -36,7 +36,6 @@ def _where(row: Json) -> str:
 def of(
     decision: Decision,
     found: Attribution,
-    data: Data,
     generic: Surrogate,
     stretches: dict[str, Windows],
 ) -> tuple[str, ...]:
@@ -56,6 +55,12 @@ def of(
                 f'{name} does not agree across the halves of the records ({sizes} {unit}): its '
                 'size changes with time, frequency or stiffness, or it stands for something else'
             )
+    own = decision.final.own
+    if own is not None:
+        out.append(
+            f'{decision.final.added} acts in one record only: that channel may have been set '
+            'differently between these tests; check its setting, or diagnose them apart'
+        )
     if decision.verdict == 'unexplained':
         best = found.singles[0].added if found.singles else ''
         out.append(
@@ -80,9 +85,24 @@ def of(
             f'structure of {1e6 * found.structure:.1f} um is immaterial '
             f'(threshold {1e6 * found.material:.1f} um)'
         )
-    if all(r.known_stiffness() == 0.0 for r in data.records):
-        out.append(
-            'all records are without specimen: only beta_1 and alpha_1_beta_0/alpha_2 are '
-            'identified; add a record with a known specimen stiffness'
-        )
     return tuple(out)
+
+
+def unidentified(data: Data, estimates: dict[str, Estimate]) -> tuple[str, ...]:
+    """Say which parameters the records do not fix: their posterior is that of the bounds."""
+    loose = {n: e for n, e in estimates.items() if not e.identified and e.bounds}
+    if not loose:
+        return ()
+    names = ', '.join(
+        f'{n} (bounds {e.bounds[0]:g} to {e.bounds[1]:g} {e.unit})'
+        for n, e in loose.items()
+        if e.bounds
+    )
+    free = all(r.known_stiffness() == 0.0 for r in data.records)
+    more = (
+        '; without specimen only beta_1 and alpha_1_beta_0/alpha_2 are identified: add a record '
+        'with a known specimen stiffness'
+        if free
+        else ''
+    )
+    return (f'not identified by these records, their spread is that of the bounds: {names}{more}',)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.residual.score import Scorer, evidence, pooled, splits_of
 from actuator_glue.residual.search import Search, Trial
 from actuator_glue.residual.settings import Settings
@@ -123,12 +124,18 @@ class Attributor:
         ranked: list[Trial] = list(singles)
         threshold = self.material
         for stage in range(1, s.most + 1):
-            if not ranked or not self.better(ranked[0], current, threshold):
+            # Nats weigh the whitened error, materiality the plain one: the best by nats may be
+            # immaterial where another effect is neither.
+            worth = [t for t in ranked if self.better(t, current, threshold)]
+            if not worth:
                 break
-            current = ranked[0]
+            current = worth[0]
             self.renoise(current)
             base, singles = self.search.trial(()), self.rescored(singles)
-            threshold = max(self.material, s.later_share * removed(base, current))
+            threshold = self.material
+            if self.left(current) < max(threshold, s.left_share * self.first):
+                # Most is explained: small change may only mend the form of what was found.
+                threshold = max(threshold, s.later_share * removed(base, current))
             hopeless = stage > 1 and self.left(current) > s.hopeless * self.first
             if self.left(current) < threshold or stage == s.most or hopeless:
                 break
@@ -160,9 +167,23 @@ class Attributor:
                 if trials and trials[0].scores.sum() > best.scores.sum():
                     best = trials[0]
             if best is current:
+                best = self.simpler(current, rivals)
+            if best is current:
                 break
             current = best
         return current, rivals
+
+    def simpler(self, current: Trial, rivals: dict[str, tuple[Rival, ...]]) -> Trial:
+        """Take a rival of fewer parameters that these data cannot tell from a member."""
+        for name, row in rivals.items():
+            for rival in row:
+                effects = tuple(
+                    n for n in CATALOGUE if n == rival.name or (n in current.effects and n != name)
+                )
+                fewer = len(CATALOGUE[rival.name].parameters) < len(CATALOGUE[name].parameters)
+                if rival.tied and fewer and rival.nats < self.settings.tie_nats:
+                    return self.search.trial(effects, rival.name)
+        return current
 
     def compare(
         self, rest: Trial, best: Trial, name: str, trials: Sequence[Trial]

@@ -54,24 +54,28 @@ def decide(
 ) -> Decision:
     """Weigh what was found against what remains.
 
-    Where material structure remains, names that a generic surrogate of as many parameters
-    clearly beats explain nothing, even if they remove most of the structure.
+    Names that a generic surrogate of as many parameters beats beyond chance stand only where
+    next to nothing remains: what a regression on the motion explains better than they do is not
+    their doing, even where they remove most of it. A machine that lacks three effects and more
+    lacks others too, and a regression finds some of them: each name then stands by its evidence.
     """
     variance = sum(m.rms**2 for m in seen if m.name != 'hum')
     left = float(np.sqrt(max(0.0, found.left**2 - variance)))
     many = sum(gain >= found.material for gain in found.removed.values()) > 2
     share = settings.left_share_many if many else settings.left_share
     limit = max(settings.left_noise * found.noise, found.material, share * found.structure)
-    floor = max(settings.left_noise * found.noise, found.material)
-    if left > floor and found.final.effects and surrogate.beats(found.material, settings.nats):
-        limit = floor
+    beaten = bool(found.final.effects) and surrogate.beats(found.material, settings.nats)
+    if beaten and not many:
+        floor = max(settings.beaten_noise * found.noise, settings.beaten_share * found.structure)
+        limit = min(limit, floor)
     verdict: Verdict = 'none'
     if left > limit:
         verdict = 'unexplained'
     elif found.final.effects or seen:
         verdict = 'missing-effect'
     # Several effects that explain most of it are worth going on with; what remains is said.
-    partly = verdict == 'unexplained' and many and left < settings.hopeless * found.structure
+    partly = verdict == 'unexplained' and many and not beaten
+    partly = partly and left < settings.left_share_partly * found.structure
     named = verdict == 'missing-effect' or partly
     final = found.final if named else found.base
     return Decision(

@@ -10,18 +10,27 @@ import numpy as np
 
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.parameters import BASE
-from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
-from actuator_glue.residual import advice, measurement, posterior, surrogate, windows
-from actuator_glue.residual.apart import settings_of_records
+from actuator_glue.residual import (
+    advice,
+    apart,
+    lines,
+    measurement,
+    posterior,
+    surrogate,
+    windows,
+)
 from actuator_glue.residual.attribute import Attribution, Attributor
 from actuator_glue.residual.decide import Decision, decide
 from actuator_glue.residual.detect import alarm_of
 from actuator_glue.residual.diagnosis import Candidate, Diagnosis, Estimate, Finding
+from actuator_glue.residual.fit import Space
 from actuator_glue.residual.hygiene import prepare
+from actuator_glue.residual.lines import Line
 from actuator_glue.residual.measurement import Measured
-from actuator_glue.residual.search import Search
+from actuator_glue.residual.search import Search, Trial
 from actuator_glue.residual.settings import Settings
+from actuator_glue.residual.surrogate import Surrogate
 from actuator_glue.residual.verify import Side, traces, verify
 from actuator_glue.residual.windows import Windows
 
@@ -65,14 +74,21 @@ def diagnose(
     held = [holdout] if isinstance(holdout, Record) else list(holdout or ())
     tell('check', 0.0)
     prepared = prepare(records, held)
-    search = Search(prepared.fit, MEAN_EFFECTS, jobs)
     tell('base fit', 0.0)
+    search = Search(prepared.fit, MEAN_EFFECTS, jobs)
+    line = lines.find(prepared.fit, search.base().error)
+    if line is not None:
+        search = Search(lines.without(prepared.fit, line), MEAN_EFFECTS, jobs)
+    data = search.data
     found = Attributor(search, settings, tell).run()
-    seen = measurement.find(prepared.fit, found.final.fit.error, found.material)
+    seen, generic, decision = _conclude(search, found, settings, line)
+    if decision.verdict == 'unexplained':
+        tell('one record', 0.0)
+        own = apart.setting(search, found, decision.limit, prepared.held.records, settings)
+        if own is not None:
+            found = own
+            seen, generic, decision = _conclude(search, found, settings, line)
     assert search.scorer is not None
-    chosen = found.final if found.final.effects else found.singles[0]
-    generic = surrogate.compare(prepared.fit, search.scorer, found.base, chosen)
-    decision = decide(found, seen, prepared.fit, settings, generic)
     stretches = windows.agreement(decision.final, search.scorer)
     rng = np.random.default_rng([seed, 1])
     sides: list[Side] = []
@@ -81,24 +97,21 @@ def diagnose(
             sides.append(sides[0])
             break
         draws = posterior.sample(
-            prepared.fit,
-            trial.effects,
+            data,
+            trial.model,
             trial.fit,
             search.scorer,
             rng=rng,
             evaluations=settings.evaluations if trial.effects else 0,
             progress=partial(tell, stage),
         )
-        sides.append(Side(trial.effects, trial.fit.theta, draws))
+        sides.append(Side(trial.model, trial.fit.theta, draws))
     before, after = sides
-    apart: tuple[str, ...] = ()
-    if decision.verdict == 'unexplained':
-        apart = settings_of_records(prepared.fit, found.material, settings.nats)
     tell('held-out', 0.0)
     error, coverage, curves = verify(
-        prepared.fit, prepared.held, before, after, found.base.fit.error, decision.noise, seed
+        data, prepared.held, before, after, found.base.fit.error, decision.noise, seed, line
     )
-    estimates = _estimates(after)
+    estimates = _estimates(after, max(r.duration for r in data.records))
     tell('done', 1.0)
     return Diagnosis(
         verdict=decision.verdict,
@@ -106,15 +119,15 @@ def diagnose(
         error=error,
         candidates=_candidates(found, seen),
         coverage=coverage,
-        alarm=alarm_of(found, seen, decision, prepared.fit, seed),
+        alarm=alarm_of(found, seen, decision, data, seed),
         advice=(
-            *apart,
-            *advice.of(decision, found, prepared.fit, generic, stretches),
+            *advice.of(decision, found, generic, stretches),
+            *advice.unidentified(data, estimates),
             *prepared.notes,
         ),
         base={p.name: estimates[p.name] for p in BASE},
-        structure=after.effects,
-        names=Structure(after.effects).names,
+        structure=decision.final.effects,
+        names=tuple(p.name for p in after.model.parameters),
         posterior=after.draws,
         best=after.theta,
         traces=(
@@ -127,13 +140,27 @@ def diagnose(
     )
 
 
-def _estimates(side: Side) -> dict[str, Estimate]:
+def _conclude(
+    search: Search, found: Attribution, settings: Settings, line: Line | None
+) -> tuple[tuple[Measured, ...], Surrogate, Decision]:
+    """Look for measurement effects and a generic surrogate beside a structure, and decide."""
+    assert search.scorer is not None
+    seen = measurement.find(search.data, found.final.fit.error, found.material, line)
+    chosen = found.final if found.final.effects else found.singles[0]
+    generic = surrogate.compare(search.data, search.scorer, found.base, chosen)
+    return seen, generic, decide(found, seen, search.data, settings, generic)
+
+
+def _estimates(side: Side, duration: float) -> dict[str, Estimate]:
     out = {}
-    for parameter, column in zip(Structure(side.effects).parameters, side.draws.T, strict=True):
+    space = Space(side.model, duration)
+    lower, upper = space.theta(space.lower), space.theta(space.upper)
+    known = posterior.identified(space, side.draws)
+    for i, (parameter, column) in enumerate(zip(side.model.parameters, side.draws.T, strict=True)):
         low, high = np.quantile(column, [0.025, 0.975])
         out[parameter.name] = Estimate(
             float(column.mean()), float(column.std(ddof=1)), float(low), float(high),
-            parameter.unit, parameter.neutral,
+            parameter.unit, parameter.neutral, bool(known[i]), (float(lower[i]), float(upper[i])),
         )  # fmt: skip
     return out
 
@@ -172,6 +199,7 @@ def _findings(
                 plausible=_excludes_neutral(first),
                 agrees_across_windows=stretches[name].agree,
                 windows=stretches[name].values,
+                records=_records_of(decision.final, name),
             )
         )
     for effect in decision.measured:
@@ -189,6 +217,13 @@ def _findings(
             )
         )
     return tuple(sorted(out, key=lambda f: -(f.error_without**2 - f.error_with**2)))
+
+
+def _records_of(trial: Trial, name: str) -> tuple[str, ...]:
+    """Records that alone have an effect; none where all have it."""
+    if not isinstance(trial.own, apart.OneRecord) or trial.own.own != name:
+        return ()
+    return (trial.own.records[0].source or 'one record',)
 
 
 def _excludes_neutral(estimate: Estimate) -> bool:

@@ -30,6 +30,8 @@ class Estimate:
         upper: 97.5 % quantile [unit].
         unit: SI unit.
         neutral: value that switches the effect off [unit]; None for parameters of Eq. (2).
+        identified: the records fix it; else mean and interval are those of the bounds.
+        bounds: prior bounds [unit].
     """
 
     mean: float
@@ -38,6 +40,8 @@ class Estimate:
     upper: float
     unit: str
     neutral: float | None = None
+    identified: bool = True
+    bounds: tuple[float, float] | None = None
 
     def to_json(self) -> Json:
         """Return the JSON object of one parameter."""
@@ -48,6 +52,8 @@ class Estimate:
             'upper': number(self.upper),
             'unit': self.unit,
             'neutral': self.neutral,
+            'identified': self.identified,
+            'bounds': list(self.bounds) if self.bounds else None,
         }
 
 
@@ -68,6 +74,7 @@ class Finding:
         agrees_across_windows: its leading parameter is the same in all halves of the records
             that fix it; None where fewer than two do (see residual/windows.py).
         windows: the leading parameter in each of these halves [unit of the parameter].
+        records: sources of the records that alone have it; empty where all do.
     """
 
     name: str
@@ -81,6 +88,7 @@ class Finding:
     plausible: bool = True
     agrees_across_windows: bool | None = None
     windows: tuple[float, ...] = ()
+    records: tuple[str, ...] = ()
 
     def to_json(self) -> Json:
         """Return the JSON object of one finding."""
@@ -96,6 +104,7 @@ class Finding:
             'plausible': self.plausible,
             'agrees_across_windows': self.agrees_across_windows,
             'windows': [number(v) for v in self.windows],
+            'records': list(self.records),
         }
 
 
@@ -138,6 +147,8 @@ class HeldOutError:
         removable_removed: share of (before^2 - floor^2) removed, 1 is all.
         sham: rms error with a sham effect of equal parameter count, as control.
         records: rms error before and after of each held-out record.
+        after_without_hum: `after` with the hum that was found regressed out of the held-out part
+            (frequency known, phase not); None without hum.
         split: 'held-out' where data were set aside.
     """
 
@@ -149,6 +160,7 @@ class HeldOutError:
     removable_removed: float
     sham: float
     records: tuple[tuple[str, float, float], ...] = ()
+    after_without_hum: float | None = None
     split: str = 'held-out'
 
     def to_json(self) -> Json:
@@ -163,6 +175,9 @@ class HeldOutError:
             'noise_floor': number(self.noise_floor),
             'removable_removed': number(self.removable_removed),
             'sham': number(self.sham),
+            'after_without_hum': number(self.after_without_hum)
+            if self.after_without_hum is not None
+            else None,
             'records': [
                 {'source': s, 'before': number(b), 'after': number(a)} for s, b, a in self.records
             ],
@@ -300,7 +315,9 @@ class Diagnosis:
                 f'held-out error {before:.1f} -> {after:.1f} um, noise {floor:.1f} um'
             )
         sets = ', '.join(
-            e.name + (f' (or {", ".join(e.alternatives)})' if e.alternatives else '')
+            e.name
+            + (f' in {", ".join(e.records)} only' if e.records else '')
+            + (f' (or {", ".join(e.alternatives)})' if e.alternatives else '')
             for e in self.effects
         )
         return (

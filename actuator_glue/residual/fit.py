@@ -94,6 +94,7 @@ def jacobian(data: Data, model: Model, space: Space, z: Array, output: Array) ->
     return out
 
 
+@np.errstate(all='ignore')  # a start that diverges proposes nothing worth taking
 def _proposals(jac: Array, error: Array, z: Array, damping: float, space: Space) -> Array:
     """Marquardt steps of one start for several dampings, kept inside the bounds: (d, p)."""
     normal, pull = jac @ jac.T, jac @ error

@@ -1,8 +1,7 @@
-"""Effects of the measurement that leave no mean response: grid, line, jitter.
+"""Effects of the measurement that leave no mean response: grid and jitter (hum: lines.py).
 
-quantisation: the values lie on a grid. hum: a line in the stationary spectrum that the command
-does not have. timing-jitter: variance that follows the squared velocity at frequencies where the
-mean response has nothing.
+quantisation: the values lie on a grid, or the error is a sawtooth of position. timing-jitter:
+variance that follows the squared velocity at frequencies where the mean response has nothing.
 """
 
 from __future__ import annotations
@@ -13,7 +12,11 @@ import numpy as np
 from scipy import ndimage, signal
 
 from actuator_glue.records import Array, Record
+from actuator_glue.residual import lines
 from actuator_glue.residual.data import Data
+from actuator_glue.residual.lines import Line
+
+_CLEAR_STEP = 60.0  # of the median power, as for a line in time (lines.py)
 
 
 @dataclass(frozen=True)
@@ -63,55 +66,44 @@ def quantisation(data: Data) -> Measured | None:
     )
 
 
-def _line_power(error: Array, time: Array, frequency: float) -> tuple[float, Array]:
-    """Mean square that a sinusoid explains, and its cosine and sine amplitudes."""
-    basis = np.stack([np.cos(2 * np.pi * frequency * time), np.sin(2 * np.pi * frequency * time)])
-    amplitudes = np.linalg.solve(basis @ basis.T, basis @ error)
-    return float(0.5 * (amplitudes @ amplitudes)), amplitudes
+def staircase(data: Data, errors: Array) -> Measured | None:
+    """Return the converter's step where noise was added after it: an error periodic in position.
 
-
-def hum(data: Data, errors: Array) -> Measured | None:
-    """Return a stationary line of the residual that is not in the command.
-
-    Each record has its own phase: mains is not synchronous with a test.
+    Rounding adds the sawtooth d (round(y/d) - y/d) of the noise-free position y, whose first
+    harmonic over y has the amplitude d/pi: a period and an amplitude that must agree.
     """
-    best: tuple[float, float] = (0.0, 0.0)
-    parts = data.split(errors)
-    for error, period in zip(parts, data.periods, strict=True):
-        spectrum = np.abs(np.fft.rfft(signal.detrend(error) * np.hanning(len(error)))) ** 2
-        level = ndimage.median_filter(spectrum, 201, mode='reflect') + 1e-300
-        f = np.fft.rfftfreq(len(error), period)
-        inside = (f > 2.0) & (f < 0.48 / period)
-        ratio = np.where(inside, spectrum / level, 0.0)
-        at = int(np.argmax(ratio))
-        if ratio[at] > best[0]:
-            best = (float(ratio[at]), float(f[at]))
-    if best[0] < 60.0:  # 40 times the mean; one in 10^6 records of noise
+    parts = list(zip(data.split(errors), data.split(data.target - errors), strict=True))
+    reach = max(float(np.ptp(y)) for _, y in parts)
+    bins = 1 << 13
+    cell = 2.0 * reach / bins  # padded to twice the range: periods are resolved by half a cycle
+    power = np.zeros(bins // 2 + 1)
+    for e, y in parts:
+        at = np.minimum(((y - y.min()) / cell).astype(np.int64), bins - 1)
+        power += np.abs(np.fft.rfft(np.bincount(at, e - e.mean(), bins))) ** 2
+    density = np.fft.rfftfreq(bins, cell)
+    level = ndimage.median_filter(power, 201, mode='reflect') + 1e-300
+    inside = (density > 20.0 / reach) & (density < 0.15 / cell)
+    ratio = np.where(inside, power / level, 0.0)
+    at = int(np.argmax(ratio))
+    if ratio[at] < _CLEAR_STEP:
         return None
-    duration = max(r.duration for r in data.records)
-    frequency = best[1]
+
+    def amplitude(inverse: float) -> float:
+        sums = [abs(np.sum(e * np.exp(2j * np.pi * inverse * y))) for e, y in parts]
+        return float(2.0 * np.sum(sums) / len(errors))
+
+    inverse = float(density[at])
     for width in (0.5, 0.1, 0.02):
-        tried = frequency + np.linspace(-1, 1, 21) * width / duration * 2
-        power = [
-            sum(_line_power(e, t, f)[0] for e, t in zip(parts, data.times, strict=True))
-            for f in tried
-        ]
-        frequency = float(tried[int(np.argmax(power))])
-    found = [_line_power(e, t, frequency) for e, t in zip(parts, data.times, strict=True)]
-    mean_square = float(np.mean([p for p, _ in found]))
-    first = min(found, key=lambda p: -p[0])[1]
-    floor = float(np.mean(errors**2)) - mean_square
-    nats = 0.5 * len(errors) * np.log1p(mean_square / max(floor, 1e-30))
-    spread = float(np.sqrt(2.0 * max(floor, 0.0) / len(errors)))
-    line = float(np.sqrt(6.0 * max(floor, 0.0) / (np.pi**2 * len(errors))) / duration)
-    line /= max(float(np.hypot(*first)), 1e-12)
-    return Measured(
-        'hum',
-        float(np.sqrt(mean_square)),
-        nats,
-        (float(first[0]), float(first[1]), frequency),
-        (spread, spread, line),
-    )
+        tried = inverse + np.linspace(-1.0, 1.0, 21) * width / reach
+        inverse = float(tried[int(np.argmax([amplitude(v) for v in tried]))])
+    step, first = 1.0 / inverse, amplitude(inverse)
+    if not 0.5 < first * np.pi / step < 1.5:
+        return None
+    rms = step / np.sqrt(12.0)
+    floor = max(float(np.mean(errors**2)) - rms**2, 1e-30)
+    nats = 0.5 * len(errors) * float(np.log1p(0.5 * first**2 / floor))
+    spread = step**2 * np.sqrt(6.0 * floor / len(errors)) / (np.pi * first * reach)
+    return Measured('quantisation', rms, nats, (step,), (float(spread),))
 
 
 def jitter(data: Data, errors: Array, simulated: Array) -> Measured | None:
@@ -151,17 +143,22 @@ def jitter(data: Data, errors: Array, simulated: Array) -> Measured | None:
     )
 
 
-def find(data: Data, errors: Array, material: float) -> tuple[Measured, ...]:
+def find(
+    data: Data, errors: Array, material: float, line: Line | None = None
+) -> tuple[Measured, ...]:
     """Return the measurement effects that are significant and material.
 
     Args:
         data: counted samples.
         errors: residual of the final structure (N,) [m].
         material: rms above which an effect matters [m].
+        line: hum that was taken out of the data before.
     """
+    line = line or lines.find(data, errors)
+    hum = Measured('hum', line.rms, line.nats, line.values, line.stddev) if line else None
     found = (
-        quantisation(data),
-        hum(data, errors),
+        quantisation(data) or staircase(data, errors),
+        hum,
         jitter(data, errors, data.target - errors),
     )
     return tuple(m for m in found if m is not None and m.rms >= material and m.nats >= 25.0)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from actuator_glue.inference import dream
 from actuator_glue.model.parameters import BASE
-from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
-from actuator_glue.residual.data import Data
+from actuator_glue.residual.data import Data, Model
 from actuator_glue.residual.fit import Fit, Space
 from actuator_glue.residual.score import Scorer
 
@@ -33,9 +33,21 @@ def laplace(data: Data, scorer: Scorer, fit: Fit) -> tuple[Array, float]:
     return np.asarray(inflation * covariance), inflation
 
 
+def identified(space: Space, draws: Array) -> NDArray[np.bool_]:
+    """Which parameters the records fix (p,): draws (m, p) fill less than half of the bounds.
+
+    Bounds of Eq. (2)'s parameters are decades wide: a factor of e^2 between the 2.5 and 97.5 %
+    quantiles is no knowledge of one.
+    """
+    low, high = np.quantile(space.z(draws), [0.025, 0.975], axis=0)
+    widest = 0.5 * (space.upper - space.lower)
+    widest[:_P] = 2.0
+    return np.asarray(high - low < widest)
+
+
 def sample(
     data: Data,
-    effects: tuple[str, ...],
+    model: Model,
     fit: Fit,
     scorer: Scorer,
     *,
@@ -47,14 +59,13 @@ def sample(
 
     Args:
         data: the fitting part.
-        effects: effects of the structure.
+        model: the structure.
         fit: its best fit.
         scorer: whitening filters of the noise.
         rng: random numbers.
         evaluations: likelihood evaluations; 0 returns draws of the Laplace approximation.
         progress: called with the share done.
     """
-    model = Structure(effects)
     space = Space(model, max(r.duration for r in data.records))
     covariance, inflation = laplace(data, scorer, fit)
     spread = np.sqrt(np.diag(covariance))

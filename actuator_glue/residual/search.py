@@ -12,7 +12,7 @@ from actuator_glue.model.effects import CATALOGUE, Scale, scale
 from actuator_glue.model.parameters import BASE
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
-from actuator_glue.residual.data import Data
+from actuator_glue.residual.data import Data, Model
 from actuator_glue.residual.fit import Fit, base_starts, fit
 from actuator_glue.residual.score import Scorer
 
@@ -31,12 +31,19 @@ class Trial:
         added: the effect that was added last.
         fit: base and effects refitted together.
         scores: out-of-sample log density of every block (B,) [nats].
+        own: the model where it is not `Structure(effects)` (see residual/apart.py).
     """
 
     effects: tuple[str, ...]
     added: str
     fit: Fit
     scores: Array
+    own: Model | None = None
+
+    @property
+    def model(self) -> Model:
+        """What simulates it."""
+        return self.own or Structure(self.effects)
 
     @property
     def mean_square(self) -> float:

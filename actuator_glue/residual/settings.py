@@ -12,7 +12,7 @@ class Settings:
     Attributes:
         noise_share: an effect is material where it removes more than this share of the noise rms,
         stroke_share: and more than this share of the command's amplitude.
-        later_share: a further effect must remove this share of the structure found at first.
+        later_share: where most is explained, a further effect must remove this share of it.
         nats: smallest out-of-sample evidence for any addition.
         tie_nats: two effects cannot be told apart below this evidence,
         tie_share: or where they differ by less than this share of what the better one removes.
@@ -20,6 +20,9 @@ class Settings:
         left_share: and above this share of the structure found at first remains;
         left_share_many: this share where three or more effects are material: such a machine
             lacks more than any search finds, and each finding stands on evidence of its own.
+        left_share_partly: such findings are named beside `unexplained` below this share.
+        beaten_noise, beaten_share: as left_noise and left_share, where a generic surrogate
+            explains more than the names do (0.28 of the noise is found in noise alone).
         hopeless: no third effect is sought where two leave this share of the structure.
         most: most effects added.
         beam: structures carried on from one size to the next.
@@ -29,12 +32,15 @@ class Settings:
 
     noise_share: float = 0.4
     stroke_share: float = 1e-3
-    later_share: float = 0.15
+    later_share: float = 0.08
     nats: float = 10.0
     tie_nats: float = 4.0
     tie_share: float = 0.1
     left_noise: float = 0.6
     left_share: float = 0.3
+    beaten_noise: float = 0.3
+    beaten_share: float = 0.15
+    left_share_partly: float = 0.5
     left_share_many: float = 0.45
     hopeless: float = 0.7
     most: int = 6

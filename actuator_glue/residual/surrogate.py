@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,6 +29,7 @@ class Surrogate:
         structure_error: the same for the structure [m].
         explained: share of the squared error of Eq. (2) that the surrogate removes.
         nats: evidence of the surrogate over the structure, out of sample.
+        tried: how many features were there to choose from.
     """
 
     features: tuple[str, ...]
@@ -36,6 +38,7 @@ class Surrogate:
     structure_error: float
     explained: float
     nats: float
+    tried: int
 
     @property
     def place(self) -> str:
@@ -47,9 +50,12 @@ class Surrogate:
         return 'command' if self.features[0].startswith('loop') else 'sensor'
 
     def beats(self, material: float, nats: float) -> bool:
-        """Whether the surrogate is better both materially and beyond chance."""
-        gain = max(0.0, self.structure_error**2 - self.error**2)
-        return gain > material**2 and self.nats > nats
+        """Whether the surrogate explains more, beyond chance: each feature was the best of many.
+
+        Nats weigh the whitened error; one that is materially worse in plain error is no rival.
+        """
+        worse = max(0.0, self.error**2 - self.structure_error**2) > material**2
+        return not worse and self.nats > nats + len(self.features) * math.log(self.tried)
 
     def to_json(self) -> Json:
         """Return the JSON object of the surrogate."""
@@ -156,4 +162,5 @@ def compare(data: Data, scorer: Scorer, base: Trial, structure: Trial) -> Surrog
         structure_error=scorer.left_out_error(structure.fit),
         explained=max(0.0, 1.0 - (left / whole) ** 2) if whole > 0.0 else 0.0,
         nats=evidence(scorer.block_scores(fit), structure.scores),
+        tried=len(names),
     )

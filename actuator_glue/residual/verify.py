@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
-from actuator_glue.residual.data import Data
+from actuator_glue.residual import lines
+from actuator_glue.residual.data import Data, Model
 from actuator_glue.residual.diagnosis import HeldOutError, Trace
+from actuator_glue.residual.lines import Line
 from actuator_glue.residual.score import BLOCK, pooled, splits_of
 
 _RESAMPLES = 1000
@@ -19,9 +20,9 @@ _NORMAL_95 = 1.959964
 
 @dataclass(frozen=True)
 class Side:
-    """A refitted structure: its effects, best parameters and posterior draws."""
+    """A refitted structure: what simulates it, best parameters and posterior draws."""
 
-    effects: tuple[str, ...]
+    model: Model
     theta: Array
     draws: Array
 
@@ -57,7 +58,7 @@ def bootstrap(
 def _spread(data: Data, side: Side, rng: np.random.Generator) -> Array:
     """Standard deviation of the simulation over posterior draws, (N,) [m]."""
     rows = rng.integers(0, len(side.draws), min(_DRAWS, len(side.draws)))
-    out = data.simulate(Structure(side.effects), side.draws[rows])
+    out = data.simulate(side.model, side.draws[rows])
     out = out[np.isfinite(out).all(axis=1)]
     return np.asarray(out.std(axis=0)) if len(out) > 1 else np.zeros(data.target.size)
 
@@ -70,7 +71,6 @@ def _sham(
     Phase-randomised copies of the command run through the same model: as flexible as a real
     effect with `count` parameters and as smooth, but knowing nothing of the actuator.
     """
-    model = Structure(side.effects)
     features = []
     for data in (fit, held):
         rng = np.random.default_rng([seed, 5])
@@ -82,7 +82,7 @@ def _sham(
                 turn = np.exp(2j * np.pi * rng.random(len(spectrum)))
                 turn[0] = 0.0  # a mean would do what a bias does
                 fake = np.fft.irfft(spectrum * turn, len(record))
-                y = model.simulate(side.theta, replace(record, command=fake))
+                y = side.model.simulate(side.theta, replace(record, command=fake))
                 parts.append(y[mask])
             row[:] = np.concatenate(parts)
         features.append(rows)
@@ -104,23 +104,29 @@ def verify(
     fit_error: Array,
     noise: float,
     seed: int,
+    line: Line | None = None,
 ) -> tuple[HeldOutError, tuple[float, float], dict[str, tuple[Array, Array, Array, Array]]]:
     """Compare both structures on data that decided nothing.
+
+    A line found in the fitting part belongs to the noise here: its phase in the held-out part
+    cannot be predicted. What it does there is told apart (`after_without_hum`): its frequency is
+    known, two amplitudes per record are regressed, and nothing is decided by it.
 
     Returns:
         The error, the coverage of the 95 % bands before and after, and per side the joined
         simulation and band half width of (fit, held) for pictures.
     """
     rng = np.random.default_rng([seed, 3])
+    noise = float(np.hypot(noise, line.rms)) if line else noise
     errors, halves, sims = {}, {}, {}
     for key, side in (('before', before), ('after', after)):
-        sims[key] = held.simulate(Structure(side.effects), side.theta)[0]
+        sims[key] = held.simulate(side.model, side.theta)[0]
         errors[key] = held.target - sims[key]
     floor = noise_floor(held, errors['after'], noise)
     curves = {}
     for key, side in (('before', before), ('after', after)):
         halves[key] = _NORMAL_95 * np.sqrt(_spread(held, side, rng) ** 2 + floor**2)
-        inner = fit.simulate(Structure(side.effects), side.theta)[0]
+        inner = fit.simulate(side.model, side.theta)[0]
         width = _NORMAL_95 * np.sqrt(_spread(fit, side, rng) ** 2 + noise**2)
         curves[key] = (inner, width, sims[key], halves[key])
     intervals = bootstrap((errors['before'] ** 2, errors['after'] ** 2), held, rng)
@@ -147,6 +153,7 @@ def verify(
         noise_floor=floor,
         removable_removed=(first**2 - last**2) / removable if removable > 0 else 0.0,
         sham=sham,
+        after_without_hum=rms(lines.regressed(held, errors['after'], line)) if line else None,
         records=per_record,
     )
     coverage = tuple(

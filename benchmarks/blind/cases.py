@@ -52,6 +52,8 @@ UNKNOWN: dict[str, tuple[float, float]] = {
     'sensor-dropout': (0.1, 4.0),
     'sensor-switch': (5e-6, 200e-6),
 }
+
+
 def sweep() -> Array:
     """Problem R's sweep at this rate [m]."""
     t = np.arange(SAMPLES) / plant.RATE

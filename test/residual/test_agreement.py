@@ -80,6 +80,7 @@ def test_the_truth_beats_the_surrogate() -> None:
     assert found.structure_error == pytest.approx(1e-5, rel=0.1)
     assert found.error > 1.2 * found.structure_error
     assert not found.beats(4e-6, 10.0)
+    assert found.nats < 0.0
 
 
 def test_the_surrogate_beats_a_wrong_name() -> None:

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -73,6 +74,56 @@ def test_play_is_named_and_removed() -> None:
         'removable_removed',
     }  # fmt: skip
     assert out['candidates'][0]['name'] == 'backlash'
+
+
+def test_a_name_that_a_regression_beats_is_withdrawn() -> None:
+    """A command gain that depends on its rate: no effect of the catalogue, small enough to pass.
+
+    Without the surrogate a linear effect is named for it; what v|v| explains by 50 nats and more
+    better than the name is not the name's doing.
+    """
+    rng = np.random.default_rng(21)
+    rated = SWEEP * (1 + 0.5 * np.abs(np.gradient(SWEEP, 1 / RATE)))
+    records = []
+    for k in (0.0, 250e3):
+        y = Structure(()).simulate(THETA, Record(rated, rated, 1 / RATE, stiffness=k))
+        y = y + 1e-5 * rng.standard_normal(len(T))
+        records.append(Record(SWEEP, y, 1 / RATE, stiffness=k))
+    trusting = diagnose(records, settings=replace(QUICK, beaten_share=1.0))
+    assert trusting.verdict == 'missing-effect'
+    found = diagnose(records, settings=QUICK)
+    assert found.verdict == 'unexplained'
+    assert found.effects == ()
+    assert found.surrogate['features'] == ['d/dt loop(v|v|)']
+    assert found.surrogate['nats'] > 40.0
+
+
+@pytest.mark.parametrize('size', [1.03, 1.05])
+def test_a_gain_of_one_test_is_named_with_its_record(size: float) -> None:
+    """The spring test alone has a command gain: no common size explains it, its own does."""
+    free, spring, _ = make(['gain'], [1.0], 23)
+    wrong = Structure(()).simulate(
+        THETA, Record(size * SWEEP, SWEEP, 1 / RATE, stiffness=250e3)
+    ) + (spring.measured - Structure(()).simulate(THETA, spring))
+    spring = replace(spring, measured=wrong, source='spring')
+    found = diagnose([free, spring], settings=QUICK)
+    assert found.verdict == 'missing-effect'
+    assert [(e.name, e.records) for e in found.effects] == [('gain', ('spring',))]
+    estimate = found.effects[0].parameters['gain']
+    assert estimate.lower < size < estimate.upper
+    assert found.error.after == pytest.approx(1e-5, rel=0.1)
+    assert 'gain in spring only' in found.summary()
+
+
+@pytest.mark.parametrize(
+    ('effect', 'size'),
+    [('specimen-hardening', 2.5e5), ('specimen-gap', 6e-4), ('viscous-damping', 2e4)],
+)
+def test_a_specimen_effect_is_not_taken_for_a_setting(effect: str, size: float) -> None:
+    """What only the specimen test shows is the specimen's where that explains it."""
+    a, b, held = make([effect], [size], 24)
+    found = diagnose([a, b], held, settings=QUICK)
+    assert [(e.name, e.records) for e in found.effects] == [(effect, ())]
 
 
 def test_unknown_stiffness_is_refused() -> None:

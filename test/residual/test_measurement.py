@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from actuator_glue.records import Record
+from actuator_glue.residual import lines
 from actuator_glue.residual.data import Data
-from actuator_glue.residual.measurement import find, grid, hum, jitter, quantisation
+from actuator_glue.residual.measurement import find, grid, jitter, quantisation, staircase
 
 RATE = 256.0
 T = np.arange(int(30 * RATE)) / RATE
@@ -46,10 +47,44 @@ def test_a_line_is_found_in_every_phase() -> None:
         e = SIGMA * rng.standard_normal(len(T)) + 2e-5 * np.sin(2 * np.pi * 50.03 * T + phase)
         records.append(Record(Y, Y + e, 1 / RATE, stiffness=0.0))
         errors.append(e)
-    found = hum(Data.whole(records), np.concatenate(errors))
+    found = lines.find(Data.whole(records), np.concatenate(errors))
     assert found is not None
     assert found.values[2] == pytest.approx(50.03, abs=2e-3)
     assert found.rms == pytest.approx(2e-5 / np.sqrt(2), rel=0.1)
+
+
+def test_a_line_is_taken_out_with_its_phase() -> None:
+    """What remains is the noise; 2 % is two standard errors of its rms."""
+    rng = np.random.default_rng(5)
+    e = SIGMA * rng.standard_normal(len(T))
+    hum = 3e-5 * np.sin(2 * np.pi * 50.0 * T + 1.1)
+    seen = data(e + hum)
+    found = lines.find(seen, e + hum)
+    assert found is not None
+    left = lines.without(seen, found).records[0].measured - Y
+    assert np.std(left) == pytest.approx(SIGMA, rel=0.02)
+    assert np.std(lines.regressed(seen, e + hum, found)) == pytest.approx(SIGMA, rel=0.02)
+
+
+def test_harmonics_of_a_sinusoidal_command_are_no_hum() -> None:
+    """The third harmonic is the response to the command, at 9 Hz under a sine of 3 Hz."""
+    u = 2e-3 * np.sin(2 * np.pi * 3.0 * T)
+    e = SIGMA * np.random.default_rng(6).standard_normal(len(T))
+    e = e + 3e-5 * np.sin(2 * np.pi * 9.0 * T)
+    record = Record(u, u + e, 1 / RATE, stiffness=0.0)
+    assert lines.find(Data.whole([record]), e) is None
+    assert lines.find(data(e), e) is not None
+
+
+@pytest.mark.parametrize('step', [2e-5, 6e-5])
+def test_a_grid_under_later_noise_is_found(step: float) -> None:
+    """Noise that the amplifier adds after the converter hides the grid, not its sawtooth."""
+    e = step * np.round(Y / step) - Y + SIGMA * np.random.default_rng(8).standard_normal(len(T))
+    seen = data(e)
+    assert grid(seen.records[0]) == 0.0
+    found = staircase(seen, e)
+    assert found is not None
+    assert found.values[0] == pytest.approx(step, rel=1e-3)
 
 
 def test_jitter_is_variance_with_velocity() -> None:
