@@ -58,8 +58,16 @@ class Job:
 
     @property
     def evaluations(self) -> int:
-        """Likelihood evaluations the window is allowed."""
-        return self.settings.start_evaluations if self.afresh else self.settings.evaluations
+        """Likelihood evaluations the window is allowed; of chains that fill a batch up, too."""
+        generations = self.settings.evaluations // self.settings.chains
+        usual = max(self.settings.evaluations, generations * self.chains)
+        return max(self.settings.start_evaluations, usual) if self.afresh else usual
+
+    @property
+    def chains(self) -> int:
+        """Markov chains; effects are simulated in batches, which are filled up."""
+        wanted = self.settings.chains
+        return fitting.batch(wanted) if self.model.effects else wanted
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -211,17 +219,14 @@ def _stop(job: Job, expired: Callable[[], bool] | None) -> Callable[[dream.State
 
 
 def _sampler(job: Job) -> dream.Settings:
-    """Settings of the sampler; effects are simulated in batches, which are filled up."""
+    """Settings of the sampler."""
     warm = job.archive is not None
-    chains = job.settings.chains
-    sampler = dream.Settings(chains=chains, adaptation=ADAPT if warm else 50)
-    if not job.model.effects:
+    sampler = dream.Settings(chains=job.chains, adaptation=ADAPT if warm else 50)
+    if not (warm and job.model.effects):
         return sampler
-    chains = fitting.batch(chains)
-    if not warm:
-        return replace(sampler, chains=chains)
-    # A warm start takes a quarter of the population, and moves a chain of so many sweeps each.
-    return replace(sampler, chains=chains, population=4 * sampler.sweeps * chains)
+    # A warm start takes a quarter of the population, and moves a chain of so many sweeps each:
+    # batches are full.
+    return replace(sampler, population=4 * sampler.sweeps * job.chains)
 
 
 def _archive(new: Array, old: Array | None) -> Array:

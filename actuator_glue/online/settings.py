@@ -39,7 +39,7 @@ LIMITS: dict[str, Limit] = {
     'settle': Limit('s', 0.0, 60.0, 'start of a window that only lets the state be forgotten'),
     'time_budget': Limit('s', 1e-3, 600.0, 'longest time one window may be computed'),
     'shaping_factor': Limit('1', 1e-3, 1e9, 'G of L = -G ln Var[E], Eq. (4)'),
-    'evaluations': Limit('1', 2000, 10_000_000, 'likelihood evaluations per window'),
+    'evaluations': Limit('1', 2000, 10_000_000, 'likelihood evaluations per window of Eq. (2)'),
     'start_evaluations': Limit('1', 2000, 10_000_000, 'evaluations of a window sampled afresh'),
     'chains': Limit('1', 3, 256, 'Markov chains'),
     'draws': Limit('1', 20, 5000, 'posterior draws simulated for a band'),
@@ -71,9 +71,9 @@ class EstimatorSettings:
     settle: float = 0.5
     time_budget: float = 0.8
     shaping_factor: float = 256.0
-    evaluations: int = 20_000
+    evaluations: int = 4000
     start_evaluations: int = 30_000
-    chains: int = 20
+    chains: int = 8
     draws: int = 200
     seed: int = 1
     rhat_limit: float = 1.05

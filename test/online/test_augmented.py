@@ -7,7 +7,7 @@ from online_streams import THETA, stream
 from actuator_glue.model import commands
 from actuator_glue.model.structure import Structure
 from actuator_glue.online.estimator import Estimator
-from actuator_glue.online.fitting import choose_model
+from actuator_glue.online.fitting import batch, choose_model
 from actuator_glue.online.job import run
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Block, Setup
@@ -43,7 +43,10 @@ def streamed(effect, seed):
 def test_windows_converge_soon_after_a_swap(effect):
     """Two windows may learn the ridge; the third is judged. R-hat is 1.01 to 1.03 on 20 seeds."""
     record, truth = streamed(effect, seed=list(SIZES).index(effect))
-    settings = EstimatorSettings(evaluations=EVALUATIONS, start_evaluations=EVALUATIONS)
+    chains = EstimatorSettings().chains
+    settings = EstimatorSettings(
+        evaluations=EVALUATIONS * chains // batch(chains), start_evaluations=EVALUATIONS
+    )
     estimator = Estimator(settings, choose_model())
     results = []
     for item in stream(record):
