@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from actuator_glue.cli._calibration import fit_error, initial_state, sample, sampled_model
+from actuator_glue.cli._compilation import compilation
 from actuator_glue.cli._output import add_json, note, say, table, write_json
 from actuator_glue.cli._records import add_records, load, number
 from actuator_glue.errors import InputError
@@ -98,13 +99,16 @@ def run(args: argparse.Namespace) -> int:
 
     structure = Structure(args.effect)
     started = time.perf_counter()
-    chains = sample(args, structure, records, initial, settle)
-    seconds = time.perf_counter() - started
+    with compilation() as compiled:
+        chains = sample(args, structure, records, initial, settle)
+    seconds = time.perf_counter() - started - sum(compiled)
     errors = structure.errors(records, [round(settle / r.period) for r in records], initial)
     fit = fit_error(errors.residuals(chains.best[: len(structure.names)]), records, settle)
     parameters = _parameters(structure, chains, args.likelihood)
     converged = all(p['rhat'] is not None and p['rhat'] <= CONVERGED for p in parameters.values())
     _show(args, records, parameters, chains, fit, seconds)
+    if sum(compiled) > 0.5:
+        say(f'{sum(compiled):.1f} s of compilation besides, once per installation', args)
     _warn(records, parameters, chains, converged)
     if args.draws is not None:
         _save_draws(args.draws, chains, parameters, args.effect, initial)
@@ -113,6 +117,7 @@ def run(args: argparse.Namespace) -> int:
         'parameters': parameters,
         'evaluations': chains.evaluations,
         'seconds': seconds,
+        'compile_seconds': sum(compiled),
         'error': fit,
         'converged': converged,
         'effects': list(structure.effects),

@@ -39,6 +39,7 @@ def test_problem_r_from_csv_files(run, problem_r: Path, tmp_path: Path, rng_seed
     assert got['ess'].min() > 1000
     assert content['converged'] is True
     assert content['evaluations'] <= 60_000
+    assert content['seconds'] > 0.0 and content['compile_seconds'] >= 0.0
     assert 2e-5 < content['error']['rms_m'] < 5e-5
     assert 0 < content['error']['nrmse'] < 0.1
     saved = np.load(tmp_path / 'draws.npz')
