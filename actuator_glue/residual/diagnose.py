@@ -11,36 +11,21 @@ import numpy as np
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array, Record
-from actuator_glue.residual import (
-    advice,
-    apart,
-    lines,
-    measurement,
-    posterior,
-    surrogate,
-    windows,
-)
-from actuator_glue.residual.attribute import Attribution, Attributor
-from actuator_glue.residual.decide import Decision, decide
+from actuator_glue.residual import advice, apart, posterior, windows
+from actuator_glue.residual.attribute import Attribution
+from actuator_glue.residual.conclude import Progress, conclude, with_the_right_hold
+from actuator_glue.residual.decide import Decision
 from actuator_glue.residual.detect import alarm_of
 from actuator_glue.residual.diagnosis import Candidate, Diagnosis, Estimate, Finding
 from actuator_glue.residual.fit import Space
 from actuator_glue.residual.hygiene import prepare
-from actuator_glue.residual.lines import Line
 from actuator_glue.residual.measurement import Measured
-from actuator_glue.residual.search import Search, Trial
+from actuator_glue.residual.search import Trial
 from actuator_glue.residual.settings import Settings
-from actuator_glue.residual.surrogate import Surrogate
 from actuator_glue.residual.verify import Side, traces, verify
 from actuator_glue.residual.windows import Windows
 
-Progress = Callable[[str, float], None]
 Clock = Callable[[], float]
-
-# Effects with a mean response; the others are found by measurement.py.
-MEAN_EFFECTS = tuple(
-    name for name, effect in CATALOGUE.items() if effect.variance is None and name != 'hum'
-)
 
 
 def diagnose(
@@ -73,23 +58,11 @@ def diagnose(
     tell = progress or (lambda stage, share: None)
     held = [holdout] if isinstance(holdout, Record) else list(holdout or ())
     tell('check', 0.0)
-    prepared = prepare(records, held)
-    tell('base fit', 0.0)
-    search = Search(prepared.fit, MEAN_EFFECTS, jobs)
-    line = lines.find(prepared.fit, search.base().error)
-    if line is not None:
-        search = Search(lines.without(prepared.fit, line), MEAN_EFFECTS, jobs)
-    data = search.data
-    found = Attributor(search, settings, tell).run()
-    seen, generic, decision = _conclude(search, found, settings, line)
-    if decision.verdict == 'unexplained':
-        tell('one record', 0.0)
-        own = apart.setting(search, found, decision.limit, prepared.held.records, settings)
-        if own is not None:
-            found = own
-            seen, generic, decision = _conclude(search, found, settings, line)
-    assert search.scorer is not None
-    stretches = windows.agreement(decision.final, search.scorer)
+    first = conclude(prepare(records, held), settings, jobs, tell)
+    result = with_the_right_hold(first, settings, jobs, tell)
+    prepared, data, scorer = result.prepared, result.data, result.scorer
+    found, decision = result.found, result.decision
+    stretches = windows.agreement(decision.final, scorer)
     rng = np.random.default_rng([seed, 1])
     sides: list[Side] = []
     for stage, trial in (('posterior before', found.base), ('posterior', decision.final)):
@@ -100,7 +73,7 @@ def diagnose(
             data,
             trial.model,
             trial.fit,
-            search.scorer,
+            scorer,
             rng=rng,
             evaluations=settings.evaluations if trial.effects else 0,
             progress=partial(tell, stage),
@@ -109,7 +82,7 @@ def diagnose(
     before, after = sides
     tell('held-out', 0.0)
     error, coverage, curves = verify(
-        data, prepared.held, before, after, found.base.fit.error, decision.noise, seed, line
+        data, prepared.held, before, after, found.base.fit.error, decision.noise, seed, result.line
     )
     estimates = _estimates(after, max(r.duration for r in data.records))
     tell('done', 1.0)
@@ -117,11 +90,11 @@ def diagnose(
         verdict=decision.verdict,
         effects=_findings(decision, found, estimates, stretches),
         error=error,
-        candidates=_candidates(found, seen),
+        candidates=_candidates(found, result.seen),
         coverage=coverage,
-        alarm=alarm_of(found, seen, decision, data, seed),
+        alarm=alarm_of(found, result.seen, decision, data, seed),
         advice=(
-            *advice.of(decision, found, generic, stretches),
+            *advice.of(decision, found, result.generic, stretches),
             *advice.unidentified(data, estimates),
             *prepared.notes,
         ),
@@ -134,21 +107,10 @@ def diagnose(
             *traces(prepared.fit, False, curves),
             *traces(prepared.held, True, curves),
         ),
-        surrogate=generic.to_json(),
+        surrogate=result.generic.to_json(),
         remaining=decision.remaining,
         seconds=clock() - start if clock else math.nan,
     )
-
-
-def _conclude(
-    search: Search, found: Attribution, settings: Settings, line: Line | None
-) -> tuple[tuple[Measured, ...], Surrogate, Decision]:
-    """Look for measurement effects and a generic surrogate beside a structure, and decide."""
-    assert search.scorer is not None
-    seen = measurement.find(search.data, found.final.fit.error, found.material, line)
-    chosen = found.final if found.final.effects else found.singles[0]
-    generic = surrogate.compare(search.data, search.scorer, found.base, chosen)
-    return seen, generic, decide(found, seen, search.data, settings, generic)
 
 
 def _estimates(side: Side, duration: float) -> dict[str, Estimate]:
