@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from actuator_glue.errors import InputError
-from actuator_glue.model.effects import kernel, run
+from actuator_glue.model.effects import kernel, lti, run
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Hold, check_stiffness
 
@@ -77,9 +77,11 @@ class Stream:
     def reset(self) -> None:
         """Return to rest at zero displacement, sample 0 (the random generator runs on)."""
         start = (0.0, 0.0)
-        self._table = run.tables(self._values, self.stiffness, self._substeps, self.period, start)[
-            0
-        ]
+        args = self._values, self.stiffness
+        if self.structure.linear:
+            self._table = lti.tables(*args, self.period, self.hold == 'linear', start)[0]
+        else:
+            self._table = run.tables(*args, self._substeps, self.period, start)[0]
         self._history = np.zeros(1)
         self._offset = -1
         self._begin = 0
@@ -104,23 +106,30 @@ class Stream:
         u = np.concatenate([self._history, block])
         out = np.empty((len(block), kernel.LANES))
         force = np.empty_like(out)
-        kernel.advance(
-            self._table,
-            self.structure.switches,
-            u,
-            self._offset,
-            self._begin,
-            self._substeps,
-            self.period,
-            self.hold == 'linear',
-            out,
-            force,
-        )
+        self._advance(u, out, force)
         samples = np.arange(self._begin, self._begin + len(block), dtype=np.float64)
         self._begin += len(block)
         self._forget(u)
         y = self.structure.sensed(self.theta[np.newaxis], samples * self.period, out[:, :1])[:, 0]
         return self._measured(y), force[:, 0].copy()
+
+    def _advance(self, u: Array, out: Array, force: Array) -> None:
+        """Run the compiled step through the samples after `_begin`."""
+        at = u, self._offset, self._begin
+        if self.structure.linear:
+            effects = self.structure.effects
+            lti.advance(self._table, lti.third(effects), 'delay' in effects, *at, out, force)
+        else:
+            kernel.advance(
+                self._table,
+                self.structure.switches,
+                *at,
+                self._substeps,
+                self.period,
+                self.hold == 'linear',
+                out,
+                force,
+            )
 
     def _forget(self, u: Array) -> None:
         """Keep the command samples that later steps may ask for."""

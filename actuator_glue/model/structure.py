@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from actuator_glue.errors import InputError
 from actuator_glue.model import linear
-from actuator_glue.model.effects import CATALOGUE, Effect, Scale, kernel, run
+from actuator_glue.model.effects import CATALOGUE, Effect, Scale, kernel, lti, run
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.parameters import BASE, Parameter
 from actuator_glue.model.structure_errors import StructureErrors
@@ -32,6 +32,7 @@ class Structure:
         effects: names of the effects.
         parameters: base parameters, then those of every effect.
         names: their names.
+        linear: all effects are linear, the simulation is exact (effects.lti).
 
     Raises:
         InputError: unknown or repeated effect.
@@ -58,7 +59,8 @@ class Structure:
             first += len(effect.parameters)
         self._on = np.zeros(kernel.SWITCHES, dtype=np.bool_)
         self._on[[s for effect in self.entries for s in effect.switches]] = True
-        self._linear = _OUTSIDE.issuperset(self.effects)
+        self._plain = _OUTSIDE.issuperset(self.effects)
+        self.linear = _OUTSIDE.union(lti.EFFECTS).issuperset(self.effects)
 
     def __repr__(self) -> str:
         return f'Structure({self.effects!r})'
@@ -271,7 +273,14 @@ class Structure:
     ) -> Iterator[tuple[NDArray[np.intp], int, Array]]:
         """Yield which parameter sets (c,), from which sample, and what they record (n, c)."""
         time = record.time + origin
-        if not self._linear:
+        if self.linear and not self._plain:
+            for which, begin, x in run.exact_blocks(
+                self.values(table), self.effects, record, start
+            ):
+                now = time[begin : begin + len(x)]
+                yield which, begin, self.sensed(table[which], now, x)
+            return
+        if not self._plain:
             values = self.values(table)
             with np.errstate(all='ignore'):  # absurd parameters
                 values['delay'] = values['delay'] + values['clock_skew'] * origin

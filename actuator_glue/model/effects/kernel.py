@@ -56,7 +56,7 @@ SWITCHES = 9
 
 
 @njit(inline='always')
-def _held(u: Array, at: int) -> Any:
+def held(u: Array, at: int) -> Any:
     """Command sample `at`, held constant before the first and after the last one."""
     return u[min(max(at, 0), u.shape[0] - 1)]
 
@@ -69,13 +69,13 @@ def _command(u: Array, offset: int, start: float, stop: float, linear: bool) -> 
     a held command keeps its integral and its centre.
     """
     i, k = math.floor(start), math.floor(stop)
-    left, right = _held(u, i - offset), _held(u, k - offset)
+    left, right = held(u, i - offset), held(u, k - offset)
     if not linear:
         share = (stop - k) / (stop - start) if k > i else 0.0
         jump = right - left
         return left + jump * share, 6.0 * jump * share * (1.0 - share)
-    first = left + (start - i) * (_held(u, i + 1 - offset) - left)
-    last = right + (stop - k) * (_held(u, k + 1 - offset) - right)
+    first = left + (start - i) * (held(u, i + 1 - offset) - left)
+    last = right + (stop - k) * (held(u, k + 1 - offset) - right)
     if k == i:
         return 0.5 * (first + last), last - first
     share = (stop - k) / (stop - start)
@@ -288,7 +288,7 @@ def advance(
                     w[_U + n] = w[GAIN + n] * mean
                     w[_RAMP + n] = w[GAIN + n] * slope
             else:
-                mean, slope = _held(u, at - offset), 0.0
+                mean, slope = held(u, at - offset), 0.0
                 if linear:
                     start = at + j * inverse
                     mean, slope = _command(u, offset, start, start + inverse, True)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.jit import njit
-from actuator_glue.model.effects import coefficients, kernel
+from actuator_glue.model.effects import coefficients, kernel, lti
 from actuator_glue.records import Array, Record
 
 # Sub-steps are at most this long: the error of one effect stays below 0.3 um on a 2 mm sweep.
@@ -155,6 +155,29 @@ def blocks(
                     nothing,
                 )
                 yield lanes, begin, part[:, : len(lanes)]
+
+
+def exact_blocks(
+    values: Mapping[str, Array],
+    effects: Sequence[str],
+    record: Record,
+    start: tuple[float, float],
+) -> Iterator[tuple[NDArray[np.intp], int, Array]]:
+    """Simulate a record with linear effects only, as `blocks` does, but exactly and faster."""
+    linear = record.hold == 'linear'
+    before = record.command[:1] if start != (0.0, 0.0) else np.zeros(1)
+    command = np.concatenate([before, record.command])
+    nothing = np.empty((0, kernel.LANES))
+    out = np.empty((min(len(record), _CHUNK), kernel.LANES))
+    third, delayed = lti.third(effects), 'delay' in effects
+    split = lti.tables(values, record.known_stiffness(), record.period, linear, start)
+    count = len(values['beta_1'])
+    for block, table in enumerate(split):
+        lanes = np.arange(block * kernel.LANES, min((block + 1) * kernel.LANES, count))
+        for begin in range(0, len(record), _CHUNK):
+            part = out[: min(_CHUNK, len(record) - begin)]
+            lti.advance(table, third, delayed, command, -1, begin, part, nothing)
+            yield lanes, begin, part[:, : len(lanes)]
 
 
 @njit(nogil=True)
