@@ -15,10 +15,9 @@ from actuator_glue.model.parameters import BASE, Parameter
 from actuator_glue.model.structure_errors import StructureErrors
 from actuator_glue.records import Array, Record
 
-# Effects that Eq. (2)'s exact kernel serves: they scale the command or act on the record.
-_OUTSIDE = frozenset(
-    {'gain'} | {n for n, e in CATALOGUE.items() if e.output is not None or e.variance is not None}
-)
+# Effects that leave the mean of the record, and those that leave the loop Eq. (2).
+_MEANLESS = frozenset(n for n, e in CATALOGUE.items() if e.variance is not None)
+_OUTSIDE = _MEANLESS | {'gain'} | {n for n, e in CATALOGUE.items() if e.output is not None}
 _DEFAULTS = {p.name: p.neutral for e in CATALOGUE.values() for p in e.parameters}
 
 
@@ -59,7 +58,7 @@ class Structure:
             first += len(effect.parameters)
         self._on = np.zeros(kernel.SWITCHES, dtype=np.bool_)
         self._on[[s for effect in self.entries for s in effect.switches]] = True
-        self._plain = _OUTSIDE.issuperset(self.effects)
+        self._plain = _MEANLESS.issuperset(self.effects)
         self.linear = _OUTSIDE.union(lti.EFFECTS).issuperset(self.effects)
 
     def __repr__(self) -> str:
@@ -290,22 +289,12 @@ class Structure:
                 now = time[begin : begin + len(x)]
                 yield which, begin, self.sensed(table[which], now, x)
             return
-        base = table[:, : len(BASE)]
-        x = _respond(base, record, record.command, start)
-        if 'gain' in self._columns:
-            free = _respond(base, record, np.zeros(len(record)), start)
-            with np.errstate(all='ignore'):
-                x = free + table[:, self._columns['gain']] * (x - free)
-        yield np.arange(len(table)), 0, self.sensed(table, time, x.T)
-
-
-def _respond(base: Array, record: Record, command: Array, start: tuple[float, float]) -> Array:
-    """Return Eq. (2)'s displacement under a command, shape (m, n) [m]."""
-    return linear.simulate(
-        base,
-        command,
-        stiffness=record.known_stiffness(),
-        period=record.period,
-        hold=record.hold,
-        initial=start,
-    )
+        x = linear.simulate(
+            table[:, : len(BASE)],
+            record.command,
+            stiffness=record.known_stiffness(),
+            period=record.period,
+            hold=record.hold,
+            initial=start,
+        )
+        yield np.arange(len(table)), 0, x.T
