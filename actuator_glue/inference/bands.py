@@ -13,7 +13,7 @@ from actuator_glue.records import Array
 
 # Quantiles sort a copy of the draws; columns are taken in blocks so that a whole test at 1 kHz
 # does not need its copy in memory.
-COLUMNS_AT_ONCE = 4096
+COLUMNS_AT_ONCE = 512
 
 
 @dataclass(frozen=True, slots=True, eq=False)

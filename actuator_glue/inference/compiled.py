@@ -9,7 +9,8 @@ import numpy as np
 
 from actuator_glue.inference.evaluate import LogDensity
 from actuator_glue.jit import njit
-from actuator_glue.model import quadratic, ridge
+from actuator_glue.model import kernel, laguerre, quadratic, ridge
+from actuator_glue.model.fast import Samples
 from actuator_glue.records import Array
 
 
@@ -18,6 +19,7 @@ class Compiled(NamedTuple):
 
     Attributes:
         rows: its quadratic forms, one row per record (`FastErrors.rows`).
+        samples: the records' samples, for the exact kernel.
         tolerance: error bound beyond which the exact kernel is needed.
         size: samples counted in all records.
         shaping: G of Eq. (4), or 0 for independent Gaussian errors.
@@ -29,6 +31,7 @@ class Compiled(NamedTuple):
     """
 
     rows: Array
+    samples: Samples
     tolerance: float
     size: float
     shaping: float
@@ -86,11 +89,35 @@ def gaussian_likelihood(sums, size, sigma):  # type: ignore[no-untyped-def]
 
 
 @njit(fastmath=False)
+def _exactly(rows, samples, theta, exact, sums):  # type: ignore[no-untyped-def]
+    """Overwrite the error sums (m, R, 2) of thetas (m, p) where exact (R, m) asks for it."""
+    for r in range(len(rows)):
+        which = np.flatnonzero(exact[r])
+        if which.size == 0:
+            continue
+        systems = kernel.systems(theta[which], rows[r, laguerre.STIFFNESS])
+        foh = rows[r, laguerre.FOH] > 0.0
+        table = kernel.discretise(systems, rows[r, laguerre.PERIOD], foh)
+        begin, end = samples.first[r], samples.first[r + 1]
+        out = np.empty((len(which), 2))
+        kernel.error_sums(
+            table,
+            samples.starts[r],
+            samples.measured[begin:end],
+            samples.command[begin + 2 * r : end + 2 * r + 2],
+            samples.settle[r],
+            foh,
+            out,
+        )
+        for i in range(len(which)):
+            sums[which[i], r] = out[i]
+
+
+@njit(fastmath=False)
 def log_densities(density, x, log_jacobian, values):  # type: ignore[no-untyped-def]
     """Fill values (m,) with the log densities of points x (m, p).
 
     Points beyond the bounds (log_jacobian minus infinity) are left out: they are impossible.
-    Returns False where the exact kernel is needed; values are worth nothing then.
     """
     theta = np.empty_like(x)
     which = np.empty(len(x), np.int64)
@@ -114,11 +141,10 @@ def log_densities(density, x, log_jacobian, values):  # type: ignore[no-untyped-
     sums = np.empty((count, records, 2))
     exact = np.empty((records, count), np.bool_)
     if quadratic.evaluate_all(density.rows, theta[:count], density.tolerance, sums, exact):
-        return False
+        _exactly(density.rows, density.samples, theta[:count], exact, sums)
     if density.shaping > 0.0:
         found = variance_likelihood(sums, density.size, density.shaping)
     else:
         found = gaussian_likelihood(sums, density.size, density.sigma)
     for i in range(count):
         values[which[i]] = inner[which[i]] + found[i] if density.mapped else found[i]
-    return True

@@ -56,7 +56,7 @@ class RawErrors(Protocol):
 def _compiled(errors: Errors, size: float, shaping: float, sigma: float) -> Compiled | None:
     if not isinstance(errors, FastErrors):
         return None
-    return Compiled(errors.rows, errors.tolerance, size, shaping, sigma)
+    return Compiled(errors.rows, errors.samples, errors.tolerance, size, shaping, sigma)
 
 
 class GlueLikelihood:

@@ -106,8 +106,7 @@ def many(
 ) -> tuple[Walk, Archive, Path]:
     """Advance all chains by g generations; the bits are those of `one` g times.
 
-    Compiled code goes as far as the fast likelihood holds; a generation with a candidate that
-    needs another kernel is done by `one`.
+    Compiled code goes to the end, or to a candidate of infinite density, which `one` refuses.
 
     Args:
         uniforms: (g, n, `moves.uniforms_per_chain`).
@@ -155,7 +154,7 @@ def _advance(  # type: ignore[no-untyped-def]
     uniforms, z, x, values, target, rows, size, until_append, every, lower, width, tuning,
     pairs, unit_jump, jitter, noise, tempering, density, counts, path_z, path_x, path_values,
 ):  # fmt: skip
-    """Do generations until one needs Python; return how many, the archive's size, the chains."""
+    """Do generations; return how many, the archive's size, the chains."""
     done = 0
     while done < len(uniforms):
         new_z, new_x, log_jacobian, correction, label = generation.propose(
@@ -163,8 +162,7 @@ def _advance(  # type: ignore[no-untyped-def]
             tuning.scale, tuning.centre, tuning.factor, pairs, unit_jump, jitter, noise,
         )  # fmt: skip
         new_values = np.empty(len(z))
-        if not log_densities(density, new_x, log_jacobian, new_values):
-            break
+        log_densities(density, new_x, log_jacobian, new_values)
         new_target = generation.temper(
             new_values, log_jacobian, new_z, tempering.power, tempering.centre, tempering.factor
         )
@@ -172,7 +170,7 @@ def _advance(  # type: ignore[no-untyped-def]
             z, x, values, target, new_z, new_x, new_values, new_target, correction, uniforms[done]
         )
         if infinite >= 0:
-            break  # Python refuses it
+            break  # `one` refuses it
         generation.tally(z, new_z, accepted, label, tuning.scale, counts)
         z, x, values, target = new_z, new_x, new_values, new_target
         path_z[done], path_x[done], path_values[done] = z, x, values

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,6 +25,24 @@ TOLERANCE = 3e-9  # relative error of the sum of squares; times G = 256 it is 8e
 _FEWEST, _MOST, _MOST_FREE = 16, 128, 96
 _MARGIN, _MARGIN_FREE = 1.4, 1.2
 _ENOUGH = 1e-11  # what the terms should leave of the response
+
+
+class Samples(NamedTuple):
+    """The samples of all records one after another, for compiled loops.
+
+    Attributes:
+        measured: shape (n_1 + ... + n_R,) [m].
+        command: two samples longer per record (`linear.padded`) [m].
+        first: where each record begins in `measured`, and the end, shape (R + 1,).
+        starts: initial position and velocity of each record, shape (R, 2) [m, m/s].
+        settle: its uncounted samples, shape (R,).
+    """
+
+    measured: Array
+    command: Array
+    first: NDArray[np.int64]
+    starts: Array
+    settle: NDArray[np.int64]
 
 
 class FastErrors:
@@ -62,6 +82,18 @@ class FastErrors:
         self.rows = np.zeros((len(rows), max(len(row) for row in rows)))
         for wide, row in zip(self.rows, rows, strict=True):
             wide[: len(row)] = row
+
+    @cached_property
+    def samples(self) -> Samples:
+        """What the exact kernel needs."""
+        exact = self.exact
+        return Samples(
+            np.concatenate([record.measured for record in exact.records]),
+            np.concatenate(exact.padded),
+            np.cumsum([0, *(len(record) for record in exact.records)]),
+            np.array(exact.starts),
+            np.array(exact.settle),
+        )
 
     @property
     def sizes(self) -> NDArray[np.int64]:

@@ -1,4 +1,4 @@
-"""Compiled generations have the bits of single steps, wherever Python has to step in."""
+"""Compiled generations have the bits of single steps, with the exact kernel where it is needed."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from actuator_glue.errors import InputError
-from actuator_glue.inference.compiled import Compiled, compiled
+from actuator_glue.inference.compiled import compiled
 from actuator_glue.inference.dream import Settings, State, init, sample, step, stretch
 from actuator_glue.inference.evaluate import LogDensity
 from actuator_glue.inference.likelihood import GaussianLikelihood, GlueLikelihood
@@ -124,6 +124,6 @@ def test_plus_infinity_is_refused_from_compiled_code_too() -> None:
     def infinite(x: Array) -> Array:
         return np.full(len(x), np.inf)
 
-    nothing = Compiled(fast.rows, fast.tolerance, np.inf, fast.shaping, fast.sigma)
+    nothing = fast._replace(size=np.inf)
     with pytest.raises(InputError, match='plus infinity'):
         stretch(np.random.default_rng(0), state, infinite, nothing, 10)
