@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
+from actuator_glue.jit import njit
 from actuator_glue.model.effects import kernel
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.parameters import Parameter
@@ -18,9 +21,33 @@ def _drift(p: Array, time: Array, y: Array) -> Array:
     return y + time * p[:, 0]
 
 
+@njit
+def _line(a: Array, b: Array, hertz: Array, time: Array, y: Array, out: Array) -> None:
+    """Write y plus a spectral line; vector code, which the library's sine is not."""
+    for i in range(y.shape[0]):
+        for n in range(y.shape[1]):
+            turns = hertz[n] * time[i]
+            half = math.pi * (turns - math.floor(turns + 0.5))
+            # Taylor series of sine and cosine up to a quarter turn, to rounding; written out,
+            # since a loop inside would keep the lanes apart.
+            z = half * half
+            sine = 1.0 - z / 272.0 * (1.0 - z / 342.0 * (1.0 - z / 420.0))
+            sine = 1.0 - z / 110.0 * (1.0 - z / 156.0 * (1.0 - z / 210.0 * sine))
+            sine = 1.0 - z / 20.0 * (1.0 - z / 42.0 * (1.0 - z / 72.0 * sine))
+            sine = half * (1.0 - z / 6.0 * sine)
+            cosine = 1.0 - z / 240.0 * (1.0 - z / 306.0 * (1.0 - z / 380.0))
+            cosine = 1.0 - z / 90.0 * (1.0 - z / 132.0 * (1.0 - z / 182.0 * cosine))
+            cosine = 1.0 - z / 12.0 * (1.0 - z / 30.0 * (1.0 - z / 56.0 * cosine))
+            cosine = 1.0 - z / 2.0 * cosine
+            line = a[n] * (1.0 - 2.0 * sine * sine) + b[n] * (2.0 * sine * cosine)
+            out[i, n] = y[i, n] + line
+
+
 def _hum(p: Array, time: Array, y: Array) -> Array:
-    angle = 2.0 * np.pi * time * p[:, 2]
-    return np.asarray(y + p[:, 0] * np.cos(angle) + p[:, 1] * np.sin(angle))
+    out = np.empty(y.shape)
+    a, b, hertz = np.ascontiguousarray(p.T)
+    _line(a, b, hertz, np.ascontiguousarray(time[:, 0]), y, out)
+    return out
 
 
 def _quantisation(p: Array, velocity: Array) -> Array:
