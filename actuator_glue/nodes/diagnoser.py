@@ -216,7 +216,7 @@ class DiagnoserNode(base.SuiteNode):
             self.complain('set_model', f'{self._model_client.srv_name} is not there')
             self._finish(outcome)
             return
-        request = SetModel.Request(effects=list(diagnosis.structure))
+        request = diagnosing.augmented(diagnosis)
 
         def answered(future: Any) -> None:
             response = future.result()

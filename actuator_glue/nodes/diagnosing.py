@@ -9,9 +9,11 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from actuator_glue_msgs.msg import Candidate, Effect
+from actuator_glue_msgs.srv import SetModel
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.load import load_records
+from actuator_glue.model.structure import Structure
 from actuator_glue.nodes.messages import fill
 from actuator_glue.nodes.worker import Tell
 from actuator_glue.online.wire import Fields, Head
@@ -102,6 +104,25 @@ def work(request: Request, tell: Tell) -> Outcome:
         message=found.summary(),
         sources=tuple(r.source for r in records),
         actuator=records[0].actuator,
+    )
+
+
+def augmented(diagnosis: Diagnosis) -> Any:
+    """Return the SetModel request that has an estimator start from what was found."""
+    known = {p.name: p for p in Structure(diagnosis.structure).parameters}
+    found = {
+        known[name]: float(posterior.mean)
+        for effect in diagnosis.effects
+        for name, posterior in effect.parameters.items()
+        if name in known
+    }
+    inside = {p: mean for p, mean in found.items() if p.lower <= mean <= p.upper}
+    return SetModel.Request(
+        effects=list(diagnosis.structure),
+        parameter_names=[p.name for p in inside],
+        lower=[p.lower for p in inside],
+        upper=[p.upper for p in inside],
+        start=list(inside.values()),
     )
 
 

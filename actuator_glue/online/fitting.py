@@ -108,7 +108,7 @@ def starting_points(
     """Return points to start from after the model changed, shape (m, p).
 
     Parameters both models have keep their values; new ones are spread around their starting
-    value by a tenth of their range, or over the prior. None where nothing is shared.
+    value by a tenth of it, or over the prior. None where nothing is shared.
     """
     if model.names == before.names:
         return np.clip(archive, *model.bounds)
@@ -117,7 +117,8 @@ def starting_points(
     points = rng.uniform(lower, upper, (len(archive), len(lower)))
     for j, start in enumerate(model.start):
         if not np.isnan(start):
-            spread = 0.1 * (upper[j] - lower[j])
+            width = upper[j] - lower[j]
+            spread = 0.1 * min(max(abs(start), 1e-3 * width), width)
             points[:, j] = start + spread * rng.uniform(-1.0, 1.0, len(points))
     for j, name in enumerate(model.names):
         if name in before.names:
