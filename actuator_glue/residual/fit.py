@@ -146,13 +146,13 @@ def fit(
     error = data.target - output
     sse = _sse(error)
     alive = np.isfinite(sse)
-    if not alive.any():
-        error = np.where(np.isfinite(error), error, data.target)
     z, output, error, sse = z[alive], output[alive], error[alive], sse[alive]
     if not len(z):
         p = len(space.lower)
         first = space.z(np.atleast_2d(starts))[0]
-        return Fit(space.theta(first), np.full(data.target.size, np.inf), np.zeros((p, 1)), first)
+        # Every start diverged: a metre of error, which nothing prefers.
+        size = data.target.size
+        return Fit(space.theta(first), np.ones(size), np.zeros((p, size)), first)
     damping = np.full(len(z), 1e-2)
     active = np.ones(len(z), dtype=np.bool_)
     for iteration in range(iterations):

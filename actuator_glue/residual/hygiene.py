@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import signal
 
 from actuator_glue.errors import InputError
 from actuator_glue.model.exact import Initial
@@ -13,6 +14,10 @@ from actuator_glue.records import Record
 from actuator_glue.residual.data import Data, Mask
 
 _SHORTEST = 5.0  # s
+_SMALLEST = 5e-6  # m of command, from end to end: below it is no test of an actuator
+_LEAD = 5e-3  # s by which a measured displacement may lead (a compensated command)
+_REACH = 0.5  # s of lag that is looked at
+_FASTEST = 10.0  # m/s: no servo-hydraulic actuator follows
 _REST = 1.5  # s of constant command that define the zero of both channels
 _SETTLE = 1.0  # s in which an unknown initial state is forgotten
 _RATE = 300.0  # Hz: counted samples need not be denser, no effect acts above 100 Hz
@@ -43,7 +48,8 @@ def check(record: Record, number: int) -> None:
     """Refuse a record that cannot be diagnosed.
 
     Raises:
-        InputError: stiffness not known, too short, nothing moves, or units that do not match.
+        InputError: stiffness not known, too short, nothing moves, units that do not match, or
+            channels that are swapped or of opposite sign.
     """
     where = _where(record, number)
     record.known_stiffness()
@@ -53,6 +59,43 @@ def check(record: Record, number: int) -> None:
             f'diagnosis; give at least {_SHORTEST:g} s and 500 samples'
         )
     replace(record, source=where).check_channels()
+    reach = float(np.ptp(record.command))
+    speed = float(np.quantile(np.abs(np.diff(record.command)), 0.99)) / record.period
+    if reach < _SMALLEST or speed > _FASTEST:
+        raise InputError(
+            f'{where}: the command moves {reach:.3g} m in all, at up to {speed:.3g} m/s; check '
+            'the units of its channel and of time (metres and seconds are expected)'
+        )
+    _follows(record, where)
+
+
+def _follows(record: Record, where: str) -> None:
+    """Refuse channels that are swapped or of opposite sign: an actuator follows its command.
+
+    Raises:
+        InputError: the measured displacement leads the command, or moves against it.
+    """
+    u, y = (c - c.mean() for c in (record.command, record.measured))
+    cross = signal.correlate(y, u, method='fft') / np.sqrt(float(u @ u) * float(y @ y))
+    reach = min(len(u) // 4, round(_REACH / record.period))
+    near = cross[len(u) - 1 - reach : len(u) + reach]
+    lags = np.arange(-reach, reach + 1) * record.period
+    at = int(np.argmax(np.abs(near)))
+    lead = -lags[at]
+    # A periodic command has other peaks as high: then nothing can be said.
+    peaks = signal.find_peaks(np.abs(near), height=0.9 * abs(near[at]))[0]
+    if abs(near[at]) < 0.5 or len(peaks) > 1:
+        return
+    if near[at] < 0.0:
+        raise InputError(
+            f'{where}: the measured displacement moves against the command (correlation '
+            f'{near[at]:.2f}); change the sign of one channel'
+        )
+    if lead > max(_LEAD, 2.0 * record.period):
+        raise InputError(
+            f'{where}: the measured displacement leads the command by {1e3 * lead:.0f} ms; '
+            'check whether the two channels are swapped, or their clocks apart'
+        )
 
 
 def rest_samples(record: Record) -> int:

@@ -126,6 +126,20 @@ def test_a_specimen_effect_is_not_taken_for_a_setting(effect: str, size: float) 
     assert [(e.name, e.records) for e in found.effects] == [(effect, ())]
 
 
+def test_a_command_that_ran_linearly_is_seen() -> None:
+    """Half a sample of lead, 4 ms here, looks like a drifting gain: the hold is said instead."""
+    rng = np.random.default_rng(26)
+    records = []
+    for k in (0.0, 250e3):
+        record = Record(SWEEP, SWEEP, 1 / RATE, stiffness=k, hold='linear')
+        y = Structure(()).simulate(THETA, record) + 1e-5 * rng.standard_normal(len(T))
+        records.append(replace(record, measured=y, hold='zoh'))
+    found = diagnose(records, settings=QUICK)
+    assert found.verdict == 'none'
+    assert found.error.after == pytest.approx(1e-5, rel=0.1)
+    assert any('--hold linear' in line for line in found.advice)
+
+
 def test_unknown_stiffness_is_refused() -> None:
     """The stiffness decides what is identified."""
     record = Record(SWEEP, SWEEP, 1 / RATE)

@@ -22,6 +22,10 @@ GOOD = Record(U, 0.9 * U, 1 / 256, stiffness=0.0, source='good')
         (replace(GOOD, command=0 * U), 'command is constant'),
         (replace(GOOD, measured=0 * U + 1e-3), 'channel is connected'),
         (replace(GOOD, measured=900 * U), 'units'),
+        (replace(GOOD, command=1e3 * U, measured=900 * U), 'm/s; check the units'),
+        (replace(GOOD, command=1e-3 * U, measured=9e-4 * U), 'check the units'),
+        (replace(GOOD, measured=-0.9 * U), 'change the sign'),
+        (replace(GOOD, measured=np.append(U[8:], np.zeros(8))), 'leads the command by 31 ms'),
     ],
 )
 def test_unusable_records_say_why(record: Record, says: str) -> None:
@@ -29,6 +33,13 @@ def test_unusable_records_say_why(record: Record, says: str) -> None:
     with pytest.raises(InputError, match=says) as error:
         prepare([record], [])
     assert 'good' in str(error.value)
+
+
+def test_a_periodic_command_has_no_lag_to_judge() -> None:
+    """A sine that lags by 200 degrees looks as if it led by 160: nothing is refused for it."""
+    u = 2e-3 * np.sin(2 * np.pi * 4.0 * T)
+    y = 1e-3 * np.sin(2 * np.pi * 4.0 * T - np.deg2rad(200.0))
+    prepare([Record(u, y, 1 / 256, stiffness=0.0)], [])
 
 
 def test_no_record_is_an_error() -> None:
