@@ -17,6 +17,8 @@ from actuator_glue.records import Record
 
 # From the worker to the published message [s].
 ON_THE_WAY = 5e-3
+# Share of the time budget that is left to whatever else the computer does meanwhile.
+SLACK = 0.08
 
 
 class _Reserve:
@@ -31,11 +33,12 @@ def compute(job: Job, deadline: float, tell: Tell) -> WindowResult:
     Sampling ends early enough for what follows it, as long as that took lately.
     """
     last = time.monotonic()
+    kept = ON_THE_WAY + SLACK * job.settings.time_budget
 
     def expired() -> bool:
         nonlocal last
         last = time.monotonic()
-        return last > deadline - 1.3 * _Reserve.seconds - ON_THE_WAY
+        return last > deadline - 1.3 * _Reserve.seconds - kept
 
     result = run(job, expired)
     after = time.monotonic() - last
