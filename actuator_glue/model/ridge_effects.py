@@ -12,6 +12,7 @@ record fixes:
     Stribeck:       the break-away force in place of the sliding force
     flow:           velocities count as flow over alpha_2; the record shows flow over k + alpha_2
     supply droop:   logarithm of its time constant
+    hum:            its phase in the middle of the record, not at the start of the test
 """
 
 from __future__ import annotations
@@ -34,10 +35,11 @@ _njit: Any = partial(njit, fastmath=False)
 NAMES = (
     'gain', 'damping', 'mass', 'mass_damping', 'coulomb_force', 'sliding_force', 'breakaway_ratio',
     'hardening', 'post_yield_ratio', 'droop_time', 'droop', 'saturation_velocity',
+    'hum_cosine', 'hum_sine', 'hum_frequency',
 )  # fmt: skip
 (
     GAIN, DAMPING, MASS, MASS_DAMPING, COULOMB, SLIDING, BREAKAWAY, HARDENING, POST_YIELD,
-    DROOP_TIME, DROOP, SATURATION,
+    DROOP_TIME, DROOP, SATURATION, COSINE, SINE, FREQUENCY,
 ) = range(len(NAMES))  # fmt: skip
 _SHARES: Final = (DAMPING, MASS, COULOMB, SLIDING, HARDENING)
 # No machine's d0/n0 is larger by more: it would lose ten parts in eleven of its static command.
@@ -78,6 +80,9 @@ def bounds(at: NDArray[np.int64], k: float, low: Array, high: Array) -> tuple[Ar
         lower[j] = 0.0
     if (j := at[DROOP]) >= 0:
         upper[j] *= _LEAST_OIL
+    for part in (COSINE, SINE):
+        if (j := at[part]) >= 0:  # corners of the box, turned
+            lower[j], upper[j] = 1.5 * low[j], 1.5 * high[j]
     if (j := at[DROOP_TIME]) >= 0:
         lower[j], upper[j] = math.log(low[j]), math.log(high[j])
     return lower, upper
@@ -97,11 +102,20 @@ def _split(rate, lag, inertia, s):  # type: ignore[no-untyped-def]
 
 
 @_njit
-def physical(z, k, low, high, at, phi, theta):  # type: ignore[no-untyped-def]
+def turn(row, at, time):  # type: ignore[no-untyped-def]
+    """Turn a line's amplitudes, of a phase that counts from `time` [s], to one from 0."""
+    angle = 2.0 * math.pi * row[at[FREQUENCY]] * time
+    c, s = row[at[COSINE]], row[at[SINE]]
+    row[at[COSINE]] = c * math.cos(angle) - s * math.sin(angle)
+    row[at[SINE]] = c * math.sin(angle) + s * math.cos(angle)
+
+
+@_njit
+def physical(z, k, low, high, at, middle, phi, theta):  # type: ignore[no-untyped-def]
     """Fill theta (p,) from coordinates z (p,), return the log Jacobian less a constant.
 
     It is minus infinity where theta lies outside low..high. `at` is from `columns`, phi (4,) is
-    scratch, k the specimen stiffness [N/m].
+    scratch, k the specimen stiffness [N/m], middle the time of the record's middle [s].
     """
     for j in range(4, len(z)):
         theta[j] = z[j]
@@ -160,6 +174,8 @@ def physical(z, k, low, high, at, phi, theta):  # type: ignore[no-untyped-def]
     if j >= 0:
         theta[j] = math.exp(z[j])
         log_jacobian += z[j]
+    if at[COSINE] >= 0:
+        turn(theta, at, middle)
     for j in range(4, len(z)):
         if not low[j] <= theta[j] <= high[j]:
             return -math.inf
@@ -167,15 +183,15 @@ def physical(z, k, low, high, at, phi, theta):  # type: ignore[no-untyped-def]
 
 
 @_njit
-def physical_all(z, k, low, high, at, theta, log_jacobian):  # type: ignore[no-untyped-def]
+def physical_all(z, k, low, high, at, middle, theta, log_jacobian):  # type: ignore[no-untyped-def]
     """Fill theta (m, p) and the log Jacobian (m,)."""
     phi = np.empty(4)
     for i in range(len(z)):
-        log_jacobian[i] = physical(z[i], k, low, high, at, phi, theta[i])
+        log_jacobian[i] = physical(z[i], k, low, high, at, middle, phi, theta[i])
 
 
 @_njit
-def coordinates_all(theta, k, low, high, at, z):  # type: ignore[no-untyped-def]
+def coordinates_all(theta, k, low, high, at, middle, z):  # type: ignore[no-untyped-def]
     """Fill z (m, p) with the coordinates of physical parameters theta (m, p)."""
     z[:] = theta
     ridge.coordinates_all(theta, k, low, high, z)
@@ -201,6 +217,8 @@ def coordinates_all(theta, k, low, high, at, z):  # type: ignore[no-untyped-def]
         j = at[DROOP_TIME]
         if j >= 0:
             z[i, j] = math.log(theta[i, j])
+        if at[COSINE] >= 0:
+            turn(z[i], at, -middle)
         for part in (MASS_DAMPING, DAMPING):
             j = at[part]
             if j >= 0:

@@ -52,12 +52,20 @@ class Coordinates:
     Args:
         model: gives the prior's box.
         stiffness: specimen stiffness k [N/m].
+        middle: time of the window's middle since the test began [s].
         points: physical parameters (m, p) of an earlier posterior near this one, if there is one.
     """
 
-    def __init__(self, model: ModelChoice, stiffness: float, points: Array | None = None) -> None:
+    def __init__(
+        self,
+        model: ModelChoice,
+        stiffness: float,
+        points: Array | None = None,
+        middle: float = 0.0,
+    ) -> None:
         self._low, self._high = model.bounds
         self._k = stiffness
+        self._middle = middle
         self._at = ridge_effects.columns(model.names)
         self.lower, self.upper = ridge_effects.bounds(self._at, stiffness, self._low, self._high)
         self.lower[:4], self.upper[:4] = -ridge.EDGE, ridge.EDGE
@@ -87,7 +95,7 @@ class Coordinates:
             ridge.physical_all(z, self._k, self._low, self._high, theta, log_jacobian)
         else:
             ridge_effects.physical_all(
-                z, self._k, self._low, self._high, self._at, theta, log_jacobian
+                z, self._k, self._low, self._high, self._at, self._middle, theta, log_jacobian
             )
         if self._shear is not None:
             log_jacobian[~((z >= self._box[0]) & (z <= self._box[1])).all(axis=1)] = -np.inf
@@ -101,7 +109,9 @@ class Coordinates:
         """Return coordinates of physical parameters, (..., p), moved inside their bounds."""
         flat = np.ascontiguousarray(theta, dtype=np.float64).reshape(-1, len(self._low))
         z = np.empty_like(flat)
-        ridge_effects.coordinates_all(flat, self._k, self._low, self._high, self._at, z)
+        ridge_effects.coordinates_all(
+            flat, self._k, self._low, self._high, self._at, self._middle, z
+        )
         if self._shear is not None:
             z = self._shear.straight(np.clip(z, *self._box))
         return np.clip(z, self.lower, self.upper).reshape(theta.shape)

@@ -150,7 +150,8 @@ def _estimate(job: Job, expired: Callable[[], bool] | None) -> WindowResult:
     )
     # What another model has shown says nothing about this one's bends.
     shown = None if job.afresh else job.archive
-    coordinates = Coordinates(model, record.known_stiffness(), shown)
+    middle = (record.first_index + 0.5 * len(record)) * record.period
+    coordinates = Coordinates(model, record.known_stiffness(), shown, middle)
 
     seed = (settings.seed, record.first_index)
     sampler = _sampler(job)

@@ -35,7 +35,7 @@ def determinant(there, phi):
 def test_coordinates_are_one_to_one_and_the_prior_stays_uniform(effects, stiffness, sheared):
     model = choose_model(effects)
     points = inside(model, 400, seed=1) if sheared else None
-    there = Coordinates(model, stiffness, points)
+    there = Coordinates(model, stiffness, points, middle=25.0)
     theta = inside(model, 12, seed=2)
     phi = there.coordinates(theta)
     got = there.log_jacobian(phi)
