@@ -141,6 +141,7 @@ class Attributor:
                 break
             ranked = self.extend(self.rescored(ranked[: s.beam]), stage + 1)
             current = self.search.trial(current.effects, current.added)
+        current = self.pruned(current)
         current, rivals = self.settle(current)
         gains, nats = {}, {}
         for name in current.effects:
@@ -151,6 +152,14 @@ class Attributor:
             base, tuple(singles), current, rivals, gains, nats,
             self.first, self.left(current), self.noise, self.material,
         )  # fmt: skip
+
+    def pruned(self, current: Trial) -> Trial:
+        """Take members away that are not worth their parameters beside the others."""
+        for name in current.effects if len(current.effects) > 1 else ():
+            rest = self.search.without(current, name)
+            if not self.better(current, rest, self.material):
+                return self.pruned(rest)
+        return current
 
     def settle(self, current: Trial) -> tuple[Trial, dict[str, tuple[Rival, ...]]]:
         """Swap members for better rivals until none is better; return rivals of each member."""

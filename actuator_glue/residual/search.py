@@ -73,6 +73,7 @@ class Search:
     _tried: dict[frozenset[str], Fit] = field(default_factory=dict)
     _signatures: dict[str, tuple[Array, Array]] = field(default_factory=dict)
     _polished: set[frozenset[str]] = field(default_factory=set)
+    _descended: set[tuple[frozenset[str], tuple[str, ...]]] = field(default_factory=set)
 
     def base(self) -> Fit:
         """Fit Eq. (2) from a grid of starts."""
@@ -210,15 +211,23 @@ class Search:
         return [wanted[i] for i in np.argsort(-np.array(shares), kind='stable')]
 
     def without(self, current: Trial, name: str) -> Trial:
-        """Refit a structure with one effect taken away."""
+        """Refit a structure with one effect taken away, from where the larger one stands.
+
+        A smaller structure that was fitted before may have stopped in a worse minimum than the
+        larger one leads to: the effect would then be credited with what only the start gained.
+        """
         effects = tuple(n for n in current.effects if n != name)
         key = frozenset(effects)
-        if effects and key not in self._polished:
-            self._polished.add(key)
+        if (key, current.effects) not in self._descended:
+            self._descended.add((key, current.effects))
             model = Structure(current.effects)
             names = {p.name for p in CATALOGUE[name].parameters}
             keep = np.array([p.name not in names for p in model.parameters])
             start = np.stack([current.fit.theta[keep], current.fit.theta[keep]])
             start[1, :_P] = self._tried[frozenset()].theta
-            self._tried[key] = fit(self.data, Structure(effects), start)
+            again = fit(self.data, Structure(effects), start)
+            known = self._tried.get(key)
+            if known is None or again.rms < known.rms:
+                self._tried[key] = again
+            self._polished.add(key)
         return self.trial(effects)
