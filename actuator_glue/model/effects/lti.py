@@ -192,8 +192,10 @@ def _fill(values, k, period, linear, start, tables):  # type: ignore[no-untyped-
                 into[r, 0], into[r, 1], into[r, 2] = first[r] - late[r], late[r], 0.0
         position, velocity = start
         initial[0], initial[2] = position, velocity
-        initial[1] = velocity + t[3] * k * position / oil
-        initial[3], initial[4], initial[5] = k * position / oil, 0.0, position
+        # As if it had gone on at this velocity.
+        load = k * position + (t[7] + t[8] * t[9]) * velocity
+        initial[1] = velocity + t[3] * load / oil
+        initial[3], initial[4], initial[5] = load / oil, 0.0, position
         for r in range(p):
             at = used[r]
             for c in range(p):

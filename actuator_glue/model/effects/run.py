@@ -91,9 +91,13 @@ def tables(
         rows[begin] = x * one
     rows[kernel.V] = rows[kernel.V_EXACT] = v * one
     rows[kernel.DX] = rows[kernel.PLAY_DX] = v * step * one
-    rows[kernel.F] = rows[kernel.R] = stiffness * x * one
-    flow = (stiffness + values['alpha_2']) * v + values['alpha_3'] * stiffness * x
-    rows[kernel.Q] = rows[kernel.Q_TRAP] = flow
+    # As if it had gone on at this velocity: what damps the motion loads the piston.
+    rows[kernel.R] = stiffness * x * one
+    damping = values['damping'] + values['mass'] * values['mass_damping']
+    rows[kernel.F] = rows[kernel.R] + damping * v
+    flow = (stiffness + values['alpha_2']) * v + values['alpha_3'] * rows[kernel.R]
+    rows[kernel.Q_TRAP] = flow
+    rows[kernel.Q] = flow + values['alpha_3'] * damping * v
     if 'envelope' in values:  # of flow over alpha_2, as the kernel has it
         rows[kernel.ENVELOPE] = values['envelope'] * (stiffness + values['alpha_2']) * one
         rows[kernel.ENVELOPE] /= values['alpha_2']
