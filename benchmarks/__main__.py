@@ -88,6 +88,7 @@ def kernel(out: Path) -> dict[str, Any]:
         'linear_ns': rows[0]['ns'],
         'one_effect_ns': rows[1]['ns'],
         'against_effects': rows,
+        'each_effect_ns': effects.each(),
     }
 
 
