@@ -30,7 +30,7 @@ class Settings:
         tried: refits per structure after the first stage, best screened first.
     """
 
-    noise_share: float = 0.4
+    noise_share: float = 0.5
     stroke_share: float = 1e-3
     later_share: float = 0.08
     nats: float = 10.0
