@@ -25,8 +25,6 @@ SIZES = {
 }
 # Evaluations that one core does in 0.4 s at 1 kHz and 5 s, a hop of 1 s.
 EVALUATIONS = 12_000
-# Eight chains are filled up to a batch of 32, each of as many generations.
-SETTINGS = EstimatorSettings(chains=8, evaluations=EVALUATIONS // 4, start_evaluations=EVALUATIONS)
 SWAP, END, RATE = 18.0, 21.0, 1000.0
 
 
