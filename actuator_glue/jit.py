@@ -1,11 +1,48 @@
-"""One place for how kernels are compiled: cached on disk, IEEE except for reassociation."""
+"""One place for how kernels are compiled and where compiled code is kept.
+
+IEEE arithmetic except for reassociation and contraction.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import os
+import shutil
+from contextlib import suppress
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numba
+
+_KEPT = 4
+
+
+def _folder() -> Path:
+    """Return the folder for the code of exactly these sources; of others the newest few stay.
+
+    numba looks at the file of a function alone: after an update a caller would go on with its
+    copy of a callee that has changed in another file.
+    """
+    package = Path(__file__).parent
+    digest = hashlib.sha256()
+    for path in sorted(package.rglob('*.py')):
+        content = path.read_bytes()
+        if b'njit' in content:
+            digest.update(content)
+    folder = package / '__pycache__' / f'compiled-{digest.hexdigest()[:16]}'
+    others = [p for p in folder.parent.glob('compiled-*') if p != folder]
+    # Not all: a process that began before an update may still write to its own. And whoever else
+    # starts now does the same.
+    with suppress(OSError):
+        for other in sorted(others, key=os.path.getmtime)[:-_KEPT]:
+            shutil.rmtree(other, ignore_errors=True)
+    return folder
+
+
+# Who names a folder, or installs the package where it cannot be written, is left to numba.
+if 'NUMBA_CACHE_DIR' not in os.environ and os.access(Path(__file__).parent, os.W_OK):
+    numba.config.CACHE_DIR = str(_folder())
 
 # Reassociation and contraction let LLVM use vector and fused instructions; NaN and infinity keep
 # their meaning (a diverging simulation must stay visible as such).

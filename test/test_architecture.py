@@ -34,7 +34,8 @@ ARROWS = {
     'demo': EVERYTHING,
     'cli': EVERYTHING | {'demo'},
 }
-PURE = ('errors', 'records', 'jit', 'model', 'inference', 'online', 'residual')
+# All below io but jit, which keeps compiled code in files.
+PURE = ('errors', 'records', 'model', 'inference', 'online', 'residual')
 ROS = ('rclpy', 'launch', 'ament_index_python')
 HEAVY = ('numba', 'scipy', 'matplotlib', 'arviz', 'control', 'statsmodels', 'rosbags', 'rclpy')
 

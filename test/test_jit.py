@@ -1,6 +1,7 @@
-"""Compiled code gives the same bits in the process that compiles it and in all later ones."""
+"""Compiled code: the same bits in every process, and never that of sources of yesterday."""
 
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -32,3 +33,29 @@ def test_fresh_and_cached_code_agree_to_the_bit(tmp_path: Path) -> None:
     )  # fmt: skip
     assert any(tmp_path.rglob('*.nbc'))
     assert compiled == cached
+
+
+def test_a_changed_callee_is_compiled_again(tmp_path: Path) -> None:
+    """Numba alone would go on with the copy in the caller's cached code."""
+    package = tmp_path / 'actuator_glue'
+    package.mkdir()
+    (package / '__init__.py').touch()
+    shutil.copy(Path(__file__).parents[1] / 'actuator_glue/jit.py', package)
+    (package / 'outer.py').write_text(
+        'from actuator_glue.inner import inner\nfrom actuator_glue.jit import njit\n\n'
+        '@njit\ndef outer(x):\n    return 10.0 * inner(x)\n'
+    )
+    found = []
+    for number in (1, 2, 2):
+        (package / 'inner.py').write_text(
+            'from actuator_glue.jit import njit\n\n'
+            f'@njit\ndef inner(x):\n    return x + {number}\n'
+        )
+        done = subprocess.run(
+            [sys.executable, '-c', 'from actuator_glue.outer import outer; print(outer(0.0))'],
+            env={k: v for k, v in os.environ.items() if k != 'NUMBA_CACHE_DIR'},
+            cwd=tmp_path, check=True, capture_output=True, text=True, timeout=300,
+        )  # fmt: skip
+        found.append(float(done.stdout))
+    assert found == [10.0, 20.0, 20.0]
+    assert len(list((package / '__pycache__').glob('compiled-*'))) == 2
