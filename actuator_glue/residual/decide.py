@@ -58,7 +58,7 @@ def decide(
     next to nothing remains: what a regression on the motion explains better than they do is not
     their doing, even where they remove most of it. A machine that lacks three effects and more
     lacks others too, and a regression finds some of them: its names are then held to the share
-    that one or two effects are held to.
+    that one or two effects are held to, and fall where the regression leaves nothing material.
     """
     variance = sum(m.rms**2 for m in seen if m.name != 'hum')
     left = float(np.sqrt(max(0.0, found.left**2 - variance)))
@@ -66,7 +66,8 @@ def decide(
     beaten = bool(found.final.effects) and surrogate.beats(found.material, settings.nats)
     share = settings.left_share_many if many and not beaten else settings.left_share
     limit = max(settings.left_noise * found.noise, found.material, share * found.structure)
-    if beaten and not many:
+    rest = max(0.0, surrogate.error**2 - found.noise**2)
+    if beaten and (not many or rest < found.material**2):
         floor = max(settings.beaten_noise * found.noise, settings.beaten_share * found.structure)
         limit = min(limit, floor)
     verdict: Verdict = 'none'
