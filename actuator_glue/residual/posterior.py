@@ -33,6 +33,20 @@ def laplace(data: Data, scorer: Scorer, fit: Fit) -> tuple[Array, float]:
     return np.asarray(inflation * covariance), inflation
 
 
+def _scaled(covariance: Array, widest: Array) -> tuple[Array, Array]:
+    """Standard deviations (p,) and correlations (p, p); `widest` (p,) where data say nothing.
+
+    What the data say nothing about has a variance of 0 or of many decades: left in the covariance,
+    it takes all digits from the directions that they do fix.
+    """
+    sd = np.sqrt(np.diag(covariance))
+    told = sd > 0.0
+    safe = np.where(told, sd, 1.0)
+    correlation = covariance / np.outer(safe, safe)
+    correlation[np.diag_indices(len(sd))] = 1.0
+    return np.where(told, sd, widest), correlation
+
+
 def identified(space: Space, draws: Array) -> NDArray[np.bool_]:
     """Which parameters the records fix (p,): draws (m, p) fill less than half of the bounds.
 
@@ -68,15 +82,15 @@ def sample(
     """
     space = Space(model, max(r.duration for r in data.records))
     covariance, inflation = laplace(data, scorer, fit)
-    spread = np.sqrt(np.diag(covariance))
+    spread, correlation = _scaled(covariance, space.upper - space.lower)
     spread[:_P] = np.minimum(spread[:_P], 1.0)
     lower = np.maximum(space.lower, fit.z - _REACH * spread)
     upper = np.minimum(space.upper, fit.z + _REACH * spread)
     # A parameter at its bound or without curvature still needs room to move.
     width = np.maximum(upper - lower, 1e-6 * (space.upper - space.lower))
     lower, upper = np.maximum(space.lower, upper - width), np.minimum(space.upper, lower + width)
-    values, vectors = np.linalg.eigh(covariance)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    values, vectors = np.linalg.eigh(correlation)
+    root = spread[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
 
     def gaussian(count: int) -> Array:
         z = fit.z + rng.standard_normal((count, len(fit.z))) @ root.T
