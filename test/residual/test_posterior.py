@@ -7,7 +7,7 @@ from actuator_glue.residual.posterior import _scaled
 
 def test_an_unknown_direction_takes_no_digits_from_the_known_ones() -> None:
     """At k = 0 alpha_3 has no curvature to speak of; beta_1 must keep its spread all the same."""
-    known = np.array([[5e-5, 2e-7], [2e-7, 4e-10]])
+    known = np.array([[5e-5, 1e-7], [1e-7, 4e-10]])
     covariance = np.zeros((4, 4))
     covariance[:2, :2] = known
     covariance[2, 2] = 6e15
