@@ -11,6 +11,7 @@ def test_an_unknown_direction_takes_no_digits_from_the_known_ones() -> None:
     covariance = np.zeros((4, 4))
     covariance[:2, :2] = known
     covariance[2, 2] = 6e15
+    covariance[2, :2] = covariance[:2, 2] = (1e3, 1e1)
     spread, correlation = _scaled(covariance, np.full(4, 7.0))
     assert spread[3] == 7.0
     values, vectors = np.linalg.eigh(correlation)
