@@ -52,6 +52,7 @@ if 'NUMBA_CACHE_DIR' not in os.environ and os.access(Path(__file__).parent, os.W
 njit: Any = partial(
     numba.njit,
     cache=True,
+    nogil=True,
     forceinline=True,
     error_model='numpy',
     fastmath={'reassoc', 'contract', 'nsz', 'arcp'},

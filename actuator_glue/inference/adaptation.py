@@ -6,6 +6,7 @@ renewed whenever the archive has doubled, that is ever more rarely, from ever mo
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from actuator_glue.inference.moves import INDEPENDENCE, NAMES, PARALLEL, independence
 from actuator_glue.inference.settings import Settings
+from actuator_glue.jit import njit
 from actuator_glue.records import Array
 
 # Every crossover class keeps at least this weight, and the independence move this share, so that
@@ -49,31 +51,61 @@ def tune(
 ) -> Tuning:
     """Fit the proposals to points (m, p) and the shares to what the moves achieved.
 
-    The measure is the mean squared jump (Vrugt 2016, section 3.2.1): the independence and parallel
-    moves share by it what the snooker move leaves, and so do the crossover classes, unless
-    `crossover_cdf` says what they have.
+    Crossover classes share by their mean squared jump (Vrugt 2016, section 3.2.1), unless
+    `crossover_cdf` says what they have; the independence and parallel moves share what the snooker
+    move leaves by the square of the effective draws that such jumps make: nearer to the better one
+    alone than to equal parts.
     """
-    reach = _mean_jumps(counts)
-    both = reach[INDEPENDENCE] + reach[PARALLEL]
-    share = settings.independence * (reach[INDEPENDENCE] / both if both > 0.0 else 0.5)
-    if settings.independence > 0.0:
-        share = max(share, min(_LEAST, settings.independence))
-    free = 1.0 - settings.snooker
-    moves = np.array([free * (1.0 - share), settings.snooker, free * share])
-    if crossover_cdf is None:
-        crossover = reach[len(NAMES) :]
-        crossover = crossover / crossover.sum() if crossover.sum() > 0.0 else crossover
-        crossover = np.maximum(crossover, _FLOOR)
-        crossover_cdf = np.cumsum(crossover / crossover.sum())
-    centre, factor = independence.fit(points)
-    scale = np.sqrt((factor**2).sum(axis=1))
-    return Tuning(np.cumsum(moves), crossover_cdf, scale, centre, factor)
-
-
-def _mean_jumps(counts: Array) -> Array:
-    return np.divide(
-        counts[:, 2], counts[:, 0], out=np.zeros(len(counts)), where=counts[:, 0] > 0.0
+    shares, crossovers = np.empty(len(NAMES)), np.empty(settings.crossovers)
+    centre, factor, scale = _fit(
+        points, counts, settings.independence, settings.snooker, shares, crossovers
     )
+    return Tuning(
+        shares, crossovers if crossover_cdf is None else crossover_cdf, scale, centre, factor
+    )
+
+
+@njit(fastmath=False)
+def _drawn(jump, dimension):  # type: ignore[no-untyped-def]
+    """Effective draws per move whose mean squared jump is 2 p r, in standard deviations."""
+    r = min(0.5 * jump / dimension, 1.0)
+    return r / (2.0 - r)
+
+
+@njit(fastmath=False)
+def _fit(points, counts, most, snooker, moves, crossovers):  # type: ignore[no-untyped-def]
+    """Fill the cumulative probabilities, return centre, factor and scale of the points."""
+    reach = np.zeros(len(counts))
+    for i in range(len(counts)):
+        if counts[i, 0] > 0.0:
+            reach[i] = counts[i, 2] / counts[i, 0]
+    alone = _drawn(reach[INDEPENDENCE], points.shape[1]) ** 2
+    along = _drawn(reach[PARALLEL], points.shape[1]) ** 2
+    share = most * (alone / (alone + along) if alone + along > 0.0 else 0.5)
+    if most > 0.0:
+        share = max(share, min(_LEAST, most))
+    free = 1.0 - snooker
+    moves[0] = free * (1.0 - share)
+    moves[1] = moves[0] + snooker
+    moves[2] = moves[1] + free * share
+    first = len(moves)
+    total = 0.0
+    for i in range(len(crossovers)):
+        total += reach[first + i]
+    weights = 0.0
+    for i in range(len(crossovers)):
+        weight = reach[first + i] / total if total > 0.0 else 0.0
+        weights += max(weight, _FLOOR)
+        crossovers[i] = weights
+    for i in range(len(crossovers)):
+        crossovers[i] /= weights
+    centre, factor = independence.fit(points)
+    scale = np.zeros(len(centre))
+    for j in range(len(centre)):
+        for k in range(j + 1):
+            scale[j] += factor[j, k] * factor[j, k]
+        scale[j] = math.sqrt(scale[j])
+    return centre, factor, scale
 
 
 def outliers(mean_log_density: Array) -> NDArray[np.intp]:

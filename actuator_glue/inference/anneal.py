@@ -161,7 +161,21 @@ def _rise(gain, most, survivors):  # type: ignore[no-untyped-def]
 
 def resample(rng: np.random.Generator, log_weights: Array, size: int) -> NDArray[np.intp]:
     """Systematic resampling: `size` indices drawn with the given log weights."""
-    weights = np.exp(log_weights - log_weights.max())
-    cumulative = np.cumsum(weights)
-    places = (np.arange(size) + rng.random()) / size * cumulative[-1]
-    return np.asarray(np.minimum(np.searchsorted(cumulative, places), len(weights) - 1))
+    return np.asarray(_systematic(log_weights - log_weights.max(), rng.random(), size))
+
+
+@njit(fastmath=False)
+def _systematic(log_weights, first, size):  # type: ignore[no-untyped-def]
+    total = 0.0
+    weights = np.exp(log_weights)
+    for weight in weights:
+        total += weight
+    chosen = np.empty(size, np.intp)
+    at, reached = 0, weights[0]
+    for i in range(size):
+        place = (i + first) / size * total
+        while reached < place and at < len(weights) - 1:
+            at += 1
+            reached += weights[at]
+        chosen[i] = at
+    return chosen

@@ -10,7 +10,6 @@ import math
 from functools import lru_cache
 
 import numpy as np
-from scipy.fft import irfft, next_fast_len, rfft
 from scipy.special import ndtri
 
 from actuator_glue.jit import njit
@@ -29,7 +28,7 @@ def gelman_rubin(draws: Array) -> Array:
         (p,); nan where fewer than two draws or chains remain or nothing moves.
     """
     half = draws[len(draws) // 2 :]
-    return _potential_reduction(np.ascontiguousarray(half.T))
+    return np.asarray(_potential_reduction(np.ascontiguousarray(half.T)))
 
 
 def rhat(draws: Array) -> Array:
@@ -145,49 +144,88 @@ def _ranked(values, ordered, scores, out):  # type: ignore[no-untyped-def]
             out[row, i] = scores[2 * below + equal - 1]
 
 
-def _potential_reduction(values: Array) -> Array:
+@njit(fastmath=False)
+def _spread(chains):  # type: ignore[no-untyped-def]
+    """Return the mean variance within chains (m, n), and the variance of their means."""
+    m, n = chains.shape
+    within, centre = 0.0, 0.0
+    means = np.empty(m)
+    for i in range(m):
+        means[i] = chains[i].sum() / n
+        centre += means[i] / m
+    between = 0.0
+    for i in range(m):
+        total = 0.0
+        for value in chains[i]:
+            total += (value - means[i]) ** 2
+        within += total / (n - 1) / m
+        between += (means[i] - centre) ** 2 / (m - 1)
+    return within, between, means
+
+
+@njit(fastmath=False)
+def _potential_reduction(values):  # type: ignore[no-untyped-def]
     """sqrt(((n - 1)/n W + B/n) / W) for values (p, chains, n)."""
     chains, n = values.shape[1:]
+    found = np.full(len(values), np.nan)
     if n < 2 or chains < 2:
-        return np.full(len(values), np.nan)
-    within = values.var(axis=2, ddof=1).mean(axis=1)
-    between = values.mean(axis=2).var(axis=1, ddof=1)
-    with np.errstate(divide='ignore', invalid='ignore'):
-        return np.asarray(np.sqrt((n - 1) / n + between / within))
+        return found
+    for i in range(len(values)):
+        within, between, _ = _spread(values[i])
+        found[i] = math.sqrt((n - 1) / n + between / within)
+    return found
 
 
 def _effective(values: Array) -> Array:
     """Effective sample size of (p, chains, n): Vehtari et al. (2021), Eqs. (10)-(12)."""
     chains, n = values.shape[1:]
-    mean = values.mean(axis=2)
-    length = next_fast_len(2 * n, real=True)
-    spectrum = rfft(values - mean[:, :, np.newaxis], length, axis=2)
-    power = (spectrum.real**2 + spectrum.imag**2).sum(axis=1)
-    covariance = irfft(power, length, axis=1)[:, :n] / (n * chains)
-    between = mean.var(axis=1, ddof=1)
     found = np.full(len(values), np.nan)
-    for i, one in enumerate(covariance):
-        within = one[0] * n / (n - 1)
+    for i, one in enumerate(values):
+        within, between, means = _spread(one)
         if within > 0.0:
-            rho = 1.0 - (within - one) / (one[0] + between[i])
-            rho[0] = 1.0
-            least = 1.0 / np.log10(n * chains)
-            found[i] = n * chains / max(_correlation_time(rho), least)
+            time = _correlation_time(one - means[:, np.newaxis], within, between)
+            found[i] = n * chains / max(time, 1.0 / np.log10(n * chains))
     return found
 
 
-def _correlation_time(rho: Array) -> float:
+@njit
+def _covariance(values, lag):  # type: ignore[no-untyped-def]
+    """Mean over chains (m, n) without their means of the product with what comes `lag` later."""
+    m, n = values.shape
+    total = 0.0
+    for i in range(m):
+        row = values[i]
+        for t in range(n - lag):
+            total += row[t] * row[t + lag]
+    return total / (n * m)
+
+
+@njit
+def _correlation_time(values, within, between):  # type: ignore[no-untyped-def]
     """Sum of autocorrelations by Geyer's initial monotone sequence of pairs.
 
     As in Stan and arviz, the even term of the pair after the last one counts once, unless both it
-    and its pair are negative.
+    and its pair are negative. Lags are summed one by one: chains that mix need few of them.
+
+    Args:
+        values: chains less their means, (m, n).
+        within: mean variance within them.
+        between: variance of their means.
     """
-    pairs = rho[: len(rho) // 2 * 2].reshape(-1, 2).sum(axis=1)
-    last = max((len(rho) - 3) // 2, 0)
-    failing = np.flatnonzero(pairs[:last] <= 0.0)
-    count = int(failing[0]) if failing.size else last
-    monotone = np.minimum.accumulate(pairs[:count]).sum() if count else 0.0
-    extra = rho[2 * count]
-    if extra < 0.0 and pairs[count] < 0.0:
-        extra = 0.0
-    return float(-1.0 + 2.0 * monotone + extra)
+    n = values.shape[1]
+    total = _covariance(values, 0) + between
+    last = max((n - 3) // 2, 0)
+    least, time = math.inf, -1.0
+    even, odd = 1.0, 0.0
+    for pair in range(last + 1):
+        if pair > 0:
+            even = 1.0 - (within - _covariance(values, 2 * pair)) / total
+        if 2 * pair + 1 < n:
+            odd = 1.0 - (within - _covariance(values, 2 * pair + 1)) / total
+        if pair == last or even + odd <= 0.0:
+            break
+        least = min(least, even + odd)
+        time += 2.0 * least
+    if even < 0.0 and even + odd < 0.0:
+        even = 0.0
+    return time + even

@@ -33,6 +33,8 @@ from actuator_glue.records import Array
 # Evaluations of a compiled likelihood between two questions whether to stop: 0.2 ms; and in one go
 # where nobody asks: the uniforms of more would leave the cache.
 _PATIENCE, _MOST = 200, 1000
+# Shares of the generations after which a run may have drawn enough.
+_LOOKS = (0.5, 0.75)
 
 __all__ = ['Chains', 'Info', 'Settings', 'State', 'init', 'sample', 'step']
 
@@ -179,6 +181,7 @@ def sample(
     settings: Settings | None = None,
     archive: ArrayLike | None = None,
     stop: Callable[[State], bool] | None = None,
+    enough: Callable[[Chains], bool] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Chains:
     """Draw from the posterior of a uniform prior and a log likelihood.
@@ -198,6 +201,8 @@ def sample(
         archive: points (m, p) of an earlier run (`Chains.archive`) for a warm start.
         stop: asked after every generation, or about every 200 evaluations where the likelihood
             has a compiled form, always at the same ones; True ends the run.
+        enough: asked at one half and three quarters of the run whether its draws will do; True
+            ends it.
         progress: called now and then with (evaluations made, evaluations at most).
 
     Raises:
@@ -223,9 +228,22 @@ def sample(
     if stop is not None:
         most = 1 if density is None else -(-_PATIENCE // n)
     every = max(generations // 100, 1)
+    looks = [int(share * generations) for share in _LOOKS] if enough is not None else []
+
+    def so_far(done: int) -> Chains:
+        return Chains(
+            draws=draws[:done],
+            log_density=log_densities[:done],
+            evaluations=state.evaluations,
+            start_evaluations=spent,
+            burn=_burn_in(settings, done, archive is not None),
+            annealed=state.power == 1.0,
+        )
+
     done = 0
     while done < generations:
-        state, path = stretch(rng, state, log_density, density, min(most, generations - done))
+        ahead = min((look for look in looks if look > done), default=generations) - done
+        state, path = stretch(rng, state, log_density, density, min(most, ahead))
         new = done + len(path.x)
         draws[done:new], log_densities[done:new] = path.x, path.log_density
         if progress is not None and new // every > done // every:
@@ -233,11 +251,6 @@ def sample(
         done = new
         if stop is not None and stop(state):
             break
-    return Chains(
-        draws=draws[:done],
-        log_density=log_densities[:done],
-        evaluations=state.evaluations,
-        start_evaluations=spent,
-        burn=_burn_in(settings, done, archive is not None),
-        annealed=state.power == 1.0,
-    )
+        if enough is not None and done in looks and enough(so_far(done)):
+            break
+    return so_far(done)

@@ -149,7 +149,7 @@ def many(
 
 
 # Strict floating point, as numpy has it: see compiled.log_densities.
-@njit(nogil=True, fastmath=False)
+@njit(fastmath=False)
 def _advance(  # type: ignore[no-untyped-def]
     uniforms, z, x, values, target, rows, size, until_append, every, lower, width, tuning,
     pairs, unit_jump, jitter, noise, tempering, density, counts, path_z, path_x, path_values,

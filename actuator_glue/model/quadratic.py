@@ -145,7 +145,7 @@ def evaluate(t: Array, theta: Array, tolerance: float, out: Array, exact: Flags)
             exact[m] = not _trusted(square, tail, near, tolerance)
 
 
-@njit(nogil=True)
+@njit
 def evaluate_all(rows: Array, theta: Array, tolerance: float, out: Array, exact: Flags) -> bool:
     """Do `evaluate` for every record; out (m, R, 2), exact (R, m). Return whether any is exact."""
     for r in range(len(rows)):

@@ -11,20 +11,34 @@ from actuator_glue.jit import njit
 # Strict floating point: the same bits wherever it is inlined.
 _njit: Any = partial(njit, fastmath=False)
 
-# Logits beyond this are as good as the bound: 1e-7 of the way from it.
-EDGE = 16.0
+# Standard deviations beyond this are as good as the bound: 1e-7 of the way from it.
+EDGE = 5.2
 
 
 @_njit
 def share(z: float) -> Any:
-    """Logistic function: the share of the way between two bounds."""
-    return 1.0 / (1.0 + math.exp(-z))
+    """Normal distribution function: the share of the way between two bounds.
+
+    What is uniform between them is a standard normal coordinate.
+    """
+    return 0.5 * math.erfc(-z * math.sqrt(0.5))
 
 
 @_njit
-def log_slope(z: float) -> Any:
-    """Return ln of the derivative of `share`."""
-    return -abs(z) - 2.0 * math.log1p(math.exp(-abs(z)))
+def score(part: float) -> Any:
+    """Return the inverse of `share`, inside +-EDGE."""
+    tail = min(part, 1.0 - part)
+    if not tail > 1e-7:
+        return EDGE if part > 0.5 else -EDGE
+    # Abramowitz and Stegun 26.2.23, then Newton's steps on the logarithm.
+    t = math.sqrt(-2.0 * math.log(tail))
+    z = (2.515517 + t * (0.802853 + t * 0.010328)) / (
+        1.0 + t * (1.432788 + t * (0.189269 + t * 0.001308))
+    ) - t
+    for _ in range(2):
+        below = share(z)
+        z -= below * math.log(below / tail) / (math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi))
+    return min(max(-z if part > 0.5 else z, -EDGE), EDGE)
 
 
 @_njit
@@ -56,7 +70,7 @@ def physical(phi, k, low, high, theta):  # type: ignore[no-untyped-def]
     least, most = oil_range(inertia, s, k, low, high)
     if not (0.0 < most > least and low[0] <= theta[0] <= high[0]):
         return -math.inf
-    log_jacobian = phi[0] - 2.0 * phi[1] + log_slope(phi[2])
+    log_jacobian = phi[0] - 2.0 * phi[1] - 0.5 * phi[2] * phi[2]
     # Given the other coordinates the prior's density of alpha_2 + k rises with its square (k = 0:
     # with itself); of its power + 1 it is uniform. In units of `most`, against overflow.
     rest = (least / most) ** power
@@ -65,10 +79,13 @@ def physical(phi, k, low, high, theta):  # type: ignore[no-untyped-def]
     # Inside the box but for rounding.
     theta[1] = min(max(oil / inertia, low[1]), high[1])
     theta[2] = min(max(oil - k, low[2]), high[2])
-    theta[3] = s * oil / k if k > 0.0 else phi[3]
-    if not low[3] <= theta[3] <= high[3]:
-        return -math.inf
-    return log_jacobian
+    if k > 0.0:
+        theta[3] = s * oil / k
+        if not low[3] <= theta[3] <= high[3]:
+            return -math.inf
+        return log_jacobian
+    theta[3] = low[3] + (high[3] - low[3]) * share(phi[3])
+    return log_jacobian - 0.5 * phi[3] * phi[3]
 
 
 @_njit
@@ -82,23 +99,13 @@ def physical_all(phi, k, low, high, theta, log_jacobian):  # type: ignore[no-unt
 
 
 @_njit
-def logit(part: float) -> Any:
-    """Return the inverse of `share`, inside +-EDGE."""
-    if not part > 0.0:
-        return -EDGE
-    if not part < 1.0:
-        return EDGE
-    return min(max(math.log(part / (1.0 - part)), -EDGE), EDGE)
-
-
-@_njit
 def coordinates_all(theta, k, low, high, phi):  # type: ignore[no-untyped-def]
     """Fill phi (m, 4) with the coordinates of physical parameters theta (m, 4)."""
     for i in range(len(theta)):
         oil = max(k + theta[i, 2], 1e-9)
         inertia = oil / max(theta[i, 1], 1e-300)
         s, power = 0.0, 2.0
-        phi[i, 3] = theta[i, 3]
+        phi[i, 3] = score((theta[i, 3] - low[3]) / (high[3] - low[3]))
         if k > 0.0:
             s, power = theta[i, 3] * k / oil, 3.0
             phi[i, 3] = s
@@ -106,4 +113,4 @@ def coordinates_all(theta, k, low, high, phi):  # type: ignore[no-untyped-def]
         phi[i, 1] = math.log(inertia)
         least, most = oil_range(inertia, s, k, low, high)
         rest = (least / most) ** power
-        phi[i, 2] = logit(((oil / most) ** power - rest) / (1.0 - rest))
+        phi[i, 2] = score(((oil / most) ** power - rest) / (1.0 - rest))

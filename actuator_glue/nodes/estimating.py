@@ -9,8 +9,9 @@ import numpy as np
 from actuator_glue.nodes.worker import Tell
 from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.fitting import choose_model
-from actuator_glue.online.job import Job, WindowResult, run
+from actuator_glue.online.job import WindowResult, run
 from actuator_glue.online.replay import stream
+from actuator_glue.online.sampling import Job
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Block, Preview, Setup
 from actuator_glue.records import Record

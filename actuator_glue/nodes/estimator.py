@@ -21,7 +21,8 @@ from actuator_glue.nodes.worker import DIED, FAILED, Answer, Worker
 from actuator_glue.online import wire
 from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.fitting import choose_model, identifiable
-from actuator_glue.online.job import Job, WindowResult
+from actuator_glue.online.job import WindowResult
+from actuator_glue.online.sampling import Job
 from actuator_glue.online.settings import LIMITS, EstimatorSettings, ModelChoice
 from actuator_glue.online.stream import Dropped, Event, Failed, Rejected, Restarted
 

@@ -71,10 +71,9 @@ class Coordinates:
         self.lower[:4], self.upper[:4] = -ridge.EDGE, ridge.EDGE
         self.lower[0], self.upper[0] = _LAG
         self.lower[1], self.upper[1] = _INERTIA
-        self.lower[3], self.upper[3] = self._low[3], self._high[3]
         if stiffness > 0.0:
-            self.lower[3] *= stiffness / (stiffness + self._high[2])
-            self.upper[3] *= stiffness / (stiffness + self._low[2])
+            self.lower[3] = self._low[3] * stiffness / (stiffness + self._high[2])
+            self.upper[3] = self._high[3] * stiffness / (stiffness + self._low[2])
         # The sampler takes logarithms above a lower bound of 0, which bends what is straight. A
         # bound just below is none; the prior's box is checked all the same.
         self.lower = np.where(self.lower == 0.0, -1e-6 * self.upper, self.lower)

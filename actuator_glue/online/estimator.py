@@ -10,7 +10,8 @@ import numpy as np
 from actuator_glue.errors import InputError
 from actuator_glue.online.fitting import starting_points
 from actuator_glue.online.forecast import Frozen
-from actuator_glue.online.job import Job, WindowResult
+from actuator_glue.online.job import WindowResult
+from actuator_glue.online.sampling import Fit, Job
 from actuator_glue.online.settings import EstimatorSettings, ModelChoice
 from actuator_glue.online.stream import (
     Block,
@@ -164,20 +165,20 @@ class Estimator:
         )
         return self.running
 
-    def finish(self, result: WindowResult) -> list[Event]:
-        """Take the result of the running job."""
+    def finish(self, result: WindowResult | Fit) -> list[Event]:
+        """Take the result of the running job, or as much of it as the next job needs."""
         self.running = None
-        window = result.window
-        if result.failure:
-            return [Failed(window.number, window.record.first_index, result.failure)]
-        memory = self._memory
-        memory.archive, memory.model, memory.epoch = result.archive, result.model, window.epoch
+        window, memory = result.window, self._memory
+        if result.archive is not None:
+            memory.archive, memory.model, memory.epoch = result.archive, result.model, window.epoch
         memory.frozen = [
             f for f in memory.frozen if f.segment == window.segment and f.stop > window.end
         ]
         if result.frozen is not None:
             memory.frozen.append(result.frozen)
             del memory.frozen[:-MAX_FROZEN]
+        if result.failure:
+            return [Failed(window.number, window.record.first_index, result.failure)]
         return []
 
     def abandon(self, reason: str) -> list[Event]:

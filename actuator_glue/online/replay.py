@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterable, Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
@@ -10,13 +12,16 @@ from actuator_glue.errors import InputError
 from actuator_glue.online import wire
 from actuator_glue.online.estimator import Estimator, Schedule
 from actuator_glue.online.fitting import choose_model
-from actuator_glue.online.job import WindowResult, run
+from actuator_glue.online.job import WindowResult, fit, report
 from actuator_glue.online.settings import EstimatorSettings, ModelChoice
-from actuator_glue.online.stream import Block, Event, Preview, Rejected, Setup
+from actuator_glue.online.stream import Block, Event, Failed, Preview, Rejected, Setup
 from actuator_glue.records import Record
 
 Item: TypeAlias = Setup | Block | Preview
 Named: TypeAlias = tuple[str, Any]
+
+# Results that may wait for their bands while the next windows are sampled.
+LAG = 2
 
 
 def replay(
@@ -34,18 +39,46 @@ def replay(
         schedule: repeats what a live run dropped or stopped early.
     """
     estimator = Estimator(settings, model or choose_model(), schedule=schedule)
-    for item in items:
-        if isinstance(item, Setup):
-            yield from estimator.setup(item)
-        elif isinstance(item, Preview):
-            yield from estimator.preview(item)
+    with ThreadPoolExecutor(1) as pool:
+        waiting: deque[Event | Future[WindowResult]] = deque()
+        for item in items:
+            waiting += _given(estimator, item)
+            while (job := estimator.next_job()) is not None:
+                fitted = fit(job)
+                waiting += estimator.finish(fitted)
+                if not fitted.failure:
+                    # The next window needs the posterior only; bands are computed beside it.
+                    waiting.append(pool.submit(report, job, fitted))
+            yield from _ready(waiting, LAG)
+        yield from _ready(waiting, 0)
+
+
+def _given(estimator: Estimator, item: Item) -> list[Event]:
+    if isinstance(item, Setup):
+        return estimator.setup(item)
+    if isinstance(item, Preview):
+        return estimator.preview(item)
+    return estimator.push(item)
+
+
+def _ready(
+    waiting: deque[Event | Future[WindowResult]], most: int
+) -> Iterator[WindowResult | Event]:
+    """Yield what is ready, in order, and wait for as much as leaves `most` waiting."""
+    while waiting:
+        first = waiting[0]
+        if isinstance(first, Future):
+            if not first.done() and len(waiting) <= most:
+                return
+            result = first.result()
+            yield _told(result) if result.failure else result
         else:
-            yield from estimator.push(item)
-        while (job := estimator.next_job()) is not None:
-            result = run(job)
-            yield from estimator.finish(result)
-            if not result.failure:
-                yield result
+            yield first
+        waiting.popleft()
+
+
+def _told(result: WindowResult) -> Failed:
+    return Failed(result.window.number, result.window.record.first_index, result.failure)
 
 
 def stream(record: Record, block: int = 64) -> Iterator[Item]:

@@ -39,11 +39,12 @@ LIMITS: dict[str, Limit] = {
     'settle': Limit('s', 0.0, 60.0, 'start of a window that only lets the state be forgotten'),
     'time_budget': Limit('s', 1e-3, 600.0, 'longest time one window may be computed'),
     'shaping_factor': Limit('1', 1e-3, 1e9, 'G of L = -G ln Var[E], Eq. (4)'),
-    'evaluations': Limit('1', 2000, 10_000_000, 'likelihood evaluations per window of Eq. (2)'),
+    'evaluations': Limit('1', 2000, 10_000_000, 'evaluations of a window of Eq. (2), at most'),
     'start_evaluations': Limit('1', 2000, 10_000_000, 'evaluations of a window sampled afresh'),
     'chains': Limit('1', 3, 256, 'Markov chains'),
     'draws': Limit('1', 20, 5000, 'posterior draws simulated for a band'),
     'seed': Limit('1', 0, 2**53, 'seed of the sampler'),
+    'ess': Limit('1', 50, 1_000_000, 'effective sample size at which a window may end sooner'),
     'rhat_limit': Limit('1', 1.0, 2.0, 'largest R-hat that counts as converged'),
     'frequency_max': Limit('Hz', 0.1, 1000.0, 'upper end of the frequency-response band'),
     'frequencies': Limit('1', 2, 2000, 'frequencies of the frequency-response band'),
@@ -76,6 +77,7 @@ class EstimatorSettings:
     chains: int = 8
     draws: int = 200
     seed: int = 1
+    ess: int = 400
     rhat_limit: float = 1.05
     frequency_max: float = 10.0
     frequencies: int = 50

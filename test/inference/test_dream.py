@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import subprocess
 import sys
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 
@@ -280,6 +281,28 @@ def test_stop_and_progress() -> None:
     assert [done for done, _ in seen] == sorted(done for done, _ in seen)
     repeated = run(stopped.evaluations, 10**9)
     assert np.array_equal(repeated.draws, stopped.draws)
+
+
+def test_a_run_ends_where_its_draws_will_do_and_is_the_beginning_of_the_whole_one() -> None:
+    target = targets.scales()
+    asked: list[int] = []
+
+    def run(answer: Callable[[Chains], bool] | None, evaluations: int = 20_000) -> Chains:
+        return sample(
+            np.random.default_rng(1), target.log_density, target.lower, target.upper,
+            evaluations=evaluations, enough=answer,
+        )  # fmt: skip
+
+    def asks(chains: Chains) -> bool:
+        asked.append(len(chains.draws))
+        return False
+
+    whole = run(asks)
+    assert asked == [len(whole.draws) // 2, int(0.75 * len(whole.draws))]
+    half = run(lambda chains: chains.ess.min() > 400)
+    assert len(half.draws) == asked[0]
+    assert np.array_equal(half.draws, whole.draws[: asked[0]])
+    assert np.array_equal(whole.draws, run(None).draws)
 
 
 def test_impossible_regions_and_not_a_number_are_never_entered() -> None:

@@ -1,6 +1,7 @@
 """The estimator's state machine: jobs, warm start, forecasts, and replays to the last bit."""
 
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -144,8 +145,6 @@ def test_blocks_do_not_matter():
 
 
 def test_the_seed_matters_and_nothing_else_random():
-    from dataclasses import replace
-
     items = list(stream(record(3.0)))
     first, again = results(items), results(items)
     moved = results(items, settings=replace(SETTINGS, seed=2))
@@ -255,6 +254,18 @@ def test_only_the_newest_window_waits_live():
     assert len([e for e in events if isinstance(e, Dropped)]) == 11
     assert estimator.abandon('its process has died')[0].number == 0
     assert estimator.next_job() is not None
+
+
+def test_a_window_ends_when_its_draws_will_do():
+    items = list(stream(record(4.0)))
+    sooner = results(items, settings=replace(SETTINGS, evaluations=8000, ess=200))
+    never = results(items, settings=replace(SETTINGS, evaluations=8000, ess=10**6))
+    assert len(sooner) == len(never) > 2
+    for few, all_of_them in zip(sooner, never, strict=True):
+        # One half or three quarters, the start aside; a window that ends so is a whole one.
+        assert few.evaluations < 0.8 * all_of_them.evaluations
+        assert few.ess.min() >= 200 and few.rhat.max() <= 0.5 * (1.0 + SETTINGS.rhat_limit)
+        assert not few.stopped_early and not all_of_them.stopped_early
 
 
 def test_the_models_box_is_checked():

@@ -5,10 +5,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from online_streams import RATE, THETA, block, record, setup
+from scipy.special import ndtri
 from scipy.stats import norm
 
 from actuator_glue.inference.predictive import ResidualModel, total_band
-from actuator_glue.model import linear
+from actuator_glue.model import linear, ridge
 from actuator_glue.model.parameters import bounds
 from actuator_glue.online.alarm import CoverageAlarm
 from actuator_glue.online.collect import PIECE, Collector
@@ -32,6 +33,14 @@ def test_coordinates_are_a_bijection_inside_the_box(seed, stiffness):
     inside = (phi > there.lower).all(axis=1) & (phi < there.upper).all(axis=1)
     # beta_1 s is up to 10^6 times r, which is what is left of d0/d2 without it.
     assert np.allclose(there.physical(phi)[inside], theta[inside], rtol=1e-6)
+
+
+def test_what_is_uniform_between_bounds_is_a_normal_score():
+    share = np.concatenate([np.logspace(-6.9, -0.4, 500), 1.0 - np.logspace(-6.9, -0.4, 500)])
+    scores = np.array([ridge.score(s) for s in share])
+    assert np.allclose(scores, ndtri(share), rtol=0.0, atol=1e-12)
+    assert np.allclose([ridge.share(z) for z in scores], share, rtol=1e-12)
+    assert ridge.score(0.0) == -ridge.EDGE and ridge.score(1.0) == ridge.EDGE
 
 
 @pytest.mark.parametrize('stiffness', [0.0, 250e3])

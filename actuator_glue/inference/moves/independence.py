@@ -14,26 +14,43 @@ import numpy as np
 from actuator_glue.inference.moves import U_FREE
 from actuator_glue.inference.moves.draw import normal_pair
 from actuator_glue.jit import njit
-from actuator_glue.records import Array
 
 DEGREES = 5.0
 
 
-def fit(points: Array) -> tuple[Array, Array]:
+@njit(fastmath=False)
+def fit(points):  # type: ignore[no-untyped-def]
     """Return centre (p,) and lower Cholesky factor (p, p) of the covariance of points (m, p).
 
     The covariance is shrunk towards its diagonal as far as few points need it.
     """
     m, d = points.shape
-    centre = points.mean(axis=0)
-    spread = points - centre
-    covariance = spread.T @ spread / max(m - 1, 1)
-    # Never singular: points all equal in a coordinate get the spread of rounding.
-    variance = np.maximum(np.diag(covariance), 1e-16 * (1.0 + centre**2))
+    centre, factor = np.zeros(d), np.zeros((d, d))
+    for i in range(m):
+        for j in range(d):
+            centre[j] += points[i, j]
+    centre /= m
+    residual = np.empty(d)
+    for i in range(m):
+        for j in range(d):
+            residual[j] = points[i, j] - centre[j]
+            for k in range(j + 1):
+                factor[j, k] += residual[j] * residual[k]
     share = (d + 1.0) / (m + d + 1.0)
-    covariance *= 1.0 - share
-    covariance[np.diag_indices(d)] = variance * (1.0 + 1e-9)
-    return centre, np.ascontiguousarray(np.linalg.cholesky(covariance))
+    for j in range(d):
+        for k in range(j):
+            factor[j, k] *= (1.0 - share) / max(m - 1, 1)
+        # Never singular: points all equal in a coordinate get the spread of rounding.
+        least = 1e-16 * (1.0 + centre[j] * centre[j])
+        factor[j, j] = max(factor[j, j] / max(m - 1, 1), least) * (1.0 + 1e-9)
+    for j in range(d):
+        for k in range(j + 1):
+            for i in range(k):
+                factor[j, k] -= factor[j, i] * factor[k, i]
+            if k < j:
+                factor[j, k] /= factor[k, k]
+        factor[j, j] = math.sqrt(factor[j, j])
+    return centre, factor
 
 
 @njit

@@ -243,7 +243,7 @@ def _yielding(w: Array, n: int, moved: float) -> Any:
     return 1.0 - hard if middle * moved > 0.0 else 1.0
 
 
-@njit(nogil=True)
+@njit
 def advance(
     table: Array,
     on: NDArray[np.bool_],

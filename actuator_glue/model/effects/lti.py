@@ -266,7 +266,7 @@ def _in(w, r, n, delayed, u1, u2):  # type: ignore[no-untyped-def]
     return w[start + LANES] * u1 + w[start + 2 * LANES] * u2
 
 
-@njit(nogil=True)
+@njit
 def advance(table, third, delayed, u, offset, begin, displacement, force):  # type: ignore[no-untyped-def]
     """Write the recorded displacement at samples begin, begin+1, ... and carry the state on.
 

@@ -1,0 +1,240 @@
+"""The posterior of one window: its job in, chains and what the next windows need out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_glue.errors import InputError
+from actuator_glue.inference import dream
+from actuator_glue.inference.chains import Chains
+from actuator_glue.inference.convergence import rhat_and_ess
+from actuator_glue.inference.evaluate import LogDensity
+from actuator_glue.inference.likelihood import GaussianLikelihood, GlueLikelihood
+from actuator_glue.inference.predictive import fit_residual
+from actuator_glue.online import fitting
+from actuator_glue.online.coordinates import Coordinates
+from actuator_glue.online.forecast import Frozen, sensor_noise
+from actuator_glue.online.settings import EstimatorSettings, ModelChoice
+from actuator_glue.online.stream import Window
+from actuator_glue.records import Array, Record
+
+# A command that moves less than this many noise standard deviations calibrates nothing.
+EXCITATION = 3.0
+# Generations in which a sampler that starts from the last posterior adapts.
+ADAPT = 20
+# Points that a window hands to the next, at least.
+ARCHIVE = 400
+# Generations that R-hat and ESS are computed from.
+DIAGNOSED = 150
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Job:
+    """All that one window's estimate depends on.
+
+    Attributes:
+        window: the samples.
+        settings: settings of the estimator.
+        model: model to fit.
+        archive: points to start from, shape (m, p); None starts from the prior.
+        afresh: the model or the actuator is new, more evaluations are needed.
+        stop_at: evaluations after which a live run was stopped; a replay repeats it.
+        ahead: commands after the window as far as they are known, shape (na,) [m].
+        frozen: earlier posteriors whose forecasts this window's samples judge.
+    """
+
+    window: Window
+    settings: EstimatorSettings
+    model: ModelChoice
+    archive: Array | None = None
+    afresh: bool = True
+    stop_at: int | None = None
+    ahead: Array | None = None
+    frozen: tuple[Frozen, ...] = ()
+
+    @property
+    def evaluations(self) -> int:
+        """Likelihood evaluations the window is allowed; of chains that fill a batch up, too."""
+        generations = self.settings.evaluations // self.settings.chains
+        usual = max(self.settings.evaluations, generations * self.chains)
+        return max(self.settings.start_evaluations, usual) if self.afresh else usual
+
+    @property
+    def chains(self) -> int:
+        """Markov chains; effects are simulated in batches, which are filled up."""
+        wanted = self.settings.chains
+        return fitting.batch(wanted) if self.model.effects else wanted
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Fit:
+    """One window's posterior: all that later windows need of it.
+
+    Attributes:
+        window: the samples.
+        model: fitted model.
+        chains: draws in physical units.
+        rhat: rank-normalised split R-hat, shape (p,).
+        ess: bulk effective sample size, shape (p,).
+        rms_error: rms of measured minus best simulated displacement, mean removed [m].
+        frozen: what will be held against later samples.
+        archive: points to start from, shape (m, p).
+        complete: the sampling was not ended early.
+        failure: why there is nothing of all this; empty where there is.
+    """
+
+    window: Window
+    model: ModelChoice
+    chains: Chains | None = None
+    rhat: Array | None = None
+    ess: Array | None = None
+    rms_error: float = float('nan')
+    frozen: Frozen | None = None
+    archive: Array | None = None
+    complete: bool = False
+    failure: str = ''
+
+
+def fit(job: Job, expired: Callable[[], bool] | None = None) -> Fit:
+    """Sample one window.
+
+    Args:
+        job: what to compute.
+        expired: tells that the time budget is spent; None never stops early.
+
+    Raises:
+        InputError: the window calibrates nothing.
+    """
+    settings, model, record = job.settings, job.model, job.window.record
+    settle = round(settings.settle / record.period)
+    noise = sensor_noise(record.measured)
+    _check_excited(record, settle, noise)
+    drawn = _sample(job, settle, expired)
+    chains = drawn.chains
+    posterior = chains.posterior()
+    residual = (record.measured - fitting.simulate(model, chains.best[None], record)[0])[settle:]
+    frozen = Frozen(
+        number=job.window.number,
+        segment=job.window.segment,
+        start=job.window.end + round(settings.time_budget / record.period),
+        stop=job.window.end + round((settings.time_budget + settings.hop) / record.period),
+        model=model,
+        draws=posterior[_spread(len(posterior), settings.draws)],
+        residual=fit_residual(residual, parameters=len(model.names)),
+        noise=noise,
+    )
+    return Fit(
+        window=job.window,
+        model=model,
+        chains=chains,
+        rhat=drawn.rhat,
+        ess=drawn.ess,
+        rms_error=float(residual.std()),
+        frozen=frozen,
+        archive=_archive(chains.archive, job.archive),
+        complete=drawn.suffices(settings) or chains.evaluations + job.chains > job.evaluations,
+    )
+
+
+class _Drawn(NamedTuple):
+    """Chains of physical parameters and what tells how far they may be trusted."""
+
+    chains: Chains
+    rhat: Array
+    ess: Array
+
+    @staticmethod
+    def of(chains: Chains) -> _Drawn:
+        # R-hat and ESS cost more than the sampling if all of very many draws are ranked.
+        kept = chains.kept
+        return _Drawn(chains, *rhat_and_ess(kept[:: max(1, len(kept) // DIAGNOSED)]))
+
+    def suffices(self, settings: EstimatorSettings) -> bool:
+        """Whether further draws would not change what is published: R-hat well below its limit."""
+        limit = 0.5 * (1.0 + settings.rhat_limit)
+        return bool(self.ess.min() >= settings.ess and self.rhat.max() <= limit)
+
+
+def _sample(job: Job, settle: int, expired: Callable[[], bool] | None) -> _Drawn:
+    settings, model, record = job.settings, job.model, job.window.record
+    near = None if job.archive is None else np.median(job.archive, axis=0)
+    errors = fitting.errors(model, record, settle, near)
+    likelihood: LogDensity = (
+        GlueLikelihood(errors, settings.shaping_factor)
+        if settings.likelihood == 'glue'
+        else GaussianLikelihood(errors)
+    )
+    # What another model has shown says nothing about this one's bends.
+    shown = None if job.afresh else job.archive
+    middle = (record.first_index + 0.5 * len(record)) * record.period
+    coordinates = Coordinates(model, record.known_stiffness(), shown, middle)
+    seed = (settings.seed, record.first_index)
+    sampler = _sampler(job)
+    if job.archive is not None:
+        archive = coordinates.coordinates(job.archive)
+    else:
+        sampler, archive = coordinates.cold(np.random.default_rng((*seed, 3)), sampler)
+    seen: list[_Drawn] = []
+
+    def enough(sampled: Chains) -> bool:
+        seen[:] = [_Drawn.of(coordinates.chains(sampled))]
+        return seen[0].chains.annealed and seen[0].suffices(settings)
+
+    sampled = dream.sample(
+        np.random.default_rng((*seed, 0)),
+        coordinates.density(likelihood),
+        coordinates.lower,
+        coordinates.upper,
+        evaluations=job.evaluations,
+        settings=sampler,
+        archive=archive,
+        stop=_stop(job, expired),
+        enough=enough,
+    )
+    if seen and seen[0].chains.evaluations == sampled.evaluations:
+        return seen[0]
+    return _Drawn.of(coordinates.chains(sampled))
+
+
+def _stop(job: Job, expired: Callable[[], bool] | None) -> Callable[[dream.State], bool] | None:
+    """What ends the sampling early: the evaluations of the run that is repeated, or the clock."""
+    if job.stop_at is not None:
+        at = job.stop_at
+        return lambda state: state.evaluations >= at
+    return None if expired is None else lambda _: expired()
+
+
+def _sampler(job: Job) -> dream.Settings:
+    """Settings of the sampler."""
+    warm = job.archive is not None
+    sampler = dream.Settings(chains=job.chains, adaptation=ADAPT if warm else 50)
+    if not (warm and job.model.effects):
+        return sampler
+    # A warm start takes a quarter of the population, and moves a chain of so many sweeps each:
+    # batches are full.
+    return replace(sampler, population=4 * sampler.sweeps * job.chains)
+
+
+def _archive(new: Array, old: Array | None) -> Array:
+    """Points for the next window; few of them, of a window cut short, are joined by older ones."""
+    if old is None or len(new) >= ARCHIVE:
+        return new
+    return np.concatenate([new, old[_spread(len(old), ARCHIVE - len(new))]])
+
+
+def _check_excited(record: Record, settle: int, noise: float) -> None:
+    moved = float(record.command[settle:].std())
+    if moved <= EXCITATION * noise or moved == 0.0 or float(record.measured[settle:].std()) == 0.0:
+        raise InputError(
+            f'nothing moves: the command varies by {moved * 1e6:.3g} um rms, the sensor noise is '
+            f'{noise * 1e6:.3g} um; the window calibrates nothing and is left out'
+        )
+
+
+def _spread(count: int, wanted: int) -> NDArray[np.intp]:
+    return np.linspace(0, count - 1, min(count, wanted)).astype(np.intp)
