@@ -110,9 +110,15 @@ def _fit(points, counts, most, snooker, moves, crossovers):  # type: ignore[no-u
 
 def outliers(mean_log_density: Array) -> NDArray[np.intp]:
     """Chains whose mean log density lies below Q1 - 2 IQR of all chains (Vrugt 2016, Eq. 25)."""
+    return np.flatnonzero(_outlying(mean_log_density))
+
+
+@njit(fastmath=False)
+def _outlying(mean_log_density):  # type: ignore[no-untyped-def]
     ordered = np.sort(mean_log_density)
-    # np.quantile's default, without its overhead: this is asked every few generations.
-    first, third = np.interp(
-        np.array([0.25, 0.75]) * (len(ordered) - 1), np.arange(len(ordered)), ordered
-    )
-    return np.flatnonzero(mean_log_density < first - 2.0 * (third - first))
+    quartile = np.empty(2)
+    for i in range(2):  # interpolated as np.quantile does by default
+        place = (0.25 + 0.5 * i) * (len(ordered) - 1)
+        below = min(int(place), len(ordered) - 2)
+        quartile[i] = ordered[below] + (place - below) * (ordered[below + 1] - ordered[below])
+    return mean_log_density < quartile[0] - 2.0 * (quartile[1] - quartile[0])

@@ -6,6 +6,7 @@ import math
 from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
+from numpy.typing import NDArray
 
 from actuator_glue.inference.evaluate import LogDensity
 from actuator_glue.jit import njit
@@ -60,31 +61,36 @@ def compiled(log_density: LogDensity) -> Compiled | None:
 # what comes next, which would be other bits.
 @njit(fastmath=False)
 def variance_likelihood(sums, size, shaping):  # type: ignore[no-untyped-def]
-    """-shaping ln Var of errors given their sums (m, R, 2) over `size` samples in all."""
-    values = np.empty(sums.shape[0])
-    for i in range(sums.shape[0]):
-        mean = 0.0
-        square = 0.0
-        for r in range(sums.shape[1]):
-            mean += sums[i, r, 0]
-            square += sums[i, r, 1]
-        mean /= size
-        values[i] = -shaping * math.log(square / size - mean * mean)
-    return values
+    """-shaping ln Var of errors given their sums (R, 2) over `size` samples in all."""
+    mean = 0.0
+    square = 0.0
+    for r in range(len(sums)):
+        mean += sums[r, 0]
+        square += sums[r, 1]
+    mean /= size
+    return -shaping * math.log(square / size - mean * mean)
 
 
 @njit(fastmath=False)
 def gaussian_likelihood(sums, size, sigma):  # type: ignore[no-untyped-def]
-    """Gaussian log likelihood given error sums (m, R, 2); sigma = 0 integrates it out."""
-    values = np.empty(sums.shape[0])
-    for i in range(sums.shape[0]):
-        square = 0.0
-        for r in range(sums.shape[1]):
-            square += sums[i, r, 1]
-        if sigma > 0.0:
-            values[i] = -0.5 * square / (sigma * sigma)
+    """Gaussian log likelihood given error sums (R, 2); sigma = 0 integrates it out."""
+    square = 0.0
+    for r in range(len(sums)):
+        square += sums[r, 1]
+    if sigma > 0.0:
+        return -0.5 * square / (sigma * sigma)
+    return -0.5 * size * math.log(square)
+
+
+@njit(fastmath=False)
+def likelihoods(sums, size, shaping, sigma):  # type: ignore[no-untyped-def]
+    """Return log likelihoods (m,) of error sums (m, R, 2), the Gaussian one for shaping = 0."""
+    values = np.empty(len(sums))
+    for i in range(len(sums)):
+        if shaping > 0.0:
+            values[i] = variance_likelihood(sums[i], size, shaping)
         else:
-            values[i] = -0.5 * size * math.log(square)
+            values[i] = gaussian_likelihood(sums[i], size, sigma)
     return values
 
 
@@ -113,38 +119,65 @@ def _exactly(rows, samples, theta, exact, sums):  # type: ignore[no-untyped-def]
             sums[which[i], r] = out[i]
 
 
+class Scratch(NamedTuple):
+    """What `log_densities` of m points writes to, so that a loop allocates nothing.
+
+    Attributes:
+        theta: physical parameters of the points inside the bounds, (m, 4).
+        which: their places, (m,).
+        inner: log Jacobians of mapped points, (m,).
+        sums: error sums, (m, R, 2).
+        exact: what needs the exact kernel, (R, m).
+    """
+
+    theta: Array
+    which: NDArray[np.int64]
+    inner: Array
+    sums: Array
+    exact: NDArray[np.bool_]
+
+
+def scratch(density: Compiled, count: int) -> Scratch:
+    """Return room for so many points."""
+    records = len(density.rows)
+    return Scratch(
+        np.empty((count, 4)),
+        np.empty(count, np.int64),
+        np.zeros(count),
+        np.empty((count, records, 2)),
+        np.empty((records, count), np.bool_),
+    )
+
+
 @njit(fastmath=False)
-def log_densities(density, x, log_jacobian, values):  # type: ignore[no-untyped-def]
+def log_densities(density, x, log_jacobian, values, scratch):  # type: ignore[no-untyped-def]
     """Fill values (m,) with the log densities of points x (m, p).
 
     Points beyond the bounds (log_jacobian minus infinity) are left out: they are impossible.
     """
-    theta = np.empty_like(x)
-    which = np.empty(len(x), np.int64)
-    inner = np.zeros(len(x))
+    theta, inner = scratch.theta, scratch.inner
     count = 0
     for i in range(len(x)):
         values[i] = -np.inf
         if log_jacobian[i] == -np.inf:
             continue
         if density.mapped:
-            inner[i] = ridge.physical(
+            inner[count] = ridge.physical(
                 x[i], density.stiffness, density.low, density.high, theta[count]
             )
-            if inner[i] == -np.inf:
+            if inner[count] == -np.inf:
                 continue
         else:
-            theta[count] = x[i]
-        which[count] = i
+            for j in range(x.shape[1]):
+                theta[count, j] = x[i, j]
+        scratch.which[count] = i
         count += 1
-    records = len(density.rows)
-    sums = np.empty((count, records, 2))
-    exact = np.empty((records, count), np.bool_)
-    if quadratic.evaluate_all(density.rows, theta[:count], density.tolerance, sums, exact):
-        _exactly(density.rows, density.samples, theta[:count], exact, sums)
-    if density.shaping > 0.0:
-        found = variance_likelihood(sums, density.size, density.shaping)
-    else:
-        found = gaussian_likelihood(sums, density.size, density.sigma)
+    theta, sums, exact = theta[:count], scratch.sums[:count], scratch.exact[:, :count]
+    if quadratic.evaluate_all(density.rows, theta, density.tolerance, sums, exact):
+        _exactly(density.rows, density.samples, theta, exact, sums)
     for i in range(count):
-        values[which[i]] = inner[which[i]] + found[i] if density.mapped else found[i]
+        if density.shaping > 0.0:
+            found = variance_likelihood(sums[i], density.size, density.shaping)
+        else:
+            found = gaussian_likelihood(sums[i], density.size, density.sigma)
+        values[scratch.which[i]] = inner[i] + found if density.mapped else found

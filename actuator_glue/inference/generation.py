@@ -10,6 +10,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from actuator_glue.inference.coordinates import physical
 from actuator_glue.inference.moves import (
@@ -44,6 +45,38 @@ class Tempering(NamedTuple):
 UNTEMPERED = Tempering(1.0, np.empty(0), np.empty((0, 0)))
 
 
+class Room(NamedTuple):
+    """Where the candidates of n chains go, so that a loop allocates nothing.
+
+    Attributes:
+        log_jacobian: of the candidates, (n,).
+        correction: log Hastings correction, (n,).
+        label: move and crossover class, (n, 2).
+        accepted: whether the chain moves there, (n,).
+        indices: scratch, (3, max(2 pairs, 3)).
+        residual: scratch, (p,).
+    """
+
+    log_jacobian: Array
+    correction: Array
+    label: NDArray[np.int64]
+    accepted: NDArray[np.bool_]
+    indices: NDArray[np.int64]
+    residual: Array
+
+
+def room(chains: int, dimension: int, pairs: int) -> Room:
+    """Return room for the candidates of so many chains."""
+    return Room(
+        np.empty(chains),
+        np.empty(chains),
+        np.empty((chains, 2), np.int64),
+        np.empty(chains, np.bool_),
+        np.empty((3, max(2 * pairs, 3)), np.int64),
+        np.empty(dimension),
+    )
+
+
 @njit
 def propose(  # type: ignore[no-untyped-def]
     z,
@@ -52,67 +85,56 @@ def propose(  # type: ignore[no-untyped-def]
     size,
     lower,
     width,
-    move_cdf,
-    crossover_cdf,
-    scale,
-    centre,
-    factor,
+    tuning,
     pairs,
     unit_jump,
     jitter,
     noise,
+    candidate,
+    x,
+    room,
 ):
-    """Return candidates of all chains.
-
-    Returns candidate (n, p) in sampling coordinates, x (n, p) in physical units, log_jacobian
-    (n,), correction (n,) = log Hastings correction, label (n, 2) = move and crossover class.
-    """
-    n, d = z.shape
-    candidate = np.empty((n, d))
-    x = np.empty((n, d))
-    log_jacobian = np.empty(n)
-    correction = np.empty(n)
-    label = np.empty((n, 2), np.int64)
-    indices = np.empty((3, max(2 * pairs, 3)), np.int64)
-    residual = np.empty(d)
-    for i in range(n):
+    """Write a candidate of every chain, (n, p), x the same in physical units, and `room`."""
+    for i in range(z.shape[0]):
         row = uniforms[i]
-        move = choose(row[U_MOVE], move_cdf)
-        label[i, 0] = move
-        label[i, 1] = -1
-        correction[i] = 0.0
+        move = choose(row[U_MOVE], tuning.move_cdf)
+        room.label[i, 0] = move
+        room.label[i, 1] = -1
+        room.correction[i] = 0.0
         if move == PARALLEL:
-            label[i, 1] = parallel.propose(
+            room.label[i, 1] = parallel.propose(
                 z[i],
                 row,
                 rows,
                 size,
-                scale,
-                crossover_cdf,
+                tuning.scale,
+                tuning.crossover_cdf,
                 pairs,
                 unit_jump,
                 jitter,
                 noise,
-                indices,
+                room.indices,
                 candidate[i],
             )
         elif move == SNOOKER:
-            correction[i] = snooker.propose(z[i], row, rows, size, scale, indices, candidate[i])
+            room.correction[i] = snooker.propose(
+                z[i], row, rows, size, tuning.scale, room.indices, candidate[i]
+            )
         elif move == INDEPENDENCE:
-            correction[i] = independence.propose(z[i], row, centre, factor, residual, candidate[i])
-        log_jacobian[i] = physical(candidate[i], lower, width, x[i])
-    return candidate, x, log_jacobian, correction, label
+            room.correction[i] = independence.propose(
+                z[i], row, tuning.centre, tuning.factor, room.residual, candidate[i]
+            )
+        room.log_jacobian[i] = physical(candidate[i], lower, width, x[i])
 
 
 # Strict floating point: the same bits whatever it is compiled into.
 @njit(fastmath=False)
-def temper(values, log_jacobian, z, power, centre, factor):  # type: ignore[no-untyped-def]
-    """Return the log target (n,) of points z (n, p), docs/dream.md (D1) and (D6).
+def temper(values, log_jacobian, z, power, centre, factor, target):  # type: ignore[no-untyped-def]
+    """Write the log target (n,) of points z (n, p), docs/dream.md (D1) and (D6).
 
     Beyond the bounds (log_jacobian minus infinity) it is minus infinity, whatever the likelihood
     says there.
     """
-    target = np.empty(len(values))
     reference = log_jacobian
     if power != 1.0 and centre.size > 0:
         reference = independence.log_density(z, centre, factor)
@@ -123,49 +145,47 @@ def temper(values, log_jacobian, z, power, centre, factor):  # type: ignore[no-u
         target[i] = values[i] + log_jacobian[i]
         if power != 1.0:
             target[i] = (1.0 - power) * reference[i] + power * target[i]
-    return target
 
 
 @njit
 def accept(  # type: ignore[no-untyped-def]
-    z, x, log_density, target, new_z, new_x, new_log_density, new_target, correction, uniforms
+    z, x, log_density, target, new_z, new_x, new_log_density, new_target, uniforms, room
 ):
     """Metropolis-Hastings: overwrite the new_ arrays with the current state where rejected.
 
-    A target that is not a number is rejected. Returns accepted (n,) bool, and the first chain
-    whose candidate has a target of plus infinity, -1 where none has.
+    A target that is not a number is rejected. Returns the first chain whose candidate has a
+    target of plus infinity, -1 where none has; room.accepted tells who moved.
     """
-    n = z.shape[0]
-    accepted = np.empty(n, np.bool_)
     infinite = -1
-    for i in range(n):
+    for i in range(z.shape[0]):
         if new_target[i] == np.inf and infinite < 0:
             infinite = i
-        log_ratio = new_target[i] - target[i] + correction[i]
-        accepted[i] = math.log1p(-uniforms[i, U_ACCEPT]) < log_ratio
-        if not accepted[i]:
-            new_z[i] = z[i]
-            new_x[i] = x[i]
+        log_ratio = new_target[i] - target[i] + room.correction[i]
+        room.accepted[i] = math.log1p(-uniforms[i, U_ACCEPT]) < log_ratio
+        if not room.accepted[i]:
+            for j in range(z.shape[1]):
+                new_z[i, j] = z[i, j]
+                new_x[i, j] = x[i, j]
             new_log_density[i] = log_density[i]
             new_target[i] = target[i]
-    return accepted, infinite
+    return infinite
 
 
 @njit
-def tally(z, candidate, accepted, label, scale, counts):  # type: ignore[no-untyped-def]
+def tally(z, candidate, room, scale, counts):  # type: ignore[no-untyped-def]
     """Add uses, acceptances and normalised squared jumps to counts (moves + crossovers, 3).
 
     Rows 0-2 are the moves, the rest the crossover classes (Vrugt 2016, section 3.2.1).
     """
     for i in range(z.shape[0]):
         jump2 = 0.0
-        if accepted[i]:
+        if room.accepted[i]:
             for j in range(z.shape[1]):
                 step = (candidate[i, j] - z[i, j]) / scale[j]
                 jump2 += step * step
         for side in range(2):
-            row = label[i, side] + 3 * side
+            row = room.label[i, side] + 3 * side
             if row >= 3 * side:
                 counts[row, 0] += 1.0
-                counts[row, 1] += accepted[i]
+                counts[row, 1] += room.accepted[i]
                 counts[row, 2] += jump2

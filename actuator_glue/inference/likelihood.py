@@ -14,11 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.errors import InputError
-from actuator_glue.inference.compiled import (
-    Compiled,
-    gaussian_likelihood,
-    variance_likelihood,
-)
+from actuator_glue.inference.compiled import Compiled, likelihoods
 from actuator_glue.model.fast import FastErrors
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.records import Array
@@ -82,7 +78,7 @@ class GlueLikelihood:
 
     def __call__(self, theta: Array) -> Array:
         """Return L (m,) of theta (m, p)."""
-        values: Array = variance_likelihood(self.errors(theta), self._size, self.shaping_factor)
+        values: Array = likelihoods(self.errors(theta), self._size, self.shaping_factor, 0.0)
         return values
 
     def compiled(self) -> Compiled | None:
@@ -113,8 +109,7 @@ class GaussianLikelihood:
 
     def __call__(self, theta: Array) -> Array:
         """Return the log likelihood (m,) of theta (m, p)."""
-        sums = self.errors(theta)
-        values: Array = gaussian_likelihood(sums, self._size, self.sigma or 0.0)
+        values: Array = likelihoods(self.errors(theta), self._size, 0.0, self.sigma or 0.0)
         return values
 
     def compiled(self) -> Compiled | None:

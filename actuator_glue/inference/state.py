@@ -142,5 +142,6 @@ def adapted(rng: np.random.Generator, new: State) -> State:
     if lost.size == 0:
         return new
     source = np.arange(len(total))
-    source[lost] = rng.choice(np.setdiff1d(source, lost), size=lost.size)
+    others = np.delete(source, lost)
+    source[lost] = others[rng.integers(len(others), size=len(lost))]
     return new._replace(**Walk(*(part[source] for part in new.walk))._asdict())

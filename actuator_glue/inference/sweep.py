@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.inference import generation
+from actuator_glue.inference import compiled, generation
 from actuator_glue.inference.adaptation import Tuning
 from actuator_glue.inference.archive import Archive
 from actuator_glue.inference.compiled import Compiled, log_densities
@@ -73,17 +73,19 @@ def one(
         The chains, whether each has moved (n,), and `generation.propose`'s labels (n, 2).
     """
     s = around.settings
-    z, x, log_jacobian, correction, label = generation.propose(
+    z, x, target = np.empty_like(now.z), np.empty_like(now.x), np.empty_like(now.log_target)
+    room = generation.room(len(z), z.shape[1], s.pairs)
+    generation.propose(
         now.z, uniforms, archive.capacity_rows, archive.size, around.lower, around.width,
-        *around.tuning, s.pairs, s.unit_jump, s.jitter, s.noise,
+        around.tuning, s.pairs, s.unit_jump, s.jitter, s.noise, z, x, room,
     )  # fmt: skip
     values = evaluate(log_density, x)
-    target = generation.temper(values, log_jacobian, z, *around.tempering)
-    accepted, infinite = generation.accept(*now, z, x, values, target, correction, uniforms)
+    generation.temper(values, room.log_jacobian, z, *around.tempering, target)
+    infinite = generation.accept(*now, z, x, values, target, uniforms, room)
     if infinite >= 0:
         refuse_infinite(x[infinite])
-    generation.tally(now.z, z, accepted, label, around.tuning.scale, counts)
-    return Walk(z, x, values, target), accepted, label
+    generation.tally(now.z, z, room, around.tuning.scale, counts)
+    return Walk(z, x, values, target), room.accepted, room.label
 
 
 class Path(NamedTuple):
@@ -127,17 +129,23 @@ def many(
     path = Path(np.empty((count, n, d)), np.empty((count, n, d)), np.empty((count, n)))
     if every and count >= until_append:
         archive = archive.with_room(n * (1 + (count - until_append) // every))
+    target, room = np.empty((2, n)), generation.room(n, d, s.pairs)
+    scratch = None if density is None else compiled.scratch(density, n)
     done = 0
     while done < count:
         if density is not None:
-            more, size, *parts = _advance(
-                uniforms[done:], *now, archive.capacity_rows, archive.size, until_append - done,
-                every, around.lower, around.width, around.tuning, s.pairs, s.unit_jump, s.jitter,
-                s.noise, around.tempering, density, counts,
-                path.z[done:], path.x[done:], path.log_density[done:],
+            target[0] = now.log_target
+            more, size = _advance(
+                uniforms[done:], *now[:3], archive.capacity_rows, archive.size,
+                until_append - done, every, around.lower, around.width, around.tuning, s.pairs,
+                s.unit_jump, s.jitter, s.noise, around.tempering, density, counts, path.z[done:],
+                path.x[done:], path.log_density[done:], target, room, scratch,
             )  # fmt: skip
-            now, archive = Walk(*parts), archive.grown(size)
+            archive = archive.grown(size)
             done += more
+            if more:
+                at = done - 1
+                now = Walk(path.z[at], path.x[at], path.log_density[at], target[more % 2])
             if done == count:
                 break
         now, _, _ = one(uniforms[done], now, archive, around, log_density, counts)
@@ -145,37 +153,43 @@ def many(
         done += 1
         if every and done >= until_append and (done - until_append) % every == 0:
             archive = archive.append(now.z)
-    return now, archive, path
+    # Their own arrays: who keeps a state need not keep the way there.
+    return Walk(*(part.copy() for part in now)), archive, path
 
 
 # Strict floating point, as numpy has it: see compiled.log_densities.
 @njit(fastmath=False)
 def _advance(  # type: ignore[no-untyped-def]
-    uniforms, z, x, values, target, rows, size, until_append, every, lower, width, tuning,
-    pairs, unit_jump, jitter, noise, tempering, density, counts, path_z, path_x, path_values,
+    uniforms, z, x, values, rows, size, until_append, every, lower, width, tuning, pairs,
+    unit_jump, jitter, noise, tempering, density, counts, path_z, path_x, path_values, target,
+    room, scratch,
 ):  # fmt: skip
-    """Do generations; return how many, the archive's size, the chains."""
+    """Do generations, in place on the path; return how many, and the archive's size.
+
+    The target of the chains is read from target[0] and ends in target[count % 2].
+    """
     done = 0
     while done < len(uniforms):
-        new_z, new_x, log_jacobian, correction, label = generation.propose(
-            z, uniforms[done], rows, size, lower, width, tuning.move_cdf, tuning.crossover_cdf,
-            tuning.scale, tuning.centre, tuning.factor, pairs, unit_jump, jitter, noise,
+        new_z, new_x, new_values = path_z[done], path_x[done], path_values[done]
+        here, there = target[done % 2], target[(done + 1) % 2]
+        generation.propose(
+            z, uniforms[done], rows, size, lower, width, tuning, pairs, unit_jump, jitter, noise,
+            new_z, new_x, room,
         )  # fmt: skip
-        new_values = np.empty(len(z))
-        log_densities(density, new_x, log_jacobian, new_values)
-        new_target = generation.temper(
-            new_values, log_jacobian, new_z, tempering.power, tempering.centre, tempering.factor
-        )
-        accepted, infinite = generation.accept(
-            z, x, values, target, new_z, new_x, new_values, new_target, correction, uniforms[done]
+        log_densities(density, new_x, room.log_jacobian, new_values, scratch)
+        generation.temper(
+            new_values, room.log_jacobian, new_z, tempering.power, tempering.centre,
+            tempering.factor, there,
+        )  # fmt: skip
+        infinite = generation.accept(
+            z, x, values, here, new_z, new_x, new_values, there, uniforms[done], room
         )
         if infinite >= 0:
             break  # `one` refuses it
-        generation.tally(z, new_z, accepted, label, tuning.scale, counts)
-        z, x, values, target = new_z, new_x, new_values, new_target
-        path_z[done], path_x[done], path_values[done] = z, x, values
+        generation.tally(z, new_z, room, tuning.scale, counts)
+        z, x, values = new_z, new_x, new_values
         done += 1
         if every > 0 and done >= until_append and (done - until_append) % every == 0:
             rows[size : size + len(z)] = z
             size += len(z)
-    return done, size, z, x, values, target
+    return done, size

@@ -14,7 +14,7 @@ which fix the three coefficients, and alpha_2, of which one record says nothing 
 of the way from its least to its largest value inside the prior's box given the other three (as
 a normal score, so that a prior-dominated posterior has no wall and is normal). The prior stays
 uniform in the physical parameters: given the other coordinates, (k + alpha_2)^3 is uniform. At
-k = 0 alpha_3 does not act and is the normal score of its place in the box, and alpha_2^2 is uniform.
+k = 0 alpha_3 does not act: it is the normal score of its place in the box; alpha_2^2 is uniform.
 
 With effects: `model.ridge_effects` says what their coordinates are, and what remains bent is
 straightened by what an earlier window has shown (`shear`).

@@ -34,10 +34,13 @@ def _tuning(points: Array, move: int, settings: Settings = SETTINGS) -> Tuning:
 
 def _propose(rng, z, rows, lower, width, tuning, settings=SETTINGS):
     uniforms = rng.random((len(z), moves.uniforms_per_chain(z.shape[1], settings.pairs)))
-    return uniforms, generation.propose(
-        z, uniforms, rows, len(rows), lower, width, *tuning,
-        settings.pairs, settings.unit_jump, settings.jitter, settings.noise,
+    candidate, x = np.empty_like(z), np.empty_like(z)
+    room = generation.room(*z.shape, settings.pairs)
+    generation.propose(
+        z, uniforms, rows, len(rows), lower, width, tuning, settings.pairs, settings.unit_jump,
+        settings.jitter, settings.noise, candidate, x, room,
     )  # fmt: skip
+    return uniforms, candidate, x, room
 
 
 def _worst(target: targets.Target, move: int, correct: bool, rng_seed: int) -> tuple[float, float]:
@@ -57,18 +60,14 @@ def _worst(target: targets.Target, move: int, correct: bool, rng_seed: int) -> t
     where = values + jacobian
     moved = 0.0
     for _ in range(12):
-        uniforms, (new, new_x, jacobian, correction, _label) = _propose(
-            rng, z, rows, target.lower, width, tuning
-        )
+        uniforms, new, new_x, room = _propose(rng, z, rows, target.lower, width, tuning)
         new_values = target.log_density(new_x)
-        goal = new_values + jacobian
+        goal = new_values + room.log_jacobian
         if not correct:
-            correction = np.zeros(chains)
-        accepted, _ = generation.accept(
-            z, x, values, where, new, new_x, new_values, goal, correction, uniforms
-        )
+            room.correction[:] = 0.0
+        generation.accept(z, x, values, where, new, new_x, new_values, goal, uniforms, room)
         z, x, values, where = new, new_x, new_values, goal
-        moved += accepted.mean() / 12
+        moved += room.accepted.mean() / 12
     scaled = (x - target.mean) / target.sd
     exact = (target.draw(rng, chains) - target.mean) / target.sd
     worst = 0.0
@@ -142,11 +141,11 @@ def test_crossover_classes_and_unit_jumps_occur_as_often_as_they_should(rng_seed
     crossover = np.array([0.2, 0.3, 0.5])
     tuning = _tuning(rows, moves.PARALLEL, settings)._replace(crossover_cdf=crossover.cumsum())
     z = np.zeros((chains, d))
-    _, (candidate, _x, _j, correction, label) = _propose(
+    _, candidate, _x, room = _propose(
         rng, z, rows, np.full(d, -1.0), np.full(d, 2.0), tuning, settings
     )
-    assert not correction.any()
-    used = label[:, 1]
+    assert not room.correction.any()
+    used = room.label[:, 1]
     probability = np.concatenate([[0.2], 0.8 * crossover])
     assert _chi_square(np.bincount(used + 1, minlength=4), probability) > 1e-6
     moved = (candidate != 0.0).sum(axis=1)
@@ -168,13 +167,13 @@ def test_archive_pairs_occur_as_often_as_they_should_with_their_jump_rate(rng_se
     settings = Settings(jitter=0.0, noise=1e-12, unit_jump=0.2, crossovers=1, pairs=3)
     rows = np.eye(d)
     tuning = _tuning(rows, moves.PARALLEL, settings)
-    _, (candidate, _x, _j, _c, label) = _propose(
+    _, candidate, _x, room = _propose(
         rng, np.zeros((chains, d)), rows, np.full(d, -1.0), np.full(d, 2.0), tuning, settings
     )
     plus, minus = (candidate > 0.01), (candidate < -0.01)
     pairs = plus.sum(axis=1)
     assert (pairs == minus.sum(axis=1)).all()
-    unit = label[:, 1] == -1
+    unit = room.label[:, 1] == -1
     assert (pairs[unit] == 1).all()
     assert _chi_square(np.bincount(pairs[~unit], minlength=4)[1:], np.full(3, 1 / 3)) > 1e-6
     gamma = np.where(unit, 1.0, 2.38 / np.sqrt(2.0 * pairs * d))
@@ -190,9 +189,7 @@ def test_snooker_stays_on_its_line_and_carries_its_jacobian(rng_seed: int) -> No
     rows = rng.standard_normal((3, d))
     z = rng.standard_normal((200, d))
     tuning = _tuning(rows, moves.SNOOKER)._replace(scale=np.array([1.0, 10.0, 0.1, 3.0, 1.0]))
-    _, (candidate, _x, _j, correction, _label) = _propose(
-        rng, z, rows, np.full(d, -1.0), np.full(d, 2.0), tuning
-    )
+    _, candidate, _x, room = _propose(rng, z, rows, np.full(d, -1.0), np.full(d, 2.0), tuning)
     step, scale = (candidate - z) / tuning.scale, tuning.scale
     found = np.zeros(len(z), bool)
     for anchor, one, two in ((0, 1, 2), (1, 0, 2), (2, 0, 1)):
@@ -206,7 +203,7 @@ def test_snooker_stays_on_its_line_and_carries_its_jacobian(rng_seed: int) -> No
         lengths = np.linalg.norm((candidate - rows[anchor]) / scale, axis=1) / np.linalg.norm(
             line, axis=1
         )
-        assert np.allclose(correction[fits], (d - 1) * np.log(lengths[fits]), atol=1e-9)
+        assert np.allclose(room.correction[fits], (d - 1) * np.log(lengths[fits]), atol=1e-9)
         found |= fits
     assert found.all()
 
@@ -218,13 +215,11 @@ def test_independence_draws_have_the_density_it_claims(rng_seed: int) -> None:
     points = targets.equicorrelated(d).draw(rng, 2000)
     tuning = _tuning(points, moves.INDEPENDENCE)
     z = np.tile(tuning.centre, (count, 1))
-    _, (drawn, _x, _j, correction, _label) = _propose(
-        rng, z, points, np.full(d, -1.0), np.full(d, 2.0), tuning
-    )
+    _, drawn, _x, room = _propose(rng, z, points, np.full(d, -1.0), np.full(d, 2.0), tuning)
     t = stats.multivariate_t(tuning.centre, tuning.factor @ tuning.factor.T, df=5)
     log_q = t.logpdf(drawn)
     # The correction is ln q(centre) - ln q(candidate).
-    assert np.allclose(correction, t.logpdf(tuning.centre) - log_q, atol=1e-9)
+    assert np.allclose(room.correction, t.logpdf(tuning.centre) - log_q, atol=1e-9)
     normal = stats.multivariate_normal(tuning.centre, tuning.factor @ tuning.factor.T)
     weights = np.exp(normal.logpdf(drawn) - log_q)
     error = weights.std() / np.sqrt(count)
