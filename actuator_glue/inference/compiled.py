@@ -95,10 +95,10 @@ def likelihoods(sums, size, shaping, sigma):  # type: ignore[no-untyped-def]
 
 
 @njit(fastmath=False)
-def _exactly(rows, samples, theta, exact, sums):  # type: ignore[no-untyped-def]
-    """Overwrite the error sums (m, R, 2) of thetas (m, p) where exact (R, m) asks for it."""
+def _exactly(rows, samples, theta, slack, sums):  # type: ignore[no-untyped-def]
+    """Overwrite the error sums (m, R, 2) of thetas (m, p) where slack (R, m) is not 0."""
     for r in range(len(rows)):
-        which = np.flatnonzero(exact[r])
+        which = np.flatnonzero(slack[r])
         if which.size == 0:
             continue
         systems = kernel.systems(theta[which], rows[r, laguerre.STIFFNESS])
@@ -127,14 +127,14 @@ class Scratch(NamedTuple):
         which: their places, (m,).
         inner: log Jacobians of mapped points, (m,).
         sums: error sums, (m, R, 2).
-        exact: what needs the exact kernel, (R, m).
+        slack: how far the sums may be wrong, (R, m) [m^2]; 0 for not worth mentioning.
     """
 
     theta: Array
     which: NDArray[np.int64]
     inner: Array
     sums: Array
-    exact: NDArray[np.bool_]
+    slack: Array
 
 
 def scratch(density: Compiled, count: int) -> Scratch:
@@ -145,15 +145,41 @@ def scratch(density: Compiled, count: int) -> Scratch:
         np.empty(count, np.int64),
         np.zeros(count),
         np.empty((count, records, 2)),
-        np.empty((records, count), np.bool_),
+        np.empty((records, count)),
     )
 
 
+# Log likelihood by which a point must be hopeless: rounding must not decide.
+_SURE = 1e-6
+
+
 @njit(fastmath=False)
-def log_densities(density, x, log_jacobian, values, scratch):  # type: ignore[no-untyped-def]
+def _hopeless(density, sums, slack, floor):  # type: ignore[no-untyped-def]
+    """Whether even the least error that the bound allows leaves a log likelihood below `floor`.
+
+    sums (R, 2) and slack (R,) are those of one point.
+    """
+    least = 0.0
+    for r in range(len(sums)):
+        count = density.rows[r, laguerre.COUNT]
+        least += max(sums[r, 1] - sums[r, 0] * sums[r, 0] / count - slack[r], 0.0)
+    if not least > 0.0:
+        return False
+    if density.shaping > 0.0:
+        best = -density.shaping * math.log(least / density.size)
+    elif density.sigma > 0.0:
+        best = -0.5 * least / (density.sigma * density.sigma)
+    else:
+        best = -0.5 * density.size * math.log(least)
+    return best < floor - _SURE
+
+
+@njit(fastmath=False)
+def log_densities(density, x, log_jacobian, floor, values, scratch):  # type: ignore[no-untyped-def]
     """Fill values (m,) with the log densities of points x (m, p).
 
-    Points beyond the bounds (log_jacobian minus infinity) are left out: they are impossible.
+    Points beyond the bounds (log_jacobian minus infinity) are left out: they are impossible. And
+    so are those that would need the exact kernel, but are below `floor` (m,) whatever it says.
     """
     theta, inner = scratch.theta, scratch.inner
     count = 0
@@ -172,10 +198,17 @@ def log_densities(density, x, log_jacobian, values, scratch):  # type: ignore[no
                 theta[count, j] = x[i, j]
         scratch.which[count] = i
         count += 1
-    theta, sums, exact = theta[:count], scratch.sums[:count], scratch.exact[:, :count]
-    if quadratic.evaluate_all(density.rows, theta, density.tolerance, sums, exact):
-        _exactly(density.rows, density.samples, theta, exact, sums)
+    theta, sums, slack = theta[:count], scratch.sums[:count], scratch.slack[:, :count]
+    if quadratic.evaluate_all(density.rows, theta, density.tolerance, sums, slack):
+        for i in range(count):
+            least = floor[scratch.which[i]] - (inner[i] if density.mapped else 0.0)
+            if (slack[:, i] != 0.0).any() and _hopeless(density, sums[i], slack[:, i], least):
+                scratch.which[i] = -1
+                slack[:, i] = 0.0
+        _exactly(density.rows, density.samples, theta, slack, sums)
     for i in range(count):
+        if scratch.which[i] < 0:
+            continue
         if density.shaping > 0.0:
             found = variance_likelihood(sums[i], density.size, density.shaping)
         else:

@@ -52,6 +52,8 @@ class Room(NamedTuple):
         log_jacobian: of the candidates, (n,).
         correction: log Hastings correction, (n,).
         label: move and crossover class, (n, 2).
+        log_uniform: what the log acceptance ratio must exceed, (n,).
+        floor: log density below which the candidate is rejected, (n,).
         accepted: whether the chain moves there, (n,).
         indices: scratch, (3, max(2 pairs, 3)).
         residual: scratch, (p,).
@@ -60,6 +62,8 @@ class Room(NamedTuple):
     log_jacobian: Array
     correction: Array
     label: NDArray[np.int64]
+    log_uniform: Array
+    floor: Array
     accepted: NDArray[np.bool_]
     indices: NDArray[np.int64]
     residual: Array
@@ -71,6 +75,8 @@ def room(chains: int, dimension: int, pairs: int) -> Room:
         np.empty(chains),
         np.empty(chains),
         np.empty((chains, 2), np.int64),
+        np.empty(chains),
+        np.empty(chains),
         np.empty(chains, np.bool_),
         np.empty((3, max(2 * pairs, 3)), np.int64),
         np.empty(dimension),
@@ -125,6 +131,7 @@ def propose(  # type: ignore[no-untyped-def]
                 z[i], row, tuning.centre, tuning.factor, room.residual, candidate[i]
             )
         room.log_jacobian[i] = physical(candidate[i], lower, width, x[i])
+        room.log_uniform[i] = math.log1p(-row[U_ACCEPT])
 
 
 # Strict floating point: the same bits whatever it is compiled into.
@@ -147,9 +154,22 @@ def temper(values, log_jacobian, z, power, centre, factor, target):  # type: ign
             target[i] = (1.0 - power) * reference[i] + power * target[i]
 
 
+@njit(fastmath=False)
+def expect(target, power, room):  # type: ignore[no-untyped-def]
+    """Write room.floor: what a candidate's log density must exceed, given the chains' target (n,).
+
+    Minus infinity while annealing, where the reference counts, too.
+    """
+    for i in range(len(target)):
+        room.floor[i] = -np.inf
+        if power == 1.0:
+            least = target[i] + room.log_uniform[i] - room.correction[i]
+            room.floor[i] = least - room.log_jacobian[i]
+
+
 @njit
 def accept(  # type: ignore[no-untyped-def]
-    z, x, log_density, target, new_z, new_x, new_log_density, new_target, uniforms, room
+    z, x, log_density, target, new_z, new_x, new_log_density, new_target, room
 ):
     """Metropolis-Hastings: overwrite the new_ arrays with the current state where rejected.
 
@@ -161,7 +181,7 @@ def accept(  # type: ignore[no-untyped-def]
         if new_target[i] == np.inf and infinite < 0:
             infinite = i
         log_ratio = new_target[i] - target[i] + room.correction[i]
-        room.accepted[i] = math.log1p(-uniforms[i, U_ACCEPT]) < log_ratio
+        room.accepted[i] = room.log_uniform[i] < log_ratio
         if not room.accepted[i]:
             for j in range(z.shape[1]):
                 new_z[i, j] = z[i, j]

@@ -81,7 +81,7 @@ def one(
     )  # fmt: skip
     values = evaluate(log_density, x)
     generation.temper(values, room.log_jacobian, z, *around.tempering, target)
-    infinite = generation.accept(*now, z, x, values, target, uniforms, room)
+    infinite = generation.accept(*now, z, x, values, target, room)
     if infinite >= 0:
         refuse_infinite(x[infinite])
     generation.tally(now.z, z, room, around.tuning.scale, counts)
@@ -176,14 +176,13 @@ def _advance(  # type: ignore[no-untyped-def]
             z, uniforms[done], rows, size, lower, width, tuning, pairs, unit_jump, jitter, noise,
             new_z, new_x, room,
         )  # fmt: skip
-        log_densities(density, new_x, room.log_jacobian, new_values, scratch)
+        generation.expect(here, tempering.power, room)
+        log_densities(density, new_x, room.log_jacobian, room.floor, new_values, scratch)
         generation.temper(
             new_values, room.log_jacobian, new_z, tempering.power, tempering.centre,
             tempering.factor, there,
         )  # fmt: skip
-        infinite = generation.accept(
-            z, x, values, here, new_z, new_x, new_values, there, uniforms[done], room
-        )
+        infinite = generation.accept(z, x, values, here, new_z, new_x, new_values, there, room)
         if infinite >= 0:
             break  # `one` refuses it
         generation.tally(z, new_z, room, tuning.scale, counts)

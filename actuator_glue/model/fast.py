@@ -109,11 +109,11 @@ class FastErrors:
         table = linear.thetas(theta)
         count = len(self.rows)
         out = np.empty((len(table), count, 2))
-        exact = np.empty((count, len(table)), dtype=np.bool_)
-        if quadratic.evaluate_all(self.rows, table, self.tolerance, out, exact):
-            self.fallbacks += int(exact.sum())
+        slack = np.empty((count, len(table)))
+        if quadratic.evaluate_all(self.rows, table, self.tolerance, out, slack):
+            self.fallbacks += int(np.count_nonzero(slack))
             for r in range(count):
-                which = np.flatnonzero(exact[r])
+                which = np.flatnonzero(slack[r])
                 systems = linear.systems(table[which], self.exact.stiffness[r])
                 out[which, r] = self.exact.of_record(r, systems)
         return out if np.ndim(theta) == 2 else out[0]

@@ -6,10 +6,7 @@ what it is made of.
 
 from __future__ import annotations
 
-from typing import TypeAlias
-
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_glue.jit import njit
 from actuator_glue.model import kernel
@@ -31,8 +28,6 @@ from actuator_glue.model.laguerre import (
     series,
 )
 from actuator_glue.records import Array
-
-Flags: TypeAlias = NDArray[np.bool_]
 
 _ROUNDING = 1e-15  # of the quadratic form, relative to the largest of what it adds up
 
@@ -83,8 +78,8 @@ def _sums(
 
 
 @njit
-def _trusted(about_mean: float, tail: float, near: float, tolerance: float) -> bool:
-    """Return whether truncation and rounding stay within the tolerance.
+def _slack(about_mean: float, tail: float, near: float, tolerance: float) -> float:
+    """Bound the error of the sum about the mean; 0 where it stays within the tolerance [m^2].
 
     Args:
         about_mean: sum of squares about the mean [m^2].
@@ -92,13 +87,13 @@ def _trusted(about_mean: float, tail: float, near: float, tolerance: float) -> b
         near: bound of the norms of what is added up [m].
         tolerance: relative.
     """
-    bound = (2.0 * np.sqrt(max(about_mean, 0.0)) + tail) * tail + _ROUNDING * near * near
-    return bool(bound <= tolerance * about_mean)
+    bound: float = (2.0 * np.sqrt(max(about_mean, 0.0)) + tail) * tail + _ROUNDING * near * near
+    return 0.0 if bound <= tolerance * about_mean else bound
 
 
 @njit
-def evaluate(t: Array, theta: Array, tolerance: float, out: Array, exact: Flags) -> None:
-    """Write (sum e, sum e^2) of many thetas over one record, and which need the exact kernel.
+def evaluate(t: Array, theta: Array, tolerance: float, out: Array, slack: Array) -> None:
+    """Write (sum e, sum e^2) of many thetas over one record, and how far they may be wrong.
 
     Each theta uses as many blocks of terms as its own truncation bound asks for.
 
@@ -107,7 +102,8 @@ def evaluate(t: Array, theta: Array, tolerance: float, out: Array, exact: Flags)
         theta: shape (m, 4).
         tolerance: bound on the relative error of the sum of squares about the mean.
         out: shape (m, 2) [m, m^2].
-        exact: shape (m,), True where the bound is not met (or the system does not exist).
+        slack: shape (m,), 0 where the tolerance is met and the exact kernel is not needed, else
+            the bound of the error of the sum about the mean [m^2]; NaN for no such system.
     """
     banks, norm = 1 + int(t[FREE]), t[NORM]
     N = (int(t[TERMS]) + TAIL) * banks
@@ -139,15 +135,15 @@ def evaluate(t: Array, theta: Array, tolerance: float, out: Array, exact: Flags)
             left += size[count]
         near = np.sqrt(t[SQUARES]) + np.sum(size[:full])
         square = _sums(t, sums, cross, gram, z, count * BLOCK, out[m])
-        exact[m] = not _trusted(square, left, near, tolerance)
-        if exact[m] and count < full:  # it fits much better than the reference
+        slack[m] = _slack(square, left, near, tolerance)
+        if slack[m] != 0.0 and count < full:  # it fits much better than the reference
             square = _sums(t, sums, cross, gram, z, full * BLOCK, out[m])
-            exact[m] = not _trusted(square, tail, near, tolerance)
+            slack[m] = _slack(square, tail, near, tolerance)
 
 
 @njit
-def evaluate_all(rows: Array, theta: Array, tolerance: float, out: Array, exact: Flags) -> bool:
-    """Do `evaluate` for every record; out (m, R, 2), exact (R, m). Return whether any is exact."""
+def evaluate_all(rows: Array, theta: Array, tolerance: float, out: Array, slack: Array) -> bool:
+    """Do `evaluate` for every record: out (m, R, 2), slack (R, m); return whether any is not 0."""
     for r in range(len(rows)):
-        evaluate(rows[r], theta, tolerance, out[:, r], exact[r])
-    return bool(exact.any())
+        evaluate(rows[r], theta, tolerance, out[:, r], slack[r])
+    return bool((slack != 0.0).any())

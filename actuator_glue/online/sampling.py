@@ -27,8 +27,8 @@ from actuator_glue.records import Array, Record
 EXCITATION = 3.0
 # Generations in which a sampler that starts from the last posterior adapts.
 ADAPT = 20
-# Points that a window hands to the next, at least.
-ARCHIVE = 400
+# Points that a window hands to the next, about as many as its draws are worth; at least.
+ARCHIVE, LEAST = 500, 400
 # Generations that R-hat and ESS are computed from.
 DIAGNOSED = 150
 
@@ -222,9 +222,10 @@ def _sampler(job: Job) -> dream.Settings:
 
 def _archive(new: Array, old: Array | None) -> Array:
     """Points for the next window; few of them, of a window cut short, are joined by older ones."""
-    if old is None or len(new) >= ARCHIVE:
+    new = new[_spread(len(new), ARCHIVE)]
+    if old is None or len(new) >= LEAST:
         return new
-    return np.concatenate([new, old[_spread(len(old), ARCHIVE - len(new))]])
+    return np.concatenate([new, old[_spread(len(old), LEAST - len(new))]])
 
 
 def _check_excited(record: Record, settle: int, noise: float) -> None:

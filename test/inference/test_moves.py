@@ -40,7 +40,7 @@ def _propose(rng, z, rows, lower, width, tuning, settings=SETTINGS):
         z, uniforms, rows, len(rows), lower, width, tuning, settings.pairs, settings.unit_jump,
         settings.jitter, settings.noise, candidate, x, room,
     )  # fmt: skip
-    return uniforms, candidate, x, room
+    return candidate, x, room
 
 
 def _worst(target: targets.Target, move: int, correct: bool, rng_seed: int) -> tuple[float, float]:
@@ -60,12 +60,12 @@ def _worst(target: targets.Target, move: int, correct: bool, rng_seed: int) -> t
     where = values + jacobian
     moved = 0.0
     for _ in range(12):
-        uniforms, new, new_x, room = _propose(rng, z, rows, target.lower, width, tuning)
+        new, new_x, room = _propose(rng, z, rows, target.lower, width, tuning)
         new_values = target.log_density(new_x)
         goal = new_values + room.log_jacobian
         if not correct:
             room.correction[:] = 0.0
-        generation.accept(z, x, values, where, new, new_x, new_values, goal, uniforms, room)
+        generation.accept(z, x, values, where, new, new_x, new_values, goal, room)
         z, x, values, where = new, new_x, new_values, goal
         moved += room.accepted.mean() / 12
     scaled = (x - target.mean) / target.sd
@@ -141,7 +141,7 @@ def test_crossover_classes_and_unit_jumps_occur_as_often_as_they_should(rng_seed
     crossover = np.array([0.2, 0.3, 0.5])
     tuning = _tuning(rows, moves.PARALLEL, settings)._replace(crossover_cdf=crossover.cumsum())
     z = np.zeros((chains, d))
-    _, candidate, _x, room = _propose(
+    candidate, _x, room = _propose(
         rng, z, rows, np.full(d, -1.0), np.full(d, 2.0), tuning, settings
     )
     assert not room.correction.any()
@@ -167,7 +167,7 @@ def test_archive_pairs_occur_as_often_as_they_should_with_their_jump_rate(rng_se
     settings = Settings(jitter=0.0, noise=1e-12, unit_jump=0.2, crossovers=1, pairs=3)
     rows = np.eye(d)
     tuning = _tuning(rows, moves.PARALLEL, settings)
-    _, candidate, _x, room = _propose(
+    candidate, _x, room = _propose(
         rng, np.zeros((chains, d)), rows, np.full(d, -1.0), np.full(d, 2.0), tuning, settings
     )
     plus, minus = (candidate > 0.01), (candidate < -0.01)
@@ -189,7 +189,7 @@ def test_snooker_stays_on_its_line_and_carries_its_jacobian(rng_seed: int) -> No
     rows = rng.standard_normal((3, d))
     z = rng.standard_normal((200, d))
     tuning = _tuning(rows, moves.SNOOKER)._replace(scale=np.array([1.0, 10.0, 0.1, 3.0, 1.0]))
-    _, candidate, _x, room = _propose(rng, z, rows, np.full(d, -1.0), np.full(d, 2.0), tuning)
+    candidate, _x, room = _propose(rng, z, rows, np.full(d, -1.0), np.full(d, 2.0), tuning)
     step, scale = (candidate - z) / tuning.scale, tuning.scale
     found = np.zeros(len(z), bool)
     for anchor, one, two in ((0, 1, 2), (1, 0, 2), (2, 0, 1)):
@@ -215,7 +215,7 @@ def test_independence_draws_have_the_density_it_claims(rng_seed: int) -> None:
     points = targets.equicorrelated(d).draw(rng, 2000)
     tuning = _tuning(points, moves.INDEPENDENCE)
     z = np.tile(tuning.centre, (count, 1))
-    _, drawn, _x, room = _propose(rng, z, points, np.full(d, -1.0), np.full(d, 2.0), tuning)
+    drawn, _x, room = _propose(rng, z, points, np.full(d, -1.0), np.full(d, 2.0), tuning)
     t = stats.multivariate_t(tuning.centre, tuning.factor @ tuning.factor.T, df=5)
     log_q = t.logpdf(drawn)
     # The correction is ln q(centre) - ln q(candidate).
