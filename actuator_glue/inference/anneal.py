@@ -105,7 +105,8 @@ def anneal(
     columns = uniforms_per_chain(dimension, settings.pairs)
     most = math.inf if limit is None else limit
     while power < 1.0 and evaluations + chains * settings.sweeps <= most:
-        gain = values + log_jacobian - reference.log_density(z, log_jacobian)
+        base = reference.log_density(z, log_jacobian)
+        gain = values + log_jacobian - base
         gain[~np.isfinite(values)] = -np.inf
         rise = next_rise(gain, 1.0 - power, settings.survivors)
         power = 1.0 if rise >= 1.0 - power else power + rise
@@ -116,7 +117,7 @@ def anneal(
         tempering = Tempering(power, reference.centre, reference.factor)
         around = Around(lower, width, tuning, settings, tempering)
         target = np.empty(chains)
-        temper(values[start], log_jacobian[start], z[start], *tempering, target)
+        temper(values[start], log_jacobian[start], base[start], power, target)
         now = Walk(z[start], x[start], values[start], target)
         counts = empty_counts(settings)
         uniforms = rng.random((settings.sweeps, chains, columns))

@@ -53,6 +53,19 @@ def ess_bulk(draws: Array) -> Array:
     return rhat_and_ess(draws)[1]
 
 
+def quick_rhat_and_ess(draws: Array) -> tuple[Array, Array]:
+    """Return split R-hat and effective sample size without ranks, (p,) each.
+
+    A tenth of the cost of `rhat_and_ess`, and the same where the draws are nearly normal: it may
+    decide when to stop, not what is published. Arguments as in `rhat`.
+    """
+    split = _split(draws)
+    if split.shape[2] < 2 or not np.isfinite(split).all():
+        nothing = np.full(draws.shape[2], np.nan)
+        return nothing, nothing.copy()
+    return np.asarray(_potential_reduction(split)), _effective(split)
+
+
 def rhat_and_ess(draws: Array) -> tuple[Array, Array]:
     """Return `rhat` and `ess_bulk`, (p,) each, from one ranking of the draws."""
     split = _split(draws)

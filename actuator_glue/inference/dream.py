@@ -249,8 +249,9 @@ def sample(
         if progress is not None and new // every > done // every:
             progress(state.evaluations, evaluations)
         done = new
-        if stop is not None and stop(state):
-            break
+        # In this order: what had drawn enough is told so when `stop` repeats where it ended.
         if enough is not None and done in looks and enough(so_far(done)):
+            break
+        if stop is not None and stop(state):
             break
     return so_far(done)

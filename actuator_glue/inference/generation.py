@@ -52,8 +52,9 @@ class Room(NamedTuple):
         log_jacobian: of the candidates, (n,).
         correction: log Hastings correction, (n,).
         label: move and crossover class, (n, 2).
+        reference: log density of the tempered target's reference at the candidates, (n,).
         log_uniform: what the log acceptance ratio must exceed, (n,).
-        floor: log density below which the candidate is rejected, (n,).
+        floor: log likelihood below which the candidate is rejected, (n,).
         accepted: whether the chain moves there, (n,).
         indices: scratch, (3, max(2 pairs, 3)).
         residual: scratch, (p,).
@@ -62,6 +63,7 @@ class Room(NamedTuple):
     log_jacobian: Array
     correction: Array
     label: NDArray[np.int64]
+    reference: Array
     log_uniform: Array
     floor: Array
     accepted: NDArray[np.bool_]
@@ -75,6 +77,7 @@ def room(chains: int, dimension: int, pairs: int) -> Room:
         np.empty(chains),
         np.empty(chains),
         np.empty((chains, 2), np.int64),
+        np.empty(chains),
         np.empty(chains),
         np.empty(chains),
         np.empty(chains, np.bool_),
@@ -136,15 +139,21 @@ def propose(  # type: ignore[no-untyped-def]
 
 # Strict floating point: the same bits whatever it is compiled into.
 @njit(fastmath=False)
-def temper(values, log_jacobian, z, power, centre, factor, target):  # type: ignore[no-untyped-def]
-    """Write the log target (n,) of points z (n, p), docs/dream.md (D1) and (D6).
+def refer(z, log_jacobian, power, centre, factor, reference):  # type: ignore[no-untyped-def]
+    """Write the reference's log density (n,) at points z (n, p), docs/dream.md (D6)."""
+    for i in range(len(z)):
+        reference[i] = log_jacobian[i]
+    if power != 1.0 and centre.size > 0:
+        reference[:] = independence.log_density(z, centre, factor)
+
+
+@njit(fastmath=False)
+def temper(values, log_jacobian, reference, power, target):  # type: ignore[no-untyped-def]
+    """Write the log target (n,) of points, docs/dream.md (D1) and (D6).
 
     Beyond the bounds (log_jacobian minus infinity) it is minus infinity, whatever the likelihood
     says there.
     """
-    reference = log_jacobian
-    if power != 1.0 and centre.size > 0:
-        reference = independence.log_density(z, centre, factor)
     for i in range(len(values)):
         if log_jacobian[i] == -np.inf:
             target[i] = -np.inf
@@ -156,15 +165,12 @@ def temper(values, log_jacobian, z, power, centre, factor, target):  # type: ign
 
 @njit(fastmath=False)
 def expect(target, power, room):  # type: ignore[no-untyped-def]
-    """Write room.floor: what a candidate's log density must exceed, given the chains' target (n,).
-
-    Minus infinity while annealing, where the reference counts, too.
-    """
+    """Write room.floor: what a candidate's log likelihood must exceed, given chains' targets."""
     for i in range(len(target)):
-        room.floor[i] = -np.inf
-        if power == 1.0:
-            least = target[i] + room.log_uniform[i] - room.correction[i]
-            room.floor[i] = least - room.log_jacobian[i]
+        least = target[i] + room.log_uniform[i] - room.correction[i]
+        if power != 1.0:
+            least = (least - (1.0 - power) * room.reference[i]) / power
+        room.floor[i] = least - room.log_jacobian[i]
 
 
 @njit

@@ -80,7 +80,8 @@ def one(
         around.tuning, s.pairs, s.unit_jump, s.jitter, s.noise, z, x, room,
     )  # fmt: skip
     values = evaluate(log_density, x)
-    generation.temper(values, room.log_jacobian, z, *around.tempering, target)
+    generation.refer(z, room.log_jacobian, *around.tempering, room.reference)
+    generation.temper(values, room.log_jacobian, room.reference, around.tempering.power, target)
     infinite = generation.accept(*now, z, x, values, target, room)
     if infinite >= 0:
         refuse_infinite(x[infinite])
@@ -168,7 +169,7 @@ def _advance(  # type: ignore[no-untyped-def]
 
     The target of the chains is read from target[0] and ends in target[count % 2].
     """
-    done = 0
+    done, power = 0, tempering.power
     while done < len(uniforms):
         new_z, new_x, new_values = path_z[done], path_x[done], path_values[done]
         here, there = target[done % 2], target[(done + 1) % 2]
@@ -176,12 +177,12 @@ def _advance(  # type: ignore[no-untyped-def]
             z, uniforms[done], rows, size, lower, width, tuning, pairs, unit_jump, jitter, noise,
             new_z, new_x, room,
         )  # fmt: skip
-        generation.expect(here, tempering.power, room)
+        generation.refer(
+            new_z, room.log_jacobian, power, tempering.centre, tempering.factor, room.reference
+        )
+        generation.expect(here, power, room)
         log_densities(density, new_x, room.log_jacobian, room.floor, new_values, scratch)
-        generation.temper(
-            new_values, room.log_jacobian, new_z, tempering.power, tempering.centre,
-            tempering.factor, there,
-        )  # fmt: skip
+        generation.temper(new_values, room.log_jacobian, room.reference, power, there)
         infinite = generation.accept(z, x, values, here, new_z, new_x, new_values, there, room)
         if infinite >= 0:
             break  # `one` refuses it

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from actuator_glue.errors import InputError
+from actuator_glue.inference.convergence import rhat_and_ess
 from actuator_glue.inference.moments import Moments, moments
 from actuator_glue.online import fitting, sampling
 from actuator_glue.online.forecast import Frozen, Prediction, predictions
@@ -16,6 +17,9 @@ from actuator_glue.online.sampling import Fit, Job
 from actuator_glue.online.settings import EstimatorSettings, ModelChoice
 from actuator_glue.online.stream import Window
 from actuator_glue.records import Array, Record
+
+# Generations that R-hat and ESS are computed from.
+DIAGNOSED = 150
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,9 +105,11 @@ def report(job: Job, fitted: Fit) -> WindowResult:
 
 def _report(job: Job, fitted: Fit) -> WindowResult:
     settings, model, record = job.settings, job.model, job.window.record
-    chains, frozen, rhat = fitted.chains, fitted.frozen, fitted.rhat
-    if chains is None or frozen is None or rhat is None:
+    chains, frozen = fitted.chains, fitted.frozen
+    if chains is None or frozen is None:
         return WindowResult(job.window, settings, model, failure=fitted.failure)
+    # R-hat and ESS of very many draws would cost more than the sampling.
+    rhat, ess = rhat_and_ess(chains.kept[:: max(1, len(chains.kept) // DIAGNOSED)])
     summary = moments(chains.posterior(), *model.bounds)
     settle = round(settings.settle / record.period)
     seed = (settings.seed, record.first_index)
@@ -115,7 +121,7 @@ def _report(job: Job, fitted: Fit) -> WindowResult:
         prior_dominated=tuple(bool(f) for f in summary.prior_dominated),
         best=chains.best,
         rhat=rhat,
-        ess=fitted.ess,
+        ess=ess,
         rms_error=fitted.rms_error,
         nrmse=fitted.rms_error / float(record.measured[settle:].std()),
         noise=frozen.noise,

@@ -18,6 +18,7 @@ from actuator_glue.records import Array
 
 # Newton squares its relative error: a last step of 0.5 % leaves 0.005 % of a standard deviation.
 _STEPS, _PRECISION = 60, 5e-3
+_LEVEL = 1e-10  # between hills the distribution is level, and Newton's steps are lost in rounding
 _REACH = 9.0  # standard deviations beyond which there is nothing
 _MOST = 24  # terms of the series; where they do not do, components are summed one by one
 _TRUNCATION = 3e-5  # of a standard deviation, what the series may leave out
@@ -80,6 +81,9 @@ def _direct(x, inverse, drift, probability, start, limits, coming):  # type: ign
             at = new
             below, density, carried = _sums(at, x, inverse, drift)
             gap = below / m - probability[q]
+            if abs(gap) < _LEVEL:
+                new = at
+                break
             if gap > 0.0:
                 high = at
             else:

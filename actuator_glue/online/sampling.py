@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 from actuator_glue.errors import InputError
 from actuator_glue.inference import dream
 from actuator_glue.inference.chains import Chains
-from actuator_glue.inference.convergence import rhat_and_ess
+from actuator_glue.inference.convergence import quick_rhat_and_ess
 from actuator_glue.inference.evaluate import LogDensity
 from actuator_glue.inference.likelihood import GaussianLikelihood, GlueLikelihood
 from actuator_glue.inference.predictive import fit_residual
@@ -29,8 +28,6 @@ EXCITATION = 3.0
 ADAPT = 20
 # Points that a window hands to the next, about as many as its draws are worth; at least.
 ARCHIVE, LEAST = 500, 400
-# Generations that R-hat and ESS are computed from.
-DIAGNOSED = 150
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -79,8 +76,6 @@ class Fit:
         window: the samples.
         model: fitted model.
         chains: draws in physical units.
-        rhat: rank-normalised split R-hat, shape (p,).
-        ess: bulk effective sample size, shape (p,).
         rms_error: rms of measured minus best simulated displacement, mean removed [m].
         frozen: what will be held against later samples.
         archive: points to start from, shape (m, p).
@@ -91,8 +86,6 @@ class Fit:
     window: Window
     model: ModelChoice
     chains: Chains | None = None
-    rhat: Array | None = None
-    ess: Array | None = None
     rms_error: float = float('nan')
     frozen: Frozen | None = None
     archive: Array | None = None
@@ -114,8 +107,7 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> Fit:
     settle = round(settings.settle / record.period)
     noise = sensor_noise(record.measured)
     _check_excited(record, settle, noise)
-    drawn = _sample(job, settle, expired)
-    chains = drawn.chains
+    chains, complete = _sample(job, settle, expired)
     posterior = chains.posterior()
     residual = (record.measured - fitting.simulate(model, chains.best[None], record)[0])[settle:]
     frozen = Frozen(
@@ -132,35 +124,15 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> Fit:
         window=job.window,
         model=model,
         chains=chains,
-        rhat=drawn.rhat,
-        ess=drawn.ess,
         rms_error=float(residual.std()),
         frozen=frozen,
         archive=_archive(chains.archive, job.archive),
-        complete=drawn.suffices(settings) or chains.evaluations + job.chains > job.evaluations,
+        complete=complete,
     )
 
 
-class _Drawn(NamedTuple):
-    """Chains of physical parameters and what tells how far they may be trusted."""
-
-    chains: Chains
-    rhat: Array
-    ess: Array
-
-    @staticmethod
-    def of(chains: Chains) -> _Drawn:
-        # R-hat and ESS cost more than the sampling if all of very many draws are ranked.
-        kept = chains.kept
-        return _Drawn(chains, *rhat_and_ess(kept[:: max(1, len(kept) // DIAGNOSED)]))
-
-    def suffices(self, settings: EstimatorSettings) -> bool:
-        """Whether further draws would not change what is published: R-hat well below its limit."""
-        limit = 0.5 * (1.0 + settings.rhat_limit)
-        return bool(self.ess.min() >= settings.ess and self.rhat.max() <= limit)
-
-
-def _sample(job: Job, settle: int, expired: Callable[[], bool] | None) -> _Drawn:
+def _sample(job: Job, settle: int, expired: Callable[[], bool] | None) -> tuple[Chains, bool]:
+    """Return chains of physical parameters, and whether they are all that was wanted."""
     settings, model, record = job.settings, job.model, job.window.record
     near = None if job.archive is None else np.median(job.archive, axis=0)
     errors = fitting.errors(model, record, settle, near)
@@ -179,11 +151,14 @@ def _sample(job: Job, settle: int, expired: Callable[[], bool] | None) -> _Drawn
         archive = coordinates.coordinates(job.archive)
     else:
         sampler, archive = coordinates.cold(np.random.default_rng((*seed, 3)), sampler)
-    seen: list[_Drawn] = []
+    complete = False
 
     def enough(sampled: Chains) -> bool:
-        seen[:] = [_Drawn.of(coordinates.chains(sampled))]
-        return seen[0].chains.annealed and seen[0].suffices(settings)
+        nonlocal complete
+        rhat, ess = quick_rhat_and_ess(sampled.kept)
+        limit = 0.5 * (1.0 + settings.rhat_limit)
+        complete = bool(sampled.annealed and ess.min() >= settings.ess and rhat.max() <= limit)
+        return complete
 
     sampled = dream.sample(
         np.random.default_rng((*seed, 0)),
@@ -196,9 +171,8 @@ def _sample(job: Job, settle: int, expired: Callable[[], bool] | None) -> _Drawn
         stop=_stop(job, expired),
         enough=enough,
     )
-    if seen and seen[0].chains.evaluations == sampled.evaluations:
-        return seen[0]
-    return _Drawn.of(coordinates.chains(sampled))
+    complete = complete or sampled.evaluations + job.chains > job.evaluations
+    return coordinates.chains(sampled), complete
 
 
 def _stop(job: Job, expired: Callable[[], bool] | None) -> Callable[[dream.State], bool] | None:
