@@ -227,9 +227,9 @@ class Structure:
 
     def values(self, table: Array) -> dict[str, Array]:
         """Return every catalogue parameter by name, each (m,), neutral if not in theta."""
-        m = len(table)
-        known = {name: np.full(m, value) for name, value in _DEFAULTS.items()}
-        known.update({name: table[:, i] for i, name in enumerate(self.names)})
+        off = np.repeat([[*_DEFAULTS.values()]], len(table), axis=0).T
+        known = dict(zip(_DEFAULTS, np.ascontiguousarray(off), strict=True))
+        known.update(zip(self.names, table.T, strict=True))
         return known
 
     @property

@@ -17,7 +17,7 @@ MAX_STEP = 1.05e-3  # s
 _MAX_POLE_STEP = 0.8
 _MAX_REFINEMENT = 8
 # Samples simulated at a time: their displacements stay in the second-level cache.
-_CHUNK = 1024
+_CHUNK = 2048
 
 
 def sample_steps(period: float) -> int:
