@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from actuator_glue.errors import InputError
-from actuator_glue.model.effects import kernel, lti, run
+from actuator_glue.model.effects import kernel, lti, rows, run
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Hold, check_stiffness
 
@@ -104,7 +104,7 @@ class Stream:
                 f'command block of shape {block.shape} must be one row of finite samples [m]'
             )
         u = np.concatenate([self._history, block])
-        out = np.empty((len(block), kernel.LANES))
+        out = np.empty((len(block), rows.LANES))
         force = np.empty_like(out)
         self._advance(u, out, force)
         samples = np.arange(self._begin, self._begin + len(block), dtype=np.float64)

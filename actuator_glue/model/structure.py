@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from actuator_glue.errors import InputError
 from actuator_glue.model import linear
-from actuator_glue.model.effects import CATALOGUE, Effect, Scale, kernel, lti, run
+from actuator_glue.model.effects import CATALOGUE, Effect, Scale, lti, rows, run
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.parameters import BASE, Parameter
 from actuator_glue.model.structure_errors import StructureErrors
@@ -56,7 +56,7 @@ class Structure:
         for effect in self.entries:
             self._columns[effect.name] = slice(first, first + len(effect.parameters))
             first += len(effect.parameters)
-        self._on = np.zeros(kernel.SWITCHES, dtype=np.bool_)
+        self._on = np.zeros(rows.SWITCHES, dtype=np.bool_)
         self._on[[s for effect in self.entries for s in effect.switches]] = True
         self._plain = _MEANLESS.issuperset(self.effects)
         self.linear = _OUTSIDE.union(lti.EFFECTS).issuperset(self.effects)
@@ -227,14 +227,14 @@ class Structure:
 
     def values(self, table: Array) -> dict[str, Array]:
         """Return every catalogue parameter by name, each (m,), neutral if not in theta."""
-        m = len(table)
-        known = {name: np.full(m, value) for name, value in _DEFAULTS.items()}
-        known.update({name: table[:, i] for i, name in enumerate(self.names)})
+        off = np.repeat([[*_DEFAULTS.values()]], len(table), axis=0).T
+        known = dict(zip(_DEFAULTS, np.ascontiguousarray(off), strict=True))
+        known.update(zip(self.names, table.T, strict=True))
         return known
 
     @property
     def switches(self) -> NDArray[np.bool_]:
-        """Which stages of the kernel act, shape (kernel.SWITCHES,)."""
+        """Which stages of the kernel act, shape (rows.SWITCHES,)."""
         return self._on.copy()
 
     @np.errstate(all='ignore')  # NaN and infinity are the answer where parameters are absurd

@@ -9,7 +9,7 @@ import numpy as np
 from actuator_glue.errors import InputError
 from actuator_glue.inference.likelihood import Errors
 from actuator_glue.model import linear
-from actuator_glue.model.effects.kernel import LANES
+from actuator_glue.model.effects.rows import LANES
 from actuator_glue.model.fast import FastErrors
 from actuator_glue.model.structure import Structure
 from actuator_glue.online.settings import ModelChoice

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import actuator_glue
-from actuator_glue.model.effects import CATALOGUE, scale
+from actuator_glue.model.effects import CATALOGUE, balance, scale
 from actuator_glue.model.effects.table import markdown, renewed
 from actuator_glue.model.parameters import NAMES, TABLE_2
 from actuator_glue.model.structure import Structure
@@ -291,3 +291,11 @@ def test_yielding_dissipates() -> None:
         x, f = (column[-round(4 * RATE) :] for column in stream.step(sine(2.0, amplitude)))
         areas.append(np.trapezoid(f, x) / 8.0)  # eight cycles
     assert areas[0] > 1e-3 and areas[1] > 3.0 * areas[0]
+
+
+def test_bell_of_falling_friction() -> None:
+    """The polynomial stands for the exponential, and keeps what is not a number."""
+    square = np.concatenate([np.linspace(0.0, 80.0, 20_001), [1e3, np.inf]])
+    found = np.array([balance.bell(s) for s in square])
+    np.testing.assert_allclose(found, np.exp(-0.5 * square), rtol=0.0, atol=2e-7)
+    assert np.isnan(balance.bell(np.nan))

@@ -1,163 +1,213 @@
-"""From physical parameters to the kernel's coefficient table (docs/effects.md, 'Scheme')."""
+"""From physical parameters to the kernel's table (docs/effects.md, 'Scheme').
+
+Compiled and written where the kernel reads it: for 32 parameter sets numpy would spend more time
+in its calls than in the arithmetic.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import math
+from typing import Any, Final
 
 import numpy as np
 
-from actuator_glue.model.effects import kernel as k
+from actuator_glue.jit import njit
+from actuator_glue.model.effects import rows as r
 from actuator_glue.records import Array
 
 # A limit at or above this velocity is no limit: the neutral value of flow-saturation.
-NO_LIMIT = 2.0  # m/s
+NO_LIMIT: Final = 2.0  # m/s
 # The rise of dry friction follows a change of velocity with this time constant (frictional
 # memory), or with MEMORY_MARGIN rise / ((k + alpha_2) v_s) where that is longer: the steepest
 # fall of the Stribeck curve is 0.86 rise / v_s, and a massless specimen has one velocity only
 # where the memory is longer than 0.86 rise / ((k + alpha_2) v_s).
-FRICTION_MEMORY = 2e-3  # s
-MEMORY_MARGIN = 1.72
+FRICTION_MEMORY: Final = 2e-3  # s
+MEMORY_MARGIN: Final = 1.72
 
-_TERMS = 14  # Taylor terms for arguments below 1/4: 0.25^14/14! is below rounding
+# Parameters that the kernel takes. 'envelope' is the averaged speed before the first sample [m/s].
+NAMES: Final = (
+    'beta_1', 'alpha_1_beta_0', 'alpha_2', 'alpha_3', 'gain', 'delay', 'clock_skew',
+    'null_offset', 'deadband', 'valve_lag', 'saturation_velocity', 'asymmetry',
+    'inverse_stall_force', 'droop', 'droop_time', 'gain_drift', 'damping', 'mass', 'mass_damping',
+    'coulomb_force', 'sliding_force', 'breakaway_ratio', 'stribeck_velocity', 'gap', 'hardening',
+    'yield_displacement', 'post_yield_ratio', 'yield_sharpness', 'backlash', 'sensor_lag',
+    'envelope',
+)  # fmt: skip
+KIND: Final = np.dtype([(name, np.float64) for name in NAMES])
+
+_TERMS: Final = 14  # Taylor terms for arguments below 1/4: 0.25^14/14! is below rounding
 
 
-def _exact(a1: Array, a0: Array, step: float) -> tuple[Array, Array, Array]:
+@njit
+def _exact(a1: float, a0: float, step: float) -> tuple[float, float, float]:
     """Return position after a unit step of acceleration, its derivative and its integral.
 
     x'' + a1 x' + a0 x = 1 from rest at time `step`; Taylor series of the scaled system, then
     doubled back (the transition matrix follows from both).
     """
-    size = np.maximum(np.abs(a1) * step, np.sqrt(np.abs(a0)) * step)
-    doublings = np.clip(np.ceil(np.log2(size / 0.25)), 0, 60)
-    doublings = np.where(np.isfinite(doublings), doublings, 0)
+    size = max(abs(a1), math.sqrt(abs(a0))) * step
+    doublings = 0
+    if 0.25 < size < math.inf:
+        doublings = min(math.ceil(math.log2(size / 0.25)), 60)
     t = step / 2.0**doublings
     e1, e2 = -a1 * t, a0 * t * t
-    h_old, h = np.zeros_like(t), np.ones_like(t)
-    factorial = 1.0
-    s1, s2, s3 = np.zeros_like(t), np.zeros_like(t), np.zeros_like(t)
+    h_old, h = 0.0, 1.0
+    factorial, s1, s2, s3 = 1.0, 0.0, 0.0, 0.0
     for n in range(_TERMS):
         factorial *= n + 1
-        s1 = s1 + h / factorial
-        s2 = s2 + h / (factorial * (n + 2))
-        s3 = s3 + h / (factorial * (n + 2) * (n + 3))
+        s1 += h / factorial
+        s2 += h / (factorial * (n + 2))
+        s3 += h / (factorial * (n + 2) * (n + 3))
         h_old, h = h, e1 * h - e2 * h_old
     velocity, position, ramp = t * s1, t * t * s2, t * t * t * s3
-    for n in range(int(doublings.max(initial=0.0))):
-        more = n < doublings
+    for _ in range(doublings):
         f11 = 1.0 - a0 * position
         f22 = f11 - a1 * velocity
-        ramp = np.where(more, (1.0 + f11) * ramp + (t + velocity) * position, ramp)
-        position, velocity = (
-            np.where(more, position + f11 * position + velocity * velocity, position),
-            np.where(more, velocity * (f11 + f22), velocity),
-        )
-        t = np.where(more, 2.0 * t, t)
+        ramp = (1.0 + f11) * ramp + (t + velocity) * position
+        position += f11 * position + velocity * velocity
+        velocity *= f11 + f22
+        t *= 2.0
     return position, velocity, ramp
 
 
-def build(
-    values: Mapping[str, Array], stiffness: float, step: float, period: float
-) -> dict[int, Array]:
-    """Return the coefficient rows of the kernel's table, each (m,), by where they begin.
-
-    Args:
-        values: every base and effect parameter of the compiled stages by name, each (m,).
-        stiffness: specimen stiffness k [N/m].
-        step: sub-step [s].
-        period: sample period [s].
-    """
-    v = values
-    b1, n0, a2, a3 = v['beta_1'], v['alpha_1_beta_0'], v['alpha_2'], v['alpha_3']
-    c: dict[int, Array] = {}
+@njit
+def _valve(w: Array, n: int, p: Any, step: float) -> None:
+    """Valve T q'' + q' + beta_1 q = n0 e by the trapezoidal rule: mean flow over the step."""
     half = 0.5 * step
+    below = 1.0 + p.beta_1 * half + 2.0 * p.valve_lag / step
+    w[r.VALVE_E + n] = half * p.alpha_1_beta_0 / below
+    w[r.VALVE_Q + n] = 1.0 - half * p.beta_1 / below
+    w[r.VALVE_D + n] = p.valve_lag / below
+    w[r.NULL + n], w[r.DEADBAND + n] = p.null_offset, p.deadband
 
-    c[k.GAIN] = v['gain']
-    c[k.LAG_SAMPLES] = v['delay'] / period
-    c[k.SKEW] = v['clock_skew']
-    c[k.NULL] = v['null_offset']
-    c[k.DEADBAND] = v['deadband']
 
-    # Valve T q'' + q' + beta_1 q = n0 e by the trapezoidal rule: mean flow over the step.
-    lag = v['valve_lag']
-    below = 1.0 + b1 * half + 2.0 * lag / step
-    c[k.VALVE_E] = half * n0 / below
-    c[k.VALVE_Q] = 1.0 - half * b1 / below
-    c[k.VALVE_D] = lag / below
+@njit
+def _flow(w: Array, n: int, p: Any, step: float) -> None:
+    limit, half = p.saturation_velocity, 0.5 * step
+    w[r.SATURATION + n] = math.inf if limit >= NO_LIMIT else limit * p.alpha_2
+    w[r.ASYMMETRY + n] = p.asymmetry
+    w[r.INVERSE_STALL + n] = p.inverse_stall_force
+    w[r.DROOP + n], w[r.DROOP_HALF + n] = p.droop, half / (p.droop_time + half)
+    w[r.GAIN_DRIFT + n] = p.gain_drift
+    w[r.INVERSE_ALPHA_2 + n] = 1.0 / p.alpha_2
 
-    limit = v['saturation_velocity']
-    c[k.SATURATION] = np.where(limit >= NO_LIMIT, np.inf, limit * a2)
-    c[k.ASYMMETRY] = v['asymmetry']
-    c[k.INVERSE_STALL] = v['inverse_stall_force']
-    c[k.DROOP] = v['droop']
-    c[k.DROOP_HALF] = half / (v['droop_time'] + half)
-    c[k.GAIN_DRIFT] = v['gain_drift']
-    c[k.INVERSE_ALPHA_2] = 1.0 / a2
 
-    c[k.FORCE_F] = (1.0 - half * a3) / (1.0 + half * a3)
-    c[k.FORCE_Q] = step / (1.0 + half * a3)
-    c[k.FORCE_X] = a2 / (1.0 + half * a3)
+@njit
+def _forces(w: Array, n: int, p: Any, k: float, step: float) -> None:
+    """Oil by the trapezoidal rule, inertia and damping, and one over what resists an increment."""
+    below = 1.0 + 0.5 * step * p.alpha_3
+    w[r.FORCE_F + n] = (2.0 - below) / below
+    w[r.FORCE_Q + n] = step / below
+    w[r.FORCE_X + n] = p.alpha_2 / below
+    damping = p.damping + p.mass * p.mass_damping
+    w[r.DAMPING_2 + n] = 2.0 * damping / step + 4.0 * p.mass / (step * step)
+    w[r.MASS_4V + n] = 4.0 * p.mass / step
+    idle = w[r.FORCE_X + n] + w[r.DAMPING_2 + n]
+    acting = idle + 0.5 * w[r.FORCE_Q + n] * w[r.VALVE_E + n]
+    w[r.ACTING_TOUCHED + n], w[r.IDLE_TOUCHED + n] = 1.0 / (acting + k), 1.0 / (idle + k)
+    w[r.ACTING_FREE + n], w[r.IDLE_FREE + n] = 1.0 / acting, 1.0 / idle
 
-    c[k.STIFFNESS] = np.full_like(b1, stiffness)
-    damping = v['damping'] + v['mass'] * v['mass_damping']
-    c[k.DAMPING_2] = 2.0 * damping / step + 4.0 * v['mass'] / step**2
-    c[k.MASS_4V] = 4.0 * v['mass'] / step
 
-    c[k.COULOMB] = v['coulomb_force'] + v['sliding_force']
-    rise = v['sliding_force'] * (v['breakaway_ratio'] - 1.0)
-    speed = v['stribeck_velocity']
-    c[k.STRIBECK_EXTRA] = rise
-    c[k.STRIBECK_RATE] = 1.0 / (step * speed)
-    memory = np.maximum(FRICTION_MEMORY, MEMORY_MARGIN * rise / ((stiffness + a2) * speed))
-    c[k.STRIBECK_LAG] = np.exp(-step / memory)
+@njit
+def _friction(w: Array, n: int, p: Any, k: float, step: float) -> None:
+    w[r.COULOMB + n] = p.coulomb_force + p.sliding_force
+    rise, speed = p.sliding_force * (p.breakaway_ratio - 1.0), p.stribeck_velocity
+    memory = max(FRICTION_MEMORY, MEMORY_MARGIN * rise / ((k + p.alpha_2) * speed))
+    w[r.STRIBECK_LAG + n] = math.exp(-step / memory)
+    w[r.STRIBECK_EXTRA + n] = rise * (1.0 - w[r.STRIBECK_LAG + n])
+    w[r.STRIBECK_BEND + n] = 2.0 / (step * step * speed * speed)
 
-    c[k.GAP] = v['gap']
-    c[k.HARDENING] = v['hardening']
+
+@njit
+def _specimen(w: Array, n: int, p: Any, k: float) -> None:
+    w[r.STIFFNESS + n], w[r.GAP + n], w[r.HARDENING + n] = k, p.gap, p.hardening
     # Past the peak of a softening spring (3 |kappa| x^2 = 1) the secant stays.
-    c[k.HARDENING_CAP] = np.where(
-        v['hardening'] < 0.0, 1.0 / (3.0 * np.abs(v['hardening'])), np.inf
-    )
-    c[k.INVERSE_YIELD] = 1.0 / v['yield_displacement']
-    c[k.YIELD] = v['yield_displacement']
-    c[k.YIELD_RATIO] = v['post_yield_ratio']
-    for power, row in enumerate((k.SHARP_1, k.SHARP_2, k.SHARP_4, k.SHARP_8, k.SHARP_16)):
-        c[row] = np.maximum(0.0, 1.0 - np.abs(v['yield_sharpness'] - power))
-
-    c[k.BACKLASH] = v['backlash']
-    c[k.SENSOR_LAG] = v['sensor_lag'] / step
-    c[k.SENSOR_DECAY] = np.exp(-step / v['sensor_lag'])
-
-    _linear(c, b1, n0, a2, a3, stiffness, step)
-    return c
+    softens = p.hardening < 0.0
+    w[r.HARDENING_CAP + n] = -1.0 / (3.0 * p.hardening) if softens else math.inf
+    w[r.YIELD + n], w[r.INVERSE_YIELD + n] = p.yield_displacement, 1.0 / p.yield_displacement
+    w[r.YIELD_RATIO + n] = p.post_yield_ratio
+    for power in range(5):  # SHARP_1 .. SHARP_16 follow one another
+        share = max(1.0 - abs(p.yield_sharpness - power), 0.0)
+        w[r.SHARP_1 + power * r.LANES + n] = share
 
 
-def _linear(
-    c: dict[int, Array], b1: Array, n0: Array, a2: Array, a3: Array, stiffness: float, step: float
-) -> None:
-    """Write both linear chains: Eq. (2) exactly in (x, v), and by the scheme in (x, q)."""
-    d2 = stiffness + a2
-    a1 = (a3 * stiffness + b1 * d2) / d2
-    a0 = (b1 * a3 * stiffness + n0) / d2
+@njit
+def _chains(w: Array, n: int, p: Any, k: float, step: float) -> None:
+    """Both linear chains: Eq. (2) exactly in (x, v), and by the scheme in (x, q)."""
+    b1, n0, oil = p.beta_1, p.alpha_1_beta_0, k + p.alpha_2
+    a1 = (p.alpha_3 * k + b1 * oil) / oil
+    a0 = (b1 * p.alpha_3 * k + n0) / oil
     position, velocity, ramp = _exact(a1, a0, step)
-    c[k.EXACT_XX] = 1.0 - a0 * position
-    c[k.EXACT_XV] = velocity
-    c[k.EXACT_XU] = n0 / d2 * position
-    c[k.EXACT_XR] = n0 / d2 * (ramp / step - 0.5 * position)
-    c[k.EXACT_VX] = -a0 * velocity
-    c[k.EXACT_VV] = c[k.EXACT_XX] - a1 * velocity
-    c[k.EXACT_VU] = n0 / d2 * velocity
-    c[k.EXACT_VR] = n0 / d2 * (position / step - 0.5 * velocity)
+    into = p.gain * n0 / oil
+    w[r.EXACT_XX + n] = 1.0 - a0 * position
+    w[r.EXACT_XV + n] = velocity
+    w[r.EXACT_XU + n] = into * position
+    w[r.EXACT_XR + n] = into * (ramp / step - 0.5 * position)
+    w[r.EXACT_VX + n] = -a0 * velocity
+    w[r.EXACT_VV + n] = 1.0 - a0 * position - a1 * velocity
+    w[r.EXACT_VU + n] = into * velocity
+    w[r.EXACT_VR + n] = into * (position / step - 0.5 * velocity)
 
     below = 1.0 + 0.5 * step * b1
     from_e = 0.5 * step * n0 / below
     from_q = 1.0 - 0.5 * step * b1 / below
-    force_f, force_q = c[k.FORCE_F], c[k.FORCE_Q]
-    stiff = c[k.FORCE_X] + stiffness + 0.5 * force_q * from_e
-    dx_x = ((force_f - 1.0) * stiffness - force_q * from_e) / stiff
+    force_f, force_q = w[r.FORCE_F + n], w[r.FORCE_Q + n]
+    stiff = w[r.FORCE_X + n] + k + 0.5 * force_q * from_e
+    dx_x = ((force_f - 1.0) * k - force_q * from_e) / stiff
     dx_q = force_q * from_q / stiff
     dx_u = force_q * from_e / stiff
-    c[k.TRAP_XX] = 1.0 + dx_x
-    c[k.TRAP_XQ] = dx_q
-    c[k.TRAP_XU] = dx_u
-    c[k.TRAP_QX] = -2.0 * from_e * (1.0 + 0.5 * dx_x)
-    c[k.TRAP_QQ] = 2.0 * from_q - 1.0 - from_e * dx_q
-    c[k.TRAP_QU] = 2.0 * from_e * (1.0 - 0.5 * dx_u)
+    w[r.TRAP_XX + n] = 1.0 + dx_x
+    w[r.TRAP_XQ + n] = dx_q
+    w[r.TRAP_XU + n] = p.gain * dx_u
+    w[r.TRAP_QX + n] = -2.0 * from_e * (1.0 + 0.5 * dx_x)
+    w[r.TRAP_QQ + n] = 2.0 * from_q - 1.0 - from_e * dx_q
+    w[r.TRAP_QU + n] = p.gain * 2.0 * from_e * (1.0 - 0.5 * dx_u)
+
+
+@njit
+def _start(w: Array, n: int, p: Any, k: float, step: float, x: float, v: float) -> None:
+    """The state at the first sample, as if the piston had gone on at this velocity."""
+    w[r.X + n], w[r.X_EXACT + n], w[r.X_TRAP + n] = x, x, x
+    w[r.PLAY + n], w[r.SENSED + n] = x, x
+    w[r.V + n], w[r.V_EXACT + n] = v, v
+    w[r.DX + n], w[r.PLAY_DX + n] = v * step, v * step
+    w[r.BELL + n] = math.exp(-0.5 * w[r.STRIBECK_BEND + n] * (v * step) ** 2)
+    # What damps the motion loads the piston.
+    damping = p.damping + p.mass * p.mass_damping
+    w[r.R + n] = k * x
+    w[r.F + n] = k * x + damping * v
+    w[r.Q_TRAP + n] = (k + p.alpha_2) * v + p.alpha_3 * k * x
+    w[r.Q + n] = w[r.Q_TRAP + n] + p.alpha_3 * damping * v
+    # Of flow over alpha_2, as the kernel has it.
+    w[r.ENVELOPE + n] = p.envelope * (k + p.alpha_2) / p.alpha_2
+
+
+@njit
+def fill(
+    parameters: Any, stiffness: float, step: float, period: float, x: Array, v: Array, out: Array
+) -> None:
+    """Write the kernel's tables at the first sample.
+
+    Args:
+        parameters: (m,) of KIND.
+        stiffness: specimen stiffness k [N/m].
+        step: sub-step [s].
+        period: sample period [s].
+        x: position at the first sample, (m,) [m].
+        v: velocity there, (m,) [m/s].
+        out: (blocks, rows.SIZE); the last block is filled up by repeating the last set.
+    """
+    for i in range(len(out) * r.LANES):
+        w, n, at = out[i // r.LANES], i % r.LANES, min(i, len(parameters) - 1)
+        p = parameters[at]
+        w[r.GAIN + n] = p.gain
+        w[r.LAG_SAMPLES + n], w[r.SKEW + n] = p.delay / period, p.clock_skew
+        _valve(w, n, p, step)
+        _flow(w, n, p, step)
+        _forces(w, n, p, stiffness, step)
+        _friction(w, n, p, stiffness, step)
+        _specimen(w, n, p, stiffness)
+        _chains(w, n, p, stiffness, step)
+        w[r.BACKLASH + n], w[r.SENSOR_LAG + n] = p.backlash, p.sensor_lag / step
+        w[r.SENSOR_DECAY + n] = math.exp(-step / p.sensor_lag)
+        _start(w, n, p, stiffness, step, x[at], v[at])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from actuator_glue.model.effects import kernel
+from actuator_glue.model.effects import rows
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.parameters import Parameter
 
@@ -15,7 +15,7 @@ DELAY = Effect(
     signature='linear; phase error proportional to frequency',
     source='Horiuchi et al. 1999',
     starts=lambda s: ((0.001,), (0.004,), (0.01,)),
-    switches=(kernel.ON_LAG,),
+    switches=(rows.ON_LAG,),
 )
 
 GAIN = Effect(

@@ -79,7 +79,7 @@ class Effect:
         source: literature.
         starts: sizes from which a fit may start, given the scale of the test; each row holds
             one value per parameter.
-        switches: the kernel's stages it needs (kernel.ON_...).
+        switches: the kernel's stages it needs (rows.ON_...).
         output: post-step on the recorded displacement: (parameters (m, p), time (n, 1),
             displacement (n, m)) -> (n, m).
         variance: variance it adds to the measurement: (parameters (m, p), velocity of the

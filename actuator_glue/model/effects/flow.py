@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from actuator_glue.model.effects import kernel
+from actuator_glue.model.effects import rows
 from actuator_glue.model.effects.coefficients import NO_LIMIT
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.parameters import Parameter
@@ -25,7 +25,7 @@ SATURATION = Effect(
     signature='odd harmonics above an onset in velocity',
     source='Merritt 1967; Jelali & Kroll 2003',
     starts=lambda s: ((0.95 * s.velocity,), (0.75 * s.velocity,), (0.5 * s.velocity,)),
-    switches=(kernel.ON_FLOW,),
+    switches=(rows.ON_FLOW,),
 )
 
 PRESSURE = Effect(
@@ -43,7 +43,7 @@ PRESSURE = Effect(
     starts=lambda s: tuple(
         (share / max(s.stiffness * s.stroke, 0.2 * s.oil * s.stroke),) for share in (0.1, 0.4)
     ),
-    switches=(kernel.ON_FLOW, kernel.ON_PRESSURE),
+    switches=(rows.ON_FLOW, rows.ON_PRESSURE),
 )
 
 ASYMMETRY = Effect(
@@ -59,7 +59,7 @@ ASYMMETRY = Effect(
     signature='even harmonics and a mean that follows the velocity',
     source='Jelali & Kroll 2003 (single-rod cylinder)',
     starts=lambda s: ((0.03,), (-0.03,), (0.15,), (-0.15,)),
-    switches=(kernel.ON_FLOW,),
+    switches=(rows.ON_FLOW,),
 )
 
 DROOP = Effect(
@@ -76,7 +76,7 @@ DROOP = Effect(
     starts=lambda s: tuple(
         (share / s.velocity, time) for share in (0.05, 0.25) for time in (0.2, 1.0, 5.0)
     ),
-    switches=(kernel.ON_FLOW, kernel.ON_DROOP),
+    switches=(rows.ON_FLOW, rows.ON_DROOP),
 )
 
 DRIFT = Effect(
@@ -92,7 +92,7 @@ DRIFT = Effect(
     signature='parameters trend with time, not with amplitude',
     source='Jelali & Kroll 2003 (viscosity and bulk modulus against temperature)',
     starts=lambda s: ((0.05 / s.duration,), (-0.05 / s.duration,), (0.2 / s.duration,)),
-    switches=(kernel.ON_FLOW,),
+    switches=(rows.ON_FLOW,),
 )
 
 EFFECTS = (SATURATION, PRESSURE, ASYMMETRY, DROOP, DRIFT)

@@ -24,7 +24,8 @@ from typing import Any, Final
 import numpy as np
 
 from actuator_glue.jit import njit
-from actuator_glue.model.effects.kernel import LANES, held
+from actuator_glue.model.effects.rows import LANES
+from actuator_glue.model.effects.stages import held
 from actuator_glue.records import Array
 
 # Effects that this file knows; it takes gain, delay and what acts on the record as well.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from actuator_glue.model.effects import kernel
+from actuator_glue.model.effects import rows
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.parameters import Parameter
 
@@ -35,7 +35,7 @@ STRIBECK = Effect(
         for share in (0.005, 0.02, 0.08)
         for ratio, speed in ((1.5, 0.005), (2.0, 0.03))
     ),
-    switches=(kernel.ON_CURVED, kernel.ON_STRIBECK),
+    switches=(rows.ON_STRIBECK,),
 )
 
 BACKLASH = Effect(
@@ -49,7 +49,7 @@ BACKLASH = Effect(
     signature='rectangular loop against displacement, flat after reversals; size falls as 1/A',
     source='Tao & Kokotovic 1996 (play operator)',
     starts=lambda s: ((0.005 * s.stroke,), (0.02 * s.stroke,), (0.06 * s.stroke,)),
-    switches=(kernel.ON_TRANSDUCER,),
+    switches=(rows.ON_TRANSDUCER,),
 )
 
 EFFECTS = (COULOMB, STRIBECK, BACKLASH)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.jit import njit
-from actuator_glue.model.effects import coefficients, kernel, lti
+from actuator_glue.model.effects import coefficients, kernel, lti, rows
 from actuator_glue.records import Array, Record
 
 # Sub-steps are at most this long: the error of one effect stays below 0.3 um on a 2 mm sweep.
@@ -17,7 +17,7 @@ MAX_STEP = 1.05e-3  # s
 _MAX_POLE_STEP = 0.8
 _MAX_REFINEMENT = 8
 # Samples simulated at a time: their displacements stay in the second-level cache.
-_CHUNK = 1024
+_CHUNK = 2048
 
 
 def sample_steps(period: float) -> int:
@@ -69,44 +69,29 @@ def tables(
     period: float,
     start: tuple[float, float],
 ) -> Array:
-    """Return the kernel's tables at the first sample, shape (blocks, kernel.SIZE).
+    """Return the kernel's tables at the first sample, shape (blocks, rows.SIZE).
 
     The last block is filled up by repeating the last parameter set.
 
     Args:
-        values: parameters of every compiled stage by name, each (m,); 'envelope', where given, is
-            the averaged speed before the first sample [m/s].
+        values: parameters by name, each (m,), with all of coefficients.NAMES but 'envelope'.
         stiffness: specimen stiffness k [N/m].
         substeps: sub-steps per sample.
         period: sample period [s].
         start: position [m] and velocity [m/s].
     """
-    x, v = start
-    step = period / substeps
-    rows = coefficients.build(values, stiffness, step, period)
+    total = np.zeros(len(values['beta_1']))
+    parameters = np.zeros(len(total), coefficients.KIND)
+    for name, value in values.items():
+        total += value
+        if name in coefficients.NAMES:
+            parameters[name] = value
     # A limit that is not a number must not pass for no limit: it makes the state not a number.
-    unknown = np.isnan(sum(values.values()))
-    one = np.where(unknown, np.nan, 1.0)
-    for begin in (kernel.X, kernel.X_EXACT, kernel.X_TRAP, kernel.PLAY, kernel.SENSED):
-        rows[begin] = x * one
-    rows[kernel.V] = rows[kernel.V_EXACT] = v * one
-    rows[kernel.DX] = rows[kernel.PLAY_DX] = v * step * one
-    # As if it had gone on at this velocity: what damps the motion loads the piston.
-    rows[kernel.R] = stiffness * x * one
-    damping = values['damping'] + values['mass'] * values['mass_damping']
-    rows[kernel.F] = rows[kernel.R] + damping * v
-    flow = (stiffness + values['alpha_2']) * v + values['alpha_3'] * rows[kernel.R]
-    rows[kernel.Q_TRAP] = flow
-    rows[kernel.Q] = flow + values['alpha_3'] * damping * v
-    if 'envelope' in values:  # of flow over alpha_2, as the kernel has it
-        rows[kernel.ENVELOPE] = values['envelope'] * (stiffness + values['alpha_2']) * one
-        rows[kernel.ENVELOPE] /= values['alpha_2']
-    table = np.zeros((kernel.SIZE // kernel.LANES, len(one)))
-    for begin, row in rows.items():
-        table[begin // kernel.LANES] = row
-    wide = np.pad(table, ((0, 0), (0, -len(one) % kernel.LANES)), mode='edge')
-    split = wide.reshape(len(wide), -1, kernel.LANES).transpose(1, 0, 2)
-    return np.ascontiguousarray(split).reshape(-1, kernel.SIZE)
+    one = np.where(np.isnan(total), np.nan, 1.0)
+    out = np.zeros((-(-len(total) // rows.LANES), rows.SIZE))
+    x, v = start[0] * one, start[1] * one
+    coefficients.fill(parameters, stiffness, period / substeps, period, x, v, out)
+    return out
 
 
 def blocks(
@@ -120,7 +105,7 @@ def blocks(
 
     Args:
         values: parameters of every compiled stage by name, each (m,).
-        on: switches, (kernel.SWITCHES,).
+        on: switches, (rows.SWITCHES,).
         record: command, period, hold and known stiffness.
         start: position and velocity at the first sample.
         rate: how many times finer than usual the sub-steps are.
@@ -135,13 +120,13 @@ def blocks(
     # One sample before the record: at rest the command was zero, else it was held.
     before = record.command[:1] if start != (0.0, 0.0) else np.zeros(1)
     command = np.concatenate([before, record.command])
-    nothing = np.empty((0, kernel.LANES))
-    out = np.empty((min(len(record), _CHUNK), kernel.LANES))
+    nothing = np.empty((0, rows.LANES))
+    out = np.empty((min(len(record), _CHUNK), rows.LANES))
     for factor in np.unique(factors):
         which = np.flatnonzero(factors == factor)
         substeps = base * int(factor)
         some = {name: value[which] for name, value in values.items()}
-        members = (which[i : i + kernel.LANES] for i in range(0, len(which), kernel.LANES))
+        members = (which[i : i + rows.LANES] for i in range(0, len(which), rows.LANES))
         split = tables(some, stiffness, substeps, record.period, start)
         for lanes, table in zip(members, split, strict=True):
             for begin in range(0, len(record), _CHUNK):
@@ -171,13 +156,13 @@ def exact_blocks(
     linear = record.hold == 'linear'
     before = record.command[:1] if start != (0.0, 0.0) else np.zeros(1)
     command = np.concatenate([before, record.command])
-    nothing = np.empty((0, kernel.LANES))
-    out = np.empty((min(len(record), _CHUNK), kernel.LANES))
+    nothing = np.empty((0, rows.LANES))
+    out = np.empty((min(len(record), _CHUNK), rows.LANES))
     third, delayed = lti.third(effects), 'delay' in effects
     split = lti.tables(values, record.known_stiffness(), record.period, linear, start)
     count = len(values['beta_1'])
     for block, table in enumerate(split):
-        lanes = np.arange(block * kernel.LANES, min((block + 1) * kernel.LANES, count))
+        lanes = np.arange(block * rows.LANES, min((block + 1) * rows.LANES, count))
         for begin in range(0, len(record), _CHUNK):
             part = out[: min(_CHUNK, len(record) - begin)]
             lti.advance(table, third, delayed, command, -1, begin, part, nothing)

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from actuator_glue.jit import njit
-from actuator_glue.model.effects import kernel
+from actuator_glue.model.effects import rows
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.records import Array
@@ -69,7 +69,7 @@ LAG = Effect(
     signature='linear; as a delay with a slight roll-off',
     source='Jelali & Kroll 2003 (transducers)',
     starts=lambda s: ((0.0005,), (0.002,), (0.008,)),
-    switches=(kernel.ON_TRANSDUCER,),
+    switches=(rows.ON_TRANSDUCER,),
 )
 
 BIAS = Effect(
@@ -145,7 +145,7 @@ SKEW = Effect(
     signature='lag grows with time',
     source='Mills 1991 (frequency error of clocks)',
     starts=lambda s: ((5e-5,), (-5e-5,), (3e-4,), (-3e-4,)),
-    switches=(kernel.ON_LAG,),
+    switches=(rows.ON_LAG,),
 )
 
 JITTER = Effect(

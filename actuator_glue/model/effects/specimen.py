@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from actuator_glue.model.effects import kernel
+from actuator_glue.model.effects import rows
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.parameters import Parameter
 
@@ -48,7 +48,7 @@ GAP = Effect(
     signature='odd; stiffness missing around zero displacement',
     source='Kerschen et al. 2006 (clearance)',
     starts=lambda s: ((0.02 * s.stroke,), (0.1 * s.stroke,), (0.3 * s.stroke,)),
-    switches=(kernel.ON_CURVED, kernel.ON_GAP),
+    switches=(rows.ON_GAP,),
 )
 
 HARDENING = Effect(
@@ -62,7 +62,7 @@ HARDENING = Effect(
     signature='odd harmonics; relative size grows as A^2',
     source='Kerschen et al. 2006 (Duffing)',
     starts=lambda s: tuple((share / s.stroke**2,) for share in (0.1, -0.1, 0.5)),
-    switches=(kernel.ON_CURVED,),
+    switches=(rows.ON_CURVED,),
 )
 
 YIELD = Effect(
@@ -84,7 +84,7 @@ YIELD = Effect(
         for share in (0.2, 0.6)
         for sharp in (0.5, 2.5)
     ),
-    switches=(kernel.ON_CURVED, kernel.ON_YIELD),
+    switches=(rows.ON_CURVED, rows.ON_YIELD),
 )
 
 EFFECTS = (DAMPING, INERTIA, GAP, HARDENING, YIELD)

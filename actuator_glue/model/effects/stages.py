@@ -1,0 +1,148 @@
+"""Stages of a sub-step before and after its balance of forces, each for one lane.
+
+Derivation in docs/effects.md. A value that only one side of a choice needs is loaded before it: a
+choice between two loads would stop the compiler from writing vector code.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_glue.jit import njit
+from actuator_glue.model.effects import rows as r
+from actuator_glue.records import Array
+
+
+@njit
+def held(u: Array, at: int) -> Any:
+    """Command sample `at`, held constant before the first and after the last one."""
+    return u[min(max(at, 0), u.shape[0] - 1)]
+
+
+@njit
+def command(u: Array, offset: int, start: float, stop: float, linear: bool) -> Any:
+    """Mean and slope of the held command over [start, stop] samples (at most one sample long).
+
+    The slope is that of the ramp with the same first moment: with both, any fractional shift of
+    a held command keeps its integral and its centre.
+    """
+    i, k = math.floor(start), math.floor(stop)
+    left, right = held(u, i - offset), held(u, k - offset)
+    if not linear:
+        share = (stop - k) / (stop - start) if k > i else 0.0
+        jump = right - left
+        return left + jump * share, 6.0 * jump * share * (1.0 - share)
+    first = left + (start - i) * (held(u, i + 1 - offset) - left)
+    last = right + (stop - k) * (held(u, k + 1 - offset) - right)
+    if k == i:
+        return 0.5 * (first + last), last - first
+    share = (stop - k) / (stop - start)
+    before, after = (first + right) * (1.0 - share), (right + last) * share
+    # 12 times the moment of the triangle by which a kink leaves the straight line.
+    kink = right - first * share - last * (1.0 - share)
+    return 0.5 * (before + after), last - first + kink * (1.0 - 2.0 * share)
+
+
+@njit
+def valve(w: Array, n: int, mean: float) -> Any:
+    """Mean spool flow over the step if the piston goes on as before, and d(flow)/d(dx).
+
+    The command's mean is `mean` plus what is the lane's own.
+    """
+    u = w[r.GAIN + n] * (mean + w[r.IN_MEAN + n])
+    error = u + w[r.NULL + n] - w[r.X + n] - 0.5 * w[r.DX + n]
+    band, acting = w[r.DEADBAND + n], w[r.VALVE_E + n]
+    left = error - min(max(error, -band), band)
+    flow = acting * left + w[r.VALVE_Q + n] * w[r.Q + n] + w[r.VALVE_D + n] * w[r.QD + n]
+    return flow, (-0.5 * acting if abs(error) >= band else 0.0)
+
+
+@njit
+def flow(w: Array, on: NDArray[np.bool_], time: float) -> None:
+    """Write the flow into the cylinder and its d/d(dx): gain of the orifice, then its limit."""
+    for n in range(r.LANES):
+        side = w[r.ASYMMETRY + n] if w[r.IN_Q + n] > 0.0 else -w[r.ASYMMETRY + n]
+        w[r.IN_GAIN + n] = max(1.0 + w[r.GAIN_DRIFT + n] * time, 0.0) * (1.0 + side)
+    if on[r.ON_PRESSURE]:
+        for n in range(r.LANES):
+            load = (w[r.F + n] + 0.5 * w[r.DF + n]) * w[r.INVERSE_STALL + n]
+            w[r.IN_GAIN + n] *= math.sqrt(max(1.0 - (load if w[r.IN_Q + n] > 0.0 else -load), 0.0))
+    if on[r.ON_DROOP]:
+        for n in range(r.LANES):
+            before = w[r.ENVELOPE + n]
+            speed = abs(w[r.IN_Q + n]) * w[r.INVERSE_ALPHA_2 + n]
+            middle = before + w[r.DROOP_HALF + n] * (speed - before)
+            w[r.IN_GAIN + n] *= math.sqrt(max(1.0 - w[r.DROOP + n] * middle, 0.0))
+            w[r.ENVELOPE + n] = 2.0 * middle - before
+    for n in range(r.LANES):
+        gain, limit = w[r.IN_GAIN + n], w[r.SATURATION + n]
+        through, slope = w[r.IN_Q + n] * gain, w[r.IN_DQ + n] * gain
+        w[r.IN_FLOW + n] = min(max(through, -limit), limit)
+        w[r.IN_DFLOW + n] = slope if abs(through) <= limit else 0.0
+
+
+@njit
+def drive(w: Array, n: int, flow: Any, dflow: Any) -> Any:
+    """What drives the piston: force at rest, the oil's part of it, stiffness of the oil.
+
+    Forces balance where specimen + friction = force at rest - (stiffness + DAMPING_2) dx.
+    `flow` is that at the last increment, `dflow` its d/d(dx).
+    """
+    slope = w[r.FORCE_Q + n] * dflow
+    oil = w[r.FORCE_F + n] * w[r.F + n] + w[r.FORCE_Q + n] * flow - slope * w[r.DX + n]
+    push = w[r.F + n] + oil - w[r.R + n] + w[r.MASS_4V + n] * w[r.V + n]
+    return push, oil, w[r.FORCE_X + n] - slope
+
+
+@njit
+def finish(
+    w: Array, n: int, rate: Any, q: Any, dq: Any, push: Any, oil: Any, stiff: Any, dx: Any
+) -> None:
+    """Carry the state on to the end of the step; a piston that sticks has no velocity."""
+    end = oil - stiff * dx
+    w[r.DF + n], w[r.F + n] = end - w[r.F + n], end
+    w[r.R + n] = push - (stiff + w[r.DAMPING_2 + n]) * dx
+    v = rate * dx - w[r.V + n]
+    w[r.V + n] = 0.0 if dx == 0.0 else v
+    mean = q + dq * (dx - w[r.DX + n])
+    w[r.QD + n] = 2.0 * rate * (mean - w[r.Q + n]) - w[r.QD + n]
+    w[r.Q + n] = 2.0 * mean - w[r.Q + n]
+    w[r.X + n] += dx
+    w[r.DX + n] = dx
+
+
+@njit
+def chains(w: Array, n: int, mean: float, slope: float) -> Any:
+    """Carry both linear chains on: Eq. (2) exactly, and as the scheme solves it.
+
+    Returns the position without the scheme's own error.
+    """
+    xe, ve, xt, qt = w[r.X_EXACT + n], w[r.V_EXACT + n], w[r.X_TRAP + n], w[r.Q_TRAP + n]
+    u, ramp = mean + w[r.IN_MEAN + n], slope + w[r.IN_SLOPE + n]
+    exact = w[r.EXACT_VX + n] * xe + w[r.EXACT_VV + n] * ve
+    w[r.V_EXACT + n] = exact + w[r.EXACT_VU + n] * u + w[r.EXACT_VR + n] * ramp
+    w[r.Q_TRAP + n] = w[r.TRAP_QX + n] * xt + w[r.TRAP_QQ + n] * qt + w[r.TRAP_QU + n] * u
+    exact = w[r.EXACT_XX + n] * xe + w[r.EXACT_XV + n] * ve
+    exact += w[r.EXACT_XU + n] * u + w[r.EXACT_XR + n] * ramp
+    trap = w[r.TRAP_XX + n] * xt + w[r.TRAP_XQ + n] * qt + w[r.TRAP_XU + n] * u
+    w[r.X_EXACT + n], w[r.X_TRAP + n] = exact, trap
+    return w[r.X + n] + exact - trap
+
+
+@njit
+def transducer(w: Array, n: int, corrected: Any) -> Any:
+    """Play, then the first-order lag of the parabola through the last three positions."""
+    before, lag = w[r.PLAY + n], w[r.SENSOR_LAG + n]
+    # In this order a position that is not a number goes through.
+    after = min(corrected + w[r.BACKLASH + n], max(corrected - w[r.BACKLASH + n], before))
+    moved = after - before
+    bend = 0.5 * (moved - w[r.PLAY_DX + n])
+    end = after - lag * (moved + bend - 2.0 * lag * bend)
+    first = before - lag * (moved - bend - 2.0 * lag * bend)
+    sensed = end + w[r.SENSOR_DECAY + n] * (w[r.SENSED + n] - first)
+    w[r.SENSED + n], w[r.PLAY + n], w[r.PLAY_DX + n] = sensed, after, moved
+    return sensed
