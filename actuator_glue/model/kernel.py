@@ -176,7 +176,7 @@ def respond(
     """
     L, n = LANES, len(command)
     m = len(table)
-    S = np.zeros(9 * L)
+    S, passed = np.zeros(9 * L), np.empty(4 * L)
     for first in range(0, m, L):
         width = min(L, m - first)
         for j in range(L):
@@ -185,7 +185,36 @@ def respond(
             S[_D * L + j] = start_increment(c, x0, v0, command[0], command[min(1, n - 1)])
             for row in range(_DECAY, _G2 + 1):
                 S[row * L + j] = c[row - _DECAY + DECAY]
-        for i in range(n):
+        i = 0
+        # Four samples per pass: loading and storing the lanes costs more than stepping them.
+        while i + 5 < n:
+            u0, u1, u2, u3, u4, u5 = (
+                command[i], command[i + 1], command[i + 2], command[i + 3], command[i + 4],
+                command[i + 5],
+            )  # fmt: skip
+            for j in range(L):
+                y, d = S[_Y * L + j], S[_D * L + j]
+                decay, pull = S[_DECAY * L + j], S[_PULL * L + j]
+                g0, g1, g2 = S[_G0 * L + j], S[_G1 * L + j], S[_G2 * L + j]
+                passed[j] = y
+                y += d
+                d = decay * d - pull * y + (g0 * u2 + g1 * u1 + g2 * u0)
+                passed[L + j] = y
+                y += d
+                d = decay * d - pull * y + (g0 * u3 + g1 * u2 + g2 * u1)
+                passed[2 * L + j] = y
+                y += d
+                d = decay * d - pull * y + (g0 * u4 + g1 * u3 + g2 * u2)
+                passed[3 * L + j] = y
+                y += d
+                S[_Y * L + j] = y
+                S[_D * L + j] = decay * d - pull * y + (g0 * u5 + g1 * u4 + g2 * u3)
+            for k in range(4):
+                if i + k >= first_out:
+                    for j in range(width):
+                        out[i + k - first_out, first + j] = passed[k * L + j]
+            i += 4
+        while i < n:
             u0, u1, u2 = command[i], command[min(i + 1, n - 1)], command[min(i + 2, n - 1)]
             if i >= first_out:
                 for j in range(width):
@@ -198,6 +227,7 @@ def respond(
                     - S[_PULL * L + j] * y
                     + (S[_G0 * L + j] * u2 + S[_G1 * L + j] * u1 + S[_G2 * L + j] * u0)
                 )
+            i += 1
 
 
 @njit

@@ -179,6 +179,20 @@ def _solve(a, terms, normal, he, spare):  # type: ignore[no-untyped-def]
 
 
 @njit
+def _largest(values):  # type: ignore[no-untyped-def]
+    """Return the largest modulus of finite values (m,).
+
+    As integers, in whose order moduli are, too: vector units compare those, not numbers that might
+    be NaN.
+    """
+    bits = values.view(np.int64)
+    largest = np.int64(0)
+    for i in range(len(bits)):
+        largest = max(largest, bits[i] & 0x7FFFFFFFFFFFFFFF)
+    return np.array([largest]).view(np.float64)[0]
+
+
+@njit
 def _quantiles(columns, mean, sd, probability, normal, out):  # type: ignore[no-untyped-def]
     """Write quantiles (q, n) of columns (n, m); return how many columns the series did."""
     n, m = columns.shape
@@ -205,12 +219,10 @@ def _quantiles(columns, mean, sd, probability, normal, out):  # type: ignore[no-
             second += offset[i] * offset[i]
         square = second / m + variance
         scale = math.sqrt(square)
-        far = most = 0.0
         for i in range(m):
             offset[i] /= scale
             excess[i] = sd[i] * sd[i] / square - 1.0
-            far = max(far, abs(offset[i]))
-            most = max(most, abs(excess[i]))
+        far, most = _largest(offset), _largest(excess)
         terms = _terms(far, most, wanted)
         solved = terms > 0
         if solved:
