@@ -133,10 +133,7 @@ def _messages(run: Run) -> Iterator[tuple[str, int, Any]]:
 
 def twenty_times_a_second(seconds: float) -> dict[str, float]:
     """Latency from a window's last sample to its forecast band, both as the recorder got them."""
-    settings = {
-        'window': 10.0, 'hop': 0.05, 'settle': 1.0, 'time_budget': 0.05, 'evaluations': 2000,
-        'draws': 100,
-    }  # fmt: skip
+    settings = {'window': 10.0, 'hop': 0.05, 'settle': 1.0, 'time_budget': 0.05, 'draws': 100}
     with chain(1000.0, seconds, 10, settings, pin=True) as run:
         arrived: dict[int, int] = {}
         due: dict[int, int] = {}
