@@ -219,7 +219,7 @@ def advance(
     inverse = 1.0 / substeps
     rate = 2.0 * substeps / period
     want_force = force.shape[0] > 0
-    if begin == 0:  # the state as it stands
+    if begin == 0 and displacement.shape[0] > 0:  # the state as it stands
         for n in range(r.LANES):
             scheme = w[r.X_EXACT + n] - w[r.X_TRAP + n]
             displacement[0, n] = w[r.SENSED + n] if on[r.ON_TRANSDUCER] else w[r.X + n] + scheme
