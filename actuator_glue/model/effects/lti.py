@@ -44,8 +44,9 @@ _FORCE: Final = _STATE + STATES * LANES
 _WHOLE: Final = _FORCE + STATES * LANES
 _TAPS: Final = _WHOLE + LANES
 SIZE: Final = _TAPS + 3 * LANES
-# The state an effect adds; NONE, or ALL for more than one.
-_ADDED: Final = {'viscous-damping': 2, 'valve-lag': 4, 'sensor-lag': 5, 'payload-inertia': -1}
+# The state an effect adds, velocity and force at once; NONE, or ALL for more than that.
+_ADDED: Final = {'viscous-damping': 2, 'payload-inertia': 3, 'valve-lag': 4, 'sensor-lag': 5}
+_MASS: Final = 3
 NONE: Final = -2
 ALL: Final = -1
 # Time constants below this do not act: they would move the piston by less than 0.1 nm.
@@ -251,6 +252,11 @@ def _row6(w, r, n):  # type: ignore[no-untyped-def]
 
 
 @njit(inline='always')
+def _row4(w, r, n):  # type: ignore[no-untyped-def]
+    return _row2(w, r, n, 0, 1) + _row2(w, r, n, 2, 3)
+
+
+@njit(inline='always')
 def _one(w, r, n, s):  # type: ignore[no-untyped-def]
     return w[_PHI + (STATES * r + s) * LANES + n] * w[_STATE + s * LANES + n]
 
@@ -307,6 +313,14 @@ def advance(table, third, delayed, u, offset, begin, displacement, force):  # ty
                     s = _row2(w, 2, n, 0, 1) + _one(w, 2, n, 2) + _in(w, 2, n, delayed, u1, u2)
                     w[_STATE + n], w[_STATE + LANES + n] = x, q
                     w[_STATE + 2 * LANES + n] = s
+            elif third == _MASS:
+                for n in range(LANES):
+                    x = _row4(w, 0, n) + _in(w, 0, n, delayed, u1, u2)
+                    q = _row4(w, 1, n) + _in(w, 1, n, delayed, u1, u2)
+                    v = _row4(w, 2, n) + _in(w, 2, n, delayed, u1, u2)
+                    f = _row4(w, 3, n) + _in(w, 3, n, delayed, u1, u2)
+                    w[_STATE + n], w[_STATE + LANES + n] = x, q
+                    w[_STATE + 2 * LANES + n], w[_STATE + 3 * LANES + n] = v, f
             elif third == 4:
                 for n in range(LANES):
                     x = _row2(w, 0, n, 0, 1) + _one(w, 0, n, 4) + _in(w, 0, n, delayed, u1, u2)
@@ -344,6 +358,11 @@ def advance(table, third, delayed, u, offset, begin, displacement, force):  # ty
 
 
 def third(effects: Iterable[str]) -> int:
-    """Return which one state effects add to x and q; NONE for none, ALL for several."""
+    """Return which one state effects add to x and q; NONE for none, ALL for several.
+
+    A mass brings velocity and force, and with them what damps the velocity.
+    """
     added = {_ADDED[name] for name in effects if name in _ADDED}
+    if added == {2, _MASS}:
+        return _MASS
     return added.pop() if len(added) == 1 else ALL if added else NONE
