@@ -274,6 +274,26 @@ def _in(w, r, n, delayed, u1, u2):  # type: ignore[no-untyped-def]
 
 
 @njit
+def _first_taps(w, u, at, whole):  # type: ignore[no-untyped-def]
+    """Fill the whole samples of delay, and the delayed command as before the step from `at`."""
+    for n in range(LANES):
+        whole[n] = int(w[_WHOLE + n])
+        w[_TAPS + LANES + n] = held(u, at - 1 - whole[n])
+        w[_TAPS + 2 * LANES + n] = held(u, at - whole[n])
+
+
+@njit
+def _shift(w, u, after, whole):  # type: ignore[no-untyped-def]
+    """Move the delayed command on by one sample, to the one that ends the step at `after`."""
+    last = u.shape[0] - 1
+    for n in range(LANES):
+        # An index without sign: numba would add a test for one that counts from the end.
+        new = u[np.uint64(min(max(after - whole[n], 0), last))]
+        w[_TAPS + n], w[_TAPS + LANES + n] = w[_TAPS + LANES + n], w[_TAPS + 2 * LANES + n]
+        w[_TAPS + 2 * LANES + n] = new
+
+
+@njit
 def advance(table, third, delayed, u, offset, begin, displacement, force):  # type: ignore[no-untyped-def]
     """Write the recorded displacement at samples begin, begin+1, ... and carry the state on.
 
@@ -290,17 +310,16 @@ def advance(table, third, delayed, u, offset, begin, displacement, force):  # ty
     """
     w = np.empty(SIZE)  # known to the compiler
     w[:] = table
+    whole = np.empty(LANES, np.int64)
+    if delayed:
+        _first_taps(w, u, max(begin - 1, 0) - offset, whole)
     shown = _STATE + (5 * LANES if third in (5, ALL) else 0)
     for i in range(displacement.shape[0]):
         at = begin + i - 1  # the interval from sample `at` to the sample written now
         if at >= 0:
             u1, u2 = held(u, at - offset), held(u, at + 1 - offset)
             if delayed:
-                for n in range(LANES):
-                    k = at - offset - int(w[_WHOLE + n])
-                    w[_TAPS + n] = held(u, k - 1)
-                    w[_TAPS + LANES + n] = held(u, k)
-                    w[_TAPS + 2 * LANES + n] = held(u, k + 1)
+                _shift(w, u, at - offset + 1, whole)
             if third == NONE:
                 for n in range(LANES):
                     x = _row2(w, 0, n, 0, 1) + _in(w, 0, n, delayed, u1, u2)
