@@ -18,6 +18,7 @@ from actuator_glue.model.benchmark_plant import (
     benchmark_plant,
 )
 from actuator_glue.model.commands import noise, sweep
+from actuator_glue.model.effects import rows
 from actuator_glue.model.parameters import TABLE_2
 from actuator_glue.model.plant import MeasuredPlant, Plant
 from actuator_glue.model.sensor import SensorSpec
@@ -62,6 +63,29 @@ def test_output_does_not_depend_on_the_blocks(kind, hold, cuts, seed):
     plant.reset()
     edges = [0, *sorted(cuts), len(u)]
     parts = [plant.step(u[a:b]) for a, b in pairwise(edges)]
+    for channel in (0, 1):
+        np.testing.assert_array_equal(whole[channel], np.concatenate([p[channel] for p in parts]))
+
+
+def test_an_empty_first_block_writes_nothing():
+    # Guarded memory around the output: a write past it would only sometimes crash.
+    plant = paper_plant(effects=('delay', 'backlash'))
+    memory = np.full((3, rows.LANES), 7.0)
+    out, force = memory[1:1], np.empty((0, rows.LANES))
+    plant._advance(np.zeros(1), out, force)
+    assert (memory == 7.0).all()
+
+
+@pytest.mark.parametrize('kind', ['clock-skew', 'delay'])
+@pytest.mark.parametrize('hold', HOLDS)
+def test_a_late_command_does_not_depend_on_the_blocks(kind, hold):
+    structure = Structure((kind, 'coulomb-friction'))
+    theta = np.array([*TABLE_2, {'clock-skew': 2.3e-2, 'delay': 3.7e-3}[kind], 300.0])
+    plant = Stream(structure, theta, stiffness=250e3, period=1e-3, hold=hold)
+    u = noise(1000.0, 2.0, 1.0, 20.0, 5e-3, 1)
+    whole = plant.step(u)
+    plant.reset()
+    parts = [plant.step(u[a:b]) for a, b in pairwise([0, 1, 2, 130, 131, 700, 1999, len(u)])]
     for channel in (0, 1):
         np.testing.assert_array_equal(whole[channel], np.concatenate([p[channel] for p in parts]))
 

@@ -19,19 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.jit import njit
-from actuator_glue.model.effects import balance, stages
+from actuator_glue.model.effects import balance, lag, stages
 from actuator_glue.model.effects import rows as r
 from actuator_glue.records import Array
-
-
-@njit
-def _late(w: Array, u: Array, offset: int, at: int, j: int, inverse: float, linear: bool) -> None:
-    """Write every lane's own mean and slope of the command over sub-step j from sample `at`."""
-    for n in range(r.LANES):
-        clock = 1.0 - w[r.SKEW + n]
-        start = (at + j * inverse) * clock - w[r.LAG_SAMPLES + n]
-        mean, slope = stages.command(u, offset, start, start + clock * inverse, linear)
-        w[r.IN_MEAN + n], w[r.IN_SLOPE + n] = mean, slope
 
 
 @njit
@@ -216,22 +206,26 @@ def advance(
     """
     w = np.empty(r.SIZE)  # known to the compiler
     w[:] = table
+    places = np.empty(lag.PLACES, np.int32)
+    lag.prepare(w, substeps)
     inverse = 1.0 / substeps
     rate = 2.0 * substeps / period
     want_force = force.shape[0] > 0
-    if begin == 0:  # the state as it stands
+    if begin == 0 and displacement.shape[0] > 0:  # the state as it stands
         for n in range(r.LANES):
             scheme = w[r.X_EXACT + n] - w[r.X_TRAP + n]
             displacement[0, n] = w[r.SENSED + n] if on[r.ON_TRANSDUCER] else w[r.X + n] + scheme
     for i in range(displacement.shape[0]):
         at = begin + i - 1  # the interval from sample `at` to the sample written now
         for j in range(substeps if at >= 0 else 0):
-            mean, slope = 0.0, 0.0
+            mean, slope, start = 0.0, 0.0, at + j * inverse
             if on[r.ON_LAG]:
-                _late(w, u, offset, at, j, inverse, linear)
+                if linear:
+                    lag.linear(w, places, u, offset, start, inverse)
+                else:
+                    lag.held(w, places, u, offset, start, inverse)
             elif linear:
-                start = at + j * inverse
-                mean, slope = stages.command(u, offset, start, start + inverse, True)
+                mean, slope = stages.linear(u, offset, start, start + inverse)
             else:
                 mean = stages.held(u, at - offset)
             _substep(w, on, mean, rate, (at + (j + 0.5) * inverse) * period)

@@ -24,6 +24,7 @@ from typing import Any, Final
 import numpy as np
 
 from actuator_glue.jit import njit
+from actuator_glue.model.effects import transition
 from actuator_glue.model.effects.rows import LANES
 from actuator_glue.model.effects.stages import held
 from actuator_glue.records import Array
@@ -44,17 +45,14 @@ _FORCE: Final = _STATE + STATES * LANES
 _WHOLE: Final = _FORCE + STATES * LANES
 _TAPS: Final = _WHOLE + LANES
 SIZE: Final = _TAPS + 3 * LANES
-# The state an effect adds; NONE, or ALL for more than one.
-_ADDED: Final = {'viscous-damping': 2, 'valve-lag': 4, 'sensor-lag': 5, 'payload-inertia': -1}
+# The state an effect adds, velocity and force at once; NONE, or ALL for more than that.
+_ADDED: Final = {'viscous-damping': 2, 'payload-inertia': 3, 'valve-lag': 4, 'sensor-lag': 5}
+_MASS: Final = 3
 NONE: Final = -2
 ALL: Final = -1
 # Time constants below this do not act: they would move the piston by less than 0.1 nm.
 _NOTHING = 1e-9  # s
 _NO_MASS = 1e-14  # s^2, mass over oil stiffness
-
-# The transition matrix is found by its Taylor series, halved until its norm is below this.
-_NORM: Final = 0.25
-_TERMS: Final = 13
 
 _strict: Any = partial(njit, fastmath=False)
 
@@ -94,57 +92,6 @@ def _system(t, k, a, b, row, force):  # type: ignore[no-untyped-def]
 
 
 @_strict
-def _transition(a, b, scale, t, phi, first, second):  # type: ignore[no-untyped-def]
-    """Fill exp(A t), its integral times b, and its double integral times b, for p states.
-
-    scale (p,) brings the states to like size.
-    """
-    p = len(a)
-    n = p + 2
-    big = np.zeros((n, n))
-    for i in range(p):
-        for j in range(p):
-            big[i, j] = a[i, j] * t * scale[j] / scale[i]
-        big[i, p] = b[i] * t / scale[i]
-    big[p, p + 1] = 1.0
-    size = 0.0
-    for i in range(n):
-        total = 0.0
-        for j in range(n):
-            total += abs(big[i, j])
-        size = max(size, total)
-    squarings = 0
-    while size > _NORM and squarings < 60:
-        size *= 0.5
-        squarings += 1
-    big *= 0.5**squarings
-    result = np.eye(n)
-    term = np.eye(n)
-    for order in range(1, _TERMS):
-        term = _times(term, big, n, 1.0 / order)
-        result += term
-    for _ in range(squarings):
-        result = _times(result, result, n, 1.0)
-    for i in range(p):
-        for j in range(p):
-            phi[i, j] = result[i, j] * scale[i] / scale[j]
-        first[i] = result[i, p] * scale[i]
-        second[i] = result[i, p + 1] * scale[i] * t
-
-
-@_strict
-def _times(left, right, n, factor):  # type: ignore[no-untyped-def]
-    out = np.zeros((n, n))
-    for i in range(n):
-        for j in range(n):
-            value = left[i, j] * factor
-            if value != 0.0:
-                for c in range(n):
-                    out[i, c] += value * right[j, c]
-    return out
-
-
-@_strict
 def _fill(values, k, period, linear, start, tables):  # type: ignore[no-untyped-def]
     """Fill tables (blocks, SIZE) of parameter sets values (m, len(NAMES))."""
     a, b, force = np.empty((STATES, STATES)), np.empty(STATES), np.empty(STATES)
@@ -181,8 +128,8 @@ def _fill(values, k, period, linear, start, tables):  # type: ignore[no-untyped-
         lag = t[5] / period if t[5] == t[5] else 0.0
         whole = math.floor(lag)
         part = lag - whole
-        _transition(small_a, small_b, scale, period, phi, first, second)
-        _transition(small_a, small_b, scale, (1.0 - part) * period, small, late, later)
+        transition.fill(small_a, small_b, scale, period, phi, first, second)
+        transition.fill(small_a, small_b, scale, (1.0 - part) * period, small, late, later)
         for r in range(p):
             if linear:
                 rise, bend = second[r] / period, later[r] / period
@@ -251,6 +198,11 @@ def _row6(w, r, n):  # type: ignore[no-untyped-def]
 
 
 @njit(inline='always')
+def _row4(w, r, n):  # type: ignore[no-untyped-def]
+    return _row2(w, r, n, 0, 1) + _row2(w, r, n, 2, 3)
+
+
+@njit(inline='always')
 def _one(w, r, n, s):  # type: ignore[no-untyped-def]
     return w[_PHI + (STATES * r + s) * LANES + n] * w[_STATE + s * LANES + n]
 
@@ -265,6 +217,26 @@ def _in(w, r, n, delayed, u1, u2):  # type: ignore[no-untyped-def]
             + w[start + 2 * LANES] * w[_TAPS + 2 * LANES + n]
         )
     return w[start + LANES] * u1 + w[start + 2 * LANES] * u2
+
+
+@njit
+def _first_taps(w, u, at, whole):  # type: ignore[no-untyped-def]
+    """Fill the whole samples of delay, and the delayed command as before the step from `at`."""
+    for n in range(LANES):
+        whole[n] = int(w[_WHOLE + n])
+        w[_TAPS + LANES + n] = held(u, at - 1 - whole[n])
+        w[_TAPS + 2 * LANES + n] = held(u, at - whole[n])
+
+
+@njit
+def _shift(w, u, after, whole):  # type: ignore[no-untyped-def]
+    """Move the delayed command on by one sample, to the one that ends the step at `after`."""
+    last = u.shape[0] - 1
+    for n in range(LANES):
+        # An index without sign: numba would add a test for one that counts from the end.
+        new = u[np.uint64(min(max(after - whole[n], 0), last))]
+        w[_TAPS + n], w[_TAPS + LANES + n] = w[_TAPS + LANES + n], w[_TAPS + 2 * LANES + n]
+        w[_TAPS + 2 * LANES + n] = new
 
 
 @njit
@@ -284,17 +256,16 @@ def advance(table, third, delayed, u, offset, begin, displacement, force):  # ty
     """
     w = np.empty(SIZE)  # known to the compiler
     w[:] = table
+    whole = np.empty(LANES, np.int64)
+    if delayed:
+        _first_taps(w, u, max(begin - 1, 0) - offset, whole)
     shown = _STATE + (5 * LANES if third in (5, ALL) else 0)
     for i in range(displacement.shape[0]):
         at = begin + i - 1  # the interval from sample `at` to the sample written now
         if at >= 0:
             u1, u2 = held(u, at - offset), held(u, at + 1 - offset)
             if delayed:
-                for n in range(LANES):
-                    k = at - offset - int(w[_WHOLE + n])
-                    w[_TAPS + n] = held(u, k - 1)
-                    w[_TAPS + LANES + n] = held(u, k)
-                    w[_TAPS + 2 * LANES + n] = held(u, k + 1)
+                _shift(w, u, at - offset + 1, whole)
             if third == NONE:
                 for n in range(LANES):
                     x = _row2(w, 0, n, 0, 1) + _in(w, 0, n, delayed, u1, u2)
@@ -307,6 +278,14 @@ def advance(table, third, delayed, u, offset, begin, displacement, force):  # ty
                     s = _row2(w, 2, n, 0, 1) + _one(w, 2, n, 2) + _in(w, 2, n, delayed, u1, u2)
                     w[_STATE + n], w[_STATE + LANES + n] = x, q
                     w[_STATE + 2 * LANES + n] = s
+            elif third == _MASS:
+                for n in range(LANES):
+                    x = _row4(w, 0, n) + _in(w, 0, n, delayed, u1, u2)
+                    q = _row4(w, 1, n) + _in(w, 1, n, delayed, u1, u2)
+                    v = _row4(w, 2, n) + _in(w, 2, n, delayed, u1, u2)
+                    f = _row4(w, 3, n) + _in(w, 3, n, delayed, u1, u2)
+                    w[_STATE + n], w[_STATE + LANES + n] = x, q
+                    w[_STATE + 2 * LANES + n], w[_STATE + 3 * LANES + n] = v, f
             elif third == 4:
                 for n in range(LANES):
                     x = _row2(w, 0, n, 0, 1) + _one(w, 0, n, 4) + _in(w, 0, n, delayed, u1, u2)
@@ -344,6 +323,11 @@ def advance(table, third, delayed, u, offset, begin, displacement, force):  # ty
 
 
 def third(effects: Iterable[str]) -> int:
-    """Return which one state effects add to x and q; NONE for none, ALL for several."""
+    """Return which one state effects add to x and q; NONE for none, ALL for several.
+
+    A mass brings velocity and force, and with them what damps the velocity.
+    """
     added = {_ADDED[name] for name in effects if name in _ADDED}
+    if added == {2, _MASS}:
+        return _MASS
     return added.pop() if len(added) == 1 else ALL if added else NONE

@@ -30,12 +30,13 @@ LANES = 32
     # ... states (filled by run.py, carried on by `advance`) ...
     X, Q, QD, F, R, V, DX, DF, Z, ENVELOPE, LEVEL, BELL, PLAY, PLAY_DX, SENSED,
     X_EXACT, V_EXACT, X_TRAP, Q_TRAP,
-    # ... and scratch within one step: command, spool flow, gain of the orifice, flow, balance of
-    # forces, the increment.
+    # ... and scratch within one step: command samples and what part of each, command, spool flow,
+    # gain of the orifice, flow, balance of forces, the increment.
+    PER_CLOCK, IN_SHARE, IN_PART, IN_PART_STOP, IN_U, IN_U_STOP, IN_U_NEXT, IN_U_STOP_NEXT,
     IN_MEAN, IN_SLOPE, IN_Q, IN_DQ, IN_GAIN, IN_FLOW, IN_DFLOW,
     IN_PUSH, IN_OIL, IN_STIFF, IN_REACH, IN_FALL, IN_MIDDLE, IN_SOFT, IN_DX,
-) = range(0, 91 * LANES, LANES)  # fmt: skip
-SIZE = 91 * LANES
+) = range(0, 99 * LANES, LANES)  # fmt: skip
+SIZE = 99 * LANES
 
 # One flag per stage that can be skipped; ON_FLOW for any effect on the flow, ON_CURVED for any
 # specimen whose force is neither proportional nor has a gap only.

@@ -24,27 +24,27 @@ def held(u: Array, at: int) -> Any:
 
 
 @njit
-def command(u: Array, offset: int, start: float, stop: float, linear: bool) -> Any:
-    """Mean and slope of the held command over [start, stop] samples (at most one sample long).
+def kinked(first: Any, kink: Any, last: Any, share: Any) -> Any:
+    """Mean and slope of a command from `first` by `kink` to `last`, in the last `share` of it.
 
     The slope is that of the ramp with the same first moment: with both, any fractional shift of
-    a held command keeps its integral and its centre.
+    a command keeps its integral and its centre. A share of zero is no kink.
     """
+    middle = kink if share > 0.0 else last
+    before, after = (first + middle) * (1.0 - share), (middle + last) * share
+    # 12 times the moment of the triangle by which a kink leaves the straight line.
+    bend = middle - first * share - last * (1.0 - share)
+    return 0.5 * (before + after), last - first + bend * (1.0 - 2.0 * share)
+
+
+@njit
+def linear(u: Array, offset: int, start: float, stop: float) -> Any:
+    """Mean and slope of a linear command over [start, stop] samples (at most one sample long)."""
     i, k = math.floor(start), math.floor(stop)
     left, right = held(u, i - offset), held(u, k - offset)
-    if not linear:
-        share = (stop - k) / (stop - start) if k > i else 0.0
-        jump = right - left
-        return left + jump * share, 6.0 * jump * share * (1.0 - share)
     first = left + (start - i) * (held(u, i + 1 - offset) - left)
     last = right + (stop - k) * (held(u, k + 1 - offset) - right)
-    if k == i:
-        return 0.5 * (first + last), last - first
-    share = (stop - k) / (stop - start)
-    before, after = (first + right) * (1.0 - share), (right + last) * share
-    # 12 times the moment of the triangle by which a kink leaves the straight line.
-    kink = right - first * share - last * (1.0 - share)
-    return 0.5 * (before + after), last - first + kink * (1.0 - 2.0 * share)
+    return kinked(first, right, last, (stop - k) / (stop - start) if k > i else 0.0)
 
 
 @njit
