@@ -16,7 +16,7 @@ for _name in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS'):
 import numpy as np  # noqa: E402
 
 from actuator_glue.inference.convergence import rhat  # noqa: E402
-from actuator_glue.inference.dream import Chains, Settings, init, sample, step  # noqa: E402
+from actuator_glue.inference.dream import Chains, Settings, sample  # noqa: E402
 from actuator_glue.inference.likelihood import GlueLikelihood  # noqa: E402
 from actuator_glue.model import problem_r  # noqa: E402
 from actuator_glue.model.fast import FastErrors  # noqa: E402
@@ -38,18 +38,16 @@ def evaluations_to_rhat(chains: Chains, limit: float = 1.01) -> float:
     return float('inf')
 
 
-def overhead(settings: Settings, generations: int = 3000) -> float:
-    """Time of a generation per evaluation without the likelihood [us]."""
+def evaluation(settings: Settings, evaluations: int = 300_000, repeats: int = 5) -> float:
+    """Processor time of one evaluation of a run, the likelihood and all else included [us]."""
     density = GlueLikelihood(FastErrors(problem_r.records()), G)
-    rng = np.random.default_rng(0)
-    state = init(rng, density, *bounds(), settings)
-    ready = state.log_density.copy()
     taken = []
-    for _ in range(generations):
-        began = time.perf_counter()
-        step(rng, state, lambda _: ready)
-        taken.append(time.perf_counter() - began)
-    return statistics.median(taken) / settings.chains * 1e6
+    for seed in range(repeats):
+        began = time.process_time()
+        rng = np.random.default_rng(seed)
+        sample(rng, density, *bounds(), evaluations=evaluations, settings=settings)
+        taken.append(time.process_time() - began)
+    return statistics.median(taken) / evaluations * 1e6
 
 
 def run(repeats: int = 5, seeds: int = 20) -> dict[str, Any]:
@@ -59,8 +57,8 @@ def run(repeats: int = 5, seeds: int = 20) -> dict[str, Any]:
     the start and burn-in included (median over repeats); `ess_per_second_default` the same with
     default settings; `ess_per_1000_evaluations` from a warm start with default settings, burn-in
     included; `evaluations_to_rhat_1p01` that nine of ten seeds keep, `..._median`, and the share
-    of seeds within 20 000; `overhead_us` per evaluation for 20 and 64 chains; `first_call_s` with
-    compilation or its cache.
+    of seeds within 20 000; `evaluation_us` with the likelihood, 8 to 64 chains; `first_call_s`
+    with compilation or its cache.
     """
     began = time.perf_counter()
     density = GlueLikelihood(FastErrors(problem_r.records()), G)
@@ -101,7 +99,7 @@ def run(repeats: int = 5, seeds: int = 20) -> dict[str, Any]:
         'ess_per_1000_evaluations': statistics.median(
             1000.0 * c.ess.min() / c.evaluations for c in warm
         ),
-        'overhead_us': {str(n): overhead(Settings(chains=n)) for n in (20, 64)},
+        'evaluation_us': {str(n): evaluation(Settings(chains=n)) for n in (8, 20, 64)},
         'first_call_s': first_call,
         'setting': '64 chains sustained, 20 chains for the other figures; fast likelihood',
     }

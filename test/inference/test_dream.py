@@ -298,10 +298,10 @@ def test_a_run_ends_where_its_draws_will_do_and_is_the_beginning_of_the_whole_on
         return False
 
     whole = run(asks)
-    assert asked == [len(whole.draws) // 2, int(0.75 * len(whole.draws))]
-    half = run(lambda chains: chains.ess.min() > 400)
-    assert len(half.draws) == asked[0]
-    assert np.array_equal(half.draws, whole.draws[: asked[0]])
+    assert asked == [int(eighth / 8 * len(whole.draws)) for eighth in range(3, 8)]
+    half = run(lambda chains: len(chains.draws) >= len(whole.draws) // 2)
+    assert len(half.draws) == asked[1]
+    assert np.array_equal(half.draws, whole.draws[: asked[1]])
     assert np.array_equal(whole.draws, run(None).draws)
 
 
