@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import socket
@@ -40,6 +41,9 @@ def main(make: Callable[[], SuiteNode], args: Sequence[str] | None = None) -> in
         if not started:
             code = 2
             stop.set()
+    # What is there now stays: the garbage collector need not go through it while samples wait.
+    gc.collect()
+    gc.freeze()
     while not stop.is_set() and not node.finished and rclpy.ok():
         try:
             executor.spin_once()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import os
 import queue
@@ -124,6 +125,9 @@ def _serve(pipe: Connection, warm: Callable[[], None] | None, nice: int) -> None
     with suppress(EOFError, BrokenPipeError, ConnectionResetError):
         if warm is not None:
             warm()
+        # What is there now stays: going through it for garbage takes 100 ms, two deadlines.
+        gc.collect()
+        gc.freeze()
         pipe.send(None)
         while (task := pipe.recv()) is not None:
             function, args = task
