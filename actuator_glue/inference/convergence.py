@@ -164,7 +164,10 @@ def _spread(chains):  # type: ignore[no-untyped-def]
     within, centre = 0.0, 0.0
     means = np.empty(m)
     for i in range(m):
-        means[i] = chains[i].sum() / n
+        means[i] = 0.0
+        for value in chains[i]:
+            means[i] += value
+        means[i] /= n
         centre += means[i] / m
     between = 0.0
     for i in range(m):
@@ -201,19 +204,23 @@ def _effective(values: Array) -> Array:
     return found
 
 
-@njit
+# Strict floating point: what is published must not depend on which process compiled it.
+@njit(fastmath=False)
 def _covariance(values, lag):  # type: ignore[no-untyped-def]
     """Mean over chains (m, n) without their means of the product with what comes `lag` later."""
     m, n = values.shape
-    total = 0.0
+    total = odd = 0.0
     for i in range(m):
         row = values[i]
-        for t in range(n - lag):
+        for t in range(0, n - lag - 1, 2):
             total += row[t] * row[t + lag]
-    return total / (n * m)
+            odd += row[t + 1] * row[t + 1 + lag]
+        if (n - lag) % 2 == 1:
+            total += row[n - lag - 1] * row[n - 1]
+    return (total + odd) / (n * m)
 
 
-@njit
+@njit(fastmath=False)
 def _correlation_time(values, within, between):  # type: ignore[no-untyped-def]
     """Sum of autocorrelations by Geyer's initial monotone sequence of pairs.
 
