@@ -20,7 +20,7 @@ from actuator_glue.inference.archive import Archive
 from actuator_glue.inference.compiled import compiled
 from actuator_glue.inference.coordinates import physical_all, sampling
 from actuator_glue.inference.evaluate import LogDensity, check_values, evaluate
-from actuator_glue.inference.generation import UNTEMPERED, Tempering, temper
+from actuator_glue.inference.generation import UNTEMPERED, Tempering, refer, temper
 from actuator_glue.inference.moves import independence, uniforms_per_chain
 from actuator_glue.inference.settings import Settings
 from actuator_glue.inference.sweep import Around, Walk, many
@@ -37,12 +37,6 @@ class Reference(NamedTuple):
     points: Array
     centre: Array
     factor: Array
-
-    def log_density(self, z: Array, log_jacobian: Array) -> Array:
-        """Return the log density (m,) at points z (m, p), less a constant."""
-        if not self.centre.size:
-            return log_jacobian
-        return np.asarray(independence.log_density(z, self.centre, self.factor))
 
 
 class Population(NamedTuple):
@@ -105,7 +99,8 @@ def anneal(
     columns = uniforms_per_chain(dimension, settings.pairs)
     most = math.inf if limit is None else limit
     while power < 1.0 and evaluations + chains * settings.sweeps <= most:
-        base = reference.log_density(z, log_jacobian)
+        base = np.empty(len(z))
+        refer(z, log_jacobian, power, reference.centre, reference.factor, base)
         gain = values + log_jacobian - base
         gain[~np.isfinite(values)] = -np.inf
         rise = next_rise(gain, 1.0 - power, settings.survivors)

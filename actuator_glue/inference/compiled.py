@@ -60,37 +60,36 @@ def compiled(log_density: LogDensity) -> Compiled | None:
 # Strict floating point in what follows: inlined elsewhere, it could be reassociated or fused with
 # what comes next, which would be other bits.
 @njit(fastmath=False)
-def variance_likelihood(sums, size, shaping):  # type: ignore[no-untyped-def]
-    """-shaping ln Var of errors given their sums (R, 2) over `size` samples in all."""
-    mean = 0.0
-    square = 0.0
-    for r in range(len(sums)):
-        mean += sums[r, 0]
-        square += sums[r, 1]
-    mean /= size
-    return -shaping * math.log(square / size - mean * mean)
+def _likelihood(total, square, size, shaping, sigma):  # type: ignore[no-untyped-def]
+    """Log likelihood of errors given their sum and sum of squares over `size` samples in all.
 
-
-@njit(fastmath=False)
-def gaussian_likelihood(sums, size, sigma):  # type: ignore[no-untyped-def]
-    """Gaussian log likelihood given error sums (R, 2); sigma = 0 integrates it out."""
-    square = 0.0
-    for r in range(len(sums)):
-        square += sums[r, 1]
+    -shaping ln Var; for shaping = 0 the Gaussian one, whose sigma = 0 is integrated out.
+    """
+    if shaping > 0.0:
+        mean = total / size
+        return -shaping * math.log(square / size - mean * mean)
     if sigma > 0.0:
         return -0.5 * square / (sigma * sigma)
     return -0.5 * size * math.log(square)
 
 
 @njit(fastmath=False)
+def likelihood(sums, size, shaping, sigma):  # type: ignore[no-untyped-def]
+    """Return the log likelihood of the error sums (R, 2) of all records."""
+    total = 0.0
+    square = 0.0
+    for r in range(len(sums)):
+        total += sums[r, 0]
+        square += sums[r, 1]
+    return _likelihood(total, square, size, shaping, sigma)
+
+
+@njit(fastmath=False)
 def likelihoods(sums, size, shaping, sigma):  # type: ignore[no-untyped-def]
-    """Return log likelihoods (m,) of error sums (m, R, 2), the Gaussian one for shaping = 0."""
+    """Return the log likelihoods (m,) of error sums (m, R, 2)."""
     values = np.empty(len(sums))
     for i in range(len(sums)):
-        if shaping > 0.0:
-            values[i] = variance_likelihood(sums[i], size, shaping)
-        else:
-            values[i] = gaussian_likelihood(sums[i], size, sigma)
+        values[i] = likelihood(sums[i], size, shaping, sigma)
     return values
 
 
@@ -165,12 +164,7 @@ def _hopeless(density, sums, slack, floor):  # type: ignore[no-untyped-def]
         least += max(sums[r, 1] - sums[r, 0] * sums[r, 0] / count - slack[r], 0.0)
     if not least > 0.0:
         return False
-    if density.shaping > 0.0:
-        best = -density.shaping * math.log(least / density.size)
-    elif density.sigma > 0.0:
-        best = -0.5 * least / (density.sigma * density.sigma)
-    else:
-        best = -0.5 * density.size * math.log(least)
+    best = _likelihood(0.0, least, density.size, density.shaping, density.sigma)
     return best < floor - _SURE
 
 
@@ -209,8 +203,5 @@ def log_densities(density, x, log_jacobian, floor, values, scratch):  # type: ig
     for i in range(count):
         if scratch.which[i] < 0:
             continue
-        if density.shaping > 0.0:
-            found = variance_likelihood(sums[i], density.size, density.shaping)
-        else:
-            found = gaussian_likelihood(sums[i], density.size, density.sigma)
+        found = likelihood(sums[i], density.size, density.shaping, density.sigma)
         values[scratch.which[i]] = inner[i] + found if density.mapped else found

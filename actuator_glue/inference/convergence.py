@@ -60,18 +60,16 @@ def quick_rhat_and_ess(draws: Array) -> tuple[Array, Array]:
     decide when to stop, not what is published. Arguments as in `rhat`.
     """
     split = _split(draws)
-    if split.shape[2] < 2 or not np.isfinite(split).all():
-        nothing = np.full(draws.shape[2], np.nan)
-        return nothing, nothing.copy()
+    if split is None:
+        return np.full(draws.shape[2], np.nan), np.full(draws.shape[2], np.nan)
     return np.asarray(_potential_reduction(split)), _effective(split)
 
 
 def rhat_and_ess(draws: Array) -> tuple[Array, Array]:
     """Return `rhat` and `ess_bulk`, (p,) each, from one ranking of the draws."""
     split = _split(draws)
-    if split.shape[2] < 2 or not np.isfinite(split).all():
-        nothing = np.full(draws.shape[2], np.nan)
-        return nothing, nothing.copy()
+    if split is None:
+        return np.full(draws.shape[2], np.nan), np.full(draws.shape[2], np.nan)
     values = split.reshape(len(split), -1)
     ordered = np.sort(values, axis=1)
     middle = values.shape[1] // 2
@@ -82,11 +80,15 @@ def rhat_and_ess(draws: Array) -> tuple[Array, Array]:
     return reduction, _effective(bulk)
 
 
-def _split(draws: Array) -> Array:
-    """(p, 2 chains, generations // 2): each chain's first and last half, the middle dropped."""
+def _split(draws: Array) -> Array | None:
+    """(p, 2 chains, generations // 2): each chain's first and last half, the middle dropped.
+
+    None for too few draws, or some that are not finite.
+    """
     half = len(draws) // 2
     parts = (draws[:half], draws[len(draws) - half :])
-    return np.ascontiguousarray(np.concatenate(parts, axis=1).T)
+    split = np.ascontiguousarray(np.concatenate(parts, axis=1).T)
+    return split if half >= 2 and np.isfinite(split).all() else None
 
 
 def _normal(values: Array, ordered: Array) -> Array:
