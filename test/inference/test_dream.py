@@ -1,23 +1,16 @@
-"""The sampler as a whole: exact moments, reproducibility, start, burn-in, bad input."""
+"""The sampler as a whole: moments of targets that are known, from the prior and warm started."""
 
 from __future__ import annotations
 
-import hashlib
-import subprocess
-import sys
-from collections.abc import Callable
 from dataclasses import replace
-from itertools import pairwise
 
 import numpy as np
 import pytest
 import targets
 from scipy import integrate, stats
 
-from actuator_glue.errors import InputError
-from actuator_glue.inference.adaptation import outliers
 from actuator_glue.inference.convergence import ess_bulk
-from actuator_glue.inference.dream import Chains, Settings, init, sample, step
+from actuator_glue.inference.dream import Chains, Settings, sample
 from actuator_glue.records import Array
 
 # Every moment test below fails by chance once in a million runs.
@@ -144,107 +137,6 @@ def test_a_hundred_correlated_dimensions(rng_seed: int) -> None:
         assert (limit * error < 0.5).all(), ess_bulk(values).min()
 
 
-def _short(seed: int, evaluations: int = 6000, **settings: object) -> Chains:
-    target = targets.scales()
-    return sample(
-        np.random.default_rng(seed),
-        target.log_density,
-        target.lower,
-        target.upper,
-        evaluations=evaluations,
-        settings=Settings(population=100, **settings),  # type: ignore[arg-type]
-    )
-
-
-def _digest(chains: Chains) -> str:
-    return hashlib.sha256(chains.draws.tobytes() + chains.log_density.tobytes()).hexdigest()
-
-
-def test_same_seed_same_bits_in_another_process() -> None:
-    here = _digest(_short(7))
-    assert here == _digest(_short(7))
-    assert here != _digest(_short(8))
-    code = 'import test_dream as t; print(t._digest(t._short(7)))'
-    there = subprocess.run(
-        [sys.executable, '-c', code], capture_output=True, text=True, check=True,
-        env={'PYTHONPATH': ':'.join(p for p in sys.path if p)},
-    )  # fmt: skip
-    assert there.stdout.strip() == here
-
-
-def test_a_shorter_run_is_the_beginning_of_a_longer_one() -> None:
-    long, short = _short(3, 6000), _short(3, 4000)
-    assert np.array_equal(long.draws[: len(short.draws)], short.draws)
-    assert short.burn == long.burn == Settings().adaptation
-
-
-def test_step_leaves_the_given_state_as_it_is_and_branches_do_not_meet() -> None:
-    target = targets.scales()
-    rng = np.random.default_rng(5)
-    state = init(rng, target.log_density, target.lower, target.upper, Settings(thinning=1))
-    before = [np.array(part) for part in (state.x, state.z, state.archive.rows, state.counts)]
-
-    def walk(seed: int) -> Array:
-        rng, now = np.random.default_rng(seed), state
-        for _ in range(5):
-            now, _info = step(rng, now, target.log_density)
-        return np.array(now.archive.rows)
-
-    first, other, again = walk(1), walk(2), walk(1)
-    assert np.array_equal(first, again)
-    assert not np.array_equal(first, other)
-    for old, part in zip(
-        before, (state.x, state.z, state.archive.rows, state.counts), strict=True
-    ):
-        assert np.array_equal(old, part)
-
-
-def test_burn_in_ends_what_must_end() -> None:
-    target = targets.scales()
-    rng = np.random.default_rng(1)
-    settings = Settings(adaptation=30, thinning=3)
-    state = init(rng, target.log_density, target.lower, target.upper, settings)
-    fits = []
-    for _ in range(2000):
-        old = state
-        state, _ = step(rng, state, target.log_density)
-        if not old.adapting:
-            assert np.array_equal(state.tuning.crossover_cdf, old.tuning.crossover_cdf)
-            if state.fitted != old.fitted:
-                fits.append(state.fitted)
-    assert fits and all(b >= 2 * a for a, b in pairwise(fits))
-
-
-def test_outlier_chains_are_found_and_rescued_in_burn_in_only() -> None:
-    assert outliers(np.array([-10.0, -11.0, -9.0, -10.5, -500.0])).tolist() == [4]
-    assert outliers(np.array([-10.0, -11.0, -9.0, -10.5, -12.0])).size == 0
-
-    target = targets.scales()
-    settings = Settings(chains=8, adaptation=20, thinning=5)
-
-    def stranded(generation: int) -> bool:
-        """Put one chain where no move leads away from, see whether it is brought back."""
-        rng = np.random.default_rng(2)
-        state = init(rng, target.log_density, target.lower, target.upper, settings)
-        values = state.log_density.copy()
-        values[3] = -1e6
-
-        def nowhere_but_there(x: Array) -> Array:
-            found = target.log_density(x)
-            found[3] = -np.inf
-            return found
-
-        x, z = state.x.copy(), state.z.copy()
-        z[3] = 5.0
-        state = state._replace(x=x, z=z, log_density=values, generation=generation)
-        for _ in range(10):
-            state, _ = step(rng, state, nowhere_but_there)
-        return bool((state.z[3] == 5.0).all())
-
-    assert not stranded(0)
-    assert stranded(20)
-
-
 def test_warm_start_follows_a_small_and_a_large_move(rng_seed: int) -> None:
     target = targets.scales()
     archive = target.draw(np.random.default_rng(rng_seed), 500)
@@ -261,108 +153,3 @@ def test_warm_start_follows_a_small_and_a_large_move(rng_seed: int) -> None:
             assert max(run.start_evaluations for run in runs) < 1000
         inside = replace(moved, lower=lower, upper=upper)
         _check_moments(inside, runs)
-
-
-def test_stop_and_progress() -> None:
-    target = targets.scales()
-    seen: list[tuple[int, int]] = []
-
-    def run(evaluations: int, stop_at: int) -> Chains:
-        return sample(
-            np.random.default_rng(1), target.log_density, target.lower, target.upper,
-            evaluations=evaluations, stop=lambda state: state.evaluations >= stop_at,
-            progress=lambda done, most: seen.append((done, most)),
-        )  # fmt: skip
-
-    stopped = run(20_000, 12_000)
-    assert 12_000 <= stopped.evaluations < 12_000 + Settings().chains
-    assert stopped.evaluations == stopped.evaluations_at(len(stopped.draws) - 1)
-    assert seen and all(most == 20_000 for _, most in seen)
-    assert [done for done, _ in seen] == sorted(done for done, _ in seen)
-    repeated = run(stopped.evaluations, 10**9)
-    assert np.array_equal(repeated.draws, stopped.draws)
-
-
-def test_a_run_ends_where_its_draws_will_do_and_is_the_beginning_of_the_whole_one() -> None:
-    target = targets.scales()
-    asked: list[int] = []
-
-    def run(answer: Callable[[Chains], bool] | None, evaluations: int = 20_000) -> Chains:
-        return sample(
-            np.random.default_rng(1), target.log_density, target.lower, target.upper,
-            evaluations=evaluations, enough=answer,
-        )  # fmt: skip
-
-    def asks(chains: Chains) -> bool:
-        asked.append(len(chains.draws))
-        return False
-
-    whole = run(asks)
-    assert asked == [int(eighth / 8 * len(whole.draws)) for eighth in range(3, 8)]
-    half = run(lambda chains: len(chains.draws) >= len(whole.draws) // 2)
-    assert len(half.draws) == asked[1]
-    assert np.array_equal(half.draws, whole.draws[: asked[1]])
-    assert np.array_equal(whole.draws, run(None).draws)
-
-
-def test_impossible_regions_and_not_a_number_are_never_entered() -> None:
-    def log_density(x: Array) -> Array:
-        with np.errstate(invalid='ignore'):
-            values = -0.5 * (x**2).sum(axis=1) + 0.0 * np.log(x[:, 0])
-        return np.where(x[:, 1] > 1.0, -np.inf, values)
-
-    for start in ('annealed', 'prior'):
-        chains = sample(
-            np.random.default_rng(0), log_density, [-5.0, -5.0], [5.0, 5.0],
-            evaluations=20_000, settings=Settings(start=start),
-        )  # fmt: skip
-        draws = chains.posterior()
-        assert draws[:, 0].min() >= 0.0
-        assert draws[:, 1].max() <= 1.0
-        assert np.isfinite(chains.log_density[chains.burn :]).all()
-
-
-@pytest.mark.parametrize(
-    ('lower', 'upper', 'log_density', 'says'),
-    [
-        ([0.0], [0.0], None, 'lower one first'),
-        ([0.0, 0.0], [1.0], None, 'lengths 2 and 1'),
-        ([0.0], [np.inf], None, 'finite bounds'),
-        ([0.0], [1.0], lambda x: np.full(len(x), np.nan), 'not finite at any'),
-        ([0.0], [1.0], lambda x: np.full(len(x), np.inf), 'plus infinity'),
-        ([0.0], [1.0], lambda x: np.where(x[:, 0] > 0.9999, np.inf, -x[:, 0]), 'plus infinity'),
-        ([0.0], [1.0], lambda x: x, 'shape'),
-    ],
-)
-def test_what_cannot_be_sampled_is_said(lower, upper, log_density, says) -> None:  # type: ignore[no-untyped-def]
-    with pytest.raises(InputError, match=says):
-        sample(
-            np.random.default_rng(0),
-            log_density or (lambda x: -x[:, 0]),
-            lower,
-            upper,
-            evaluations=100_000,
-        )
-
-
-def test_too_few_evaluations_and_bad_settings_and_archives_are_said() -> None:
-    target = targets.scales()
-    arguments = (target.log_density, target.lower, target.upper)
-    with pytest.raises(InputError, match='used up by the start'):
-        sample(np.random.default_rng(0), *arguments, evaluations=100)
-    with pytest.raises(InputError, match='outside the prior'):
-        sample(np.random.default_rng(0), *arguments, evaluations=9000, archive=np.zeros((5, 4)))
-    with pytest.raises(InputError, match='at least two points of 4'):
-        sample(np.random.default_rng(0), *arguments, evaluations=9000, archive=np.zeros((5, 3)))
-    for wrong in ({'chains': 2}, {'snooker': 1.5}, {'survivors': 0.0}, {'start': 'there'}):
-        with pytest.raises(InputError):
-            Settings(**wrong)  # type: ignore[arg-type]
-
-
-def test_a_budget_that_ends_while_annealing_is_admitted() -> None:
-    target = targets.scales()
-    chains = sample(
-        np.random.default_rng(0), target.log_density, target.lower, target.upper, evaluations=2000
-    )
-    assert not chains.annealed
-    assert chains.evaluations <= 2000

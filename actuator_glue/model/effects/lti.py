@@ -239,6 +239,17 @@ def _shift(w, u, after, whole):  # type: ignore[no-untyped-def]
         w[_TAPS + 2 * LANES + n] = new
 
 
+@njit(inline='always')
+def _step3(w, r, delayed, u1, u2):  # type: ignore[no-untyped-def]
+    """Move x, q and the state r, which they feel, on by one sample."""
+    for n in range(LANES):
+        x = _row2(w, 0, n, 0, 1) + _one(w, 0, n, r) + _in(w, 0, n, delayed, u1, u2)
+        q = _row2(w, 1, n, 0, 1) + _one(w, 1, n, r) + _in(w, 1, n, delayed, u1, u2)
+        s = _row2(w, r, n, 0, 1) + _one(w, r, n, r) + _in(w, r, n, delayed, u1, u2)
+        w[_STATE + n], w[_STATE + LANES + n] = x, q
+        w[_STATE + r * LANES + n] = s
+
+
 @njit
 def advance(table, third, delayed, u, offset, begin, displacement, force):  # type: ignore[no-untyped-def]
     """Write the recorded displacement at samples begin, begin+1, ... and carry the state on.
@@ -272,12 +283,7 @@ def advance(table, third, delayed, u, offset, begin, displacement, force):  # ty
                     q = _row2(w, 1, n, 0, 1) + _in(w, 1, n, delayed, u1, u2)
                     w[_STATE + n], w[_STATE + LANES + n] = x, q
             elif third == 2:
-                for n in range(LANES):
-                    x = _row2(w, 0, n, 0, 1) + _one(w, 0, n, 2) + _in(w, 0, n, delayed, u1, u2)
-                    q = _row2(w, 1, n, 0, 1) + _one(w, 1, n, 2) + _in(w, 1, n, delayed, u1, u2)
-                    s = _row2(w, 2, n, 0, 1) + _one(w, 2, n, 2) + _in(w, 2, n, delayed, u1, u2)
-                    w[_STATE + n], w[_STATE + LANES + n] = x, q
-                    w[_STATE + 2 * LANES + n] = s
+                _step3(w, 2, delayed, u1, u2)
             elif third == _MASS:
                 for n in range(LANES):
                     x = _row4(w, 0, n) + _in(w, 0, n, delayed, u1, u2)
@@ -287,12 +293,7 @@ def advance(table, third, delayed, u, offset, begin, displacement, force):  # ty
                     w[_STATE + n], w[_STATE + LANES + n] = x, q
                     w[_STATE + 2 * LANES + n], w[_STATE + 3 * LANES + n] = v, f
             elif third == 4:
-                for n in range(LANES):
-                    x = _row2(w, 0, n, 0, 1) + _one(w, 0, n, 4) + _in(w, 0, n, delayed, u1, u2)
-                    q = _row2(w, 1, n, 0, 1) + _one(w, 1, n, 4) + _in(w, 1, n, delayed, u1, u2)
-                    s = _row2(w, 4, n, 0, 1) + _one(w, 4, n, 4) + _in(w, 4, n, delayed, u1, u2)
-                    w[_STATE + n], w[_STATE + LANES + n] = x, q
-                    w[_STATE + 4 * LANES + n] = s
+                _step3(w, 4, delayed, u1, u2)
             elif third == 5:
                 for n in range(LANES):  # nothing feels the transducer
                     x = _row2(w, 0, n, 0, 1) + _in(w, 0, n, delayed, u1, u2)
