@@ -10,7 +10,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from actuator_glue.inference.moves import INDEPENDENCE, NAMES, PARALLEL, independence
 from actuator_glue.inference.settings import Settings
@@ -56,13 +55,13 @@ def tune(
     move leaves by the square of the effective draws that such jumps make: nearer to the better one
     alone than to equal parts.
     """
-    shares, crossovers = np.empty(len(NAMES)), np.empty(settings.crossovers)
-    centre, factor, scale = _fit(
-        points, counts, settings.independence, settings.snooker, shares, crossovers
-    )
-    return Tuning(
-        shares, crossovers if crossover_cdf is None else crossover_cdf, scale, centre, factor
-    )
+    dimension = points.shape[1]
+    new = Tuning(
+        np.empty(len(NAMES)), np.empty(settings.crossovers), np.empty(dimension),
+        np.empty(dimension), np.empty((dimension, dimension)),
+    )  # fmt: skip
+    fit(points, counts, settings.independence, settings.snooker, new)
+    return new if crossover_cdf is None else new._replace(crossover_cdf=crossover_cdf)
 
 
 @njit(fastmath=False)
@@ -73,8 +72,9 @@ def _drawn(jump, dimension):  # type: ignore[no-untyped-def]
 
 
 @njit(fastmath=False)
-def _fit(points, counts, most, snooker, moves, crossovers):  # type: ignore[no-untyped-def]
-    """Fill the cumulative probabilities, return centre, factor and scale of the points."""
+def fit(points, counts, most, snooker, tuning):  # type: ignore[no-untyped-def]
+    """Do `tune` in place; `most` and `snooker` are the settings' shares of moves."""
+    moves, crossovers, scale = tuning.move_cdf, tuning.crossover_cdf, tuning.scale
     reach = np.zeros(len(counts))
     for i in range(len(counts)):
         if counts[i, 0] > 0.0:
@@ -99,26 +99,31 @@ def _fit(points, counts, most, snooker, moves, crossovers):  # type: ignore[no-u
         crossovers[i] = weights
     for i in range(len(crossovers)):
         crossovers[i] /= weights
-    centre, factor = independence.fit(points)
-    scale = np.zeros(len(centre))
-    for j in range(len(centre)):
+    independence.fit(points, tuning.centre, tuning.factor)
+    for j in range(len(scale)):
+        scale[j] = 0.0
         for k in range(j + 1):
-            scale[j] += factor[j, k] * factor[j, k]
+            scale[j] += tuning.factor[j, k] * tuning.factor[j, k]
         scale[j] = math.sqrt(scale[j])
-    return centre, factor, scale
-
-
-def outliers(mean_log_density: Array) -> NDArray[np.intp]:
-    """Chains whose mean log density lies below Q1 - 2 IQR of all chains (Vrugt 2016, Eq. 25)."""
-    return np.flatnonzero(_outlying(mean_log_density))
 
 
 @njit(fastmath=False)
-def _outlying(mean_log_density):  # type: ignore[no-untyped-def]
-    ordered = np.sort(mean_log_density)
+def rescue(z, x, values, target, total):  # type: ignore[no-untyped-def]
+    """Put outlier chains where the chain of the highest log likelihoods stands; zero `total`.
+
+    Outliers are chains whose mean log likelihood since they were last looked at, by which `total`
+    (n,) orders them, lies below Q1 - 2 IQR of all chains (Vrugt 2016, Eq. 25). The other arguments
+    are a `Walk`'s parts, changed in place.
+    """
+    ordered = np.sort(total)
     quartile = np.empty(2)
     for i in range(2):  # interpolated as np.quantile does by default
         place = (0.25 + 0.5 * i) * (len(ordered) - 1)
         below = min(int(place), len(ordered) - 2)
         quartile[i] = ordered[below] + (place - below) * (ordered[below + 1] - ordered[below])
-    return mean_log_density < quartile[0] - 2.0 * (quartile[1] - quartile[0])
+    least, best = quartile[0] - 2.0 * (quartile[1] - quartile[0]), np.argmax(total)
+    for i in range(len(total)):
+        if total[i] < least:
+            z[i], x[i] = z[best], x[best]
+            values[i], target[i] = values[best], target[best]
+    total[:] = 0.0

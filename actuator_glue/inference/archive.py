@@ -42,9 +42,9 @@ class Archive:
         return self._buffer.rows[: self.size]
 
     @property
-    def newest_half(self) -> Array:
-        """The later half of the points: what came from the start fades."""
-        return self._buffer.rows[self.size // 2 : self.size]
+    def newest(self) -> Array:
+        """All but the oldest quarter of the points: what came from the start fades."""
+        return self._buffer.rows[self.size // 4 : self.size]
 
     def append(self, points: Array) -> Archive:
         """Return the archive with points (m, p) added."""

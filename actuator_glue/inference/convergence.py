@@ -71,11 +71,11 @@ def rhat_and_ess(draws: Array) -> tuple[Array, Array]:
     if split is None:
         return np.full(draws.shape[2], np.nan), np.full(draws.shape[2], np.nan)
     values = split.reshape(len(split), -1)
-    ordered = np.sort(values, axis=1)
-    middle = values.shape[1] // 2
-    median = 0.5 * (ordered[:, [middle - 1 + values.shape[1] % 2]] + ordered[:, [middle]])
-    bulk = _normal(values, ordered).reshape(split.shape)
-    folded = _normal(np.abs(values - median), _folded(ordered, median)).reshape(split.shape)
+    bulk, folded = np.empty_like(split), np.empty_like(split)
+    _rank(
+        values, np.argsort(values, axis=1), _scores(values.shape[1]), bulk.reshape(values.shape),
+        folded.reshape(values.shape),
+    )  # fmt: skip
     reduction = np.maximum(_potential_reduction(bulk), _potential_reduction(folded))
     return reduction, _effective(bulk)
 
@@ -91,32 +91,6 @@ def _split(draws: Array) -> Array | None:
     return split if half >= 2 and np.isfinite(split).all() else None
 
 
-def _normal(values: Array, ordered: Array) -> Array:
-    """Normal scores of the ranks of each row's values, (p, m); `ordered` are the same, sorted."""
-    scores = np.empty_like(values)
-    _ranked(values, ordered, _scores(values.shape[1]), scores)
-    return scores
-
-
-@njit
-def _folded(ordered, median):  # type: ignore[no-untyped-def]
-    """Return the sorted distances of sorted rows from their medians: two sorted halves merged."""
-    folded = np.empty_like(ordered)
-    n = ordered.shape[1]
-    for row in range(len(ordered)):
-        up, centre = ordered[row], median[row, 0]
-        left, right = 0, n - 1
-        for i in range(n - 1, -1, -1):  # the largest distance is at one of the two ends
-            below, above = abs(up[left] - centre), abs(up[right] - centre)
-            if below > above:
-                folded[row, i] = below
-                left += 1
-            else:
-                folded[row, i] = above
-                right -= 1
-    return folded
-
-
 @lru_cache(maxsize=8)
 def _scores(count: int) -> Array:
     """Normal scores of the ranks 1, 1.5, 2, ... count (halves are those of ties)."""
@@ -125,38 +99,41 @@ def _scores(count: int) -> Array:
 
 
 @njit
-def _ranked(values, ordered, scores, out):  # type: ignore[no-untyped-def]
-    """Write the score of each value's rank; equal values share their mean rank.
+def _share(ascending, order, scores, out):  # type: ignore[no-untyped-def]
+    """Write the score of each value's rank to its place; equal values share their mean rank."""
+    first, n = 0, len(ascending)
+    while first < n:
+        equal = 1
+        while first + equal < n and ascending[first + equal] == ascending[first]:
+            equal += 1
+        for i in range(first, first + equal):
+            out[order[i]] = scores[2 * first + equal - 1]
+        first += equal
 
-    A grid over the range tells about where in `ordered` a value stands, bisection exactly.
+
+@njit
+def _rank(values, order, scores, bulk, folded):  # type: ignore[no-untyped-def]
+    """Write normal scores of rows of values (p, m), and of their distances from the median.
+
+    `order` sorts each row. The distances in order are two sorted halves, merged.
     """
     n = values.shape[1]
-    first = np.empty(n + 2, np.int64)
+    up, far, place = np.empty(n), np.empty(n), np.empty(n, np.int64)
     for row in range(len(values)):
-        up = ordered[row]
-        wide = up[n - 1] - up[0]
-        fine = n / wide if wide > 0.0 and math.isfinite(n / wide) else 0.0
-        filled = 0
         for i in range(n):
-            cell = int((up[i] - up[0]) * fine)
-            while filled <= cell:
-                first[filled] = i
-                filled += 1
-        first[filled] = n
-        for i in range(n):
-            value = values[row, i]
-            cell = int((value - up[0]) * fine)
-            below, above = first[cell], first[cell + 1]
-            while below < above:
-                middle = (below + above) // 2
-                if up[middle] < value:
-                    below = middle + 1
-                else:
-                    above = middle
-            equal = 1
-            while below + equal < n and up[below + equal] == value:
-                equal += 1
-            out[row, i] = scores[2 * below + equal - 1]
+            up[i] = values[row, order[row, i]]
+        _share(up, order[row], scores, bulk[row])
+        centre = 0.5 * (up[(n - 1) // 2] + up[n // 2])
+        left, right = 0, n - 1
+        for i in range(n - 1, -1, -1):  # the largest distance is at one of the two ends
+            below, above = abs(up[left] - centre), abs(up[right] - centre)
+            if below > above:
+                far[i], place[i] = below, order[row, left]
+                left += 1
+            else:
+                far[i], place[i] = above, order[row, right]
+                right -= 1
+        _share(far, place, scores, folded[row])
 
 
 @njit(fastmath=False)

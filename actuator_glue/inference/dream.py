@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from actuator_glue.errors import InputError
-from actuator_glue.inference.adaptation import empty_counts, tune
+from actuator_glue.inference.adaptation import Tuning, empty_counts, tune
 from actuator_glue.inference.anneal import (
     Population,
     anneal,
@@ -27,7 +27,7 @@ from actuator_glue.inference.evaluate import LogDensity, check_values, evaluate
 from actuator_glue.inference.moves import uniforms_per_chain
 from actuator_glue.inference.settings import Settings
 from actuator_glue.inference.state import Info, State, adapted, moved
-from actuator_glue.inference.sweep import Path, many, one
+from actuator_glue.inference.sweep import Path, adapt, many, one
 from actuator_glue.records import Array
 
 # Evaluations of a compiled likelihood between two questions whether to stop: 0.2 ms; and in one go
@@ -129,16 +129,22 @@ def _check_archive(archive: Array, lower: Array, width: Array) -> Array:
 
 def step(rng: np.random.Generator, state: State, log_density: LogDensity) -> tuple[State, Info]:
     """Advance every chain by one generation; the state given is left as it is."""
-    counts = state.counts.copy()
+    state = _own(state)
     uniforms = rng.random(
         (len(state.z), uniforms_per_chain(state.z.shape[1], state.settings.pairs))
     )
     walk, accepted, label = one(
-        uniforms, state.walk, state.archive, state.around, log_density, counts
+        uniforms, state.walk, state.archive, state.around, log_density, state.counts
     )
-    archive = state.archive.append(walk.z) if state.until_append == 1 else state.archive
-    new = moved(state, walk, archive, counts, walk.log_density[np.newaxis])
-    return adapted(rng, new), Info(accepted, label[:, 0], label[:, 1])
+    total, archive = state.sum_log_density, state.archive
+    if state.adapting:
+        total += walk.log_density
+    if state.until_append == 1:
+        archive = archive.append(walk.z)
+        if state.adapting:
+            adapt(walk, archive, state.around, state.counts, total)
+    new = adapted(moved(state, walk, archive, state.counts, 1))
+    return new, Info(accepted, label[:, 0], label[:, 1])
 
 
 def stretch(
@@ -148,19 +154,31 @@ def stretch(
     density: Compiled | None,
     most: int,
 ) -> tuple[State, Path]:
-    """Advance every chain by up to `most` generations, as far as nothing is adapted on the way.
+    """Advance every chain by up to `most` generations.
 
     The state is that of as many `step`s, bit by bit; with a compiled likelihood it is there
     sooner.
     """
+    state = _own(state)
     count = min(most, state.until_adaptation)
     columns = uniforms_per_chain(state.z.shape[1], state.settings.pairs)
-    counts = state.counts.copy()
     walk, archive, path = many(
         rng.random((count, len(state.z), columns)), state.walk, state.archive, state.until_append,
-        state.around, density, log_density, counts,
+        state.around, density, log_density, state.counts,
+        state.sum_log_density if state.adapting else None,
     )  # fmt: skip
-    return adapted(rng, moved(state, walk, archive, counts, path.log_density)), path
+    return adapted(moved(state, walk, archive, state.counts, count)), path
+
+
+def _own(state: State) -> State:
+    """Return the state with arrays of its own for what generations change in place."""
+    if not state.adapting:
+        return state._replace(counts=state.counts.copy())
+    return state._replace(
+        counts=state.counts.copy(),
+        sum_log_density=state.sum_log_density.copy(),
+        tuning=Tuning(*(part.copy() for part in state.tuning)),
+    )
 
 
 def _burn_in(settings: Settings, generations: int, warm: bool) -> int:

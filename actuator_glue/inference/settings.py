@@ -43,7 +43,7 @@ class Settings:
     independence: float = 0.9
     jitter: float = 0.05
     noise: float = 1e-6
-    thinning: int = 5
+    thinning: int = 2
     adaptation: int = 60
     start: Literal['annealed', 'prior'] = 'annealed'
     population: int | None = None

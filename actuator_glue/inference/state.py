@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.inference.adaptation import Tuning, empty_counts, outliers, tune
+from actuator_glue.inference.adaptation import Tuning, empty_counts, tune
 from actuator_glue.inference.archive import Archive
 from actuator_glue.inference.settings import Settings
 from actuator_glue.inference.sweep import Around, Walk
@@ -70,9 +70,9 @@ class State(NamedTuple):
 
     @property
     def until_adaptation(self) -> int:
-        """Generations until `adapted` next does something, or burn-in ends."""
+        """Generations until burn-in ends or, after that, `adapted` may next do something."""
         if self.adapting:
-            return min(self.until_append, self.settings.adaptation - self.generation)
+            return self.settings.adaptation - self.generation
         appends = -(-(2 * self.fitted - self.archive.size) // len(self.z))
         return self.until_append + (max(appends, 1) - 1) * self.settings.thinning
 
@@ -91,7 +91,7 @@ class Info(NamedTuple):
     crossover: NDArray[np.int64]
 
 
-def moved(state: State, walk: Walk, archive: Archive, counts: Array, passed: Array) -> State:
+def moved(state: State, walk: Walk, archive: Archive, counts: Array, generations: int) -> State:
     """Return the state some generations later.
 
     Args:
@@ -99,49 +99,29 @@ def moved(state: State, walk: Walk, archive: Archive, counts: Array, passed: Arr
         walk: where the chains stand now.
         archive: with what they have left in it.
         counts: with what the moves achieved.
-        passed: log likelihoods since, one row per generation, (g, n).
+        generations: how many.
     """
-    total = state.sum_log_density
-    if state.adapting:
-        for row in passed:  # one by one: the same bits however many come at once
-            total = total + row
     return state._replace(
-        **walk._asdict(),
+        x=walk.x,
+        z=walk.z,
+        log_density=walk.log_density,
+        log_target=walk.log_target,
         archive=archive,
         counts=counts,
-        sum_log_density=total,
-        generation=state.generation + len(passed),
-        evaluations=state.evaluations + passed.size,
+        fitted=archive.size if state.adapting else state.fitted,
+        generation=state.generation + generations,
+        evaluations=state.evaluations + generations * len(walk.z),
     )
 
 
-def adapted(rng: np.random.Generator, new: State) -> State:
-    """Adapt what is due after a generation.
-
-    In burn-in, whenever the archive has grown: fit the moves and rescue outlier chains; later:
-    renew the fit when the archive has doubled.
-    """
+def adapted(new: State) -> State:
+    """Renew the fit of the moves after burn-in, when the archive has doubled."""
     s = new.settings
-    if new.generation % s.thinning != 0:
+    due = new.generation > s.adaptation and new.generation % s.thinning == 0
+    if not due or new.archive.size < 2 * new.fitted:
         return new
-    if new.generation > s.adaptation:
-        if new.archive.size < 2 * new.fitted:
-            return new
-        return new._replace(
-            tuning=tune(new.archive.newest_half, new.counts, s, new.tuning.crossover_cdf),
-            fitted=new.archive.size,
-            counts=empty_counts(s),
-        )
-    total = new.sum_log_density
-    new = new._replace(
-        tuning=tune(new.archive.newest_half, new.counts, s),
+    return new._replace(
+        tuning=tune(new.archive.newest, new.counts, s, new.tuning.crossover_cdf),
         fitted=new.archive.size,
-        sum_log_density=np.zeros(len(total)),
+        counts=empty_counts(s),
     )
-    lost = outliers(total)
-    if lost.size == 0:
-        return new
-    source = np.arange(len(total))
-    others = np.delete(source, lost)
-    source[lost] = others[rng.integers(len(others), size=len(lost))]
-    return new._replace(**Walk(*(part[source] for part in new.walk))._asdict())

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.inference import compiled, generation
+from actuator_glue.inference import adaptation, compiled, generation
 from actuator_glue.inference.adaptation import Tuning
 from actuator_glue.inference.archive import Archive
 from actuator_glue.inference.compiled import Compiled, log_densities
@@ -97,6 +97,21 @@ class Path(NamedTuple):
     log_density: Array
 
 
+def adapt(now: Walk, archive: Archive, around: Around, counts: Array, total: Array) -> None:
+    """Rescue outlier chains and fit the moves to an archive that has grown, all in place.
+
+    Args:
+        now: the chains.
+        archive: with the chains in it.
+        around: its tuning is changed.
+        counts: what the moves have achieved.
+        total: sum of each chain's log likelihoods since this was last done, (n,); zeroed.
+    """
+    s = around.settings
+    adaptation.rescue(*now, total)
+    adaptation.fit(archive.newest, counts, s.independence, s.snooker, around.tuning)
+
+
 def many(
     uniforms: Array,
     now: Walk,
@@ -106,6 +121,7 @@ def many(
     density: Compiled | None,
     log_density: LogDensity,
     counts: Array,
+    total: Array | None = None,
 ) -> tuple[Walk, Archive, Path]:
     """Advance all chains by g generations; the bits are those of `one` g times.
 
@@ -121,6 +137,7 @@ def many(
         density: compiled form of the log likelihood; None has every generation done by `one`.
         log_density: log likelihood (n,) of points (n, p).
         counts: what moves achieved is added here.
+        total: in burn-in, the sum `adapt` asks for; it is done whenever the archive has grown.
 
     Returns:
         The chains, the archive, and the way the chains took.
@@ -132,6 +149,7 @@ def many(
         archive = archive.with_room(n * (1 + (count - until_append) // every))
     target, room = np.empty((2, n)), generation.room(n, d, s.pairs)
     scratch = None if density is None else compiled.scratch(density, n)
+    adapting, total = total is not None, np.empty(0) if total is None else total
     done = 0
     while done < count:
         if density is not None:
@@ -140,7 +158,8 @@ def many(
                 uniforms[done:], *now[:3], archive.capacity_rows, archive.size,
                 until_append - done, every, around.lower, around.width, around.tuning, s.pairs,
                 s.unit_jump, s.jitter, s.noise, around.tempering, density, counts, path.z[done:],
-                path.x[done:], path.log_density[done:], target, room, scratch,
+                path.x[done:], path.log_density[done:], target, room, scratch, adapting, total,
+                s.independence, s.snooker,
             )  # fmt: skip
             archive = archive.grown(size)
             done += more
@@ -150,10 +169,14 @@ def many(
             if done == count:
                 break
         now, _, _ = one(uniforms[done], now, archive, around, log_density, counts)
-        path.z[done], path.x[done], path.log_density[done] = now.z, now.x, now.log_density
         done += 1
+        if adapting:
+            total += now.log_density
         if every and done >= until_append and (done - until_append) % every == 0:
             archive = archive.append(now.z)
+            if adapting:
+                adapt(now, archive, around, counts, total)
+        path.z[done - 1], path.x[done - 1], path.log_density[done - 1] = now[:3]
     # Their own arrays: who keeps a state need not keep the way there.
     return Walk(*(part.copy() for part in now)), archive, path
 
@@ -163,7 +186,7 @@ def many(
 def _advance(  # type: ignore[no-untyped-def]
     uniforms, z, x, values, rows, size, until_append, every, lower, width, tuning, pairs,
     unit_jump, jitter, noise, tempering, density, counts, path_z, path_x, path_values, target,
-    room, scratch,
+    room, scratch, adapting, total, independence, snooker,
 ):  # fmt: skip
     """Do generations, in place on the path; return how many, and the archive's size.
 
@@ -189,7 +212,13 @@ def _advance(  # type: ignore[no-untyped-def]
         generation.tally(z, new_z, room, tuning.scale, counts)
         z, x, values = new_z, new_x, new_values
         done += 1
+        if adapting:
+            for i in range(len(total)):
+                total[i] += values[i]
         if every > 0 and done >= until_append and (done - until_append) % every == 0:
             rows[size : size + len(z)] = z
             size += len(z)
+            if adapting:
+                adaptation.rescue(z, x, values, there, total)
+                adaptation.fit(rows[size // 4 : size], counts, independence, snooker, tuning)
     return done, size

@@ -216,7 +216,9 @@ def test_independence_draws_have_the_density_it_claims(rng_seed: int) -> None:
     tuning = _tuning(points, moves.INDEPENDENCE)
     z = np.tile(tuning.centre, (count, 1))
     drawn, _x, room = _propose(rng, z, points, np.full(d, -1.0), np.full(d, 2.0), tuning)
-    t = stats.multivariate_t(tuning.centre, tuning.factor @ tuning.factor.T, df=5)
+    t = stats.multivariate_t(
+        tuning.centre, tuning.factor @ tuning.factor.T, df=moves.independence.DEGREES
+    )
     log_q = t.logpdf(drawn)
     # The correction is ln q(centre) - ln q(candidate).
     assert np.allclose(room.correction, t.logpdf(tuning.centre) - log_q, atol=1e-9)

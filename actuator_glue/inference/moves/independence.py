@@ -1,7 +1,7 @@
 """Independence move: a Student-t distribution fitted to the archive, and its density.
 
 An addition to Vrugt (2016): where the posterior is near a single hill the fitted density proposes
-almost independent draws; elsewhere its share falls by itself (see adaptation.py). Heavy tails (5
+almost independent draws; elsewhere its share falls by itself (see adaptation.py). Heavy tails (8
 degrees of freedom) keep the density ratio bounded for any posterior with Gaussian tails.
 """
 
@@ -15,17 +15,18 @@ from actuator_glue.inference.moves import U_FREE
 from actuator_glue.inference.moves.draw import normal_pair
 from actuator_glue.jit import njit
 
-DEGREES = 5.0
+DEGREES = 8.0
 
 
 @njit(fastmath=False)
-def fit(points):  # type: ignore[no-untyped-def]
-    """Return centre (p,) and lower Cholesky factor (p, p) of the covariance of points (m, p).
+def fit(points, centre, factor):  # type: ignore[no-untyped-def]
+    """Write centre (p,) and lower Cholesky factor (p, p) of the covariance of points (m, p).
 
     The covariance is shrunk towards its diagonal as far as few points need it.
     """
     m, d = points.shape
-    centre, factor = np.zeros(d), np.zeros((d, d))
+    centre[:] = 0.0
+    factor[:] = 0.0
     for i in range(m):
         for j in range(d):
             centre[j] += points[i, j]
@@ -50,7 +51,6 @@ def fit(points):  # type: ignore[no-untyped-def]
             if k < j:
                 factor[j, k] /= factor[k, k]
         factor[j, j] = math.sqrt(factor[j, j])
-    return centre, factor
 
 
 @njit
@@ -81,14 +81,15 @@ def log_density(z, centre, factor):  # type: ignore[no-untyped-def]
 def draw(uniforms, first, centre, factor, candidate):  # type: ignore[no-untyped-def]
     """Write one draw of the fitted Student t into candidate, from uniforms[first:]."""
     d = centre.size
-    # Chi-squared with five degrees of freedom: two exponentials and one squared normal.
-    normal, spare = normal_pair(uniforms[first + 2], uniforms[first + 3])
-    chi2 = normal * normal - 2.0 * math.log((1.0 - uniforms[first]) * (1.0 - uniforms[first + 1]))
-    stretch = math.sqrt(DEGREES / chi2)
+    # Chi-squared with eight degrees of freedom: four exponentials.
+    product = 1.0
+    for i in range(4):
+        product *= 1.0 - uniforms[first + i]
+    stretch = math.sqrt(-0.5 * DEGREES / math.log(product))
     for j in range(d):
-        candidate[j] = centre[j] + stretch * spare * factor[j, 0]
-    for k in range(1, d, 2):
-        one, two = normal_pair(uniforms[first + 3 + k], uniforms[first + 4 + k])
+        candidate[j] = centre[j]
+    for k in range(0, d, 2):
+        one, two = normal_pair(uniforms[first + 4 + k], uniforms[first + 5 + k])
         for j in range(k, d):
             candidate[j] += stretch * factor[j, k] * one
         for j in range(k + 1, d):
