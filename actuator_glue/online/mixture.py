@@ -21,6 +21,7 @@ _STEPS, _PRECISION = 60, 5e-3
 _LEVEL = 1e-10  # between hills the distribution is level, and Newton's steps are lost in rounding
 _REACH = 9.0  # standard deviations beyond which there is nothing
 _MOST = 24  # terms of the series; where they do not do, components are summed one by one
+_SIZE = _MOST + 3  # of their coefficients, which are computed by threes
 _TRUNCATION = 3e-5  # of a standard deviation, what the series may leave out
 _NEAR = 0.02  # standard deviations from the normal's quantile within which one step is enough
 _CRAMER = 1.0864349  # |He_n(u)| <= this sqrt(n!) exp(u^2/4)
@@ -118,22 +119,41 @@ def _terms(offset, excess, wanted):  # type: ignore[no-untyped-def]
 
 @njit
 def _coefficients(offset, excess, terms, spare, a):  # type: ignore[no-untyped-def]
-    """Write a_k = mean_i h_k(offset_i, excess_i)/k! for k <= terms; spare (2, m) is scratch."""
+    """Write a_k = mean_i h_k(offset_i, excess_i)/k! for 2 <= k <= terms, and up to two more.
+
+    h_(k+1) = offset h_k + k excess h_(k-1), three at once: most of the time would go into loading
+    and storing them. spare (2, m) is scratch, a (_SIZE,).
+    """
     m = len(offset)
     before, last = spare[0], spare[1]
-    factorial = 1.0
+    first = second = third = 0.0
     for i in range(m):
-        before[i] = 1.0
-        last[i] = offset[i]
-    for k in range(1, terms):
-        total = 0.0
+        o, e = offset[i], excess[i]
+        two = o * o + e
+        three = o * two + 2.0 * e * o
+        four = o * three + 3.0 * e * two
+        before[i], last[i] = three, four
+        first += two
+        second += three
+        third += four
+    factorial = 2.0 * m
+    a[2], a[3], a[4] = first / factorial, second / (3.0 * factorial), third / (12.0 * factorial)
+    factorial *= 12.0
+    for k in range(4, terms, 3):
+        first = second = third = 0.0
         for i in range(m):
-            new = offset[i] * last[i] + k * excess[i] * before[i]
-            before[i] = new
-            total += new
-        before, last = last, before
-        factorial *= k + 1.0
-        a[k + 1] = total / (m * factorial)
+            o, e = offset[i], excess[i]
+            one = o * last[i] + k * e * before[i]
+            two = o * one + (k + 1.0) * e * last[i]
+            three = o * two + (k + 2.0) * e * one
+            before[i], last[i] = two, three
+            first += one
+            second += two
+            third += three
+        a[k + 1] = first / (factorial * (k + 1.0))
+        a[k + 2] = second / (factorial * (k + 1.0) * (k + 2.0))
+        factorial *= (k + 1.0) * (k + 2.0) * (k + 3.0)
+        a[k + 3] = third / factorial
 
 
 @njit
@@ -204,7 +224,7 @@ def _quantiles(columns, mean, sd, probability, normal, out):  # type: ignore[no-
     farthest = np.abs(normal).max()
     wanted = _TRUNCATION / _CRAMER * math.exp(-0.25 * farthest * farthest)
     x, offset, excess, spare = np.empty(m), np.empty(m), np.empty(m), np.empty((2, m))
-    a, room = np.zeros(_MOST + 1), np.empty(_MOST + 2)
+    a, room = np.zeros(_SIZE), np.empty(_MOST + 2)
     limits, start = np.empty(len(normal)), np.empty(len(normal))
     done = 0
     known = False  # whether the column before has told where to start

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_glue.inference.bands import Band, band
-from actuator_glue.model.linear import frequency_response
+from actuator_glue.model.linear import coefficients
 from actuator_glue.model.parameters import BASE
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.records import Array
@@ -43,11 +43,9 @@ def response_band(draws: Array, stiffness: float, settings: EstimatorSettings) -
     )
     order = np.sort(np.append(frequency, settings.headline_frequency))
     at = int(np.searchsorted(order, settings.headline_frequency))
-    response = frequency_response(draws[:, : len(BASE)], stiffness, order)
-    response = response[np.isfinite(response).all(axis=1)]
-    amplitude = band(np.abs(response), settings.levels)
-    # Of second order and damped: from 0 to -pi without a jump.
-    phase = band(np.asarray(np.angle(response), np.float64), settings.levels)
+    modulus, angle = _polar(draws[:, : len(BASE)], stiffness, order)
+    amplitude = band(modulus.T, settings.levels)
+    phase = band(angle.T, settings.levels)
     keep = np.delete(np.arange(len(order)), at)
     head = settings.headline_frequency
     lag = float(phase.median[at])
@@ -57,6 +55,22 @@ def response_band(draws: Array, stiffness: float, settings: EstimatorSettings) -
         phase=_columns(phase, keep),
         headline=(head, float(amplitude.median[at]), lag, -lag / (2.0 * np.pi * head)),
     )
+
+
+def _polar(theta: Array, stiffness: float, frequency: Array) -> tuple[Array, Array]:
+    """Return modulus and phase [rad] of Eq. (2a), (nf, m'), of thetas (m, 4) where it exists.
+
+    As `linear.frequency_response` without complex numbers, and with draws side by side in memory.
+    """
+    n0, d2, d1, d0 = coefficients(theta, stiffness)
+    omega = 2.0 * np.pi * frequency[:, np.newaxis]
+    with np.errstate(divide='ignore', invalid='ignore'):
+        real, imaginary = d0 - d2 * omega**2, d1 * omega
+        modulus = n0 / np.sqrt(real * real + imaginary * imaginary)
+    # Of second order and damped: from 0 to -pi without a jump.
+    phase = -np.arctan2(imaginary, real)
+    exists = np.isfinite(modulus).all(axis=0)
+    return (modulus, phase) if exists.all() else (modulus[:, exists], phase[:, exists])
 
 
 def _columns(whole: Band, keep: Array) -> Band:

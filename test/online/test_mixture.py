@@ -84,7 +84,7 @@ def test_the_bound_of_the_terms_left_out_is_one(offset, excess):
     wanted = 1e-5
     terms = mixture._terms(offset, excess, wanted)
     assert terms > 0
-    a = np.zeros(mixture._MOST + 1)
+    a = np.zeros(mixture._SIZE)
     mixture._coefficients(np.array([offset]), np.array([-excess]), terms, np.empty((2, 1)), a)
     a[0], a[1], a[2] = 1.0, offset, 0.5 * (offset**2 - excess)
     u = np.linspace(-4, 4, 81)
