@@ -37,27 +37,36 @@ def _filter_banks(x: Array, size: int, memory: Array, pole: float, delta: float)
     """Fill each bank's rows of x with its first one passed through (1 - pole z)/(z - pole).
 
     Written as zeta = delta (z + 1)/(z - pole) - 1, which loses nothing when the pole is near one.
-    Both banks at once, for each waits for its own last result most of the time.
+    Both banks and two sections at once, for each waits for its own last result most of the time;
+    so there is a section more than there are terms.
 
     Args:
-        x: shape (2, K, samples); x[:, 0] are the inputs.
+        x: shape (2, K + 1, samples); x[:, 0] are the inputs.
         size: samples to be filtered.
-        memory: each section's last input and low-pass output across blocks, shape (2, K, 2).
+        memory: each section's last input and low-pass output across blocks, shape (2, K + 1, 2).
         pole: a.
         delta: 1 - a.
     """
-    for k in range(1, x.shape[1]):
+    for k in range(1, x.shape[1] - 1, 2):
         before0, low0 = memory[0, k, 0], memory[0, k, 1]
         before1, low1 = memory[1, k, 0], memory[1, k, 1]
+        before2, low2 = memory[0, k + 1, 0], memory[0, k + 1, 1]
+        before3, low3 = memory[1, k + 1, 0], memory[1, k + 1, 1]
         for n in range(size):
             new0, new1 = x[0, k - 1, n], x[1, k - 1, n]
             low0 = pole * low0 + delta * (new0 + before0)
             low1 = pole * low1 + delta * (new1 + before1)
-            x[0, k, n] = low0 - new0
-            x[1, k, n] = low1 - new1
             before0, before1 = new0, new1
+            new2, new3 = low0 - new0, low1 - new1
+            low2 = pole * low2 + delta * (new2 + before2)
+            low3 = pole * low3 + delta * (new3 + before3)
+            before2, before3 = new2, new3
+            x[0, k, n], x[1, k, n] = new2, new3
+            x[0, k + 1, n], x[1, k + 1, n] = low2 - new2, low3 - new3
         memory[0, k, 0], memory[0, k, 1] = before0, low0
         memory[1, k, 0], memory[1, k, 1] = before1, low1
+        memory[0, k + 1, 0], memory[0, k + 1, 1] = before2, low2
+        memory[1, k + 1, 0], memory[1, k + 1, 1] = before3, low3
 
 
 @njit
@@ -65,7 +74,7 @@ def _add_products(x: Array, size: int, e: Array, products: Array) -> None:
     """Add each row's products with both banks' inputs, with e, and its sum: (2, K, 4)."""
     u, v = x[0, 0], x[1, 0]
     for bank in range(2):
-        for k in range(x.shape[1]):
+        for k in range(products.shape[1]):
             row = x[bank, k]
             total = errors = first = second = 0.0
             for n in range(size):
@@ -81,7 +90,7 @@ def _add_products(x: Array, size: int, e: Array, products: Array) -> None:
 
 @njit
 def _states(memory: Array, pole: float, delta: float) -> Array:
-    """Return each section's state in coordinates in which a section is lossless, (2, K)."""
+    """Return each section's state in coordinates in which it is lossless, (2, sections)."""
     scale = np.sqrt(delta * (2.0 - delta))
     states: Array = (pole * memory[:, :, 1] + delta * memory[:, :, 0]) / scale
     return states
@@ -96,7 +105,7 @@ def _fill_gram(products: Array, start: Array, end: Array, banks: int, gram: Arra
 
     Args:
         products: products with the two inputs, shape (2, K, 2 or more).
-        start: `_states` at the first counted sample.
+        start: `_states` at the first counted sample, shape (2, K or more).
         end: `_states` after the last.
         banks: how many are in use; their blocks of terms take turns.
         gram: shape (dims, dims).
@@ -135,9 +144,9 @@ def prepare(t: Array, c: Array, measured: Array, command: Array, settle: int) ->
     t[BEYOND] = series(first_terms, banks, t[NORM], reference)
     state = np.zeros(kernel.STREAM)
     state[1], state[2] = t[X0], t[V0]
-    x, e = np.zeros((2, K, _SAMPLES)), np.empty(_SAMPLES)
-    memory, products = np.zeros((2, K, 2)), np.zeros((2, K, 4))
-    start = np.zeros((2, K))
+    x, e = np.zeros((2, K + 1, _SAMPLES)), np.empty(_SAMPLES)
+    memory, products = np.zeros((2, K + 1, 2)), np.zeros((2, K, 4))
+    start = np.zeros((2, K + 1))
     first, n = 0, len(command)
     while first < n:
         last = min(first + _SAMPLES, n if first >= settle else settle)
