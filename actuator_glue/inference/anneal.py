@@ -15,12 +15,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from actuator_glue.inference import generation
 from actuator_glue.inference.adaptation import empty_counts, tune
 from actuator_glue.inference.archive import Archive
 from actuator_glue.inference.compiled import compiled
 from actuator_glue.inference.coordinates import physical_all, sampling
 from actuator_glue.inference.evaluate import LogDensity, check_values, evaluate
-from actuator_glue.inference.generation import UNTEMPERED, Tempering, refer, temper
+from actuator_glue.inference.generation import UNTEMPERED, Tempering
 from actuator_glue.inference.moves import independence, uniforms_per_chain
 from actuator_glue.inference.settings import Settings
 from actuator_glue.inference.sweep import Around, Walk, many
@@ -100,21 +101,17 @@ def anneal(
     chains = max(size // settings.sweeps, 2)
     columns = uniforms_per_chain(dimension, settings.pairs)
     most = math.inf if limit is None else limit
+    start, target = np.empty(chains, np.intp), np.empty(chains)
     while power < 1.0 and evaluations + chains * settings.sweeps <= most:
-        base = np.empty(len(z))
-        refer(z, log_jacobian, power, reference.centre, reference.factor, base)
-        gain = values + log_jacobian - base
-        gain[~np.isfinite(values)] = -np.inf
-        rise = next_rise(gain, 1.0 - power, settings.survivors)
-        power = 1.0 if rise >= 1.0 - power else power + rise
-        chosen = resample(rng, gain * rise, size)
+        chosen = np.empty(len(z), np.intp)
+        power = _reweigh(
+            z, values, log_jacobian, reference.centre, reference.factor, power, settings.survivors,
+            rng.random(2), chosen, start, target,
+        )  # fmt: skip
         archive = Archive.of(z[chosen])
         tuning = tune(archive.rows, counts, settings)
-        start = resample(rng, gain * rise, chains)
         tempering = Tempering(power, reference.centre, reference.factor)
         around = Around(lower, width, tuning, settings, tempering)
-        target = np.empty(chains)
-        temper(values[start], log_jacobian[start], base[start], power, target)
         now = Walk(z[start], x[start], values[start], target)
         counts = empty_counts(settings)
         uniforms = rng.random((settings.sweeps, chains, columns))
@@ -125,21 +122,59 @@ def anneal(
         z = path.z.swapaxes(0, 1).reshape(-1, dimension)
         x, log_jacobian = physical_all(z, lower, width)
         values = path.log_density.swapaxes(0, 1).reshape(-1)
-        size = len(z)
     return Population(z, x, values, counts, power, evaluations)
 
 
-def next_rise(gain: Array, most: float, survivors: float) -> float:
-    """Largest rise of the power that keeps the effective share of points at `survivors`.
+# Strict floating point: not-a-number and minus infinity are asked for.
+@njit(fastmath=False)
+def _reweigh(  # type: ignore[no-untyped-def]
+    z, values, log_jacobian, centre, factor, power, survivors, places, chosen, start, target
+):
+    """Return the next power; resample the points z (m, p) by the weights that leads to.
 
-    The share is counted among points whose gain is finite.
+    Args:
+        z: points, (m, p).
+        values: their log likelihoods, (m,).
+        log_jacobian: (m,).
+        centre: see `Reference`.
+        factor: see `Reference`.
+        power: the one reached.
+        survivors: effective share of the points to be kept.
+        places: two uniforms, for the two resamplings.
+        chosen: receives indices of points, (m,).
+        start: receives indices for as many chains, (n,).
+        target: receives their log targets at the next power, (n,).
     """
-    finite = gain[np.isfinite(gain)]
-    return float(_rise(finite - finite.max(), most, survivors))
+    reference, gain = np.empty(len(z)), np.empty(len(z))
+    generation.refer(z, log_jacobian, power, centre, factor, reference)
+    finite, largest = 0, -np.inf
+    for i in range(len(z)):
+        gain[i] = values[i] + log_jacobian[i] - reference[i] if values[i] > -np.inf else -np.inf
+        if math.isfinite(gain[i]):
+            largest = max(largest, gain[i])
+            finite += 1
+        else:
+            gain[i] = -np.inf
+    for i in range(len(z)):
+        gain[i] -= largest
+    rise = _rise(gain, 1.0 - power, survivors * finite)
+    after = 1.0 if rise >= 1.0 - power else power + rise
+    for i in range(len(z)):
+        gain[i] *= rise
+    _systematic(gain, places[0], chosen)
+    _systematic(gain, places[1], start)
+    for i in range(len(start)):
+        at = start[i]
+        target[i] = after * (values[at] + log_jacobian[at]) + (1.0 - after) * reference[at]
+    return after
 
 
-@njit
+@njit(fastmath=False)
 def _rise(gain, most, survivors):  # type: ignore[no-untyped-def]
+    """Return the largest rise, up to `most`, that leaves so many effective points.
+
+    gain (m,) is zero at its largest; points whose gain is minus infinity have no weight.
+    """
     low, high, middle = 0.0, most, most
     # Bisection on the logarithm first: rises span many decades.
     for _ in range(60):
@@ -148,7 +183,7 @@ def _rise(gain, most, survivors):  # type: ignore[no-untyped-def]
             weight = math.exp(middle * value)
             total += weight
             squares += weight * weight
-        if total * total >= survivors * squares * len(gain):
+        if total * total >= survivors * squares:
             low = middle
         else:
             high = middle
@@ -159,17 +194,18 @@ def _rise(gain, most, survivors):  # type: ignore[no-untyped-def]
 
 
 def resample(rng: np.random.Generator, log_weights: Array, size: int) -> NDArray[np.intp]:
-    """Systematic resampling: `size` indices drawn with the given log weights."""
-    return np.asarray(_systematic(log_weights - log_weights.max(), rng.random(), size))
+    """Systematic resampling: `size` indices drawn with the given log weights, at most 0."""
+    chosen = np.empty(size, np.intp)
+    _systematic(log_weights, rng.random(), chosen)
+    return chosen
 
 
 @njit(fastmath=False)
-def _systematic(log_weights, first, size):  # type: ignore[no-untyped-def]
-    total = 0.0
+def _systematic(log_weights, first, chosen):  # type: ignore[no-untyped-def]
+    total, size = 0.0, len(chosen)
     weights = np.exp(log_weights)
     for weight in weights:
         total += weight
-    chosen = np.empty(size, np.intp)
     at, reached = 0, weights[0]
     for i in range(size):
         place = (i + first) / size * total
@@ -177,4 +213,3 @@ def _systematic(log_weights, first, size):  # type: ignore[no-untyped-def]
             at += 1
             reached += weights[at]
         chosen[i] = at
-    return chosen
