@@ -111,7 +111,7 @@ def _share(ascending, order, scores, out):  # type: ignore[no-untyped-def]
         first += equal
 
 
-@njit
+@njit(nogil=True)
 def _rank(values, order, scores, bulk, folded):  # type: ignore[no-untyped-def]
     """Write normal scores of rows of values (p, m), and of their distances from the median.
 

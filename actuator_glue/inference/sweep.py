@@ -182,7 +182,7 @@ def many(
 
 
 # Strict floating point, as numpy has it: see compiled.log_densities.
-@njit(fastmath=False)
+@njit(fastmath=False, nogil=True)
 def _advance(  # type: ignore[no-untyped-def]
     uniforms, z, x, values, rows, size, until_append, every, lower, width, tuning, pairs,
     unit_jump, jitter, noise, tempering, density, counts, path_z, path_x, path_values, target,

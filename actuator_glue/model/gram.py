@@ -124,7 +124,7 @@ def _fill_gram(products: Array, start: Array, end: Array, banks: int, gram: Arra
                         value -= end[a, k + 1] * end[b, k + shift + 1]
 
 
-@njit
+@njit(nogil=True)
 def prepare(t: Array, c: Array, measured: Array, command: Array, settle: int) -> None:
     """Fill a record's row behind its header: everything that depends on its samples.
 

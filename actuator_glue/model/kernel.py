@@ -132,7 +132,7 @@ STREAM = 5
 
 
 # Strict order of operations: the result must not depend on how a command is cut into blocks.
-@njit(fastmath=False)
+@njit(fastmath=False, nogil=True)
 def stream(c: Array, state: Array, command: Array, out: Array) -> None:
     """Step one system through a block of commands, going on from `state`.
 
@@ -159,7 +159,7 @@ def stream(c: Array, state: Array, command: Array, out: Array) -> None:
     state[0], state[1], state[2], state[3], state[4] = seen, y, d, u1, u2
 
 
-@njit
+@njit(nogil=True)
 def respond(
     table: Array, x0: float, v0: float, command: Array, first_out: int, out: Array
 ) -> None:
@@ -290,7 +290,7 @@ def _advance(S: Array, measured: Array, padded: Array, start: int, stop: int, fo
         n += 1
 
 
-@njit
+@njit(nogil=True)
 def error_sums(
     table: Array,
     starts: Array,

@@ -141,7 +141,7 @@ def evaluate(t: Array, theta: Array, tolerance: float, out: Array, slack: Array)
             slack[m] = _slack(square, tail, near, tolerance)
 
 
-@njit
+@njit(nogil=True)
 def evaluate_all(rows: Array, theta: Array, tolerance: float, out: Array, slack: Array) -> bool:
     """Do `evaluate` for every record: out (m, R, 2), slack (R, m); return whether any is not 0."""
     for r in range(len(rows)):

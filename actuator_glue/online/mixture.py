@@ -212,7 +212,7 @@ def _largest(values):  # type: ignore[no-untyped-def]
     return np.array([largest]).view(np.float64)[0]
 
 
-@njit
+@njit(nogil=True)
 def _quantiles(columns, mean, sd, probability, normal, out):  # type: ignore[no-untyped-def]
     """Write quantiles (q, n) of columns (n, m); return how many columns the series did."""
     n, m = columns.shape

@@ -182,7 +182,7 @@ def _start(w: Array, n: int, p: Any, k: float, step: float, x: float, v: float) 
     w[r.ENVELOPE + n] = p.envelope * (k + p.alpha_2) / p.alpha_2
 
 
-@njit
+@njit(nogil=True)
 def fill(
     parameters: Any, stiffness: float, step: float, period: float, x: Array, v: Array, out: Array
 ) -> None:

@@ -176,7 +176,7 @@ def _substep(w: Array, on: NDArray[np.bool_], mean: float, rate: float, time: fl
         _curved(w, rate, False)
 
 
-@njit
+@njit(nogil=True)
 def advance(
     table: Array,
     on: NDArray[np.bool_],

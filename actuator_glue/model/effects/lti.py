@@ -250,7 +250,7 @@ def _step3(w, r, delayed, u1, u2):  # type: ignore[no-untyped-def]
         w[_STATE + r * LANES + n] = s
 
 
-@njit
+@njit(nogil=True)
 def advance(table, third, delayed, u, offset, begin, displacement, force):  # type: ignore[no-untyped-def]
     """Write the recorded displacement at samples begin, begin+1, ... and carry the state on.
 

@@ -169,7 +169,7 @@ def exact_blocks(
             yield lanes, begin, part[:, : len(lanes)]
 
 
-@njit
+@njit(nogil=True)
 def add_errors(displacement: Array, measured: Array, sums: Array) -> None:
     """Add sum e and sum e^2 of e = measured - displacement to `sums`, shape (2, c).
 

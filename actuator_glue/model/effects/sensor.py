@@ -21,7 +21,7 @@ def _drift(p: Array, time: Array, y: Array) -> Array:
     return y + time * p[:, 0]
 
 
-@njit
+@njit(nogil=True)
 def _line(a: Array, b: Array, hertz: Array, time: Array, y: Array, out: Array) -> None:
     """Write y plus a spectral line; vector code, which the library's sine is not."""
     for i in range(y.shape[0]):
