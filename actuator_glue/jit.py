@@ -49,8 +49,8 @@ if 'NUMBA_CACHE_DIR' not in os.environ and os.access(Path(__file__).parent, os.W
 # A function that another one calls is inlined, whatever its size: the process that compiles would
 # otherwise link the callee's own code, every later one the copy in the caller's cached object, and
 # the two may add up in another order. A replay must repeat a live run to the bit.
-# What may take a tenth of a millisecond or more says nogil=True, and others run meanwhile; for short
-# functions, to give the lock back and to fight for it anew costs more than it frees.
+# What may take a tenth of a millisecond or more says nogil=True, and others run meanwhile; short
+# functions would pay more for giving the lock back and fighting for it anew than it frees.
 njit: Any = partial(
     numba.njit,
     cache=True,

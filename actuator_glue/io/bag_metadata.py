@@ -12,6 +12,8 @@ import yaml
 from actuator_glue.errors import InputError
 
 NAME = 'metadata.yaml'
+# libyaml, where PyYAML was built with it, is ten times as fast.
+_LOADER: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 _FOREVER = {'sec': 9223372036, 'nsec': 854775807}
 
 
@@ -56,7 +58,7 @@ def qos_profiles(text: str) -> list[dict[str, Any]]:
     What cannot be understood is left out: a bag is worth reading without it.
     """
     try:
-        loaded = yaml.safe_load(text)
+        loaded = yaml.load(text, _LOADER)
     except yaml.YAMLError:
         return []
     profiles = []
@@ -178,7 +180,7 @@ def read(bag: Path) -> dict[str, Any] | None:
     if not path.is_file():
         return None
     try:
-        content = yaml.safe_load(path.read_text('utf-8'))
+        content = yaml.load(path.read_text('utf-8'), _LOADER)
         information: dict[str, Any] = content['rosbag2_bagfile_information']
         information['relative_file_paths'] = [
             str(name) for name in information['relative_file_paths']

@@ -190,12 +190,18 @@ def trimmed(name: str, data: bytes) -> bytes:
     return data if len(data) - used <= 3 else data[:used]
 
 
+@cache
+def _definition(name: str) -> Any:
+    """Return rosbags' compiled definition of a type."""
+    return typestore().get_msgdef(name)
+
+
 def _decode(name: str, data: bytes) -> tuple[Any, int]:
     """Return the message and how many bytes it takes, encapsulation included."""
     if data[:2] not in (b'\x00\x00', b'\x00\x01'):
         raise InputError(f'{len(data)} bytes are not a {name} (not plain CDR)')
     try:
-        definition = typestore().get_msgdef(name)
+        definition = _definition(name)
         decode = definition.deserialize_cdr_le if data[1] else definition.deserialize_cdr_be
         content, used = decode(data[4:], 0, definition.cls, typestore())
     except _UNDECODABLE as error:

@@ -67,36 +67,41 @@ def check_block(block: Block) -> Block:
             laboratory has, an absurd period, or far too many samples.
     """
     where = f'block at sample {block.index}'
-    channels = [('command', block.command, 'm', MAX_DISPLACEMENT)]
-    channels.append(('measured', block.measured, 'm', MAX_DISPLACEMENT))
-    if block.force is not None:
-        channels.append(('force', block.force, 'N', MAX_FORCE))
-    lengths = {name: len(values) for name, values, _, _ in channels}
-    if len(set(lengths.values())) != 1:
+    size = len(block.command)
+    if len(block.measured) != size or (block.force is not None and len(block.force) != size):
+        lengths = {'command': size, 'measured': len(block.measured)}
+        lengths |= {} if block.force is None else {'force': len(block.force)}
         raise InputError(f'{where}: channels have different lengths {lengths}')
-    if not len(block):
+    if not size:
         raise InputError(f'{where}: it is empty; leave out blocks without samples')
-    if len(block) > MAX_BLOCK:
-        raise InputError(f'{where}: {len(block)} samples are more than {MAX_BLOCK}')
+    if size > MAX_BLOCK:
+        raise InputError(f'{where}: {size} samples are more than {MAX_BLOCK}')
     if not 0 <= block.index <= MAX_INDEX:
         raise InputError(f'{where}: the running index is outside [0, {MAX_INDEX}]')
-    if not (np.isfinite(block.period) and 1e-6 <= block.period <= 10.0):
+    if not 1e-6 <= block.period <= 10.0:
         raise InputError(f'{where}: period {block.period:g} s is outside [1e-6, 10] s')
-    for name, values, unit, limit in channels:
-        # One pass where all is well: a NaN fails the comparison as well.
-        largest = float(np.abs(values).max())
-        if largest <= limit:
-            continue
-        bad = ~np.isfinite(values)
-        if bad.any():
-            at = int(bad.argmax())
-            raise InputError(f'{where}: {name} is NaN or infinite at sample {block.index + at}')
-        at = int(np.abs(values).argmax())
-        raise InputError(
-            f'{where}: {name} is {values[at]:g} {unit} at sample {block.index + at}, beyond '
-            f'{limit:g} {unit}; check the unit of this channel'
-        )
+    _check_channel(where, block.index, 'command', block.command, 'm', MAX_DISPLACEMENT)
+    _check_channel(where, block.index, 'measured', block.measured, 'm', MAX_DISPLACEMENT)
+    if block.force is not None:
+        _check_channel(where, block.index, 'force', block.force, 'N', MAX_FORCE)
     return block
+
+
+def _check_channel(
+    where: str, index: int, name: str, values: Array, unit: str, limit: float
+) -> None:
+    # One pass where all is well: a NaN fails the comparison as well.
+    if np.abs(values).max() <= limit:
+        return
+    bad = ~np.isfinite(values)
+    if bad.any():
+        at = int(bad.argmax())
+        raise InputError(f'{where}: {name} is NaN or infinite at sample {index + at}')
+    at = int(np.abs(values).argmax())
+    raise InputError(
+        f'{where}: {name} is {values[at]:g} {unit} at sample {index + at}, beyond '
+        f'{limit:g} {unit}; check the unit of this channel'
+    )
 
 
 @dataclass(frozen=True, slots=True)
