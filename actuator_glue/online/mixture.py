@@ -98,6 +98,12 @@ def _direct(x, inverse, drift, probability, start, limits, coming):  # type: ign
         coming[q] = new + carried / density
 
 
+# Factors of the recursion of the bounds b_k: sqrt(k)/(k + 1) and sqrt(k (k - 1))/(k + 1).
+_ORDER = np.arange(_MOST + 1.0)
+_DRIFT = np.sqrt(_ORDER) / (_ORDER + 1.0)
+_SPREAD = np.sqrt(_ORDER * np.maximum(_ORDER - 1.0, 1.0)) / (_ORDER + 1.0)
+
+
 @njit
 def _terms(offset, excess, wanted):  # type: ignore[no-untyped-def]
     """How many terms leave less than `wanted` of sum_k b_k; 0 where even _MOST do not.
@@ -108,27 +114,35 @@ def _terms(offset, excess, wanted):  # type: ignore[no-untyped-def]
         return 0
     before, last = 1.0, offset  # b_1 = h_1, and h_0 in its place
     for k in range(1, _MOST):
-        root = math.sqrt(k)
-        fall = excess * math.sqrt(k * max(k - 1.0, 1.0)) / (k + 1.0)
-        before, last = last, offset * root / (k + 1.0) * last + fall * before
-        p, q = offset * math.sqrt(k + 1.0) / (k + 2.0), excess
+        before, last = last, offset * _DRIFT[k] * last + excess * _SPREAD[k] * before
+        p, q = offset * _DRIFT[k + 1], excess
         if k >= 3 and p + q < 1.0 and (p + q) * last + q * before <= wanted * (1.0 - p - q):
             return k + 1
     return 0
 
 
 @njit
-def _coefficients(offset, excess, terms, spare, a):  # type: ignore[no-untyped-def]
+def _coefficients(offset, variance, scale, terms, spare, a):  # type: ignore[no-untyped-def]
     """Write a_k = mean_i h_k(offset_i, excess_i)/k! for 2 <= k <= terms, and up to two more.
 
     h_(k+1) = offset h_k + k excess h_(k-1), three at once: most of the time would go into loading
-    and storing them. spare (2, m) is scratch, a (_SIZE,).
+    and storing them.
+
+    Args:
+        offset: of the components from the common mean, (m,), to be divided by `scale`.
+        variance: of the components, (m,); the excess is that over scale^2, less one.
+        scale: common standard deviation.
+        terms: how many are wanted.
+        spare: scratch, (2, m).
+        a: receives them, (_SIZE,).
     """
     m = len(offset)
     before, last = spare[0], spare[1]
+    inverse = 1.0 / scale
+    square = inverse * inverse
     first = second = third = 0.0
     for i in range(m):
-        o, e = offset[i], excess[i]
+        o, e = offset[i] * inverse, variance[i] * square - 1.0
         two = o * o + e
         three = o * two + 2.0 * e * o
         four = o * three + 3.0 * e * two
@@ -142,7 +156,7 @@ def _coefficients(offset, excess, terms, spare, a):  # type: ignore[no-untyped-d
     for k in range(4, terms, 3):
         first = second = third = 0.0
         for i in range(m):
-            o, e = offset[i], excess[i]
+            o, e = offset[i] * inverse, variance[i] * square - 1.0
             one = o * last[i] + k * e * before[i]
             two = o * one + (k + 1.0) * e * last[i]
             three = o * two + (k + 2.0) * e * one
@@ -216,14 +230,14 @@ def _largest(values):  # type: ignore[no-untyped-def]
 def _quantiles(columns, mean, sd, probability, normal, out):  # type: ignore[no-untyped-def]
     """Write quantiles (q, n) of columns (n, m); return how many columns the series did."""
     n, m = columns.shape
-    variance = (sd * sd).mean()
-    inverse = 1.0 / sd
+    variance, inverse = sd * sd, 1.0 / sd
+    between, least, most = variance.mean(), variance.min(), variance.max()
     he = np.empty((len(normal), _MOST + 2))
     for q in range(len(normal)):
         _hermite(normal[q], he[q])
     farthest = np.abs(normal).max()
     wanted = _TRUNCATION / _CRAMER * math.exp(-0.25 * farthest * farthest)
-    x, offset, excess, spare = np.empty(m), np.empty(m), np.empty(m), np.empty((2, m))
+    x, offset, spare = np.empty(m), np.empty(m), np.empty((2, m))
     a, room = np.zeros(_SIZE), np.empty(_MOST + 2)
     limits, start = np.empty(len(normal)), np.empty(len(normal))
     done = 0
@@ -237,16 +251,13 @@ def _quantiles(columns, mean, sd, probability, normal, out):  # type: ignore[no-
         for i in range(m):
             offset[i] = x[i] - first
             second += offset[i] * offset[i]
-        square = second / m + variance
+        square = second / m + between
         scale = math.sqrt(square)
-        for i in range(m):
-            offset[i] /= scale
-            excess[i] = sd[i] * sd[i] / square - 1.0
-        far, most = _largest(offset), _largest(excess)
-        terms = _terms(far, most, wanted)
+        excess = max(abs(least / square - 1.0), abs(most / square - 1.0))
+        terms = _terms(_largest(offset) / scale, excess, wanted)
         solved = terms > 0
         if solved:
-            _coefficients(offset, excess, terms, spare, a)
+            _coefficients(offset, variance, scale, terms, spare, a)
             for q in range(len(normal)):
                 limits[q] = first + scale * _solve(a, terms, normal[q], he[q], room)
                 solved = solved and math.isfinite(limits[q])

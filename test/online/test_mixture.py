@@ -85,7 +85,8 @@ def test_the_bound_of_the_terms_left_out_is_one(offset, excess):
     terms = mixture._terms(offset, excess, wanted)
     assert terms > 0
     a = np.zeros(mixture._SIZE)
-    mixture._coefficients(np.array([offset]), np.array([-excess]), terms, np.empty((2, 1)), a)
+    variance, spare = np.array([1.0 - excess]), np.empty((2, 1))
+    mixture._coefficients(np.array([offset]), variance, 1.0, terms, spare, a)
     a[0], a[1], a[2] = 1.0, offset, 0.5 * (offset**2 - excess)
     u = np.linspace(-4, 4, 81)
     he = np.empty((len(u), mixture._MOST + 2))
