@@ -166,7 +166,7 @@ class Estimator:
         return self.running
 
     def finish(self, result: WindowResult | Fit) -> list[Event]:
-        """Take the result of the running job, or as much of it as the next job needs."""
+        """Take the result of the running job, or as much of it as the next job starts from."""
         self.running = None
         window, memory = result.window, self._memory
         if result.archive is not None:
@@ -174,12 +174,20 @@ class Estimator:
         memory.frozen = [
             f for f in memory.frozen if f.segment == window.segment and f.stop > window.end
         ]
-        if result.frozen is not None:
-            memory.frozen.append(result.frozen)
-            del memory.frozen[:-MAX_FROZEN]
+        if isinstance(result, WindowResult):
+            self.remember(result)
         if result.failure:
             return [Failed(window.number, window.record.first_index, result.failure)]
         return []
+
+    def remember(self, result: WindowResult) -> None:
+        """Take the posterior that later samples judge, where `finish` was given a `Fit`.
+
+        It is due when the next window ends where its forecast does (`Job.forecast`), or later.
+        """
+        if result.frozen is not None:
+            self._memory.frozen.append(result.frozen)
+            del self._memory.frozen[:-MAX_FROZEN]
 
     def abandon(self, reason: str) -> list[Event]:
         """Give up the running job, whose process has died."""

@@ -10,10 +10,11 @@ import numpy as np
 from actuator_glue.errors import InputError
 from actuator_glue.inference.convergence import rhat_and_ess
 from actuator_glue.inference.moments import Moments, moments
+from actuator_glue.inference.predictive import fit_residual
 from actuator_glue.online import fitting, sampling
 from actuator_glue.online.forecast import Frozen, Prediction, predictions
 from actuator_glue.online.response import ResponseBand, response_band
-from actuator_glue.online.sampling import Fit, Job
+from actuator_glue.online.sampling import Fit, Job, spread
 from actuator_glue.online.settings import EstimatorSettings, ModelChoice
 from actuator_glue.online.stream import Window
 from actuator_glue.records import Array, Record
@@ -98,20 +99,33 @@ def report(job: Job, fitted: Fit) -> WindowResult:
         return _report(job, fitted)
     except InputError as error:
         return WindowResult(
-            job.window, job.settings, job.model, frozen=fitted.frozen, archive=fitted.archive,
-            failure=str(error),
-        )  # fmt: skip
+            job.window, job.settings, job.model, archive=fitted.archive, failure=str(error)
+        )
 
 
 def _report(job: Job, fitted: Fit) -> WindowResult:
     settings, model, record = job.settings, job.model, job.window.record
-    chains, frozen = fitted.chains, fitted.frozen
-    if chains is None or frozen is None:
+    if fitted.sampled is None or fitted.coordinates is None:
         return WindowResult(job.window, settings, model, failure=fitted.failure)
+    chains = fitted.coordinates.chains(fitted.sampled)
     # R-hat and ESS of very many draws would cost more than the sampling.
     rhat, ess = rhat_and_ess(chains.kept[:: max(1, len(chains.kept) // DIAGNOSED)])
     summary = moments(chains.posterior(), *model.bounds)
     settle = round(settings.settle / record.period)
+    residual = (record.measured - fitting.simulate(model, chains.best[None], record)[0])[settle:]
+    rms_error = float(residual.std())
+    posterior = chains.posterior()
+    start, stop = job.forecast
+    frozen = Frozen(
+        number=job.window.number,
+        segment=job.window.segment,
+        start=start,
+        stop=stop,
+        model=model,
+        draws=posterior[spread(len(posterior), settings.draws)],
+        residual=fit_residual(residual, parameters=len(model.names)),
+        noise=fitted.noise,
+    )
     seed = (settings.seed, record.first_index)
     return WindowResult(
         window=job.window,
@@ -122,8 +136,8 @@ def _report(job: Job, fitted: Fit) -> WindowResult:
         best=chains.best,
         rhat=rhat,
         ess=ess,
-        rms_error=fitted.rms_error,
-        nrmse=fitted.rms_error / float(record.measured[settle:].std()),
+        rms_error=rms_error,
+        nrmse=rms_error / float(record.measured[settle:].std()),
         noise=frozen.noise,
         evaluations=chains.evaluations,
         stopped_early=not fitted.complete,

@@ -41,14 +41,21 @@ def replay(
     estimator = Estimator(settings, model or choose_model(), schedule=schedule)
     with ThreadPoolExecutor(1) as pool:
         waiting: deque[Event | Future[WindowResult]] = deque()
+        reports: deque[tuple[int, Future[WindowResult]]] = deque()
         for item in items:
             waiting += _given(estimator, item)
-            while (job := estimator.next_job()) is not None:
+            while (window := estimator.waiting) is not None:
+                while reports and reports[0][0] <= window.end:
+                    estimator.remember(reports.popleft()[1].result())
+                job = estimator.next_job()
+                assert job is not None  # one was waiting and none is running
                 fitted = fit(job)
                 waiting += estimator.finish(fitted)
                 if not fitted.failure:
-                    # The next window needs the posterior only; bands are computed beside it.
-                    waiting.append(pool.submit(report, job, fitted))
+                    # The next window starts from the draws; what they say is computed beside it.
+                    found = pool.submit(report, job, fitted)
+                    waiting.append(found)
+                    reports.append((job.forecast[1], found))
             yield from _ready(waiting, LAG)
         yield from _ready(waiting, 0)
 

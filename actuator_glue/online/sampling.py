@@ -1,4 +1,4 @@
-"""The posterior of one window: its job in, chains and what the next windows need out."""
+"""The posterior of one window: its job in, chains and what the next window needs out."""
 
 from __future__ import annotations
 
@@ -14,7 +14,6 @@ from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.convergence import quick_rhat_and_ess
 from actuator_glue.inference.evaluate import LogDensity
 from actuator_glue.inference.likelihood import GaussianLikelihood, GlueLikelihood
-from actuator_glue.inference.predictive import fit_residual
 from actuator_glue.online import fitting
 from actuator_glue.online.coordinates import Coordinates
 from actuator_glue.online.forecast import Frozen, sensor_noise
@@ -62,6 +61,15 @@ class Job:
         return max(self.settings.start_evaluations, usual) if self.afresh else usual
 
     @property
+    def forecast(self) -> tuple[int, int]:
+        """Running index of the first sample the posterior forecasts, and one past the last."""
+        settings, end, period = self.settings, self.window.end, self.window.record.period
+        return (
+            end + round(settings.time_budget / period),
+            end + round((settings.time_budget + settings.hop) / period),
+        )
+
+    @property
     def chains(self) -> int:
         """Markov chains; effects are simulated in batches, which are filled up."""
         wanted = self.settings.chains
@@ -70,14 +78,14 @@ class Job:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Fit:
-    """One window's posterior: all that later windows need of it.
+    """One window's posterior: all that the next window needs of it, and what is to be told.
 
     Attributes:
         window: the samples.
         model: fitted model.
-        chains: draws in physical units.
-        rms_error: rms of measured minus best simulated displacement, mean removed [m].
-        frozen: what will be held against later samples.
+        sampled: draws in sampling coordinates.
+        coordinates: the map to physical parameters.
+        noise: standard deviation of the sensor noise [m].
         archive: points to start from, shape (m, p).
         complete: the sampling was not ended early.
         failure: why there is nothing of all this; empty where there is.
@@ -85,9 +93,9 @@ class Fit:
 
     window: Window
     model: ModelChoice
-    chains: Chains | None = None
-    rms_error: float = float('nan')
-    frozen: Frozen | None = None
+    sampled: Chains | None = None
+    coordinates: Coordinates | None = None
+    noise: float = 0.0
     archive: Array | None = None
     complete: bool = False
     failure: str = ''
@@ -103,36 +111,28 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> Fit:
     Raises:
         InputError: the window calibrates nothing.
     """
-    settings, model, record = job.settings, job.model, job.window.record
-    settle = round(settings.settle / record.period)
+    record = job.window.record
+    settle = round(job.settings.settle / record.period)
     noise = sensor_noise(record.measured)
     _check_excited(record, settle, noise)
-    chains, complete = _sample(job, settle, expired)
-    posterior = chains.posterior()
-    residual = (record.measured - fitting.simulate(model, chains.best[None], record)[0])[settle:]
-    frozen = Frozen(
-        number=job.window.number,
-        segment=job.window.segment,
-        start=job.window.end + round(settings.time_budget / record.period),
-        stop=job.window.end + round((settings.time_budget + settings.hop) / record.period),
-        model=model,
-        draws=posterior[_spread(len(posterior), settings.draws)],
-        residual=fit_residual(residual, parameters=len(model.names)),
-        noise=noise,
-    )
+    sampled, coordinates, complete = _sample(job, settle, expired)
+    points = sampled.posterior()
+    points = coordinates.physical(points[spread(len(points), ARCHIVE)])
     return Fit(
         window=job.window,
-        model=model,
-        chains=chains,
-        rms_error=float(residual.std()),
-        frozen=frozen,
-        archive=_archive(chains.archive, job.archive),
+        model=job.model,
+        sampled=sampled,
+        coordinates=coordinates,
+        noise=noise,
+        archive=_archive(points, job.archive),
         complete=complete,
     )
 
 
-def _sample(job: Job, settle: int, expired: Callable[[], bool] | None) -> tuple[Chains, bool]:
-    """Return chains of physical parameters, and whether they are all that was wanted."""
+def _sample(
+    job: Job, settle: int, expired: Callable[[], bool] | None
+) -> tuple[Chains, Coordinates, bool]:
+    """Return chains, their coordinates, and whether they are all that was wanted."""
     settings, model, record = job.settings, job.model, job.window.record
     near = None if job.archive is None else np.median(job.archive, axis=0)
     errors = fitting.errors(model, record, settle, near)
@@ -172,7 +172,7 @@ def _sample(job: Job, settle: int, expired: Callable[[], bool] | None) -> tuple[
         enough=enough,
     )
     complete = complete or sampled.evaluations + job.chains > job.evaluations
-    return coordinates.chains(sampled), complete
+    return sampled, coordinates, complete
 
 
 def _stop(job: Job, expired: Callable[[], bool] | None) -> Callable[[dream.State], bool] | None:
@@ -196,10 +196,9 @@ def _sampler(job: Job) -> dream.Settings:
 
 def _archive(new: Array, old: Array | None) -> Array:
     """Points for the next window; few of them, of a window cut short, are joined by older ones."""
-    new = new[_spread(len(new), ARCHIVE)]
     if old is None or len(new) >= LEAST:
         return new
-    return np.concatenate([new, old[_spread(len(old), LEAST - len(new))]])
+    return np.concatenate([new, old[spread(len(old), LEAST - len(new))]])
 
 
 def _check_excited(record: Record, settle: int, noise: float) -> None:
@@ -211,5 +210,6 @@ def _check_excited(record: Record, settle: int, noise: float) -> None:
         )
 
 
-def _spread(count: int, wanted: int) -> NDArray[np.intp]:
+def spread(count: int, wanted: int) -> NDArray[np.intp]:
+    """Return the indices of at most so many of `count` things, spread evenly."""
     return np.linspace(0, count - 1, min(count, wanted)).astype(np.intp)
