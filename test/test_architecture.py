@@ -16,7 +16,9 @@ SOURCES = sorted(p for p in ROOT.rglob('*.py'))
 
 BOTTOM = {'errors', 'records', 'jit'}
 CORE = BOTTOM | {'model', 'inference'}
-EVERYTHING = CORE | {'online', 'residual', 'report', 'io', 'reproduction', 'interfaces'}
+EVERYTHING = CORE | {
+    'online', 'residual', 'report', 'io', 'reproduction', 'interfaces', 'workers',
+}  # fmt: skip
 # Each folder or top module, and what it may import besides itself.
 ARROWS = {
     '__init__': set(),
@@ -30,6 +32,7 @@ ARROWS = {
     'report': CORE | {'online', 'residual'},
     'io': {'records', 'errors', 'interfaces'},
     'reproduction': CORE | {'residual', 'report', 'io'},
+    'workers': CORE | {'online'},
     'nodes': EVERYTHING,
     'demo': EVERYTHING,
     'cli': EVERYTHING | {'demo'},

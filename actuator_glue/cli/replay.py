@@ -155,11 +155,12 @@ def _replay(
     from actuator_glue.online.job import WindowResult
     from actuator_glue.online.replay import replay
     from actuator_glue.online.stream import Block
+    from actuator_glue.workers.reports import Reports
 
     results: list[WindowResult] = []
     events: list[str] = []
     seconds = 0.0
-    with progress('replaying', total or 1) as done:
+    with progress('replaying', total or 1) as done, Reports() as reports:
 
         def counted() -> Iterator[Item]:
             nonlocal seconds
@@ -171,7 +172,7 @@ def _replay(
 
         model = live.models[0][1] if live is not None else None
         schedule = live.schedule() if live is not None else None
-        for found in replay(counted(), settings, model, schedule):
+        for found in replay(counted(), settings, model, schedule, reports):
             if isinstance(found, WindowResult):
                 results.append(found)
             else:

@@ -16,6 +16,7 @@ from actuator_glue.io.bag_reader import decoded
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.replay import Comparison, compare, items, published, replay
 from actuator_glue.residual.diagnosis import Diagnosis
+from actuator_glue.workers.reports import Reports
 
 SCHEMA = 'actuator_glue.demo/1'
 BANDS = {
@@ -42,10 +43,10 @@ def replay_bag(bag: Path) -> Comparison:
     live = published(decoded(bag, RESULTS))
     if live.settings is None or not live.models:
         return Comparison(differing=['no estimator published its settings into this bag'])
-    results = replay(
-        items(decoded(bag, INPUTS)), live.settings, live.models[0][1], live.schedule()
-    )
-    return compare((r for r in results if isinstance(r, WindowResult)), live)
+    streamed, model = items(decoded(bag, INPUTS)), live.models[0][1]
+    with Reports() as reports:
+        results = replay(streamed, live.settings, model, live.schedule(), reports)
+        return compare((r for r in results if isinstance(r, WindowResult)), live)
 
 
 @dataclass(slots=True)

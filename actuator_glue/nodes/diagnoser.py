@@ -16,11 +16,11 @@ from actuator_glue.nodes import base, diagnosing, spin, topics
 from actuator_glue.nodes.health import ERROR
 from actuator_glue.nodes.messages import publish
 from actuator_glue.nodes.parameters import Spec
-from actuator_glue.nodes.worker import DIED, FAILED, PROGRESS, Answer, Worker
 from actuator_glue.online import wire
 from actuator_glue.online.alarm import CoverageAlarm
 from actuator_glue.online.collect import Collector
 from actuator_glue.online.stream import Event, Rejected, Restarted
+from actuator_glue.workers.worker import DIED, FAILED, PROGRESS, Answer, Worker
 
 SPECS = (
     Spec('automatic', True, 'diagnose when the coverage breaks'),

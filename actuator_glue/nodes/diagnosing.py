@@ -15,11 +15,11 @@ from actuator_glue.errors import InputError
 from actuator_glue.io.load import load_records
 from actuator_glue.model.structure import Structure
 from actuator_glue.nodes.messages import fill
-from actuator_glue.nodes.worker import Tell
 from actuator_glue.online.wire import Fields, Head
 from actuator_glue.records import Record
 from actuator_glue.residual.diagnose import diagnose
 from actuator_glue.residual.diagnosis import Diagnosis, Finding
+from actuator_glue.workers.worker import Tell
 
 
 @dataclass(frozen=True, slots=True)

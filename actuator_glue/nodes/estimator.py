@@ -17,7 +17,6 @@ from actuator_glue.nodes.estimating import compute, warm_up
 from actuator_glue.nodes.health import ERROR, Rate
 from actuator_glue.nodes.messages import publish
 from actuator_glue.nodes.parameters import Spec
-from actuator_glue.nodes.worker import DIED, FAILED, Answer, Worker
 from actuator_glue.online import wire
 from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.fitting import choose_model, identifiable
@@ -25,6 +24,7 @@ from actuator_glue.online.job import WindowResult
 from actuator_glue.online.sampling import Job
 from actuator_glue.online.settings import LIMITS, EstimatorSettings, ModelChoice
 from actuator_glue.online.stream import Dropped, Event, Failed, Rejected, Restarted
+from actuator_glue.workers.worker import DIED, FAILED, Answer, Worker
 
 
 def _specs() -> list[Spec]:

@@ -148,7 +148,6 @@ class Estimator:
             seed = (self.settings.seed, record.first_index, 2)
             archive = starting_points(model, memory.model, memory.archive, seed)
             afresh = model != memory.model
-        settled = record.first_index + round(self.settings.settle / record.period)
         self.running = Job(
             window=window,
             settings=self.settings,
@@ -157,13 +156,19 @@ class Estimator:
             afresh=afresh,
             stop_at=None if self.schedule is None else self.schedule.done[_key(window)][1],
             ahead=self._ahead.after(window.end, record.period),
-            frozen=tuple(
-                f
-                for f in memory.frozen
-                if f.segment == window.segment and f.stop <= window.end and f.start >= settled
-            ),
+            frozen=self.judged(window),
         )
         return self.running
+
+    def judged(self, window: Window) -> tuple[Frozen, ...]:
+        """Return the earlier posteriors whose forecasts a window's samples judge."""
+        record = window.record
+        settled = record.first_index + round(self.settings.settle / record.period)
+        return tuple(
+            f
+            for f in self._memory.frozen
+            if f.segment == window.segment and f.stop <= window.end and f.start >= settled
+        )
 
     def finish(self, result: WindowResult | Fit) -> list[Event]:
         """Take the result of the running job, or as much of it as the next job starts from."""
@@ -183,7 +188,7 @@ class Estimator:
     def remember(self, result: WindowResult) -> None:
         """Take the posterior that later samples judge, where `finish` was given a `Fit`.
 
-        It is due when the next window ends where its forecast does (`Job.forecast`), or later.
+        It is due when a window ends where its forecast does (`Job.forecast`), or later.
         """
         if result.frozen is not None:
             self._memory.frozen.append(result.frozen)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterable, Iterator
-from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import Future
+from dataclasses import dataclass, field, replace
 from typing import Any, TypeAlias
 
 from actuator_glue.errors import InputError
@@ -13,6 +13,7 @@ from actuator_glue.online import wire
 from actuator_glue.online.estimator import Estimator, Schedule
 from actuator_glue.online.fitting import choose_model
 from actuator_glue.online.job import WindowResult, fit, report
+from actuator_glue.online.sampling import Fit, Job
 from actuator_glue.online.settings import EstimatorSettings, ModelChoice
 from actuator_glue.online.stream import Block, Event, Failed, Preview, Rejected, Setup
 from actuator_glue.records import Record
@@ -21,7 +22,14 @@ Item: TypeAlias = Setup | Block | Preview
 Named: TypeAlias = tuple[str, Any]
 
 # Results that may wait for their bands while the next windows are sampled.
-LAG = 2
+LAG = 3
+
+
+def at_once(job: Job, fitted: Fit) -> Future[WindowResult]:
+    """Return the finished report of a window."""
+    found: Future[WindowResult] = Future()
+    found.set_result(report(job, fitted))
+    return found
 
 
 def replay(
@@ -29,6 +37,7 @@ def replay(
     settings: EstimatorSettings,
     model: ModelChoice | None = None,
     schedule: Schedule | None = None,
+    reports: Callable[[Job, Fit], Future[WindowResult]] = at_once,
 ) -> Iterator[WindowResult | Event]:
     """Run the estimator over what was streamed; yield results and events in order.
 
@@ -37,27 +46,26 @@ def replay(
         settings: settings of the estimator.
         model: model to fit; Eq. (2) where None.
         schedule: repeats what a live run dropped or stopped early.
+        reports: computes what windows publish, perhaps beside the sampling of the next ones.
     """
     estimator = Estimator(settings, model or choose_model(), schedule=schedule)
-    with ThreadPoolExecutor(1) as pool:
-        waiting: deque[Event | Future[WindowResult]] = deque()
-        reports: deque[tuple[int, Future[WindowResult]]] = deque()
-        for item in items:
-            waiting += _given(estimator, item)
-            while (window := estimator.waiting) is not None:
-                while reports and reports[0][0] <= window.end:
-                    estimator.remember(reports.popleft()[1].result())
-                job = estimator.next_job()
-                assert job is not None  # one was waiting and none is running
-                fitted = fit(job)
-                waiting += estimator.finish(fitted)
-                if not fitted.failure:
-                    # The next window starts from the draws; what they say is computed beside it.
-                    found = pool.submit(report, job, fitted)
-                    waiting.append(found)
-                    reports.append((job.forecast[1], found))
-            yield from _ready(waiting, LAG)
-        yield from _ready(waiting, 0)
+    waiting: deque[Event | Future[WindowResult]] = deque()
+    due: deque[tuple[int, Future[WindowResult]]] = deque()
+    for item in items:
+        waiting += _given(estimator, item)
+        while (job := estimator.next_job()) is not None:
+            fitted = fit(job)
+            while due and due[0][0] <= job.window.end:
+                estimator.remember(due.popleft()[1].result())
+            # The sampling does not ask for them, so they may come as late as this.
+            job = replace(job, frozen=estimator.judged(job.window))
+            waiting += estimator.finish(fitted)
+            if not fitted.failure:
+                found = reports(job, fitted)
+                waiting.append(found)
+                due.append((job.forecast[1], found))
+        yield from _ready(waiting, LAG)
+    yield from _ready(waiting, 0)
 
 
 def _given(estimator: Estimator, item: Item) -> list[Event]:
@@ -238,6 +246,7 @@ __all__ = [
     'Comparison',
     'Item',
     'Published',
+    'at_once',
     'compare',
     'items',
     'published',

@@ -1,4 +1,4 @@
-"""One process beside a node, for work that must not hold up its callbacks."""
+"""One process beside another, for work that must not hold it up."""
 
 from __future__ import annotations
 
@@ -63,10 +63,10 @@ class Worker:
         self._end(patience=0.0)
         self._start()
 
-    def close(self) -> None:
-        """End the process; what it computes is lost."""
+    def close(self, patience: float = 0.5) -> None:
+        """End the process, after so many seconds at the latest; what it computes is lost."""
         self._closed = True
-        self._end(patience=0.5)
+        self._end(patience)
 
     def _start(self) -> None:
         context = multiprocessing.get_context('spawn')

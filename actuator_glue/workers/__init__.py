@@ -1,0 +1,1 @@
+"""Work done in processes beside the one that asks for it."""

@@ -1,0 +1,100 @@
+"""What windows publish, computed in a process beside the one that samples them."""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections import deque
+from concurrent.futures import Future
+from dataclasses import fields, replace
+from types import TracebackType
+from typing import Any
+
+from actuator_glue.online.job import WindowResult, report
+from actuator_glue.online.replay import at_once
+from actuator_glue.online.sampling import Fit, Job
+from actuator_glue.workers.warm import warm_windows
+from actuator_glue.workers.worker import DIED, DONE, PROGRESS, Answer, Tell, Worker
+
+
+class Reports:
+    """Computes `job.report` in another process: for `replay`, whose results are the same.
+
+    A process and not a thread: two threads would hand the interpreter's lock to and fro for longer
+    than a report takes. Until the process is ready, and should it die, reports are computed here.
+    A script that uses this keeps its own work behind `if __name__ == '__main__'`, as always with
+    `multiprocessing`. Use as a context manager.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._asked: deque[tuple[Future[WindowResult], Job, Fit]] = deque()
+        self._gone = len(os.sched_getaffinity(0)) < 2  # nothing is gained on one core
+        self._worker = None if self._gone else Worker(self._take, warm_windows)
+
+    def __call__(self, job: Job, fitted: Fit) -> Future[WindowResult]:
+        """Return what will be the report."""
+        with self._lock:
+            if self._worker is not None and not self._gone and self._worker.ready.is_set():
+                found: Future[WindowResult] = Future()
+                self._asked.append((found, job, fitted))
+                # Points to start from are no part of a report.
+                self._worker.submit(
+                    _report, replace(job, archive=None), replace(fitted, archive=None)
+                )
+                return found
+        return at_once(job, fitted)
+
+    def wait(self, seconds: float) -> bool:
+        """Wait until the process is ready, for so long at most; return whether it is."""
+        return self._worker is not None and self._worker.ready.wait(seconds)
+
+    def _take(self, answer: Answer) -> None:
+        if answer.kind == PROGRESS:
+            return
+        with self._lock:
+            self._gone |= answer.kind == DIED
+            count = len(self._asked) if self._gone else 1
+            answered = [self._asked.popleft() for _ in range(count)]
+        for found, job, fitted in answered:
+            if answer.kind == DONE:
+                found.set_result(WindowResult(**_known(job, fitted), **answer.payload))
+            else:
+                _settle(found, job, fitted)
+
+    def __enter__(self) -> Reports:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._worker is not None:
+            self._worker.close(patience=0.0)
+
+
+def _known(job: Job, fitted: Fit) -> dict[str, Any]:
+    """Return the fields of a result that whoever asks for it has."""
+    return {
+        'window': job.window,
+        'settings': job.settings,
+        'model': job.model,
+        'archive': fitted.archive,
+    }
+
+
+def _report(job: Job, fitted: Fit, tell: Tell) -> dict[str, Any]:
+    """Return the other fields of a result: half of the bytes need not be sent back."""
+    result = report(job, fitted)
+    known = _known(job, fitted)
+    return {f.name: getattr(result, f.name) for f in fields(result) if f.name not in known}
+
+
+def _settle(found: Future[WindowResult], job: Job, fitted: Fit) -> None:
+    """Compute here what the process could not."""
+    try:
+        found.set_result(report(job, fitted))
+    except Exception as error:
+        found.set_exception(error)

@@ -1,0 +1,44 @@
+"""What a worker does before it says that it is ready."""
+
+from __future__ import annotations
+
+import pickle
+from collections.abc import Callable
+
+import numpy as np
+
+from actuator_glue.online.estimator import Estimator
+from actuator_glue.online.fitting import choose_model
+from actuator_glue.online.job import WindowResult, run
+from actuator_glue.online.replay import stream
+from actuator_glue.online.sampling import Job
+from actuator_glue.online.settings import EstimatorSettings
+from actuator_glue.online.stream import Block, Preview, Setup
+from actuator_glue.records import Record
+
+
+def warm_windows(compute: Callable[[Job], WindowResult] = run) -> None:
+    """Compile and import what windows need, by estimating a short stream as a live one.
+
+    Args:
+        compute: computes a job.
+    """
+    rng = np.random.default_rng(0)
+    command = 1e-3 * np.sin(2 * np.pi * 2.0 * np.arange(1200) / 200.0)
+    measured = command + 1e-5 * rng.standard_normal(1200)
+    settings = EstimatorSettings(
+        window=3.0, time_budget=1.0, evaluations=4000, start_evaluations=8000
+    )
+    estimator = Estimator(settings, choose_model())
+    estimator.preview(Preview(0, 1 / 200.0, command))
+    for item in stream(Record(command, measured, 1 / 200.0, 1e5)):
+        if isinstance(item, Setup):
+            estimator.setup(item)
+        elif isinstance(item, Block):
+            estimator.push(item)
+        while (job := estimator.next_job()) is not None:
+            # As it comes through a pipe: arrays lose their write protection, which numba sees.
+            job = pickle.loads(pickle.dumps(job))
+            estimator.finish(compute(job))
+            # A diagnosis may swap the model in mid-stream; nothing must wait for a compiler then.
+            estimator.set_model(choose_model(('backlash',)))
