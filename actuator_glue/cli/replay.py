@@ -49,7 +49,7 @@ def run(args: argparse.Namespace) -> int:
         InputError: the bag or a setting cannot be used.
     """
     from actuator_glue.io.bag_reader import is_bag, summarise
-    from actuator_glue.online.replay import compare, published
+    from actuator_glue.online.replay import published
 
     live: Published | None = None
     asked = {n: v for n in OVERRIDES if (v := getattr(args, n)) is not None}
@@ -67,22 +67,22 @@ def run(args: argparse.Namespace) -> int:
         note('the bag has posteriors but no EstimatorSetup: there is nothing to compare with')
         live = None
     started = time.perf_counter()
-    results, events, seconds_of_data = _replay(items, live, _settings(live, asked), total)
+    settings = _settings(live, asked)
+    windows, events, comparison, seconds_of_data = _replay(items, live, settings, total)
     seconds = time.perf_counter() - started
-    _show(results, args)
+    _show(windows, args)
     for line in list(dict.fromkeys(events))[:20]:
         note(line)
-    if not results:
+    if not windows:
         raise InputError(f'{args.bag}: not one window could be estimated')
-    comparison = None if live is None else compare(results, live)
     _verdict(comparison, args)
     rate = seconds_of_data / seconds if seconds > 0.0 else 0.0
     say(
-        f'{len(results)} windows over {seconds_of_data:.1f} s of data in {seconds:.2f} s '
+        f'{len(windows)} windows over {seconds_of_data:.1f} s of data in {seconds:.2f} s '
         f'({rate:.0f} x real time)',
         args,
     )
-    write_json(_content(args, results, events, comparison, seconds, rate), args.json)
+    write_json(_content(args, settings, windows, events, comparison, seconds, rate), args.json)
     return 0 if comparison is None or comparison.identical else 1
 
 
@@ -150,14 +150,14 @@ def _settings(live: Published | None, asked: dict[str, Any]) -> EstimatorSetting
 
 def _replay(
     items: Iterator[Item], live: Published | None, settings: EstimatorSettings, total: int
-) -> tuple[list[WindowResult], list[str], float]:
-    """Return results, what happened besides, and seconds of data."""
+) -> tuple[list[dict[str, Any]], list[str], Comparison | None, float]:
+    """Return what is told of each window, what happened besides, the verdict, seconds of data."""
     from actuator_glue.online.job import WindowResult
-    from actuator_glue.online.replay import replay
+    from actuator_glue.online.replay import compare, replay
     from actuator_glue.online.stream import Block
     from actuator_glue.workers.reports import Reports
 
-    results: list[WindowResult] = []
+    windows: list[dict[str, Any]] = []
     events: list[str] = []
     seconds = 0.0
     with progress('replaying', total or 1) as done, Reports() as reports:
@@ -170,42 +170,45 @@ def _replay(
                 done(place if total else 0)
                 yield item
 
-        model = live.models[0][1] if live is not None else None
-        schedule = live.schedule() if live is not None else None
-        for found in replay(counted(), settings, model, schedule, reports):
-            if isinstance(found, WindowResult):
-                results.append(found)
-            else:
-                events.append(getattr(found, 'message', str(found)))
-    return results, events, seconds
+        def results() -> Iterator[WindowResult]:
+            model = live.models[0][1] if live is not None else None
+            schedule = live.schedule() if live is not None else None
+            for found in replay(counted(), settings, model, schedule, reports):
+                if isinstance(found, WindowResult):
+                    # Not the result itself: its samples and bands are many.
+                    windows.append(_window(found))
+                    yield found
+                else:
+                    events.append(getattr(found, 'message', str(found)))
+
+        if live is not None:
+            return windows, events, compare(results(), live), seconds
+        for _ in results():
+            pass
+    return windows, events, None, seconds
 
 
-def _show(results: list[WindowResult], args: argparse.Namespace) -> None:
-    if not results:
+def _show(windows: list[dict[str, Any]], args: argparse.Namespace) -> None:
+    if not windows:
         return
-    names = results[-1].model.names
+    names = list(windows[-1]['parameters'])
+    shown = [w for w in windows if list(w['parameters']) == names]
+    if len(shown) > ROWS:
+        shown = [shown[i * (len(shown) - 1) // (ROWS - 1)] for i in range(ROWS)]
     rows = []
-    for r in results:
-        if r.moments is None or r.rhat is None or r.model.names != names:
-            continue
-        record = r.window.record
-        end = (record.first_index + len(record)) * record.period
-        moments = zip(r.moments.mean, r.moments.stddev, strict=True)
-        coverage = [
-            p.coverage[-1] for p in r.scored if p.kind == 'total' and p.coverage is not None
-        ]
+    for w in shown:
+        parameters = list(w['parameters'].values())
+        coverage = [b['coverage'][-1] for b in w['bands'] if b['kind'] == 'total']
         rows.append(
             (
-                str(r.window.number),
-                f'{end:.2f}',
-                *(f'{mean:.4g} {_percent(sd, mean)}' for mean, sd in moments),
-                f'{r.rhat.max():.2f}',
-                f'{1e6 * r.rms_error:.1f}',
+                str(w['window']),
+                f'{w["end_s"]:.2f}',
+                *(f'{p["mean"]:.4g} {_percent(p["stddev"], p["mean"])}' for p in parameters),
+                f'{max(p["rhat"] for p in parameters):.2f}',
+                f'{1e6 * w["error"]["rms_m"]:.1f}',
                 f'{100 * coverage[-1]:.0f} %' if coverage else '-',
             )
         )
-    if len(rows) > ROWS:
-        rows = [rows[i * (len(rows) - 1) // (ROWS - 1)] for i in range(ROWS)]
     columns = ('window', 'end [s]', *names, 'R-hat', 'rms [um]', 'cover')
     title = 'Posterior mean (SI units) and standard deviation (% of it) of each window'
     table(title, columns, rows, args)
@@ -231,13 +234,13 @@ def _verdict(comparison: Comparison | None, args: argparse.Namespace) -> None:
 
 def _content(
     args: argparse.Namespace,
-    results: list[WindowResult],
+    settings: EstimatorSettings,
+    windows: list[dict[str, Any]],
     events: list[str],
     comparison: Comparison | None,
     seconds: float,
     rate: float,
 ) -> dict[str, Any]:
-    settings = results[0].settings
     return {
         'schema': 'actuator_glue.replay/1',
         'bag': str(args.bag),
@@ -250,7 +253,7 @@ def _content(
             'bands': comparison.bands,
             'differing': comparison.differing,
         },
-        'windows': [_window(r) for r in results],
+        'windows': windows,
         'events': events,
         'seconds': seconds,
         'times_real_time': rate,
@@ -266,6 +269,7 @@ def _window(r: WindowResult) -> dict[str, Any]:
         'window': r.window.number,
         'index': record.first_index,
         'samples': len(record),
+        'end_s': (record.first_index + len(record)) * record.period,
         'parameters': {
             name: {key: values[i] for key, values in columns.items()}
             for i, name in enumerate(r.model.names)

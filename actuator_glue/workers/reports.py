@@ -30,7 +30,7 @@ class Reports:
         self._lock = threading.Lock()
         self._asked: deque[tuple[Future[WindowResult], Job, Fit]] = deque()
         self._gone = len(os.sched_getaffinity(0)) < 2  # nothing is gained on one core
-        self._worker = None if self._gone else Worker(self._take, warm_windows)
+        self._worker = None if self._gone else Worker(self._take, _warm)
 
     def __call__(self, job: Job, fitted: Fit) -> Future[WindowResult]:
         """Return what will be the report."""
@@ -73,6 +73,11 @@ class Reports:
     ) -> None:
         if self._worker is not None:
             self._worker.close(patience=0.0)
+
+
+def _warm() -> None:
+    # Effects take a second more, which most replays can do without.
+    warm_windows(swap=False)
 
 
 def _known(job: Job, fitted: Fit) -> dict[str, Any]:

@@ -17,11 +17,12 @@ from actuator_glue.online.stream import Block, Preview, Setup
 from actuator_glue.records import Record
 
 
-def warm_windows(compute: Callable[[Job], WindowResult] = run) -> None:
+def warm_windows(compute: Callable[[Job], WindowResult] = run, swap: bool = True) -> None:
     """Compile and import what windows need, by estimating a short stream as a live one.
 
     Args:
         compute: computes a job.
+        swap: whether the model may be swapped for one with effects, too.
     """
     rng = np.random.default_rng(0)
     command = 1e-3 * np.sin(2 * np.pi * 2.0 * np.arange(1200) / 200.0)
@@ -41,4 +42,5 @@ def warm_windows(compute: Callable[[Job], WindowResult] = run) -> None:
             job = pickle.loads(pickle.dumps(job))
             estimator.finish(compute(job))
             # A diagnosis may swap the model in mid-stream; nothing must wait for a compiler then.
-            estimator.set_model(choose_model(('backlash',)))
+            if swap:
+                estimator.set_model(choose_model(('backlash',)))
