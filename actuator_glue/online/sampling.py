@@ -25,8 +25,8 @@ from actuator_glue.records import Array, Record
 EXCITATION = 3.0
 # Generations in which a sampler that starts from the last posterior adapts.
 ADAPT = 20
-# Points that a window hands to the next, about as many as its draws are worth; at least.
-ARCHIVE, LEAST = 500, 400
+# Points that a window hands to the next, about as many as its draws are worth.
+ARCHIVE = 400
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -196,9 +196,9 @@ def _sampler(job: Job) -> dream.Settings:
 
 def _archive(new: Array, old: Array | None) -> Array:
     """Points for the next window; few of them, of a window cut short, are joined by older ones."""
-    if old is None or len(new) >= LEAST:
+    if old is None or len(new) >= ARCHIVE:
         return new
-    return np.concatenate([new, old[spread(len(old), LEAST - len(new))]])
+    return np.concatenate([new, old[spread(len(old), ARCHIVE - len(new))]])
 
 
 def _check_excited(record: Record, settle: int, noise: float) -> None:
