@@ -29,7 +29,7 @@ class Reports:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self._asked: deque[tuple[Future[WindowResult], Job, Fit]] = deque()
-        self._gone = len(os.sched_getaffinity(0)) < 2  # nothing is gained on one core
+        self._gone = _cores() < 2  # nothing is gained on one
         self._worker = None if self._gone else Worker(self._take, _warm)
 
     def __call__(self, job: Job, fitted: Fit) -> Future[WindowResult]:
@@ -73,6 +73,12 @@ class Reports:
     ) -> None:
         if self._worker is not None:
             self._worker.close(patience=0.0)
+
+
+def _cores() -> int:
+    # Only Linux says how many this process may use.
+    usable = getattr(os, 'sched_getaffinity', None)
+    return len(usable(0)) if usable is not None else os.cpu_count() or 1
 
 
 def _warm() -> None:
