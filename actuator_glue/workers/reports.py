@@ -7,7 +7,6 @@ import threading
 from collections import deque
 from concurrent.futures import Future
 from dataclasses import fields, replace
-from types import TracebackType
 from typing import Any
 
 from actuator_glue.online.job import WindowResult, report
@@ -65,12 +64,7 @@ class Reports:
     def __enter__(self) -> Reports:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *error: object) -> None:
         if self._worker is not None:
             self._worker.close(patience=0.0)
 
