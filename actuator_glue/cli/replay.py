@@ -173,19 +173,19 @@ def _replay(
         def results() -> Iterator[WindowResult]:
             model = live.models[0][1] if live is not None else None
             schedule = live.schedule() if live is not None else None
-            for found in replay(counted(), settings, model, schedule, reports):
-                if isinstance(found, WindowResult):
+            for told in replay(counted(), settings, model, schedule, reports):
+                if isinstance(told, WindowResult):
                     # Not the result itself: its samples and bands are many.
-                    windows.append(_window(found))
-                    yield found
+                    windows.append(_window(told))
+                    yield told
                 else:
-                    events.append(getattr(found, 'message', str(found)))
+                    events.append(getattr(told, 'message', str(told)))
 
-        if live is not None:
-            return windows, events, compare(results(), live), seconds
-        for _ in results():
+        found = results()
+        comparison = None if live is None else compare(found, live)
+        for _ in found:  # all of them, where nothing was compared
             pass
-    return windows, events, None, seconds
+    return windows, events, comparison, seconds
 
 
 def _show(windows: list[dict[str, Any]], args: argparse.Namespace) -> None:

@@ -149,7 +149,7 @@ def _reweigh(  # type: ignore[no-untyped-def]
     generation.refer(z, log_jacobian, power, centre, factor, reference)
     finite, largest = 0, -np.inf
     for i in range(len(z)):
-        gain[i] = values[i] + log_jacobian[i] - reference[i] if values[i] > -np.inf else -np.inf
+        gain[i] = values[i] + log_jacobian[i] - reference[i]
         if math.isfinite(gain[i]):
             largest = max(largest, gain[i])
             finite += 1
@@ -163,9 +163,7 @@ def _reweigh(  # type: ignore[no-untyped-def]
         gain[i] *= rise
     _systematic(gain, places[0], chosen)
     _systematic(gain, places[1], start)
-    for i in range(len(start)):
-        at = start[i]
-        target[i] = after * (values[at] + log_jacobian[at]) + (1.0 - after) * reference[at]
+    generation.temper(values[start], log_jacobian[start], reference[start], after, target)
     return after
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from actuator_glue.jit import njit
 from actuator_glue.records import Array
 
 
@@ -43,8 +44,8 @@ class Archive:
 
     @property
     def newest(self) -> Array:
-        """All but the oldest quarter of the points: what came from the start fades."""
-        return self._buffer.rows[self.size // 4 : self.size]
+        """What `newest` leaves of the points."""
+        return np.asarray(newest(self._buffer.rows, self.size))
 
     def append(self, points: Array) -> Archive:
         """Return the archive with points (m, p) added."""
@@ -67,3 +68,9 @@ class Archive:
             return self
         self._buffer.filled = size
         return Archive(self._buffer, size)
+
+
+@njit
+def newest(rows: Array, size: int) -> Array:
+    """Return the first `size` rows but the oldest quarter: what came from the start fades."""
+    return rows[size // 4 : size]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from actuator_glue.inference import adaptation, compiled, generation
 from actuator_glue.inference.adaptation import Tuning
-from actuator_glue.inference.archive import Archive
+from actuator_glue.inference.archive import Archive, newest
 from actuator_glue.inference.compiled import Compiled, log_densities
 from actuator_glue.inference.evaluate import LogDensity, evaluate, refuse_infinite
 from actuator_glue.inference.settings import Settings
@@ -220,5 +220,5 @@ def _advance(  # type: ignore[no-untyped-def]
             size += len(z)
             if adapting:
                 adaptation.rescue(z, x, values, there, total)
-                adaptation.fit(rows[size // 4 : size], counts, independence, snooker, tuning)
+                adaptation.fit(newest(rows, size), counts, independence, snooker, tuning)
     return done, size

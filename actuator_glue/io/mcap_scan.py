@@ -89,11 +89,8 @@ class Scan:
                 file.seek(length, 1)
             if body and opcode == Opcode.CHUNK:
                 yield from self._chunk(body, at, whole)
-            elif body and opcode == Opcode.MESSAGE:
-                if (found := self._message(body, at)) is not None:
-                    yield found
-            elif body:
-                self._learn(opcode, body, at)
+            elif body and (found := self._record(opcode, body, at)) is not None:
+                yield found
             self.position = file.tell()
             if not whole:
                 self.note(
@@ -102,35 +99,29 @@ class Scan:
                 )
                 return
 
-    def _learn(self, opcode: int, body: bytes, at: int) -> None:
-        """Take a schema or channel."""
-        stream = ReadDataStream(BytesIO(body))
+    def _record(self, opcode: int, body: bytes, at: int) -> tuple[Schema, Channel, Message] | None:
+        """Take a schema or channel; return a message with both, where there is one to be used."""
         try:
+            if opcode == Opcode.MESSAGE:
+                # By hand: there are many, and mcap's stream takes five times as long.
+                number, sequence, logged, published = _MESSAGE.unpack_from(body)
+                channel, data = self.channels[number], body[_MESSAGE.size :]
+                message = Message(number, logged, data, published, sequence)
+                return self.schemas[channel.schema_id], channel, message
+            stream = ReadDataStream(BytesIO(body))
             if opcode == Opcode.SCHEMA:
                 schema = Schema.read(stream)
                 self.schemas[schema.id] = schema
             else:
                 channel = Channel.read(stream)
                 self.channels[channel.id] = channel
-        except _UNREADABLE as error:
-            self.note(f'{self.path}: damaged record at byte {at} ({error})')
-
-    def _message(self, body: bytes, at: int) -> tuple[Schema, Channel, Message] | None:
-        """Return a message with its schema and channel; None where it cannot be used."""
-        # By hand: there are many, and mcap's stream takes five times as long.
-        try:
-            number, sequence, logged, published = _MESSAGE.unpack_from(body)
-            channel = self.channels[number]
-            schema = self.schemas[channel.schema_id]
-        except struct.error as error:
-            self.note(f'{self.path}: damaged record at byte {at} ({error})')
-            return None
         except KeyError:
             if not self.orphans:
                 self.note(f'{self.path}: messages from byte {at} on belong to no known topic')
             self.orphans += 1
-            return None
-        return schema, channel, Message(number, logged, body[_MESSAGE.size :], published, sequence)
+        except _UNREADABLE as error:
+            self.note(f'{self.path}: damaged record at byte {at} ({error})')
+        return None
 
     def _chunk(
         self, body: bytes, at: int, whole: bool
@@ -151,11 +142,10 @@ class Scan:
                 if whole:
                     self.note(f'{self.path}: damaged chunk at byte {at}')
                 return
-            if opcode == Opcode.MESSAGE:
-                if (found := self._message(data[start:position], at)) is not None:
+            if opcode in _PARSED:
+                found = self._record(opcode, data[start:position], at)
+                if found is not None:
                     yield found
-            elif opcode in _PARSED:
-                self._learn(opcode, data[start:position], at)
 
     def _learn_topics(self) -> None:
         """Take topics from the end of the file: a damaged chunk may have held them."""

@@ -110,11 +110,11 @@ def _report(job: Job, fitted: Fit) -> WindowResult:
     chains = fitted.coordinates.chains(fitted.sampled)
     # R-hat and ESS of very many draws would cost more than the sampling.
     rhat, ess = rhat_and_ess(chains.kept[:: max(1, len(chains.kept) // DIAGNOSED)])
-    summary = moments(chains.posterior(), *model.bounds)
+    posterior = chains.posterior()
+    summary = moments(posterior, *model.bounds)
     settle = round(settings.settle / record.period)
     residual = (record.measured - fitting.simulate(model, chains.best[None], record)[0])[settle:]
     rms_error = float(residual.std())
-    posterior = chains.posterior()
     start, stop = job.forecast
     frozen = Frozen(
         number=job.window.number,

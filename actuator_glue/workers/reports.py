@@ -13,7 +13,7 @@ from actuator_glue.online.job import WindowResult, report
 from actuator_glue.online.replay import at_once
 from actuator_glue.online.sampling import Fit, Job
 from actuator_glue.workers.warm import warm_windows
-from actuator_glue.workers.worker import DIED, DONE, PROGRESS, Answer, Tell, Worker
+from actuator_glue.workers.worker import DIED, DONE, Answer, Tell, Worker
 
 
 class Reports:
@@ -49,8 +49,6 @@ class Reports:
         return self._worker is not None and self._worker.ready.wait(seconds)
 
     def _take(self, answer: Answer) -> None:
-        if answer.kind == PROGRESS:
-            return
         with self._lock:
             self._gone |= answer.kind == DIED
             count = len(self._asked) if self._gone else 1

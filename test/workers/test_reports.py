@@ -49,9 +49,9 @@ def same(one: object, other: object) -> bool:
     if isinstance(one, np.ndarray):
         return np.array_equal(one, other, equal_nan=one.dtype.kind == 'f')
     if isinstance(one, dict):
-        return one.keys() == other.keys() and all(same(one[k], other[k]) for k in one)  # type: ignore[attr-defined, index]
+        return one.keys() == other.keys() and all(same(one[k], other[k]) for k in one)
     if isinstance(one, (list, tuple)):
-        return len(one) == len(other) and all(map(same, one, other))  # type: ignore[arg-type]
+        return len(one) == len(other) and all(map(same, one, other))
     return one == other or (one != one and other != other)
 
 
@@ -63,7 +63,7 @@ def test_the_bits_are_those_of_one_process(record: Record, alone: list[object]) 
     assert all(
         type(a) is type(b) and same(asdict(a), asdict(b))
         for a, b in zip(found, alone, strict=True)
-    )  # type: ignore[call-overload]
+    )
 
 
 @needs_two_cores
@@ -75,17 +75,17 @@ def test_nothing_is_lost_when_the_process_dies(
         assert reports.wait(120.0)
         killed = False
 
-        def deadly(job, fitted):  # type: ignore[no-untyped-def]
+        def deadly(job, fitted):
             nonlocal killed
             found = reports(job, fitted)
             if job.window.number >= after and not killed:
-                os.kill(reports._worker._process.pid, signal.SIGKILL)  # type: ignore[union-attr]
+                os.kill(reports._worker._process.pid, signal.SIGKILL)
                 killed = True
             return found
 
         found = list(replay(stream(record), SETTINGS, reports=deadly))
     assert killed
-    assert all(same(asdict(a), asdict(b)) for a, b in zip(found, alone, strict=True))  # type: ignore[call-overload]
+    assert all(same(asdict(a), asdict(b)) for a, b in zip(found, alone, strict=True))
 
 
 def test_until_the_process_is_ready_reports_are_computed_here(
@@ -93,4 +93,4 @@ def test_until_the_process_is_ready_reports_are_computed_here(
 ) -> None:
     with Reports() as reports:
         found = list(replay(stream(record), SETTINGS, reports=lambda *asked: reports(*asked)))
-    assert all(same(asdict(a), asdict(b)) for a, b in zip(found, alone, strict=True))  # type: ignore[call-overload]
+    assert all(same(asdict(a), asdict(b)) for a, b in zip(found, alone, strict=True))
