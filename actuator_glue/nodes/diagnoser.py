@@ -33,6 +33,8 @@ SPECS = (
     Spec('seed', 1, 'seed of diagnoses by itself', '1', 0, 2**53),
     Spec('estimator', 'estimator', 'name of the estimator node', read_only=True),
 )
+# How long the estimator may take to say whether it takes the augmented model [s].
+ANSWER_SECONDS = 10.0
 
 
 class DiagnoserNode(base.SuiteNode):
@@ -41,6 +43,7 @@ class DiagnoserNode(base.SuiteNode):
     def __init__(self) -> None:
         self._goal: Any = None
         self._request: diagnosing.Request | None = None
+        self._swap: Any = None
         super().__init__('diagnoser', SPECS)
 
     def do_configure(self) -> None:
@@ -74,7 +77,7 @@ class DiagnoserNode(base.SuiteNode):
         )
         self.subscribe(topics.SAMPLES, lambda m: self._tell(self.collector.push(wire.block(m))))
         self.subscribe(topics.BAND, self._band)
-        self.every(0.2, self._check_cancel)
+        self.every(0.2, self._check)
 
     def do_deactivate(self) -> None:
         """Give up a running diagnosis."""
@@ -107,12 +110,6 @@ class DiagnoserNode(base.SuiteNode):
             self.alarm.limit = self.parameters['coverage_limit']
 
     # Watching.
-
-    def _setup(self, message: Any) -> None:
-        self._tell(self.collector.setup(wire.setup(message)))
-
-    def _block(self, message: Any) -> None:
-        self._tell(self.collector.push(wire.block(message)))
 
     def _tell(self, events: list[Event]) -> None:
         for event in events:
@@ -216,28 +213,36 @@ class DiagnoserNode(base.SuiteNode):
             self.complain('set_model', f'{self._model_client.srv_name} is not there')
             self._finish(outcome)
             return
-        request = diagnosing.augmented(diagnosis)
+        request = self._request
 
         def answered(future: Any) -> None:
+            if self._request is not request:
+                return
             response = future.result()
-            if response is not None and response.success:
+            if response is None:
+                self.complain('set_model', f'no answer within {ANSWER_SECONDS:g} s')
+            elif response.success:
                 self.get_logger().info(f'estimator: {response.message}')
                 self.alarm.reset()
                 outcome.applied = True
             else:
-                why = 'no answer' if response is None else response.message
-                self.complain('set_model', f'the estimator refuses: {why}')
+                self.complain('set_model', f'the estimator refuses: {response.message}')
             self._finish(outcome)
 
-        self._model_client.call_async(request).add_done_callback(self.guarded(answered))
+        self._swap = self._model_client.call_async(diagnosing.augmented(diagnosis))
+        self._swap.add_done_callback(self.guarded(answered))
+        self._swap_end = time.monotonic() + ANSWER_SECONDS
 
-    def _check_cancel(self) -> None:
+    def _check(self) -> None:
+        """Give up what is cancelled, and waiting for an answer that was lost."""
         if self._goal is not None and self._request is not None and self._goal.is_cancel_requested:
             self.worker.restart()
             self._finish(diagnosing.Outcome(message='cancelled'))
+        if self._swap is not None and time.monotonic() > self._swap_end:
+            self._swap.cancel()
 
     def _finish(self, outcome: diagnosing.Outcome) -> None:
-        self._request = None
+        self._request = self._swap = None
         self._outcome = outcome
         self.health.values['last diagnosis'] = outcome.message
         if self._goal is not None:

@@ -53,6 +53,11 @@ class Pacer:
         """Begin as soon as it is ready; that is the stream's time 0."""
         self._thread.start()
 
+    @property
+    def stopped(self) -> bool:
+        """Whether it was told to end."""
+        return self._stop.is_set()
+
     def stop(self) -> None:
         """End after the step being done."""
         self._stop.set()

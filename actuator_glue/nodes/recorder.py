@@ -64,6 +64,7 @@ class RecorderNode(base.SuiteNode):
         """Write what has arrived and finish the bag."""
         if self.writer is None:
             return
+        self._take_what_waits()
         self._queue.put(None)
         self._thread.join()
         try:
@@ -119,6 +120,15 @@ class RecorderNode(base.SuiteNode):
                     self._record(topics.Topic(wanted, _message(types[0]), topics.SAMPLES.qos))
                 except (ImportError, AttributeError) as error:
                     self.complain('topic', f'{name}: type {types[0]} is not installed ({error})')
+
+    def _take_what_waits(self) -> None:
+        """Take what has reached this process but not yet its callbacks."""
+        for topic, subscription in self._topics:
+            for _ in range(topic.qos.depth):
+                found = subscription.handle.take_message(subscription.msg_type, True)
+                if found is None:
+                    break
+                self._take(subscription.topic_name, found[0])
 
     def _take(self, name: str, data: bytes) -> None:
         self.received.add()

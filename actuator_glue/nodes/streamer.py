@@ -4,11 +4,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from typing import Any
+
+from rclpy.duration import Duration
 
 from actuator_glue.nodes import base, topics
 from actuator_glue.nodes.health import Rate
 from actuator_glue.nodes.pacer import Pacer, Step
 from actuator_glue.nodes.parameters import Spec
+
+# How long the end of a stream waits for subscribers that lag [s]. DDS lets go of a dead one after
+# its lease of 20 s, so that more is never needed.
+FAREWELL_SECONDS = 30.0
 
 
 def specs(*, exit_at_end: bool) -> tuple[Spec, ...]:
@@ -39,9 +46,17 @@ class Streamer(base.SuiteNode):
         """Yield what is published, and when; runs in the pacer's thread."""
         raise NotImplementedError
 
+    def publisher(self, topic: topics.Topic) -> Any:
+        """Return a publisher that lives until cleanup."""
+        made = super().publisher(topic)
+        if topic is topics.SAMPLES:
+            self._samples_out = made
+        return made
+
     def ready(self) -> bool:
         """Whether everybody who was waited for listens and the clock has begun."""
-        listening = self.count_subscribers(topics.SAMPLES.name)
+        # Those that our publisher has met: others on the topic would not get the first samples.
+        listening = self._samples_out.get_subscription_count()
         # Simulated time is 0 until the first /clock: such stamps would jump with it.
         clock_runs = not self.stamps_now or self.get_clock().now().nanoseconds > 0
         return bool(listening >= self.parameters['wait_for'] and clock_runs)
@@ -72,7 +87,19 @@ class Streamer(base.SuiteNode):
     def _ended(self, failure: BaseException | None) -> None:
         if failure is not None:
             self.complain_of_bug(failure)
+        self._wait_until_taken()
         self.get_logger().info(f'stream ended after {self.samples.count} samples')
         if self.parameters['exit_at_end']:
             self.finished = True
             self.wake()
+
+    def _wait_until_taken(self) -> None:
+        """Stay until subscribers have everything: what they lack goes with its publisher."""
+        end = time.monotonic() + FAREWELL_SECONDS
+        for out in tuple(self._made):
+            while not out.wait_for_all_acked(Duration(seconds=0.1)):
+                if self.pacer is None or self.pacer.stopped:
+                    return
+                if time.monotonic() > end:
+                    self.complain('subscribers', f'not all of {out.topic_name} was taken')
+                    return

@@ -88,6 +88,7 @@ class Probe(Node):
         self.faults = defaultdict(str)
         self.create_subscription(DiagnosticArray, '/diagnostics', self._diagnosed, 50)
         self.index = 0
+        self.callers = {}
 
     def _diagnosed(self, message):
         for status in message.status:
@@ -117,14 +118,22 @@ class Probe(Node):
     def number(self, node, key):
         return float(self.value(node, key, 'nan'))
 
-    def call(self, service, name, request, timeout=20.0):
-        """Call a service."""
-        client = self.create_client(service, name)
+    def call(self, service, name, request, timeout=20.0, attempts=3):
+        """Call a service; ask again when the answer was lost.
+
+        A server drops its answer when DDS has not yet told it of the client's reader.
+        """
+        if name not in self.callers:
+            self.callers[name] = self.create_client(service, name)
+        client = self.callers[name]
         self.until(client.service_is_ready, timeout, name)
-        future = client.call_async(request)
-        self.until(future.done, timeout, name)
-        self.destroy_client(client)
-        return future.result()
+        for _ in range(attempts):
+            future = client.call_async(request)
+            with suppress(AssertionError):
+                self.until(future.done, timeout / attempts, name)
+                return future.result()
+            client.remove_pending_request(future)
+        raise AssertionError(f'no answer: {name}; {self.health}')
 
     def state(self, node):
         return self.call(GetState, f'{node}/get_state', GetState.Request()).current_state.label
@@ -133,7 +142,11 @@ class Probe(Node):
         """Ask for a lifecycle transition; return whether it succeeded."""
         request = ChangeState.Request()
         request.transition.label = label
-        return self.call(ChangeState, f'{node}/change_state', request).success
+        before = self.state(node)
+        try:
+            return self.call(ChangeState, f'{node}/change_state', request, attempts=1).success
+        except AssertionError:
+            return self.state(node) != before
 
     def parameters(self, node):
         """Names of a node's parameters."""
@@ -164,9 +177,9 @@ class Probe(Node):
     def open_stream(self, listeners=1):
         """Make publishers and wait until they are listened to."""
         latched = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
-        self._samples = self.create_publisher(SampleBlock, 'samples', QoSProfile(depth=1000))
-        self._setup = self.create_publisher(TestSetup, 'test_setup', latched)
-        self.until(lambda: self._samples.get_subscription_count() >= listeners, 40)
+        self.samples_out = self.create_publisher(SampleBlock, 'samples', QoSProfile(depth=1000))
+        self.setup_out = self.create_publisher(TestSetup, 'test_setup', latched)
+        self.until(lambda: self.samples_out.get_subscription_count() >= listeners, 40)
         self.start_ns = 10**18
 
     def setup(self, stiffness=250e3, rate=RATE, hold='zoh', index=0):
@@ -177,7 +190,7 @@ class Probe(Node):
             hold=hold,
             index=index,
         )
-        self._setup.publish(message)
+        self.setup_out.publish(message)
 
     def block(self, command, measured, index=None, stamp_ns=None, period=1.0 / RATE):
         """Publish a block at the running index."""
@@ -188,7 +201,7 @@ class Probe(Node):
         message.header.frame_id = 'rig'
         message.command = np.asarray(command, dtype=float)
         message.measured = np.asarray(measured, dtype=float)
-        self._samples.publish(message)
+        self.samples_out.publish(message)
         self.index = index + len(command)
 
     def stream(self, record, size=20, pause=0.005):

@@ -1,0 +1,101 @@
+"""Slow discovery, stalled subscribers, lost answers: no sample is lost, nobody waits forever."""
+
+import signal
+import time
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import rclpy
+from actuator_glue_msgs.msg import SampleBlock
+from actuator_glue_msgs.srv import SetModel
+from builtin_interfaces.msg import Time
+from rclpy.duration import Duration
+from ros_nodes import RATE
+
+from actuator_glue.io.bag_reader import decoded
+from actuator_glue.nodes import diagnoser, diagnosing
+from actuator_glue.nodes.recorder import RecorderNode
+from actuator_glue.nodes.topics import SAMPLES
+
+
+def recorded(bag):
+    """Running indices of all samples in a bag."""
+    blocks = [(m.index, len(m.command)) for _, m in decoded(bag, ('SampleBlock',))]
+    return np.concatenate([np.arange(i, i + n) for i, n in blocks])
+
+
+def test_a_stream_does_not_leave_before_it_is_taken(start, probe, tmp_path):
+    """A recorder that hears of the stream only after its end still gets all of it."""
+    samples, size = 150_000, 100
+    seconds = np.arange(samples) / RATE
+    command = np.sin(2 * np.pi * 1.5 * seconds)
+    file, bag = tmp_path / 'test.csv', tmp_path / 'bag'
+    rows = np.column_stack([seconds, command, 0.9 * command])
+    np.savetxt(file, rows, delimiter=',', header='time_s,command_mm,measured_mm', comments='')
+    recorder = start('recorder', bag=str(bag))
+    bridge = start(
+        'lab_bridge', file=str(file), specimen_stiffness=1e5, speed=0.0, wait_for=2, block=size
+    )
+    for node in 'recorder', 'lab_bridge':
+        probe.until(lambda node=node: probe.value(node, 'state') == 'active', 60, node)
+    probe.for_a_while(1.0)
+    recorder.process.send_signal(signal.SIGSTOP)
+    heard = []
+    probe.create_subscription(SampleBlock, 'samples', heard.append, SAMPLES.qos)
+    probe.until(lambda: len(heard) == samples // size, 30, 'stream')
+    probe.for_a_while(1.0)
+    recorder.process.send_signal(signal.SIGCONT)
+    assert bridge.wait(30) == 0, bridge.text
+    assert recorder.end() == 0, recorder.text
+    assert np.array_equal(recorded(bag), np.arange(samples))
+
+
+def test_a_recorder_writes_what_has_reached_it_when_it_is_stopped(probe, tmp_path, monkeypatch):
+    """Messages that no callback has seen yet are in the bag."""
+    monkeypatch.chdir(tmp_path)
+    recorder = RecorderNode()
+    recorder.trigger_configure()
+    recorder.trigger_activate()
+    probe.open_stream()
+    probe.setup()
+    for _ in range(50):
+        probe.block(np.zeros(20), np.zeros(20))
+    assert probe.samples_out.wait_for_all_acked(Duration(seconds=20.0))
+    # It is in nobody's executor: no callback has run.
+    recorder.trigger_deactivate()
+    recorder.destroy_node()
+    (bag,) = tmp_path.iterdir()
+    assert np.array_equal(recorded(bag), np.arange(1000))
+    assert len(list(decoded(bag, ('TestSetup',)))) == 1
+
+
+@pytest.fixture
+def node(probe, monkeypatch):
+    """A diagnoser in this process, active, in nobody's executor."""
+    monkeypatch.setattr(diagnoser, 'ANSWER_SECONDS', 0.5)
+    made = diagnoser.DiagnoserNode()
+    made.trigger_configure()
+    made.trigger_activate()
+    yield made
+    made.trigger_shutdown()
+    made.destroy_node()
+
+
+def test_an_answer_that_is_lost_does_not_hold_up_the_diagnoser(node, probe, monkeypatch):
+    monkeypatch.setattr(diagnosing, 'augmented', lambda _: SetModel.Request())
+    # Nobody spins the probe: the request arrives and is never answered.
+    probe.create_service(SetModel, 'estimator/set_model', lambda _, answer: answer)
+    executor = rclpy.executors.SingleThreadedExecutor()
+    executor.add_node(node)
+    while not node._model_client.service_is_ready():
+        executor.spin_once(0.1)
+    node._request = diagnosing.Request(apply=True)
+    outcome = diagnosing.Outcome(diagnosis=SimpleNamespace())
+    node._apply(outcome)
+    assert node._request is not None
+    while node._request is not None:
+        executor.spin_once(0.1)
+    assert not outcome.applied
+    (told,) = node.health.message(time.monotonic(), Time(), 'active').status
+    assert told.message == 'no answer within 0.5 s'
