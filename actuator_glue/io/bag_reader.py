@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Iterator
+from collections import deque
+from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, NamedTuple, NoReturn
@@ -15,6 +16,9 @@ from actuator_glue.io.mcap_scan import Scan
 from actuator_glue.io.messages import deserialize, full_name
 
 Note = Callable[[str], None]
+TEST_SETUP = full_name('TestSetup')
+# As many sample blocks may wait on their topic while a recorder takes them before their set-up.
+WAITING = 2000
 
 
 class BagMessage(NamedTuple):
@@ -163,6 +167,36 @@ def messages(
             summary.finished = False
 
 
+def as_published(found: Iterable[BagMessage]) -> Iterator[BagMessage]:
+    """Yield messages with each test set-up before the samples that were published after it.
+
+    Topics have no order among each other: a recorder that stalls may take samples first. Within a
+    topic the recorded order stays, whatever a clock did. Bags without times of publication come
+    as they are.
+
+    Args:
+        found: messages in the order they were recorded.
+    """
+    waiting: deque[BagMessage] = deque()
+    try:
+        for message in found:
+            place = len(waiting)
+            if message.type == TEST_SETUP:
+                while place and _is_later(waiting[place - 1], message):
+                    place -= 1
+            waiting.insert(place, message)
+            if len(waiting) > WAITING:
+                yield waiting.popleft()
+    except InputError:
+        yield from waiting
+        raise
+    yield from waiting
+
+
+def _is_later(message: BagMessage, setup: BagMessage) -> bool:
+    return message.type != TEST_SETUP and message.publish_time > setup.publish_time
+
+
 def summarise(path: Path | str) -> Summary:
     """Return what a bag holds; damage is noted, never raised.
 
@@ -187,7 +221,7 @@ def decoded(
     topics: Collection[str] | None = None,
     note: Note = refuse,
 ) -> Iterator[tuple[str, Any]]:
-    """Yield (type name, message) of the wanted types in the order they were recorded.
+    """Yield (type name, message) of the wanted types in the order of `as_published`.
 
     Args:
         path: bag folder or lone .mcap.
@@ -199,7 +233,7 @@ def decoded(
         InputError: no bag, damage and nobody to note it, or bytes that are no such message.
     """
     types = {full_name(name) for name in names}
-    for found in messages(path, types=types, topics=topics, note=note):
+    for found in as_published(messages(path, types=types, topics=topics, note=note)):
         try:
             yield found.type, deserialize(found.type, found.data)
         except InputError as error:

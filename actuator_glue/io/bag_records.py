@@ -12,13 +12,19 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.bag_metadata import LATCHED
-from actuator_glue.io.bag_reader import BagMessage, Note, messages, refuse, summarise
+from actuator_glue.io.bag_reader import (
+    TEST_SETUP,
+    BagMessage,
+    Note,
+    messages,
+    refuse,
+    summarise,
+)
 from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.io.messages import deserialize, full_name, header, message, stamp_ns
 from actuator_glue.records import Array, Hold, Record
 
 SAMPLE_BLOCK = full_name('SampleBlock')
-TEST_SETUP = full_name('TestSetup')
 CLOCK_TOLERANCE = 0.1  # s; a step between two blocks beyond this is a jump, not jitter
 BLOCK = 64  # samples per message where nobody says otherwise
 

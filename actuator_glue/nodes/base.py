@@ -97,14 +97,19 @@ class SuiteNode(LifecycleNode):
         self._made.append(made)
         return made
 
-    def subscribe(
-        self, topic: Topic, callback: Callable[[Any], None], *, raw: bool = False
-    ) -> None:
-        """Subscribe until deactivation; what the callback raises is reported."""
+    def subscribe(self, topic: Topic, callback: Callable[..., None], *, raw: bool = False) -> None:
+        """Subscribe until deactivation; what the callback raises is reported.
+
+        Args:
+            topic: what to subscribe to.
+            callback: gets the message; if raw, its bytes and what the middleware knows of it.
+            raw: do not decode.
+        """
+        call = self.guarded(callback)
         made = self.create_subscription(
             topic.type,
             topic.name,
-            self.guarded(callback),
+            (lambda data, info: call(data, info)) if raw else call,
             topic.qos,
             raw=raw,
             qos_overriding_options=QoSOverridingOptions.with_default_policies(),

@@ -9,7 +9,7 @@ import threading
 import time
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.bag_metadata import LATCHED, Qos
@@ -26,6 +26,16 @@ SPECS = (
     Spec('max_file', 1 << 30, 'size at which the next file begins', 'B', 1 << 20, 1 << 40, True),
     Spec('max_waiting', 256 << 20, 'messages kept while the disk stalls', 'B', 1 << 20, 1 << 40),
 )
+
+
+class Item(NamedTuple):
+    """A message on its way to the disk; times in ns, `arrived` is monotonic [s]."""
+
+    topic: str
+    data: bytes
+    received: int
+    published: int
+    arrived: float
 
 
 class RecorderNode(base.SuiteNode):
@@ -46,7 +56,7 @@ class RecorderNode(base.SuiteNode):
         )
         self._bags += 1
         self.get_logger().info(f'recording to {self.writer.path}')
-        self._queue: queue.SimpleQueue[tuple[str, bytes, int, float] | None] = queue.SimpleQueue()
+        self._queue: queue.SimpleQueue[Item | None] = queue.SimpleQueue()
         self._waiting_bytes = self._lost = 0
         self._lag = self._worst_lag = 0.0
         self._failed = ''
@@ -107,7 +117,7 @@ class RecorderNode(base.SuiteNode):
         except InputError as error:
             self.complain('topic', str(error))
             return
-        self.subscribe(topic, lambda data: self._take(name, data), raw=True)
+        self.subscribe(topic, lambda *found: self._take(name, *found), raw=True)
 
     def _look(self) -> None:
         """Subscribe to further topics that have appeared."""
@@ -128,9 +138,9 @@ class RecorderNode(base.SuiteNode):
                 found = subscription.handle.take_message(subscription.msg_type, True)
                 if found is None:
                     break
-                self._take(subscription.topic_name, found[0])
+                self._take(subscription.topic_name, *found)
 
-    def _take(self, name: str, data: bytes) -> None:
+    def _take(self, name: str, data: bytes, info: Mapping[str, Any]) -> None:
         self.received.add()
         if self._waiting_bytes + len(data) > self.parameters['max_waiting']:
             self._lost += 1
@@ -138,7 +148,8 @@ class RecorderNode(base.SuiteNode):
             return
         self._waiting_bytes += len(data)
         now = self.get_clock().now().nanoseconds
-        self._queue.put((name, data, now, time.monotonic()))
+        item = Item(name, data, now, info['source_timestamp'] or now, time.monotonic())
+        self._queue.put(item)
 
     def _write(self) -> None:
         """Write what arrives until None arrives; runs in its own thread."""
@@ -148,19 +159,18 @@ class RecorderNode(base.SuiteNode):
             try:
                 item = self._queue.get(timeout=0.05)
             except queue.Empty:
-                item = ('', b'', 0, time.monotonic())
+                item = Item('', b'', 0, 0, time.monotonic())
             if item is None:
                 return
-            name, data, stamp, arrived = item
             try:
-                if name:
-                    writer.write_raw(name, data, stamp)
+                if item.topic:
+                    writer.write_raw(item.topic, item.data, item.received, item.published)
                 else:
                     writer.flush_if_due()
             except InputError as error:
                 self._failed = str(error)
-            self._waiting_bytes -= len(data)
-            self._lag = time.monotonic() - arrived
+            self._waiting_bytes -= len(item.data)
+            self._lag = time.monotonic() - item.arrived
             self._worst_lag = max(self._worst_lag, self._lag)
 
 

@@ -10,7 +10,7 @@ from typing import Any
 from rosgraph_msgs.msg import Clock
 
 from actuator_glue.errors import InputError
-from actuator_glue.io.bag_reader import is_bag, messages
+from actuator_glue.io.bag_reader import as_published, is_bag, messages
 from actuator_glue.io.messages import deserialize
 from actuator_glue.nodes import base, spin, streamer, topics
 from actuator_glue.nodes.pacer import Step
@@ -45,10 +45,10 @@ class ReplayNode(streamer.Streamer):
         self._time: Any = self.publisher(clock) if self.parameters['clock'] else None
 
     def stream(self) -> Iterator[Step]:
-        """Yield the messages of the bag in the order they were recorded."""
+        """Yield the messages of the bag, set-ups before their samples, as they were recorded."""
         first: int | None = None
         note = partial(self.complain, 'bag')
-        for found in messages(self.path, types=tuple(self._outputs), note=note):
+        for found in as_published(messages(self.path, types=tuple(self._outputs), note=note)):
             first = found.log_time if first is None else first
             due = (found.log_time - first) * 1e-9
             yield Step(due, partial(self._publish, found.type, found.data, found.log_time))

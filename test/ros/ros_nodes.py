@@ -179,7 +179,8 @@ class Probe(Node):
         latched = QoSProfile(depth=10, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self.samples_out = self.create_publisher(SampleBlock, 'samples', QoSProfile(depth=1000))
         self.setup_out = self.create_publisher(TestSetup, 'test_setup', latched)
-        self.until(lambda: self.samples_out.get_subscription_count() >= listeners, 40)
+        for out in self.samples_out, self.setup_out:
+            self.until(lambda out=out: out.get_subscription_count() >= listeners, 40)
         self.start_ns = 10**18
 
     def setup(self, stiffness=250e3, rate=RATE, hold='zoh', index=0):

@@ -13,7 +13,8 @@ from builtin_interfaces.msg import Time
 from rclpy.duration import Duration
 from ros_nodes import RATE
 
-from actuator_glue.io.bag_reader import decoded
+from actuator_glue.io.bag_reader import TEST_SETUP, as_published, decoded, messages
+from actuator_glue.io.messages import full_name
 from actuator_glue.nodes import diagnoser, diagnosing
 from actuator_glue.nodes.recorder import RecorderNode
 from actuator_glue.nodes.topics import SAMPLES
@@ -27,7 +28,7 @@ def recorded(bag):
 
 def test_a_stream_does_not_leave_before_it_is_taken(start, probe, tmp_path):
     """A recorder that hears of the stream only after its end still gets all of it."""
-    samples, size = 150_000, 100
+    samples, size = 150_000, 250
     seconds = np.arange(samples) / RATE
     command = np.sin(2 * np.pi * 1.5 * seconds)
     file, bag = tmp_path / 'test.csv', tmp_path / 'bag'
@@ -42,7 +43,7 @@ def test_a_stream_does_not_leave_before_it_is_taken(start, probe, tmp_path):
     probe.for_a_while(1.0)
     recorder.process.send_signal(signal.SIGSTOP)
     heard = []
-    probe.create_subscription(SampleBlock, 'samples', heard.append, SAMPLES.qos)
+    probe.create_subscription(SampleBlock, 'samples', heard.append, SAMPLES.qos, raw=True)
     probe.until(lambda: len(heard) == samples // size, 30, 'stream')
     probe.for_a_while(1.0)
     recorder.process.send_signal(signal.SIGCONT)
@@ -61,13 +62,20 @@ def test_a_recorder_writes_what_has_reached_it_when_it_is_stopped(probe, tmp_pat
     probe.setup()
     for _ in range(50):
         probe.block(np.zeros(20), np.zeros(20))
-    assert probe.samples_out.wait_for_all_acked(Duration(seconds=20.0))
+    for out in probe.setup_out, probe.samples_out:
+        assert out.wait_for_all_acked(Duration(seconds=20.0))
     # It is in nobody's executor: no callback has run.
     recorder.trigger_deactivate()
     recorder.destroy_node()
     (bag,) = tmp_path.iterdir()
     assert np.array_equal(recorded(bag), np.arange(1000))
-    assert len(list(decoded(bag, ('TestSetup',)))) == 1
+    found = list(messages(bag))
+    assert sum(m.type == TEST_SETUP for m in found) == 1
+    # When each was sent is kept beside when it was received: their order is known.
+    assert all(0 < m.publish_time < m.log_time for m in found)
+    kinds = {full_name('TestSetup'), full_name('SampleBlock')}
+    published = [m.publish_time for m in as_published(found) if m.type in kinds]
+    assert published == sorted(published)
 
 
 @pytest.fixture
