@@ -46,7 +46,6 @@ class Worker:
         self._answer = answer
         self._warm = warm
         self._nice = nice
-        self._closed = False
         self._tasks: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self.ready = threading.Event()
         self._start()
@@ -65,14 +64,14 @@ class Worker:
 
     def close(self, patience: float = 0.5) -> None:
         """End the process, after so many seconds at the latest; what it computes is lost."""
-        self._closed = True
         self._end(patience)
 
     def _start(self) -> None:
         context = multiprocessing.get_context('spawn')
         self.ready.clear()
-        self._pipe, theirs = context.Pipe()
-        self._process = context.Process(
+        # Closed with the last reference to it: never while a thread still reads.
+        ours, theirs = context.Pipe()
+        self._process: Any = context.Process(
             target=_serve, args=(theirs, self._warm, self._nice), daemon=True, name='worker'
         )
         self._process.start()
@@ -80,19 +79,21 @@ class Worker:
         # The tasks of an ended process are not the next one's.
         self._tasks = queue.SimpleQueue()
         for name, target, args in (
-            ('answers', self._listen, (self._pipe, self._process)),
-            ('tasks', self._hand_over, (self._pipe, self._tasks)),
+            ('answers', self._listen, (ours, self._process)),
+            ('tasks', self._hand_over, (ours, self._tasks)),
         ):
             threading.Thread(target=target, args=args, daemon=True, name=name).start()
 
     def _end(self, patience: float) -> None:
-        process, pipe = self._process, self._pipe
+        # Whoever hears of its end knows that it was asked for.
+        process, self._process = self._process, None
         self._tasks.put(None)
+        if process is None:
+            return
         process.join(patience)
         if process.is_alive():
             process.kill()
             process.join(2.0)
-        pipe.close()
 
     def _hand_over(self, pipe: Connection, tasks: queue.SimpleQueue[Any]) -> None:
         with suppress(OSError):
@@ -110,7 +111,7 @@ class Worker:
                 self.ready.set()
             else:
                 self._answer(Answer(*answer))
-        if process is self._process and not self._closed:
+        if process is self._process:
             process.join(1.0)
             self._answer(Answer(DIED, f'the worker process ended ({process.exitcode})', 0.0))
 
