@@ -4,10 +4,16 @@ import os
 import signal
 import threading
 import time
+from pathlib import Path
 
 import pytest
 
 from actuator_glue.workers.worker import DIED, DONE, FAILED, PROGRESS, Worker
+
+
+def open_files():
+    """Number of files and pipes this process has open."""
+    return len(list(Path('/proc/self/fd').iterdir()))
 
 
 class Answers(list):
@@ -62,7 +68,7 @@ def test_work_failure_and_progress_are_answered_in_order(worker, answers):
 
 def test_a_restart_gives_up_the_work_and_is_no_death(worker, answers):
     """At whatever moment of its start or work it comes."""
-    before = len(os.listdir('/proc/self/fd'))
+    before = open_files()
     for attempt in range(8):
         worker.submit(busy)
         if attempt % 2:
@@ -76,7 +82,7 @@ def test_a_restart_gives_up_the_work_and_is_no_death(worker, answers):
     # Threads and pipes of the processes before have ended with them.
     names = [t.name for t in threading.enumerate()]
     assert names.count('answers') == names.count('tasks') == 1
-    assert len(os.listdir('/proc/self/fd')) <= before + 8
+    assert open_files() <= before + 8
 
 
 def test_a_killed_process_is_told_once_and_replaced(worker, answers):
