@@ -8,10 +8,11 @@ from __future__ import annotations
 import hashlib
 import os
 import shutil
+from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar, overload
 
 import numba
 
@@ -51,10 +52,26 @@ if 'NUMBA_CACHE_DIR' not in os.environ and os.access(Path(__file__).parent, os.W
 # the two may add up in another order. A replay must repeat a live run to the bit.
 # What may take a tenth of a millisecond or more says nogil=True, and others run meanwhile; short
 # functions would pay more for giving the lock back and fighting for it anew than it frees.
-njit: Any = partial(
+_compile: Any = partial(
     numba.njit,
     cache=True,
     forceinline=True,
     error_model='numpy',
     fastmath={'reassoc', 'contract', 'nsz', 'arcp'},
 )
+
+Function = TypeVar('Function', bound=Callable[..., Any])
+
+
+@overload
+def njit(function: Function) -> Function: ...
+@overload
+def njit(**options: Any) -> Callable[[Function], Function]: ...
+def njit(function: Any = None, **options: Any) -> Any:
+    """Compile a function when it is first called; used as a decorator, with or without options.
+
+    Args:
+        function: what to compile; its signature is kept for type checkers.
+        options: options of numba.njit that replace the house's.
+    """
+    return _compile(**options) if function is None else _compile(function, **options)

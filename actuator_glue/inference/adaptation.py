@@ -65,14 +65,14 @@ def tune(
 
 
 @njit(fastmath=False)
-def _drawn(jump, dimension):  # type: ignore[no-untyped-def]
+def _drawn(jump: float, dimension: int) -> float:
     """Effective draws per move whose mean squared jump is 2 p r, in standard deviations."""
     r = min(0.5 * jump / dimension, 1.0)
     return r / (2.0 - r)
 
 
 @njit(fastmath=False)
-def fit(points, counts, most, snooker, tuning):  # type: ignore[no-untyped-def]
+def fit(points: Array, counts: Array, most: float, snooker: float, tuning: Tuning) -> None:
     """Do `tune` in place; `most` and `snooker` are the settings' shares of moves."""
     moves, crossovers, scale = tuning.move_cdf, tuning.crossover_cdf, tuning.scale
     reach = np.zeros(len(counts))
@@ -108,7 +108,7 @@ def fit(points, counts, most, snooker, tuning):  # type: ignore[no-untyped-def]
 
 
 @njit(fastmath=False)
-def rescue(z, x, values, target, total):  # type: ignore[no-untyped-def]
+def rescue(z: Array, x: Array, values: Array, target: Array, total: Array) -> None:
     """Put outlier chains where the chain of the highest log likelihoods stands; zero `total`.
 
     Outliers are chains whose mean log likelihood since they were last looked at, by which `total`

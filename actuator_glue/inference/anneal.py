@@ -127,9 +127,11 @@ def anneal(
 
 # Strict floating point: not-a-number and minus infinity are asked for.
 @njit(fastmath=False)
-def _reweigh(  # type: ignore[no-untyped-def]
-    z, values, log_jacobian, centre, factor, power, survivors, places, chosen, start, target
-):
+def _reweigh(
+    z: Array, values: Array, log_jacobian: Array, centre: Array, factor: Array, power: float,
+    survivors: float, places: Array, chosen: NDArray[np.intp], start: NDArray[np.intp],
+    target: Array,
+) -> float:  # fmt: skip
     """Return the next power; resample the points z (m, p) by the weights that leads to.
 
     Args:
@@ -168,7 +170,7 @@ def _reweigh(  # type: ignore[no-untyped-def]
 
 
 @njit(fastmath=False)
-def _rise(gain, most, survivors):  # type: ignore[no-untyped-def]
+def _rise(gain: Array, most: float, survivors: float) -> float:
     """Return the largest rise, up to `most`, that leaves so many effective points.
 
     gain (m,) is zero at its largest; points whose gain is minus infinity have no weight.
@@ -199,7 +201,7 @@ def resample(rng: np.random.Generator, log_weights: Array, size: int) -> NDArray
 
 
 @njit(fastmath=False)
-def _systematic(log_weights, first, chosen):  # type: ignore[no-untyped-def]
+def _systematic(log_weights: Array, first: float, chosen: NDArray[np.intp]) -> None:
     total, size = 0.0, len(chosen)
     weights = np.exp(log_weights)
     for weight in weights:

@@ -60,7 +60,7 @@ def compiled(log_density: LogDensity) -> Compiled | None:
 # Strict floating point in what follows: inlined elsewhere, it could be reassociated or fused with
 # what comes next, which would be other bits.
 @njit(fastmath=False)
-def _likelihood(total, square, size, shaping, sigma):  # type: ignore[no-untyped-def]
+def _likelihood(total: float, square: float, size: float, shaping: float, sigma: float) -> float:
     """Log likelihood of errors given their sum and sum of squares over `size` samples in all.
 
     -shaping ln Var; for shaping = 0 the Gaussian one, whose sigma = 0 is integrated out.
@@ -74,7 +74,7 @@ def _likelihood(total, square, size, shaping, sigma):  # type: ignore[no-untyped
 
 
 @njit(fastmath=False)
-def likelihood(sums, size, shaping, sigma):  # type: ignore[no-untyped-def]
+def likelihood(sums: Array, size: float, shaping: float, sigma: float) -> float:
     """Return the log likelihood of the error sums (R, 2) of all records."""
     total = 0.0
     square = 0.0
@@ -85,7 +85,7 @@ def likelihood(sums, size, shaping, sigma):  # type: ignore[no-untyped-def]
 
 
 @njit(fastmath=False)
-def likelihoods(sums, size, shaping, sigma):  # type: ignore[no-untyped-def]
+def likelihoods(sums: Array, size: float, shaping: float, sigma: float) -> Array:
     """Return the log likelihoods (m,) of error sums (m, R, 2)."""
     values = np.empty(len(sums))
     for i in range(len(sums)):
@@ -94,7 +94,7 @@ def likelihoods(sums, size, shaping, sigma):  # type: ignore[no-untyped-def]
 
 
 @njit(fastmath=False)
-def _exactly(rows, samples, theta, slack, sums):  # type: ignore[no-untyped-def]
+def _exactly(rows: Array, samples: Samples, theta: Array, slack: Array, sums: Array) -> None:
     """Overwrite the error sums (m, R, 2) of thetas (m, p) where slack (R, m) is not 0."""
     for r in range(len(rows)):
         which = np.flatnonzero(slack[r])
@@ -153,7 +153,7 @@ _SURE = 1e-6
 
 
 @njit(fastmath=False)
-def _hopeless(density, sums, slack, floor):  # type: ignore[no-untyped-def]
+def _hopeless(density: Compiled, sums: Array, slack: Array, floor: float) -> bool:
     """Whether even the least error that the bound allows leaves a log likelihood below `floor`.
 
     sums (R, 2) and slack (R,) are those of one point.
@@ -169,7 +169,9 @@ def _hopeless(density, sums, slack, floor):  # type: ignore[no-untyped-def]
 
 
 @njit(fastmath=False)
-def log_densities(density, x, log_jacobian, floor, values, scratch):  # type: ignore[no-untyped-def]
+def log_densities(
+    density: Compiled, x: Array, log_jacobian: Array, floor: Array, values: Array, scratch: Scratch
+) -> None:
     """Fill values (m,) with the log densities of points x (m, p).
 
     Points beyond the bounds (log_jacobian minus infinity) are left out: they are impossible. And

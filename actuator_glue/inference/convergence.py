@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import math
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from actuator_glue.jit import njit
@@ -99,7 +101,7 @@ def _scores(count: int) -> Array:
 
 
 @njit
-def _share(ascending, order, scores, out):  # type: ignore[no-untyped-def]
+def _share(ascending: Array, order: NDArray[np.intp], scores: Array, out: Array) -> None:
     """Write the score of each value's rank to its place; equal values share their mean rank."""
     first, n = 0, len(ascending)
     while first < n:
@@ -112,7 +114,9 @@ def _share(ascending, order, scores, out):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True)
-def _rank(values, order, scores, bulk, folded):  # type: ignore[no-untyped-def]
+def _rank(
+    values: Array, order: NDArray[np.intp], scores: Array, bulk: Array, folded: Array
+) -> None:
     """Write normal scores of rows of values (p, m), and of their distances from the median.
 
     `order` sorts each row. The distances in order are two sorted halves, merged.
@@ -137,7 +141,7 @@ def _rank(values, order, scores, bulk, folded):  # type: ignore[no-untyped-def]
 
 
 @njit(fastmath=False)
-def _spread(chains):  # type: ignore[no-untyped-def]
+def _spread(chains: Array) -> tuple[float, float, Array]:
     """Return the mean variance within chains (m, n), and the variance of their means."""
     m, n = chains.shape
     within, centre = 0.0, 0.0
@@ -159,7 +163,7 @@ def _spread(chains):  # type: ignore[no-untyped-def]
 
 
 @njit(fastmath=False)
-def _potential_reduction(values):  # type: ignore[no-untyped-def]
+def _potential_reduction(values: Array) -> Array:
     """sqrt(((n - 1)/n W + B/n) / W) for values (p, chains, n)."""
     chains, n = values.shape[1:]
     found = np.full(len(values), np.nan)
@@ -185,7 +189,7 @@ def _effective(values: Array) -> Array:
 
 # Strict floating point: what is published must not depend on which process compiled it.
 @njit(fastmath=False)
-def _covariance(values, lag):  # type: ignore[no-untyped-def]
+def _covariance(values: Array, lag: int) -> Any:
     """Mean over chains (m, n) without their means of the product with what comes `lag` later."""
     m, n = values.shape
     total = odd = 0.0
@@ -200,7 +204,7 @@ def _covariance(values, lag):  # type: ignore[no-untyped-def]
 
 
 @njit(fastmath=False)
-def _correlation_time(values, within, between):  # type: ignore[no-untyped-def]
+def _correlation_time(values: Array, within: float, between: float) -> float:
     """Sum of autocorrelations by Geyer's initial monotone sequence of pairs.
 
     As in Stan and arviz, the even term of the pair after the last one counts once, unless both it

@@ -22,7 +22,7 @@ _EDGE = 1e-12
 
 
 @njit
-def physical(z, lower, width, x):  # type: ignore[no-untyped-def]
+def physical(z: Array, lower: Array, width: Array, x: Array) -> float:
     """Write the physical point of z into x, both (p,); return ln |dx/dz| less a constant.
 
     Beyond a bound the logarithm is minus infinity and x lies on the bound.
@@ -41,7 +41,7 @@ def physical(z, lower, width, x):  # type: ignore[no-untyped-def]
 
 
 @njit
-def physical_all(z, lower, width):  # type: ignore[no-untyped-def]
+def physical_all(z: Array, lower: Array, width: Array) -> tuple[Array, Array]:
     """Return physical points (m, p) and log Jacobians (m,) of the points z (m, p)."""
     x = np.empty_like(z)
     log_jacobian = np.empty(z.shape[0])

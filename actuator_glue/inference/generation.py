@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from actuator_glue.inference.adaptation import Tuning
 from actuator_glue.inference.coordinates import physical
 from actuator_glue.inference.moves import (
     INDEPENDENCE,
@@ -87,22 +88,22 @@ def room(chains: int, dimension: int, pairs: int) -> Room:
 
 
 @njit
-def propose(  # type: ignore[no-untyped-def]
-    z,
-    uniforms,
-    rows,
-    size,
-    lower,
-    width,
-    tuning,
-    pairs,
-    unit_jump,
-    jitter,
-    noise,
-    candidate,
-    x,
-    room,
-):
+def propose(
+    z: Array,
+    uniforms: Array,
+    rows: Array,
+    size: int,
+    lower: Array,
+    width: Array,
+    tuning: Tuning,
+    pairs: int,
+    unit_jump: float,
+    jitter: float,
+    noise: float,
+    candidate: Array,
+    x: Array,
+    room: Room,
+) -> None:
     """Write a candidate of every chain, (n, p), x the same in physical units, and `room`."""
     for i in range(z.shape[0]):
         row = uniforms[i]
@@ -139,7 +140,9 @@ def propose(  # type: ignore[no-untyped-def]
 
 # Strict floating point: the same bits whatever it is compiled into.
 @njit(fastmath=False)
-def refer(z, log_jacobian, power, centre, factor, reference):  # type: ignore[no-untyped-def]
+def refer(
+    z: Array, log_jacobian: Array, power: float, centre: Array, factor: Array, reference: Array
+) -> None:
     """Write the reference's log density (n,) at points z (n, p), docs/dream.md (D6)."""
     for i in range(len(z)):
         reference[i] = log_jacobian[i]
@@ -148,7 +151,9 @@ def refer(z, log_jacobian, power, centre, factor, reference):  # type: ignore[no
 
 
 @njit(fastmath=False)
-def temper(values, log_jacobian, reference, power, target):  # type: ignore[no-untyped-def]
+def temper(
+    values: Array, log_jacobian: Array, reference: Array, power: float, target: Array
+) -> None:
     """Write the log target (n,) of points, docs/dream.md (D1) and (D6).
 
     Beyond the bounds (log_jacobian minus infinity) it is minus infinity, whatever the likelihood
@@ -164,7 +169,7 @@ def temper(values, log_jacobian, reference, power, target):  # type: ignore[no-u
 
 
 @njit(fastmath=False)
-def expect(target, power, room):  # type: ignore[no-untyped-def]
+def expect(target: Array, power: float, room: Room) -> None:
     """Write room.floor: what a candidate's log likelihood must exceed, given chains' targets."""
     for i in range(len(target)):
         least = target[i] + room.log_uniform[i] - room.correction[i]
@@ -174,9 +179,10 @@ def expect(target, power, room):  # type: ignore[no-untyped-def]
 
 
 @njit
-def accept(  # type: ignore[no-untyped-def]
-    z, x, log_density, target, new_z, new_x, new_log_density, new_target, room
-):
+def accept(
+    z: Array, x: Array, log_density: Array, target: Array, new_z: Array, new_x: Array,
+    new_log_density: Array, new_target: Array, room: Room,
+) -> int:  # fmt: skip
     """Metropolis-Hastings: overwrite the new_ arrays with the current state where rejected.
 
     A target that is not a number is rejected. Returns the first chain whose candidate has a
@@ -198,7 +204,7 @@ def accept(  # type: ignore[no-untyped-def]
 
 
 @njit
-def tally(z, candidate, room, scale, counts):  # type: ignore[no-untyped-def]
+def tally(z: Array, candidate: Array, room: Room, scale: Array, counts: Array) -> None:
     """Add uses, acceptances and normalised squared jumps to counts (moves + crossovers, 3).
 
     Rows 0-2 are the moves, the rest the crossover classes (Vrugt 2016, section 3.2.1).

@@ -152,7 +152,7 @@ def many(
     adapting, total = total is not None, np.empty(0) if total is None else total
     done = 0
     while done < count:
-        if density is not None:
+        if density is not None and scratch is not None:
             target[0] = now.log_target
             more, size = _advance(
                 uniforms[done:], *now[:3], archive.capacity_rows, archive.size,
@@ -183,11 +183,13 @@ def many(
 
 # Strict floating point, as numpy has it: see compiled.log_densities.
 @njit(fastmath=False, nogil=True)
-def _advance(  # type: ignore[no-untyped-def]
-    uniforms, z, x, values, rows, size, until_append, every, lower, width, tuning, pairs,
-    unit_jump, jitter, noise, tempering, density, counts, path_z, path_x, path_values, target,
-    room, scratch, adapting, total, independence, snooker,
-):  # fmt: skip
+def _advance(
+    uniforms: Array, z: Array, x: Array, values: Array, rows: Array, size: int, until_append: int,
+    every: int, lower: Array, width: Array, tuning: Tuning, pairs: int, unit_jump: float,
+    jitter: float, noise: float, tempering: generation.Tempering, density: Compiled, counts: Array,
+    path_z: Array, path_x: Array, path_values: Array, target: Array, room: generation.Room,
+    scratch: compiled.Scratch, adapting: bool, total: Array, independence: float, snooker: float,
+) -> tuple[int, int]:  # fmt: skip
     """Do generations, in place on the path; return how many, and the archive's size.
 
     The target of the chains is read from target[0] and ends in target[count % 2].

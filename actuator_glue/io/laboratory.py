@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
@@ -57,7 +58,8 @@ def read(
         if stiffness is None:
             stiffness = _noted_stiffness(notes, path)
     first = float(values['time'][0]) if 'time' in values else 0.0
-    chosen: Hold = hold or notes.get('hold', 'zoh')  # type: ignore[assignment]
+    # Record refuses another.
+    chosen = cast('Hold', hold or notes.get('hold', 'zoh'))
     return Record(
         command=values['command'],
         measured=values['measured'],

@@ -53,7 +53,8 @@ def coefficients(theta: ArrayLike, stiffness: float) -> tuple[Array, Array, Arra
         InputError: wrong shape, or a stiffness that cannot be used.
     """
     k = check_stiffness(stiffness)
-    parts = kernel.equation_2a.py_func(thetas(theta).T, k)
+    # Not compiled for arrays: numba keeps the function itself under this name.
+    parts = getattr(kernel.equation_2a, 'py_func')(thetas(theta).T, k)  # noqa: B009
     n0, d2, d1, d0 = (part.reshape(np.shape(theta)[:-1]) for part in parts)
     return n0, d2, d1, d0
 

@@ -7,6 +7,7 @@ from functools import partial
 from typing import Any
 
 from actuator_glue.jit import njit
+from actuator_glue.records import Array
 
 # Strict floating point: the same bits wherever it is inlined.
 _njit: Any = partial(njit, fastmath=False)
@@ -16,7 +17,7 @@ EDGE = 5.2
 
 
 @_njit
-def share(z: float) -> Any:
+def share(z: float) -> float:
     """Normal distribution function: the share of the way between two bounds.
 
     What is uniform between them is a standard normal coordinate.
@@ -25,7 +26,7 @@ def share(z: float) -> Any:
 
 
 @_njit
-def score(part: float) -> Any:
+def score(part: float) -> float:
     """Return the inverse of `share`, inside +-EDGE."""
     tail = min(part, 1.0 - part)
     if not tail > 1e-7:
@@ -42,7 +43,7 @@ def score(part: float) -> Any:
 
 
 @_njit
-def oil_range(inertia, s, k, low, high):  # type: ignore[no-untyped-def]
+def oil_range(inertia: float, s: float, k: float, low: Array, high: Array) -> tuple[float, float]:
     """Return between what alpha_2 + k the prior's box lies, given d2/n0 and s; maybe nothing.
 
     alpha_1 beta_0 and alpha_3 grow in proportion to it, each inside its own bounds.
@@ -56,7 +57,7 @@ def oil_range(inertia, s, k, low, high):  # type: ignore[no-untyped-def]
 
 
 @_njit
-def physical(phi, k, low, high, theta):  # type: ignore[no-untyped-def]
+def physical(phi: Array, k: float, low: Array, high: Array, theta: Array) -> Any:
     """Fill theta (4,) from coordinates phi (4,), return the log Jacobian less a constant.
 
     It is minus infinity where theta lies outside low..high. k is the specimen stiffness [N/m].
@@ -89,7 +90,9 @@ def physical(phi, k, low, high, theta):  # type: ignore[no-untyped-def]
 
 
 @_njit
-def physical_all(phi, k, low, high, theta, log_jacobian):  # type: ignore[no-untyped-def]
+def physical_all(
+    phi: Array, k: float, low: Array, high: Array, theta: Array, log_jacobian: Array
+) -> bool:
     """Fill theta (m, 4) and the log Jacobian (m,); return whether all are inside low..high."""
     inside = True
     for i in range(len(phi)):
@@ -99,7 +102,7 @@ def physical_all(phi, k, low, high, theta, log_jacobian):  # type: ignore[no-unt
 
 
 @_njit
-def coordinates_all(theta, k, low, high, phi):  # type: ignore[no-untyped-def]
+def coordinates_all(theta: Array, k: float, low: Array, high: Array, phi: Array) -> None:
     """Fill phi (m, 4) with the coordinates of physical parameters theta (m, 4)."""
     for i in range(len(theta)):
         oil = max(k + theta[i, 2], 1e-9)

@@ -89,7 +89,7 @@ def bounds(at: NDArray[np.int64], k: float, low: Array, high: Array) -> tuple[Ar
 
 
 @_njit
-def _split(rate, lag, inertia, s):  # type: ignore[no-untyped-def]
+def _split(rate: float, lag: float, inertia: float, s: float) -> tuple[float, float, float]:
     """Return d2/n0 without damping and the damping's share, given ln d1/d2 and d2/n0 with it.
 
     Third, the log Jacobian in (ln inertia, share).
@@ -102,7 +102,7 @@ def _split(rate, lag, inertia, s):  # type: ignore[no-untyped-def]
 
 
 @_njit
-def turn(row, at, time):  # type: ignore[no-untyped-def]
+def turn(row: Array, at: NDArray[np.int64], time: float) -> None:
     """Turn a line's amplitudes, of a phase that counts from `time` [s], to one from 0."""
     angle = 2.0 * math.pi * row[at[FREQUENCY]] * time
     c, s = row[at[COSINE]], row[at[SINE]]
@@ -111,7 +111,10 @@ def turn(row, at, time):  # type: ignore[no-untyped-def]
 
 
 @_njit
-def physical(z, k, low, high, at, middle, phi, theta):  # type: ignore[no-untyped-def]
+def physical(
+    z: Array, k: float, low: Array, high: Array, at: NDArray[np.int64], middle: float, phi: Array,
+    theta: Array,
+) -> Any:  # fmt: skip
     """Fill theta (p,) from coordinates z (p,), return the log Jacobian less a constant.
 
     It is minus infinity where theta lies outside low..high. `at` is from `columns`, phi (4,) is
@@ -183,7 +186,10 @@ def physical(z, k, low, high, at, middle, phi, theta):  # type: ignore[no-untype
 
 
 @_njit
-def physical_all(z, k, low, high, at, middle, theta, log_jacobian):  # type: ignore[no-untyped-def]
+def physical_all(
+    z: Array, k: float, low: Array, high: Array, at: NDArray[np.int64], middle: float,
+    theta: Array, log_jacobian: Array,
+) -> None:  # fmt: skip
     """Fill theta (m, p) and the log Jacobian (m,)."""
     phi = np.empty(4)
     for i in range(len(z)):
@@ -191,7 +197,9 @@ def physical_all(z, k, low, high, at, middle, theta, log_jacobian):  # type: ign
 
 
 @_njit
-def coordinates_all(theta, k, low, high, at, middle, z):  # type: ignore[no-untyped-def]
+def coordinates_all(
+    theta: Array, k: float, low: Array, high: Array, at: NDArray[np.int64], middle: float, z: Array
+) -> None:
     """Fill z (m, p) with the coordinates of physical parameters theta (m, p)."""
     z[:] = theta
     ridge.coordinates_all(theta, k, low, high, z)

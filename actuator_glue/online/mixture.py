@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -35,7 +36,7 @@ _DENSITY = np.exp(-0.5 * _NODES**2) / math.sqrt(2.0 * math.pi)
 
 
 @njit
-def _sums(at, x, inverse, drift):  # type: ignore[no-untyped-def]
+def _sums(at: float, x: Array, inverse: Array, drift: Array) -> tuple[float, float, float]:
     """Return sums over components of distribution function, density, and density times drift."""
     below = density = carried = 0.0
     for i in range(len(x)):
@@ -55,7 +56,10 @@ def _sums(at, x, inverse, drift):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _direct(x, inverse, drift, probability, start, limits, coming):  # type: ignore[no-untyped-def]
+def _direct(
+    x: Array, inverse: Array, drift: Array, probability: Array, start: Array, limits: Array,
+    coming: Array,
+) -> None:  # fmt: skip
     """Solve F(limit) = probability, F the mean of normal distribution functions.
 
     Newton's steps; one that leaves the bracket, or a density that vanishes between components, is
@@ -105,7 +109,7 @@ _SPREAD = np.sqrt(_ORDER * np.maximum(_ORDER - 1.0, 1.0)) / (_ORDER + 1.0)
 
 
 @njit
-def _terms(offset, excess, wanted):  # type: ignore[no-untyped-def]
+def _terms(offset: float, excess: float, wanted: float) -> int:
     """How many terms leave less than `wanted` of sum_k b_k; 0 where even _MOST do not.
 
     b_k bounds the k-th term at the largest offset and variance excess of any component.
@@ -122,7 +126,9 @@ def _terms(offset, excess, wanted):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _coefficients(offset, variance, scale, terms, spare, a):  # type: ignore[no-untyped-def]
+def _coefficients(
+    offset: Array, variance: Array, scale: float, terms: int, spare: Array, a: Array
+) -> None:
     """Write a_k = mean_i h_k(offset_i, excess_i)/k! for 2 <= k <= terms, and up to two more.
 
     h_(k+1) = offset h_k + k excess h_(k-1), three at once: most of the time would go into loading
@@ -171,7 +177,7 @@ def _coefficients(offset, variance, scale, terms, spare, a):  # type: ignore[no-
 
 
 @njit
-def _hermite(u, he):  # type: ignore[no-untyped-def]
+def _hermite(u: float, he: Array) -> None:
     """Write the probabilists' Hermite polynomials at u."""
     he[0] = 1.0
     he[1] = u
@@ -180,7 +186,7 @@ def _hermite(u, he):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _solve(a, terms, normal, he, spare):  # type: ignore[no-untyped-def]
+def _solve(a: Array, terms: int, normal: float, he: Array, spare: Array) -> float:
     """Return u with G(u) = Phi(normal), G(u) = Phi(u) - phi(u) sum_(k>=3) a_k He_(k-1)(u).
 
     he holds the Hermite polynomials at `normal`; spare is as long.
@@ -213,7 +219,7 @@ def _solve(a, terms, normal, he, spare):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _largest(values):  # type: ignore[no-untyped-def]
+def _largest(values: Array) -> Any:
     """Return the largest modulus of finite values (m,).
 
     As integers, in whose order moduli are, too: vector units compare those, not numbers that might
@@ -227,7 +233,9 @@ def _largest(values):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True)
-def _quantiles(columns, mean, sd, probability, normal, out):  # type: ignore[no-untyped-def]
+def _quantiles(
+    columns: Array, mean: Array, sd: Array, probability: Array, normal: Array, out: Array
+) -> int:
     """Write quantiles (q, n) of columns (n, m); return how many columns the series did."""
     n, m = columns.shape
     variance, inverse = sd * sd, 1.0 / sd

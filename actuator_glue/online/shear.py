@@ -27,7 +27,7 @@ LIMIT = 1e5
 
 
 @_njit
-def _mean(y, axis, coefficients):  # type: ignore[no-untyped-def]
+def _mean(y: Array, axis: int, coefficients: Array) -> Any:
     """Mean of one coordinate of y (in standard units), given those before it."""
     total, at = coefficients[axis, 0], 1
     for a in range(axis):
@@ -42,14 +42,14 @@ def _mean(y, axis, coefficients):  # type: ignore[no-untyped-def]
 
 
 @_njit
-def _bent(v, width, coefficients, y):  # type: ignore[no-untyped-def]
+def _bent(v: Array, width: Array, coefficients: Array, y: Array) -> None:
     for i in range(len(v)):
         for j in range(v.shape[1]):
             y[i, j] = width[j] * v[i, j] + _mean(y[i], j, coefficients)
 
 
 @_njit
-def _straight(y, width, coefficients, v):  # type: ignore[no-untyped-def]
+def _straight(y: Array, width: Array, coefficients: Array, v: Array) -> None:
     for i in range(len(y)):
         for j in range(y.shape[1]):
             v[i, j] = (y[i, j] - _mean(y[i], j, coefficients)) / width[j]

@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from actuator_glue.jit import njit
+from actuator_glue.records import Array
 
 
 @njit
-def distinct(uniforms, first, count, size, indices):  # type: ignore[no-untyped-def]
+def distinct(
+    uniforms: Array, first: int, count: int, size: int, indices: NDArray[np.int64]
+) -> None:
     """Write an ordered sample of range(size) without replacement into indices[0, :count].
 
     A Fisher-Yates shuffle of which only the first entries are made: position indices[1, m] holds
@@ -29,7 +35,7 @@ def distinct(uniforms, first, count, size, indices):  # type: ignore[no-untyped-
 
 
 @njit
-def choose(uniform, cumulative):  # type: ignore[no-untyped-def]
+def choose(uniform: float, cumulative: Array) -> int:
     """Return the class that a uniform falls into, given cumulative probabilities."""
     k = 0
     while k < cumulative.size - 1 and uniform >= cumulative[k]:
@@ -38,7 +44,7 @@ def choose(uniform, cumulative):  # type: ignore[no-untyped-def]
 
 
 @njit
-def normal_pair(u1, u2):  # type: ignore[no-untyped-def]
+def normal_pair(u1: float, u2: float) -> tuple[float, float]:
     """Return two independent standard normal numbers (Box and Muller)."""
     radius = math.sqrt(-2.0 * math.log1p(-u1))
     return radius * math.cos(2.0 * math.pi * u2), radius * math.sin(2.0 * math.pi * u2)

@@ -14,12 +14,13 @@ import numpy as np
 from actuator_glue.inference.moves import U_FREE
 from actuator_glue.inference.moves.draw import normal_pair
 from actuator_glue.jit import njit
+from actuator_glue.records import Array
 
 DEGREES = 8.0
 
 
 @njit(fastmath=False)
-def fit(points, centre, factor):  # type: ignore[no-untyped-def]
+def fit(points: Array, centre: Array, factor: Array) -> None:
     """Write centre (p,) and lower Cholesky factor (p, p) of the covariance of points (m, p).
 
     The covariance is shrunk towards its diagonal as far as few points need it.
@@ -54,7 +55,7 @@ def fit(points, centre, factor):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _distance2(z, centre, factor, residual):  # type: ignore[no-untyped-def]
+def _distance2(z: Array, centre: Array, factor: Array, residual: Array) -> float:
     """Squared Mahalanobis distance of z from the centre; residual is scratch (p,)."""
     distance2 = 0.0
     for j in range(z.size):
@@ -67,7 +68,7 @@ def _distance2(z, centre, factor, residual):  # type: ignore[no-untyped-def]
 
 
 @njit
-def log_density(z, centre, factor):  # type: ignore[no-untyped-def]
+def log_density(z: Array, centre: Array, factor: Array) -> Array:
     """Log density (m,) of the fitted Student t at points z (m, p), less a constant."""
     values = np.empty(z.shape[0])
     residual = np.empty(z.shape[1])
@@ -78,7 +79,7 @@ def log_density(z, centre, factor):  # type: ignore[no-untyped-def]
 
 
 @njit
-def draw(uniforms, first, centre, factor, candidate):  # type: ignore[no-untyped-def]
+def draw(uniforms: Array, first: int, centre: Array, factor: Array, candidate: Array) -> None:
     """Write one draw of the fitted Student t into candidate, from uniforms[first:]."""
     d = centre.size
     # Chi-squared with eight degrees of freedom: four exponentials.
@@ -97,7 +98,7 @@ def draw(uniforms, first, centre, factor, candidate):  # type: ignore[no-untyped
 
 
 @njit
-def draw_all(uniforms, centre, factor):  # type: ignore[no-untyped-def]
+def draw_all(uniforms: Array, centre: Array, factor: Array) -> Array:
     """Return draws (m, p) of the fitted Student t from uniforms (m, p + 5)."""
     points = np.empty((len(uniforms), len(centre)))
     for i in range(len(uniforms)):
@@ -106,7 +107,9 @@ def draw_all(uniforms, centre, factor):  # type: ignore[no-untyped-def]
 
 
 @njit
-def propose(z, uniforms, centre, factor, residual, candidate):  # type: ignore[no-untyped-def]
+def propose(
+    z: Array, uniforms: Array, centre: Array, factor: Array, residual: Array, candidate: Array
+) -> float:
     """Write a candidate that does not depend on z, return the log Hastings correction.
 
     residual is scratch (p,).

@@ -4,26 +4,30 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from actuator_glue.inference.moves import U_FREE
 from actuator_glue.inference.moves.draw import choose, distinct
 from actuator_glue.jit import njit
+from actuator_glue.records import Array
 
 
 @njit
-def propose(  # type: ignore[no-untyped-def]
-    z,
-    uniforms,
-    rows,
-    size,
-    scale,
-    crossover_cdf,
-    pairs,
-    unit_jump,
-    jitter,
-    noise,
-    indices,
-    candidate,
-):
+def propose(
+    z: Array,
+    uniforms: Array,
+    rows: Array,
+    size: int,
+    scale: Array,
+    crossover_cdf: Array,
+    pairs: int,
+    unit_jump: float,
+    jitter: float,
+    noise: float,
+    indices: NDArray[np.int64],
+    candidate: Array,
+) -> int:
     """Write a candidate, return the crossover class used (-1: unit jump, all coordinates).
 
     candidate = z + (1 + lambda) gamma sum_k (a_k - b_k) + epsilon over the d* coordinates that

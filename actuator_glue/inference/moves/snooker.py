@@ -4,13 +4,20 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from actuator_glue.inference.moves import U_FREE
 from actuator_glue.inference.moves.draw import distinct
 from actuator_glue.jit import njit
+from actuator_glue.records import Array
 
 
 @njit
-def propose(z, uniforms, rows, size, scale, indices, candidate):  # type: ignore[no-untyped-def]
+def propose(
+    z: Array, uniforms: Array, rows: Array, size: int, scale: Array, indices: NDArray[np.int64],
+    candidate: Array,
+) -> float:  # fmt: skip
     """Write a candidate on the line from an archive point through z, return log correction.
 
     candidate = z + gamma (P(b) - P(c)), gamma ~ U(1.2, 2.2), with P the orthogonal projection on

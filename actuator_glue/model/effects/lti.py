@@ -22,6 +22,7 @@ from functools import partial
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from actuator_glue.jit import njit
 from actuator_glue.model.effects import transition
@@ -58,7 +59,7 @@ _strict: Any = partial(njit, fastmath=False)
 
 
 @_strict
-def _system(t, k, a, b, row, force):  # type: ignore[no-untyped-def]
+def _system(t: Array, k: float, a: Array, b: Array, row: NDArray[np.int64], force: Array) -> None:
     """Fill the system a (6, 6), its input b (6,) and force row (6,) of parameters t, in NAMES.
 
     row (6,) is the state each place of the table holds; -1 where an effect needs none.
@@ -92,7 +93,9 @@ def _system(t, k, a, b, row, force):  # type: ignore[no-untyped-def]
 
 
 @_strict
-def _fill(values, k, period, linear, start, tables):  # type: ignore[no-untyped-def]
+def _fill(
+    values: Array, k: float, period: float, linear: bool, start: tuple[float, float], tables: Array
+) -> None:
     """Fill tables (blocks, SIZE) of parameter sets values (m, len(NAMES))."""
     a, b, force = np.empty((STATES, STATES)), np.empty(STATES), np.empty(STATES)
     row = np.empty(STATES, np.int64)
@@ -186,29 +189,29 @@ def tables(
 
 
 @njit(inline='always')
-def _row2(w, r, n, s, t):  # type: ignore[no-untyped-def]
+def _row2(w: Array, r: int, n: int, s: int, t: int) -> Any:
     """Part of the next state r that comes from the states s and t."""
     into = w[_PHI + (STATES * r + s) * LANES + n] * w[_STATE + s * LANES + n]
     return into + w[_PHI + (STATES * r + t) * LANES + n] * w[_STATE + t * LANES + n]
 
 
 @njit(inline='always')
-def _row6(w, r, n):  # type: ignore[no-untyped-def]
+def _row6(w: Array, r: int, n: int) -> Any:
     return _row2(w, r, n, 0, 1) + _row2(w, r, n, 2, 3) + _row2(w, r, n, 4, 5)
 
 
 @njit(inline='always')
-def _row4(w, r, n):  # type: ignore[no-untyped-def]
+def _row4(w: Array, r: int, n: int) -> Any:
     return _row2(w, r, n, 0, 1) + _row2(w, r, n, 2, 3)
 
 
 @njit(inline='always')
-def _one(w, r, n, s):  # type: ignore[no-untyped-def]
+def _one(w: Array, r: int, n: int, s: int) -> Any:
     return w[_PHI + (STATES * r + s) * LANES + n] * w[_STATE + s * LANES + n]
 
 
 @njit(inline='always')
-def _in(w, r, n, delayed, u1, u2):  # type: ignore[no-untyped-def]
+def _in(w: Array, r: int, n: int, delayed: bool, u1: float, u2: float) -> Any:
     """Part of the next state r that comes from the command."""
     start = _IN + 3 * r * LANES + n
     if delayed:
@@ -220,7 +223,7 @@ def _in(w, r, n, delayed, u1, u2):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _first_taps(w, u, at, whole):  # type: ignore[no-untyped-def]
+def _first_taps(w: Array, u: Array, at: int, whole: NDArray[np.int64]) -> None:
     """Fill the whole samples of delay, and the delayed command as before the step from `at`."""
     for n in range(LANES):
         whole[n] = int(w[_WHOLE + n])
@@ -229,7 +232,7 @@ def _first_taps(w, u, at, whole):  # type: ignore[no-untyped-def]
 
 
 @njit
-def _shift(w, u, after, whole):  # type: ignore[no-untyped-def]
+def _shift(w: Array, u: Array, after: int, whole: NDArray[np.int64]) -> None:
     """Move the delayed command on by one sample, to the one that ends the step at `after`."""
     last = u.shape[0] - 1
     for n in range(LANES):
@@ -240,7 +243,7 @@ def _shift(w, u, after, whole):  # type: ignore[no-untyped-def]
 
 
 @njit(inline='always')
-def _step3(w, r, delayed, u1, u2):  # type: ignore[no-untyped-def]
+def _step3(w: Array, r: int, delayed: bool, u1: float, u2: float) -> None:
     """Move x, q and the state r, which they feel, on by one sample."""
     for n in range(LANES):
         x = _row2(w, 0, n, 0, 1) + _one(w, 0, n, r) + _in(w, 0, n, delayed, u1, u2)
@@ -251,7 +254,10 @@ def _step3(w, r, delayed, u1, u2):  # type: ignore[no-untyped-def]
 
 
 @njit(nogil=True)
-def advance(table, third, delayed, u, offset, begin, displacement, force):  # type: ignore[no-untyped-def]
+def advance(
+    table: Array, third: int, delayed: bool, u: Array, offset: int, begin: int,
+    displacement: Array, force: Array,
+) -> None:  # fmt: skip
     """Write the recorded displacement at samples begin, begin+1, ... and carry the state on.
 
     Args:

@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from actuator_glue.jit import njit
+from actuator_glue.records import Array
 
 # The transition matrix is found by its Taylor series, halved until its norm is below this.
 _NORM: Final = 0.25
@@ -17,7 +18,9 @@ _strict: Any = partial(njit, fastmath=False)
 
 
 @_strict
-def fill(a, b, scale, t, phi, first, second):  # type: ignore[no-untyped-def]
+def fill(
+    a: Array, b: Array, scale: Array, t: float, phi: Array, first: Array, second: Array
+) -> None:
     """Fill exp(A t), its integral times b, and its double integral times b, for p states.
 
     scale (p,) brings the states to like size.
@@ -56,7 +59,7 @@ def fill(a, b, scale, t, phi, first, second):  # type: ignore[no-untyped-def]
 
 
 @_strict
-def _times(left, right, n, factor):  # type: ignore[no-untyped-def]
+def _times(left: Array, right: Array, n: int, factor: float) -> Array:
     out = np.zeros((n, n))
     for i in range(n):
         for j in range(n):

@@ -116,7 +116,8 @@ def _diagnoses(results: Results) -> list[Block]:
 
 def _by_test(tests: tuple[int, ...], values: tuple[float, ...]) -> tuple[str, str]:
     found = dict(zip(tests, values, strict=True))
-    return tuple(num(1e6 * found[t], 3) if t in found else '–' for t in (0, 1))  # type: ignore[return-value]
+    first, second = (num(1e6 * found[t], 3) if t in found else '–' for t in (0, 1))
+    return first, second
 
 
 def _removed(before: float, after: float) -> float:
