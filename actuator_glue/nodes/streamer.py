@@ -53,13 +53,16 @@ class Streamer(base.SuiteNode):
             self._samples_out = made
         return made
 
+    @property
+    def subscribers(self) -> int:
+        """How many our publisher has met: others on the topic would not get the first samples."""
+        return int(self._samples_out.get_subscription_count())
+
     def ready(self) -> bool:
         """Whether everybody who was waited for listens and the clock has begun."""
-        # Those that our publisher has met: others on the topic would not get the first samples.
-        listening = self._samples_out.get_subscription_count()
         # Simulated time is 0 until the first /clock: such stamps would jump with it.
         clock_runs = not self.stamps_now or self.get_clock().now().nanoseconds > 0
-        return bool(listening >= self.parameters['wait_for'] and clock_runs)
+        return bool(self.subscribers >= self.parameters['wait_for'] and clock_runs)
 
     def do_activate(self) -> None:
         """Begin the stream."""
@@ -73,7 +76,9 @@ class Streamer(base.SuiteNode):
             self.pacer.stop()
 
     def do_report(self) -> None:
-        """Rate and lateness."""
+        """Rate, lateness and who listens."""
+        if self.active:
+            self.health.values['subscribers'] = self.subscribers
         if self.pacer is not None:
             self.health.values.update(
                 {

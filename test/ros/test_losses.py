@@ -38,9 +38,7 @@ def test_a_stream_does_not_leave_before_it_is_taken(start, probe, tmp_path):
     bridge = start(
         'lab_bridge', file=str(file), specimen_stiffness=1e5, speed=0.0, wait_for=2, block=size
     )
-    for node in 'recorder', 'lab_bridge':
-        probe.until(lambda node=node: probe.value(node, 'state') == 'active', 60, node)
-    probe.for_a_while(1.0)
+    probe.until(lambda: probe.number('lab_bridge', 'subscribers') == 1, 60, 'recorder met')
     recorder.process.send_signal(signal.SIGSTOP)
     heard = []
     probe.create_subscription(SampleBlock, 'samples', heard.append, SAMPLES.qos, raw=True)
