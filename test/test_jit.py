@@ -59,3 +59,19 @@ def test_a_changed_callee_is_compiled_again(tmp_path: Path) -> None:
         found.append(float(done.stdout))
     assert found == [10.0, 20.0, 20.0]
     assert len(list((package / '__pycache__').glob('compiled-*'))) == 2
+
+
+def test_links_lead_to_the_same_compiled_code(tmp_path: Path) -> None:
+    """What `make demo` compiled the command line finds afterwards, workspace or not."""
+    (tmp_path / 'actuator_glue').symlink_to(Path(__file__).parents[1] / 'actuator_glue')
+    work = (
+        'import actuator_glue; from actuator_glue.model import kernel; '
+        'print(actuator_glue.__file__, kernel.systems.py_func.__code__.co_filename)'
+    )
+    done = subprocess.run(
+        [sys.executable, '-c', work],
+        cwd=tmp_path, check=True, capture_output=True, text=True, timeout=300,
+    )  # fmt: skip
+    package, kernel = map(Path, done.stdout.split())
+    assert package.parent == tmp_path / 'actuator_glue'
+    assert kernel == kernel.resolve() != package.parent / 'model' / 'kernel.py'
