@@ -27,13 +27,14 @@ def _column(values: ArrayLike, name: str, unit: str, limit: float, source: str) 
         raise InputError(f'{where}{name} is not a list of numbers ({error})') from error
     if column.ndim != 1:
         raise InputError(f'{where}{name} must be one-dimensional, got shape {column.shape}')
-    bad = ~np.isfinite(column)
-    if bad.any():
-        raise InputError(
-            f'{where}{name} has {int(bad.sum())} NaN or infinite samples, the first at sample '
-            f'{int(bad.argmax())}; cut or repair the record before that sample'
-        )
-    if column.size and float(np.abs(column).max()) > limit:
+    # One pass where all is well: a NaN fails the comparison as well.
+    if column.size and not np.abs(column).max() <= limit:
+        bad = ~np.isfinite(column)
+        if bad.any():
+            raise InputError(
+                f'{where}{name} has {int(bad.sum())} NaN or infinite samples, the first at sample '
+                f'{int(bad.argmax())}; cut or repair the record before that sample'
+            )
         at = int(np.abs(column).argmax())
         raise InputError(
             f'{where}{name} reaches {column[at]:g} {unit} at sample {at}, beyond '
