@@ -25,6 +25,8 @@ def public(tree: ast.Module) -> Iterator[tuple[str, ast.AST]]:
     for node in tree.body:
         if not isinstance(node, kinds) or node.name.startswith('_'):
             continue
+        if any(isinstance(d, ast.Name) and d.id == 'overload' for d in node.decorator_list):
+            continue  # a signature of the function that follows and has the docstring
         yield node.name, node
         if isinstance(node, ast.ClassDef):
             for member in node.body:
