@@ -14,7 +14,8 @@ from actuator_glue.errors import InputError
 if TYPE_CHECKING:
     from actuator_glue.io.bag_reader import Summary
     from actuator_glue.online.job import WindowResult
-    from actuator_glue.online.replay import Comparison, Item, Published
+    from actuator_glue.online.published import Comparison, Published
+    from actuator_glue.online.replay import Item
     from actuator_glue.online.settings import EstimatorSettings
 
 INPUTS = ('SampleBlock', 'TestSetup')
@@ -49,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
         InputError: the bag or a setting cannot be used.
     """
     from actuator_glue.io.bag_reader import is_bag, summarise
-    from actuator_glue.online.replay import published
+    from actuator_glue.online.published import published
 
     live: Published | None = None
     asked = {n: v for n in OVERRIDES if (v := getattr(args, n)) is not None}
@@ -153,7 +154,8 @@ def _replay(
 ) -> tuple[list[dict[str, Any]], list[str], Comparison | None, float]:
     """Return what is told of each window, what happened besides, the verdict, seconds of data."""
     from actuator_glue.online.job import WindowResult
-    from actuator_glue.online.replay import compare, replay
+    from actuator_glue.online.published import compare
+    from actuator_glue.online.replay import replay
     from actuator_glue.online.stream import Block
     from actuator_glue.workers.reports import Reports
 

@@ -14,7 +14,8 @@ from actuator_glue.demo.bag import Content
 from actuator_glue.demo.diagnosis import verdict
 from actuator_glue.io.bag_reader import decoded
 from actuator_glue.online.job import WindowResult
-from actuator_glue.online.replay import Comparison, compare, items, published, replay
+from actuator_glue.online.published import Comparison, compare, published
+from actuator_glue.online.replay import items, replay
 from actuator_glue.residual.diagnosis import Diagnosis
 from actuator_glue.workers.reports import Reports
 

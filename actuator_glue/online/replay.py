@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any, TypeAlias
 
 from actuator_glue.errors import InputError
@@ -123,54 +123,6 @@ def stream(record: Record, block: int = 64) -> Iterator[Item]:
         )
 
 
-@dataclass(slots=True)
-class Published:
-    """What a live estimator put into a bag.
-
-    Attributes:
-        settings: its settings; None where the bag has no EstimatorSetup.
-        models: model from each window number on.
-        posteriors: PosteriorMoments by window number.
-        scored: scored PredictionBands by window number, index and kind.
-    """
-
-    settings: EstimatorSettings | None = None
-    models: list[tuple[int, ModelChoice]] = field(default_factory=list)
-    posteriors: dict[int, Any] = field(default_factory=dict)
-    scored: dict[tuple[int, int, str], Any] = field(default_factory=dict)
-
-    def schedule(self) -> Schedule | None:
-        """What was dropped and stopped early; None where nothing was published."""
-        if not self.posteriors:
-            return None
-        done = {}
-        for number, message in self.posteriors.items():
-            last = wire.stamp_ns(message)
-            start = last - round((message.samples - 1) * message.period * 1e9)
-            done[int(message.index), start] = (number, int(message.evaluations))
-        return Schedule(done, tuple(sorted(self.models, key=lambda m: m[0])))
-
-
-def published(messages: Iterable[Named]) -> Published:
-    """Collect what a live estimator published from (type name, message) pairs.
-
-    Raises:
-        InputError: settings that cannot be read.
-    """
-    found = Published()
-    for name, message in messages:
-        kind = name.rpartition('/')[2]
-        if kind == 'EstimatorSetup':
-            found.settings = wire.estimator_settings(message)
-            found.models.append((int(message.window), wire.model_choice(message)))
-        elif kind == 'PosteriorMoments':
-            found.posteriors[int(message.window)] = message
-        elif kind == 'PredictionBand' and message.scored:
-            key = (int(message.window), int(message.index), str(message.kind))
-            found.scored[key] = message
-    return found
-
-
 def items(messages: Iterable[Named], rejected: list[Rejected] | None = None) -> Iterator[Item]:
     """Yield what a live estimator received from (type name, message) pairs, in their order.
 
@@ -190,66 +142,3 @@ def items(messages: Iterable[Named], rejected: list[Rejected] | None = None) -> 
             except InputError as error:
                 if rejected is not None:
                     rejected.append(Rejected(str(error)))
-
-
-@dataclass(slots=True)
-class Comparison:
-    """Replayed numbers held against the published ones, bit by bit.
-
-    Attributes:
-        windows: posteriors compared.
-        bands: scored bands compared.
-        differing: one line per window or band that differs or is missing.
-    """
-
-    windows: int = 0
-    bands: int = 0
-    differing: list[str] = field(default_factory=list)
-
-    @property
-    def identical(self) -> bool:
-        """Everything was there and equal, and there was something to compare."""
-        return self.windows > 0 and not self.differing
-
-
-def compare(results: Iterable[WindowResult], live: Published) -> Comparison:
-    """Hold replayed results against what was published live."""
-    found = Comparison()
-    seen: set[int] = set()
-    for result in results:
-        number = result.window.number
-        message = live.posteriors.get(number)
-        seen.add(number)
-        if message is None:
-            found.differing.append(f'window {number}: not published live')
-            continue
-        found.windows += 1
-        names = wire.differences(wire.posterior(result, float('nan'))[1], message)
-        if names:
-            found.differing.append(f'window {number}: posterior differs in {", ".join(names)}')
-        for prediction in result.scored:
-            key = (prediction.number, prediction.index, prediction.kind)
-            if key not in live.scored:
-                found.differing.append(f'window {number}: band {key} was not published live')
-                continue
-            found.bands += 1
-            fields = wire.prediction(prediction, '')[1]
-            names = wire.differences(fields, live.scored[key])
-            if names:
-                found.differing.append(f'band {key} differs in {", ".join(names)}')
-    missing = sorted(set(live.posteriors) - seen)
-    found.differing += [f'window {number}: not reproduced' for number in missing]
-    return found
-
-
-__all__ = [
-    'Comparison',
-    'Item',
-    'Published',
-    'at_once',
-    'compare',
-    'items',
-    'published',
-    'replay',
-    'stream',
-]

@@ -6,7 +6,7 @@ Nothing here imports ROS: rclpy's messages and those read from a bag have the sa
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import asdict
 from typing import Any, NamedTuple
 
@@ -216,27 +216,6 @@ def response(result: WindowResult) -> tuple[Head, Fields]:
         'headline_delay': delay,
     }
     return Head(record.stamp_ns(len(record) - 1), record.actuator), fields
-
-
-def differences(fields: Mapping[str, Any], message: Any) -> list[str]:
-    """Return the names of the fields that a message holds otherwise, to the last bit.
-
-    `seconds` is not compared: it is how long the computer took.
-    """
-    return [
-        name
-        for name, value in fields.items()
-        if name != 'seconds' and not _same(value, getattr(message, name))
-    ]
-
-
-def _same(ours: Any, theirs: Any) -> bool:
-    if isinstance(ours, str | bool | int):
-        return bool(ours == theirs)
-    if isinstance(ours, list) and ours and isinstance(ours[0], str):
-        return list(ours) == list(theirs)
-    left, right = np.asarray(ours, np.float64), np.asarray(theirs, np.float64)
-    return left.shape == right.shape and left.tobytes() == right.tobytes()
 
 
 def _array(values: Iterable[float]) -> Array:

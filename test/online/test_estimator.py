@@ -12,6 +12,7 @@ from actuator_glue.online import wire
 from actuator_glue.online.estimator import Ahead, Estimator, Schedule
 from actuator_glue.online.fitting import choose_model
 from actuator_glue.online.job import WindowResult, run
+from actuator_glue.online.published import differences
 from actuator_glue.online.replay import replay, stream
 from actuator_glue.online.stream import Block, Dropped, Failed, Preview, Setup
 
@@ -34,7 +35,7 @@ def fields(result):
 def same(one, other):
     """Whether two results publish the same bits."""
     pairs = list(zip(fields(one), fields(other), strict=True))
-    return all(not wire.differences(a, Message(b)) for a, b in pairs)
+    return all(not differences(a, Message(b)) for a, b in pairs)
 
 
 class Message:
@@ -134,9 +135,7 @@ def test_a_preview_changes_no_posterior():
     whole = record(4.0)
     told = results([Preview(0, whole.period, whole.command), *stream(whole)])
     for one, other in zip(told, results(stream(whole)), strict=True):
-        assert not wire.differences(
-            wire.posterior(one, 0.0)[1], Message(wire.posterior(other, 0.0)[1])
-        )
+        assert not differences(wire.posterior(one, 0.0)[1], Message(wire.posterior(other, 0.0)[1]))
 
 
 def test_blocks_do_not_matter():

@@ -1,0 +1,158 @@
+"""What a live estimator put into a bag, and replayed numbers held against it, bit by bit."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Mapping
+from copy import copy
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from actuator_glue.online import wire
+from actuator_glue.online.estimator import Schedule
+from actuator_glue.online.job import WindowResult
+from actuator_glue.online.settings import EstimatorSettings, ModelChoice
+
+
+@dataclass(slots=True)
+class Published:
+    """What a live estimator put into a bag.
+
+    Attributes:
+        settings: its settings; None where the bag has no EstimatorSetup.
+        models: model from each window number on.
+        posteriors: PosteriorMoments by window number.
+        scored: scored PredictionBands by window number, index and kind, as `_brief` leaves
+            them: a long bag's bands do not fit into memory.
+    """
+
+    settings: EstimatorSettings | None = None
+    models: list[tuple[int, ModelChoice]] = field(default_factory=list)
+    posteriors: dict[int, Any] = field(default_factory=dict)
+    scored: dict[tuple[int, int, str], Any] = field(default_factory=dict)
+
+    def schedule(self) -> Schedule | None:
+        """What was dropped and stopped early; None where nothing was published."""
+        if not self.posteriors:
+            return None
+        done = {}
+        for number, message in self.posteriors.items():
+            last = wire.stamp_ns(message)
+            start = last - round((message.samples - 1) * message.period * 1e9)
+            done[int(message.index), start] = (number, int(message.evaluations))
+        return Schedule(done, tuple(sorted(self.models, key=lambda m: m[0])))
+
+
+def published(messages: Iterable[tuple[str, Any]]) -> Published:
+    """Collect what a live estimator published from (type name, message) pairs.
+
+    Raises:
+        InputError: settings that cannot be read.
+    """
+    found = Published()
+    for name, message in messages:
+        kind = name.rpartition('/')[2]
+        if kind == 'EstimatorSetup':
+            found.settings = wire.estimator_settings(message)
+            found.models.append((int(message.window), wire.model_choice(message)))
+        elif kind == 'PosteriorMoments':
+            found.posteriors[int(message.window)] = message
+        elif kind == 'PredictionBand' and message.scored:
+            key = (int(message.window), int(message.index), str(message.kind))
+            found.scored[key] = _brief(message)
+    return found
+
+
+@dataclass(slots=True)
+class Comparison:
+    """Replayed numbers held against the published ones, bit by bit.
+
+    Attributes:
+        windows: posteriors compared.
+        bands: scored bands compared.
+        differing: one line per window or band that differs or is missing.
+    """
+
+    windows: int = 0
+    bands: int = 0
+    differing: list[str] = field(default_factory=list)
+
+    @property
+    def identical(self) -> bool:
+        """Everything was there and equal, and there was something to compare."""
+        return self.windows > 0 and not self.differing
+
+
+def compare(results: Iterable[WindowResult], live: Published) -> Comparison:
+    """Hold replayed results against what was published live."""
+    found = Comparison()
+    seen: set[int] = set()
+    for result in results:
+        number = result.window.number
+        message = live.posteriors.get(number)
+        seen.add(number)
+        if message is None:
+            found.differing.append(f'window {number}: not published live')
+            continue
+        found.windows += 1
+        names = differences(wire.posterior(result, float('nan'))[1], message)
+        if names:
+            found.differing.append(f'window {number}: posterior differs in {", ".join(names)}')
+        for prediction in result.scored:
+            key = (prediction.number, prediction.index, prediction.kind)
+            if key not in live.scored:
+                found.differing.append(f'window {number}: band {key} was not published live')
+                continue
+            found.bands += 1
+            fields = wire.prediction(prediction, '')[1]
+            names = differences(fields, live.scored[key])
+            if names:
+                found.differing.append(f'band {key} differs in {", ".join(names)}')
+    missing = sorted(set(live.posteriors) - seen)
+    found.differing += [f'window {number}: not reproduced' for number in missing]
+    return found
+
+
+class _Digest(NamedTuple):
+    """Stands for an array of numbers where only equality is asked for."""
+
+    shape: tuple[int, ...]
+    code: bytes
+
+
+def _digest(values: Any) -> _Digest:
+    numbers = np.asarray(values, np.float64)
+    return _Digest(numbers.shape, hashlib.blake2b(numbers.tobytes(), digest_size=16).digest())
+
+
+def _brief(band: Any) -> Any:
+    """Return a PredictionBand whose limits are digests: what `differences` needs, and small."""
+    small = copy(band)
+    for name in ('lower', 'median', 'upper'):
+        setattr(small, name, _digest(getattr(band, name)))
+    return small
+
+
+def differences(fields: Mapping[str, Any], message: Any) -> list[str]:
+    """Return the names of the fields that a message holds otherwise, to the last bit.
+
+    `seconds` is not compared: it is how long the computer took.
+    """
+    return [
+        name
+        for name, value in fields.items()
+        if name != 'seconds' and not _same(value, getattr(message, name))
+    ]
+
+
+def _same(ours: Any, theirs: Any) -> bool:
+    if isinstance(theirs, _Digest):
+        return _digest(ours) == theirs
+    if isinstance(ours, str | bool | int):
+        return bool(ours == theirs)
+    if isinstance(ours, list) and ours and isinstance(ours[0], str):
+        return list(ours) == list(theirs)
+    left, right = np.asarray(ours, np.float64), np.asarray(theirs, np.float64)
+    return left.shape == right.shape and left.tobytes() == right.tobytes()
