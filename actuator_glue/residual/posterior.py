@@ -13,18 +13,21 @@ from actuator_glue.records import Array
 from actuator_glue.residual.data import Data, Model
 from actuator_glue.residual.fit import Fit, Space
 from actuator_glue.residual.score import Scorer
+from actuator_glue.residual.straight import coordinates
 
 _P = len(BASE)
-_REACH = 8.0  # prior half width in standard deviations of the Laplace approximation
+_REACH = 8.0  # half width of the sampled box in standard deviations of the Laplace approximation
 
 
-def laplace(data: Data, scorer: Scorer, fit: Fit) -> tuple[Array, float]:
-    """Covariance of the working coordinates at the best fit and the noise inflation.
+def laplace(scorer: Scorer, fit: Fit, slopes: Array) -> tuple[Array, float]:
+    """Covariance (p, p) of coordinates at the best fit and the noise inflation.
+
+    `slopes` (p, p) are the derivatives of the working coordinates j with respect to these, i.
 
     The inflation is the mean square of the whitened error: where structure remains, every
     parameter is known less well than the noise alone says (Kennedy & O'Hagan 2001).
     """
-    jac = scorer.whiten(fit.jacobian)
+    jac = slopes @ scorer.whiten(fit.jacobian)
     error = scorer.whiten(fit.error)
     inflation = max(1.0, float(np.mean(error**2)))
     scale = np.sqrt(np.maximum(np.einsum('pn,pn->p', jac, jac), 1e-300))
@@ -81,29 +84,33 @@ def sample(
         progress: called with the share done.
     """
     space = Space(model, max(r.duration for r in data.records))
-    covariance, inflation = laplace(data, scorer, fit)
-    spread, correlation = _scaled(covariance, space.upper - space.lower)
-    spread[:_P] = np.minimum(spread[:_P], 1.0)
-    lower = np.maximum(space.lower, fit.z - _REACH * spread)
-    upper = np.minimum(space.upper, fit.z + _REACH * spread)
-    # A parameter at its bound or without curvature still needs room to move.
-    width = np.maximum(upper - lower, 1e-6 * (space.upper - space.lower))
-    lower, upper = np.maximum(space.lower, upper - width), np.minimum(space.upper, lower + width)
+    straight = coordinates(space, model, data, fit.z)
+    phi = straight.phi(fit.z)
+    covariance, inflation = laplace(scorer, fit, straight.slopes(phi))
+    spread, correlation = _scaled(covariance, straight.widest)
+    spread = np.minimum(spread, straight.widest)
+    lower, upper = straight.box(phi, _REACH * spread)
     values, vectors = np.linalg.eigh(correlation)
     root = spread[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
 
     def gaussian(count: int) -> Array:
-        z = fit.z + rng.standard_normal((count, len(fit.z))) @ root.T
-        inside = np.clip(z, lower + 1e-3 * width, upper - 1e-3 * width)
-        return np.asarray(inside)
+        drawn = phi + rng.standard_normal((count, len(phi))) @ root.T
+        margin = 1e-3 * (upper - lower)
+        drawn = np.clip(drawn, lower + margin, upper - margin)
+        # The fit itself is always inside.
+        return np.asarray(np.vstack([phi, drawn[np.isfinite(straight.theta(drawn)[1])]]))
 
     if evaluations <= 0:
-        return space.theta(gaussian(500))
+        return straight.theta(gaussian(500))[0]
 
-    def log_density(z: Array) -> Array:
-        error = scorer.whiten(data.target - data.simulate(model, space.theta(z)))
-        sums = np.einsum('mn,mn->m', error, error)
-        return np.where(np.isfinite(sums), -0.5 * sums / inflation, -np.inf)
+    def log_density(point: Array) -> Array:
+        theta, found = straight.theta(point)
+        inside = np.isfinite(found)
+        if inside.any():
+            error = scorer.whiten(data.target - data.simulate(model, theta[inside]))
+            sums = np.einsum('mn,mn->m', error, error)
+            found[inside] -= np.where(np.isfinite(sums), 0.5 * sums / inflation, np.inf)
+        return found
 
     settings = dream.Settings(chains=32, population=128, sweeps=2, adaptation=20)
     chains = dream.sample(
@@ -116,5 +123,4 @@ def sample(
         archive=gaussian(320),
         progress=lambda done, all_: progress(done / all_),
     )
-    draws = chains.draws[chains.burn :].reshape(-1, len(fit.z))
-    return space.theta(draws)
+    return straight.theta(chains.draws[chains.burn :].reshape(-1, len(phi)))[0]

@@ -1,0 +1,141 @@
+"""Coordinates in which the posterior around a fit is nearly normal.
+
+In the logarithms of Eq. (2)'s parameters the ridge that one stiffness leaves is bent, and a
+thousand times longer than wide: points around the fit lie off it, and chains creep. In those of
+`model.ridge_effects` it is straight. Records under several stiffnesses leave no such ridge: for
+them the working coordinates serve.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from actuator_glue.model import ridge, ridge_effects
+from actuator_glue.model.parameters import BASE
+from actuator_glue.records import Array
+from actuator_glue.residual.data import Data, Model
+from actuator_glue.residual.fit import Space
+
+_P = len(BASE)
+# A fit may lie on its bounds, which are rounded on the way to coordinates and back.
+_ROUNDING = 1e-9
+# How far from the fit the shares of a box can tell alpha_2 (whose cube counts) and, where no
+# specimen makes it act, alpha_3: what the records leave open by more is as good as unknown.
+_OIL_REACH, _LEAK_REACH = 2.5, 5.0  # logarithm
+
+
+def coordinates(space: Space, model: Model, data: Data, fit: Array) -> Working | Straight:
+    """Return what to sample in around the working coordinates (p,) of a fit."""
+    one = len({record.known_stiffness() for record in data.records}) == 1
+    return Straight(space, model, data, fit) if one else Working(space)
+
+
+class Working:
+    """The working coordinates themselves.
+
+    Attributes:
+        widest: spreads (p,) beyond which nothing is known.
+    """
+
+    def __init__(self, space: Space) -> None:
+        self._space = space
+        self.widest = space.upper - space.lower
+        self.widest[:_P] = 1.0
+
+    def phi(self, z: Array) -> Array:
+        """As `Straight.phi`."""
+        return z
+
+    def theta(self, phi: Array) -> tuple[Array, Array]:
+        """As `Straight.theta`."""
+        inside = ((phi >= self._space.lower) & (phi <= self._space.upper)).all(axis=1)
+        return self._space.theta(phi), np.where(inside, 0.0, -np.inf)
+
+    def slopes(self, phi: Array) -> Array:
+        """As `Straight.slopes`."""
+        return np.eye(len(phi))
+
+    def box(self, phi: Array, reach: Array) -> tuple[Array, Array]:
+        """As `Straight.box`; a parameter at its bound still has room to move."""
+        low, high = self._space.lower, self._space.upper
+        lower, upper = np.maximum(low, phi - reach), np.minimum(high, phi + reach)
+        width = np.maximum(upper - lower, 1e-6 * (high - low))
+        return np.maximum(low, upper - width), np.minimum(high, lower + width)
+
+
+class Straight:
+    """Maps working coordinates z of `Space` to straight ones phi and back.
+
+    Args:
+        space: the working coordinates; the prior is uniform within their bounds.
+        model: whose parameters they are.
+        data: records under one stiffness; the middle of the longest is used.
+        fit: working coordinates of the fit, (p,).
+
+    Attributes:
+        widest: spreads (p,) beyond which nothing is known.
+    """
+
+    def __init__(self, space: Space, model: Model, data: Data, fit: Array) -> None:
+        self._space = space
+        self._stiffness = data.records[0].known_stiffness()
+        self._middle = 0.5 * max(record.duration for record in data.records)
+        self._at = ridge_effects.columns([p.name for p in model.parameters])
+        reach = np.full(len(fit), np.inf)
+        reach[2] = _OIL_REACH
+        self._scores = [2]
+        if self._stiffness == 0.0:
+            reach[3] = _LEAK_REACH
+            self._scores = [2, 3]
+        low = space.theta(np.maximum(space.lower, fit - reach))
+        high = space.theta(np.minimum(space.upper, fit + reach))
+        margin = _ROUNDING * np.where(np.arange(len(fit)) < _P, low, high - low)
+        self._low, self._high = low - margin, high + margin
+        lower, upper = ridge_effects.bounds(self._at, self._stiffness, self._low, self._high)
+        # Logarithms and normal scores; what is known less well than this is not known.
+        self.widest = np.where(np.arange(len(fit)) < _P, 1.0, upper - lower)
+        if self._stiffness > 0.0:
+            self.widest[3] = self._high[3] * self._stiffness / (self._stiffness + self._low[2])
+
+    def phi(self, z: Array) -> Array:
+        """Straight coordinates (p,) of working ones (p,)."""
+        theta = self._space.theta(z)[None]
+        found = np.empty_like(theta)
+        ridge_effects.coordinates_all(
+            theta, self._stiffness, self._low, self._high, self._at, self._middle, found
+        )
+        return np.asarray(found[0])
+
+    def theta(self, phi: Array) -> tuple[Array, Array]:
+        """Physical parameters (m, p) and log prior density (m,) at straight coordinates (m, p).
+
+        The density is minus infinity outside the bounds, where the parameters mean nothing.
+        """
+        phi = np.ascontiguousarray(phi)
+        theta, log_prior = np.ones_like(phi), np.empty(len(phi))
+        ridge_effects.physical_all(
+            phi, self._stiffness, self._low, self._high, self._at, self._middle, theta, log_prior
+        )
+        # The Jacobian is that of a prior uniform in theta; ours is in its logarithm.
+        inside = np.isfinite(log_prior)
+        log_prior[inside] -= np.log(theta[inside, :_P]).sum(axis=1)
+        return theta, log_prior
+
+    def slopes(self, phi: Array) -> Array:
+        """Derivatives dz_j/dphi_i (p, p) at phi (p,): towards the side that is inside."""
+        sizes = np.where(
+            np.arange(len(phi)) < _P, 1.0, np.maximum(np.abs(phi), 1e-3 * self.widest)
+        )
+        steps = np.diag(1e-6 * sizes)
+        moved, log_prior = self.theta(np.concatenate([phi + steps, phi - steps]))
+        z = self._space.z(moved)
+        z[~np.isfinite(log_prior)] = self._space.z(self.theta(phi[None])[0])
+        inside = np.isfinite(log_prior).reshape(2, -1).sum(axis=0)
+        found = z[: len(phi)] - z[len(phi) :]
+        return np.asarray(found / (np.diag(steps) * np.maximum(inside, 1))[:, None])
+
+    def box(self, phi: Array, reach: Array) -> tuple[Array, Array]:
+        """Bounds (p,) and (p,): phi +- reach, and all of a score, which has little curvature."""
+        lower, upper = phi - reach, phi + reach
+        lower[self._scores], upper[self._scores] = -1.01 * ridge.EDGE, 1.01 * ridge.EDGE
+        return lower, upper
