@@ -13,6 +13,8 @@ from actuator_glue.residual.search import Search, Trial
 from actuator_glue.residual.settings import Settings
 
 Progress = Callable[[str, float], None]
+# Rounds in which members may be swapped for better or simpler ones.
+_SWAPS = 4
 
 
 @dataclass(frozen=True)
@@ -163,7 +165,7 @@ class Attributor:
 
     def settle(self, current: Trial) -> tuple[Trial, dict[str, tuple[Rival, ...]]]:
         """Swap members for better rivals until none is better; return rivals of each member."""
-        for _ in range(4):
+        for attempt in range(_SWAPS):
             rivals: dict[str, tuple[Rival, ...]] = {}
             best = current
             for name in current.effects:
@@ -177,7 +179,8 @@ class Attributor:
                     best = trials[0]
             if best is current:
                 best = self.simpler(current, rivals)
-            if best is current:
+            # The last members stay, so that the rivals told are theirs.
+            if best is current or attempt == _SWAPS - 1:
                 break
             current = best
         return current, rivals

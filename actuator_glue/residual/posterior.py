@@ -16,7 +16,8 @@ from actuator_glue.residual.score import Scorer
 from actuator_glue.residual.straight import coordinates
 
 _P = len(BASE)
-_REACH = 8.0  # half width of the sampled box in standard deviations of the Laplace approximation
+_REACH = 100.0  # of the sampled box, in standard deviations of the Laplace approximation
+_HALVINGS = 40  # bring any point of it inside the bounds of the prior
 
 
 def laplace(scorer: Scorer, fit: Fit, slopes: Array) -> tuple[Array, float]:
@@ -89,22 +90,27 @@ def sample(
     covariance, inflation = laplace(scorer, fit, straight.slopes(phi))
     spread, correlation = _scaled(covariance, straight.widest)
     spread = np.minimum(spread, straight.widest)
-    lower, upper = straight.box(phi, _REACH * spread)
     values, vectors = np.linalg.eigh(correlation)
     root = spread[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
 
+    def place(w: Array) -> tuple[Array, Array]:
+        """Parameters and log prior (m,) where the Laplace approximation is standard normal."""
+        return straight.theta(phi + w @ root.T)
+
     def gaussian(count: int) -> Array:
-        drawn = phi + rng.standard_normal((count, len(phi))) @ root.T
-        margin = 1e-3 * (upper - lower)
-        drawn = np.clip(drawn, lower + margin, upper - margin)
-        # The fit itself is always inside.
-        return np.asarray(np.vstack([phi, drawn[np.isfinite(straight.theta(drawn)[1])]]))
+        w = rng.standard_normal((count, len(phi)))
+        for _ in range(_HALVINGS):
+            outside = ~np.isfinite(place(w)[1])
+            if not outside.any():
+                break
+            w[outside] *= 0.5
+        return w
 
     if evaluations <= 0:
-        return straight.theta(gaussian(500))[0]
+        return place(gaussian(500))[0]
 
-    def log_density(point: Array) -> Array:
-        theta, found = straight.theta(point)
+    def log_density(w: Array) -> Array:
+        theta, found = place(w)
         inside = np.isfinite(found)
         if inside.any():
             error = scorer.whiten(data.target - data.simulate(model, theta[inside]))
@@ -112,15 +118,16 @@ def sample(
             found[inside] -= np.where(np.isfinite(sums), 0.5 * sums / inflation, np.inf)
         return found
 
+    box = np.full(len(phi), _REACH)
     settings = dream.Settings(chains=32, population=128, sweeps=2, adaptation=20)
     chains = dream.sample(
         rng,
         log_density,
-        lower,
-        upper,
+        -box,
+        box,
         evaluations=evaluations,
         settings=settings,
         archive=gaussian(320),
         progress=lambda done, all_: progress(done / all_),
     )
-    return straight.theta(chains.draws[chains.burn :].reshape(-1, len(phi)))[0]
+    return place(chains.draws[chains.burn :].reshape(-1, len(phi)))[0]

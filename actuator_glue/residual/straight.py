@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from actuator_glue.model import ridge, ridge_effects
+from actuator_glue.model import ridge_effects
 from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array
 from actuator_glue.residual.data import Data, Model
@@ -19,15 +19,20 @@ from actuator_glue.residual.fit import Space
 _P = len(BASE)
 # A fit may lie on its bounds, which are rounded on the way to coordinates and back.
 _ROUNDING = 1e-9
-# How far from the fit the shares of a box can tell alpha_2 (whose cube counts) and, where no
-# specimen makes it act, alpha_3: what the records leave open by more is as good as unknown.
-_OIL_REACH, _LEAK_REACH = 2.5, 5.0  # logarithm
+# How far from the fit the shares of a box can tell alpha_2, whose cube counts, or square and, too,
+# alpha_3 where no specimen makes it act: what the records leave open by more is not known.
+_HELD_REACH, _FREE_REACH = 2.5, 3.8  # logarithm
 
 
 def coordinates(space: Space, model: Model, data: Data, fit: Array) -> Working | Straight:
     """Return what to sample in around the working coordinates (p,) of a fit."""
-    one = len({record.known_stiffness() for record in data.records}) == 1
-    return Straight(space, model, data, fit) if one else Working(space)
+    if len({record.known_stiffness() for record in data.records}) == 1:
+        straight = Straight(space, model, data, fit)
+        back, log_prior = straight.theta(straight.phi(fit)[None])
+        # A fit in a corner of its bounds may have no place there.
+        if np.isfinite(log_prior[0]) and np.allclose(back[0], space.theta(fit), rtol=1e-3):
+            return straight
+    return Working(space)
 
 
 class Working:
@@ -55,13 +60,6 @@ class Working:
         """As `Straight.slopes`."""
         return np.eye(len(phi))
 
-    def box(self, phi: Array, reach: Array) -> tuple[Array, Array]:
-        """As `Straight.box`; a parameter at its bound still has room to move."""
-        low, high = self._space.lower, self._space.upper
-        lower, upper = np.maximum(low, phi - reach), np.minimum(high, phi + reach)
-        width = np.maximum(upper - lower, 1e-6 * (high - low))
-        return np.maximum(low, upper - width), np.minimum(high, lower + width)
-
 
 class Straight:
     """Maps working coordinates z of `Space` to straight ones phi and back.
@@ -82,11 +80,9 @@ class Straight:
         self._middle = 0.5 * max(record.duration for record in data.records)
         self._at = ridge_effects.columns([p.name for p in model.parameters])
         reach = np.full(len(fit), np.inf)
-        reach[2] = _OIL_REACH
-        self._scores = [2]
+        reach[2] = _HELD_REACH
         if self._stiffness == 0.0:
-            reach[3] = _LEAK_REACH
-            self._scores = [2, 3]
+            reach[2:4] = _FREE_REACH
         low = space.theta(np.maximum(space.lower, fit - reach))
         high = space.theta(np.minimum(space.upper, fit + reach))
         margin = _ROUNDING * np.where(np.arange(len(fit)) < _P, low, high - low)
@@ -133,9 +129,3 @@ class Straight:
         inside = np.isfinite(log_prior).reshape(2, -1).sum(axis=0)
         found = z[: len(phi)] - z[len(phi) :]
         return np.asarray(found / (np.diag(steps) * np.maximum(inside, 1))[:, None])
-
-    def box(self, phi: Array, reach: Array) -> tuple[Array, Array]:
-        """Bounds (p,) and (p,): phi +- reach, and all of a score, which has little curvature."""
-        lower, upper = phi - reach, phi + reach
-        lower[self._scores], upper[self._scores] = -1.01 * ridge.EDGE, 1.01 * ridge.EDGE
-        return lower, upper
