@@ -19,6 +19,8 @@ _EXPERIMENT = {
     'gain': 'a second specimen stiffness, and a static step',
     'flow-time': 'a down-sweep: time and frequency then run against each other',
 }
+# Above this a posterior's spread may be off by a tenth and more.
+_CONVERGED = 1.2
 _OTHERWISE = 'a second amplitude, a down-sweep or a record with another specimen stiffness'
 
 
@@ -106,3 +108,13 @@ def unidentified(data: Data, estimates: dict[str, Estimate]) -> tuple[str, ...]:
         else ''
     )
     return (f'not identified by these records, their spread is that of the bounds: {names}{more}',)
+
+
+def unconverged(rhat: float) -> tuple[str, ...]:
+    """Say so where the chains of the posterior have not met; NaN says nothing."""
+    if not rhat > _CONVERGED:
+        return ()
+    return (
+        f'the chains of the posterior have not met (R-hat {rhat:.2f}): its spreads are rough, its '
+        'names and errors do not depend on them',
+    )

@@ -69,7 +69,7 @@ def diagnose(
         if sides and not decision.final.effects:
             sides.append(sides[0])
             break
-        draws = posterior.sample(
+        draws, rhat = posterior.sample(
             data,
             trial.model,
             trial.fit,
@@ -96,12 +96,14 @@ def diagnose(
         advice=(
             *advice.of(decision, found, result.generic, stretches),
             *advice.unidentified(data, estimates),
+            *advice.unconverged(rhat),
             *prepared.notes,
         ),
         base={p.name: estimates[p.name] for p in BASE},
         structure=decision.final.effects,
         names=tuple(p.name for p in after.model.parameters),
         posterior=after.draws,
+        rhat=rhat,
         best=after.theta,
         traces=(
             *traces(prepared.fit, False, curves),

@@ -254,6 +254,7 @@ class Diagnosis:
         structure: effect names of the augmented model (input of `Structure`).
         names: parameter names of the columns of `posterior`.
         posterior: draws of base and effect parameters, shape (m, p).
+        rhat: largest R-hat of the draws; NaN where they are of the Laplace approximation.
         best: best-fit parameters, shape (p,).
         traces: curves for the report.
         surrogate: a generic regression of equal flexibility and what it leaves out of sample.
@@ -272,6 +273,7 @@ class Diagnosis:
     structure: tuple[str, ...]
     names: tuple[str, ...]
     posterior: Array
+    rhat: float
     best: Array
     traces: tuple[Trace, ...]
     surrogate: Json
@@ -290,6 +292,7 @@ class Diagnosis:
             'coverage': {'before': number(self.coverage[0]), 'after': number(self.coverage[1])},
             'alarm': self.alarm.to_json(),
             'base': {name: p.to_json() for name, p in self.base.items()},
+            'rhat': number(self.rhat),
             'structure': list(self.structure),
             'surrogate': self.surrogate,
             'remaining': self.remaining,

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.inference import dream
+from actuator_glue.inference.convergence import rhat
 from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array
 from actuator_glue.residual.data import Data, Model
@@ -72,8 +74,8 @@ def sample(
     rng: np.random.Generator,
     evaluations: int,
     progress: Callable[[float], None],
-) -> Array:
-    """Draw (m, p) from the posterior, physical units.
+) -> tuple[Array, float]:
+    """Draw (m, p) from the posterior, physical units; return the largest R-hat with the draws.
 
     Args:
         data: the fitting part.
@@ -81,7 +83,8 @@ def sample(
         fit: its best fit.
         scorer: whitening filters of the noise.
         rng: random numbers.
-        evaluations: likelihood evaluations; 0 returns draws of the Laplace approximation.
+        evaluations: likelihood evaluations; 0 returns draws of the Laplace approximation, and
+            not-a-number for R-hat.
         progress: called with the share done.
     """
     space = Space(model, max(r.duration for r in data.records))
@@ -107,7 +110,7 @@ def sample(
         return w
 
     if evaluations <= 0:
-        return place(gaussian(500))[0]
+        return place(gaussian(500))[0], math.nan
 
     def log_density(w: Array) -> Array:
         theta, found = place(w)
@@ -130,4 +133,5 @@ def sample(
         archive=gaussian(320),
         progress=lambda done, all_: progress(done / all_),
     )
-    return place(chains.draws[chains.burn :].reshape(-1, len(phi)))[0]
+    kept = chains.draws[chains.burn :]
+    return place(kept.reshape(-1, len(phi)))[0], float(rhat(kept).max())

@@ -5,6 +5,7 @@ import pytest
 from test_diagnose import QUICK, make
 
 from actuator_glue.inference.convergence import rhat_and_ess
+from actuator_glue.residual import advice
 from actuator_glue.residual.diagnose import diagnose
 from actuator_glue.residual.posterior import _scaled
 
@@ -37,6 +38,7 @@ def test_chains_keep_the_spread_of_the_posterior(
     quick, found = diagnose(records, settings=QUICK, seed=2), diagnose(records, seed=2)
     assert [e.name for e in found.effects] == [effect]
     rhat, ess = rhat_and_ess(found.posterior.reshape(-1, 32, found.posterior.shape[1]))
+    assert found.rhat == pytest.approx(rhat.max(), rel=0.05) and np.isnan(quick.rhat)
     # Over these cases and three seeds: R-hat up to 1.16, ESS from 166, ratios from 0.94 to 1.06
     # for the effect and from 0.53 to 1.06 for beta_1.
     assert rhat.max() < 1.3 and ess.min() > 80
@@ -51,3 +53,10 @@ def test_effects_that_take_turns_end_in_a_diagnosis() -> None:
     """Delay without a specimen: members were swapped until the last round, whose rivals lacked."""
     found = diagnose(make(['delay'], [0.004], 31)[:1], settings=QUICK, seed=2)
     assert {e.name for e in found.effects} == set(found.structure)
+
+
+def test_a_posterior_that_has_not_converged_is_told() -> None:
+    """Not-a-number is the Laplace approximation, which has no chains."""
+    assert advice.unconverged(1.1) == advice.unconverged(np.nan) == ()
+    (told,) = advice.unconverged(1.5)
+    assert 'R-hat 1.50' in told
