@@ -18,6 +18,8 @@ from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
+from actuator_glue.io.bag_reader import decoded
+
 RATE = 200.0
 # Estimator settings for short tests at RATE.
 QUICK = {
@@ -211,6 +213,12 @@ class Probe(Node):
             part = slice(start, start + size)
             self.block(record.command[part], record.measured[part])
             self.for_a_while(pause)
+
+
+def recorded(bag):
+    """Running indices of all samples in a bag."""
+    blocks = [(m.index, len(m.command)) for _, m in decoded(bag, ('SampleBlock',))]
+    return np.concatenate([np.arange(i, i + n) for i, n in blocks])
 
 
 @contextmanager

@@ -11,19 +11,13 @@ from actuator_glue_msgs.msg import SampleBlock
 from actuator_glue_msgs.srv import SetModel
 from builtin_interfaces.msg import Time
 from rclpy.duration import Duration
-from ros_nodes import RATE
+from ros_nodes import RATE, recorded
 
-from actuator_glue.io.bag_reader import TEST_SETUP, as_published, decoded, messages
+from actuator_glue.io.bag_reader import TEST_SETUP, as_published, messages
 from actuator_glue.io.messages import full_name
 from actuator_glue.nodes import diagnoser, diagnosing
 from actuator_glue.nodes.recorder import RecorderNode
 from actuator_glue.nodes.topics import SAMPLES
-
-
-def recorded(bag):
-    """Running indices of all samples in a bag."""
-    blocks = [(m.index, len(m.command)) for _, m in decoded(bag, ('SampleBlock',))]
-    return np.concatenate([np.arange(i, i + n) for i, n in blocks])
 
 
 def test_a_stream_does_not_leave_before_it_is_taken(start, probe, tmp_path):

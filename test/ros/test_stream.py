@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from actuator_glue_msgs.srv import SetModel
-from ros_nodes import QUICK, RATE
+from ros_nodes import QUICK, RATE, recorded
 
 from actuator_glue.io.bag_reader import decoded, summarise
 from actuator_glue.online.job import WindowResult
@@ -42,12 +42,6 @@ def replayed(bag):
     live = published(decoded(bag, RESULTS))
     again = replay(items(decoded(bag, INPUTS)), live.settings, live.models[0][1], live.schedule())
     return compare([r for r in again if isinstance(r, WindowResult)], live), live
-
-
-def recorded(bag):
-    """Running indices of all samples in a bag."""
-    blocks = [(m.index, len(m.command)) for _, m in decoded(bag, ('SampleBlock',))]
-    return np.concatenate([np.arange(i, i + n) for i, n in blocks])
 
 
 def one_kilohertz(start, probe, tmp_path, seconds):
