@@ -13,6 +13,7 @@ from typing import Any
 for _name in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS'):
     os.environ[_name] = '1'
 
+# Imports come late (E402): BLAS reads the number of its threads when it is loaded.
 import numpy as np  # noqa: E402
 
 from actuator_glue.inference.convergence import rhat  # noqa: E402

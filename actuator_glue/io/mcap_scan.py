@@ -195,7 +195,7 @@ def _decompress(chunk: Chunk) -> bytes:
         except zstandard.ZstdError as error:
             raise ValueError(str(error)) from error
     elif chunk.compression == 'lz4':
-        import lz4.frame  # type: ignore[import-untyped]
+        import lz4.frame
 
         with lz4.frame.LZ4FrameDecompressor() as decompressor:
             decompressed = decompressor.decompress(chunk.data, chunk.uncompressed_size)

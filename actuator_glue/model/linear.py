@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from typing import NamedTuple
 
 import numpy as np
@@ -53,8 +54,8 @@ def coefficients(theta: ArrayLike, stiffness: float) -> tuple[Array, Array, Arra
         InputError: wrong shape, or a stiffness that cannot be used.
     """
     k = check_stiffness(stiffness)
-    # Not compiled for arrays: numba keeps the function itself under this name.
-    parts = getattr(kernel.equation_2a, 'py_func')(thetas(theta).T, k)  # noqa: B009
+    # The function itself: it is compiled for one theta, not for arrays of them.
+    parts = inspect.unwrap(kernel.equation_2a)(thetas(theta).T, k)
     n0, d2, d1, d0 = (part.reshape(np.shape(theta)[:-1]) for part in parts)
     return n0, d2, d1, d0
 

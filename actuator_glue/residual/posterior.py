@@ -88,17 +88,17 @@ def sample(
         progress: called with the share done.
     """
     space = Space(model, max(r.duration for r in data.records))
-    straight = coordinates(space, model, data, fit.z)
-    phi = straight.phi(fit.z)
-    covariance, inflation = laplace(scorer, fit, straight.slopes(phi))
-    spread, correlation = _scaled(covariance, straight.widest)
-    spread = np.minimum(spread, straight.widest)
+    around = coordinates(space, model, data, fit.z)
+    phi = around.phi(fit.z)
+    covariance, inflation = laplace(scorer, fit, around.slopes(phi))
+    spread, correlation = _scaled(covariance, around.widest)
+    spread = np.minimum(spread, around.widest)
     values, vectors = np.linalg.eigh(correlation)
     root = spread[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
 
     def place(w: Array) -> tuple[Array, Array]:
         """Parameters and log prior (m,) where the Laplace approximation is standard normal."""
-        return straight.theta(phi + w @ root.T)
+        return around.theta(phi + w @ root.T)
 
     def gaussian(count: int) -> Array:
         w = rng.standard_normal((count, len(phi)))

@@ -123,6 +123,10 @@ def _serve(pipe: Connection, warm: Callable[[], None] | None, nice: int) -> None
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
     if nice:
         os.nice(nice)
+
+    def tell(payload: Any) -> None:
+        pipe.send((PROGRESS, payload, 0.0))
+
     with suppress(EOFError, BrokenPipeError, ConnectionResetError):
         if warm is not None:
             warm()
@@ -134,7 +138,6 @@ def _serve(pipe: Connection, warm: Callable[[], None] | None, nice: int) -> None
             function, args = task
             started = time.monotonic()
             try:
-                tell: Tell = lambda payload: pipe.send((PROGRESS, payload, 0.0))  # noqa: E731
                 kind, payload = DONE, function(*args, tell)
             except Exception as error:
                 kind, payload = FAILED, f'{type(error).__name__}: {error}'

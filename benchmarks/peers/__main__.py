@@ -14,6 +14,7 @@ for name in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS'):
     os.environ[name] = '1'
 os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
 
+# Imports come late (E402): BLAS reads the number of its threads when it is loaded.
 import numpy as np  # noqa: E402
 
 from benchmarks.peers.common import measure  # noqa: E402

@@ -26,7 +26,7 @@ def _runner(method: Any) -> Any:
     ) -> Array:
         np.random.seed(seed)  # noqa: NPY002 - pints has no other way
 
-        class Posterior(pints.LogPDF):  # type: ignore[misc]
+        class Posterior(pints.LogPDF):
             def n_parameters(self) -> int:
                 return 4
 

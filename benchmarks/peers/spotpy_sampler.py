@@ -29,7 +29,7 @@ def run(
             return spotpy.parameter.generate(self.params)
 
         def simulation(self, vector: object) -> list[float]:
-            return [float(density(np.array(list(vector)))[0])]  # type: ignore[call-overload]
+            return [float(density(np.array(list(vector)))[0])]
 
         def evaluation(self) -> list[float]:
             return [0.0]

@@ -72,7 +72,7 @@ def test_the_bits_are_those_of_steps(case: str, most: int, rng_seed: int) -> Non
     other = init(np.random.default_rng(rng_seed), plain, lower, upper, settings)
     assert same(one, other)
     rngs = np.random.default_rng(rng_seed), np.random.default_rng(rng_seed)
-    before = 0 if case == 'window' else density.errors.fallbacks  # type: ignore[attr-defined]
+    before = 0 if case == 'window' else density.errors.fallbacks
     while one.generation < 250:
         one, path = stretch(rngs[0], one, density, fast, most)
         while other.generation < one.generation:
@@ -81,7 +81,7 @@ def test_the_bits_are_those_of_steps(case: str, most: int, rng_seed: int) -> Non
         assert np.array_equal(path.x[-1], one.x) or one.generation <= settings.adaptation
     assert rngs[0].random() == rngs[1].random()
     if case == 'fallback':
-        assert density.errors.fallbacks > before  # type: ignore[attr-defined]
+        assert density.errors.fallbacks > before
 
 
 def test_stretches_from_one_state_do_not_meet(rng_seed: int) -> None:
@@ -103,7 +103,7 @@ def test_a_stopped_run_is_repeated_by_stopping_there(rng_seed: int) -> None:
     density = glue()
     asked = iter(range(100))
 
-    def run(stop) -> object:  # type: ignore[no-untyped-def]
+    def run(stop) -> object:
         return sample(
             np.random.default_rng(rng_seed), density, LOWER, UPPER, evaluations=30_000, stop=stop
         )

@@ -26,7 +26,7 @@ def _short(seed: int, evaluations: int = 6000, **settings: object) -> Chains:
         target.lower,
         target.upper,
         evaluations=evaluations,
-        settings=Settings(population=100, **settings),  # type: ignore[arg-type]
+        settings=Settings(population=100, **settings),
     )
 
 
@@ -195,7 +195,7 @@ def test_impossible_regions_and_not_a_number_are_never_entered() -> None:
         ([0.0], [1.0], lambda x: x, 'shape'),
     ],
 )
-def test_what_cannot_be_sampled_is_said(lower, upper, log_density, says) -> None:  # type: ignore[no-untyped-def]
+def test_what_cannot_be_sampled_is_said(lower, upper, log_density, says) -> None:
     with pytest.raises(InputError, match=says):
         sample(
             np.random.default_rng(0),
@@ -217,7 +217,7 @@ def test_too_few_evaluations_and_bad_settings_and_archives_are_said() -> None:
         sample(np.random.default_rng(0), *arguments, evaluations=9000, archive=np.zeros((5, 3)))
     for wrong in ({'chains': 2}, {'snooker': 1.5}, {'survivors': 0.0}, {'start': 'there'}):
         with pytest.raises(InputError):
-            Settings(**wrong)  # type: ignore[arg-type]
+            Settings(**wrong)
 
 
 def test_a_budget_that_ends_while_annealing_is_admitted() -> None:

@@ -42,7 +42,7 @@ def test_prior_draws_with_weights_give_the_posterior(rng_seed: int) -> None:
 )
 def test_thresholds_that_cannot_be_are_said(arguments: dict[str, float]) -> None:
     with pytest.raises(InputError):
-        behavioural(np.array([0.0, 1.0]), **arguments)  # type: ignore[arg-type]
+        behavioural(np.array([0.0, 1.0]), **arguments)
     with pytest.raises(InputError, match='finite'):
         behavioural(np.array([np.nan, -np.inf]), share=0.5)
 

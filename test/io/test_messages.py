@@ -38,7 +38,7 @@ def test_rclpy_and_we_read_each_other(count: int, forces: int, actuator: str) ->
 
     With an empty last array rclpy sends some bytes more than the message needs.
     """
-    rclpy = pytest.importorskip('rclpy.serialization')
+    rclpy = pytest.importorskip('rclpy.serialization', reason='ROS 2 is not installed')
     ours = pytest.importorskip('actuator_glue_msgs.msg', reason='install/ is not sourced')
     sent = ours.SampleBlock(period=1e-3, index=2**40)
     sent.header.stamp.sec, sent.header.stamp.nanosec = 1_700_000_000, 123_456_789

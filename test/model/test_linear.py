@@ -148,7 +148,10 @@ def test_long_high_rate_record_keeps_accuracy():
     root = np.sqrt((a1 * a1 / 4 - a0).astype(np.clongdouble))
     p1, p2 = -a1 / 2 + root, -a1 / 2 - root
     z1, z2 = np.exp(p1 * wide(period)), np.exp(p2 * wide(period))
-    h = lambda t: b0 / a0 * (1 + (p2 * np.exp(p1 * t) - p1 * np.exp(p2 * t)) / (p1 - p2))  # noqa: E731
+
+    def h(t):
+        return b0 / a0 * (1 + (p2 * np.exp(p1 * t) - p1 * np.exp(p2 * t)) / (p1 - p2))
+
     c1, c2 = (z1 + z2).real, -(z1 * z2).real
     h1, h2 = h(wide(period)).real, h(wide(2 * period)).real
     g1, g2 = h1, h2 - h1 - c1 * h1

@@ -13,6 +13,7 @@ pytest.importorskip(
     'actuator_glue_msgs', reason='interfaces are not built: `. install/setup.bash` first'
 )
 
+# Needs what is checked above.
 from ros_nodes import Probe, Process  # noqa: E402
 
 
