@@ -69,7 +69,7 @@ def archive_reference(
     centre, factor = np.empty(dimension), np.empty((dimension, dimension))
     independence.fit(archive, centre, factor)
     factor *= 1.5
-    points = independence.draw_all(rng.random((size, dimension + 5)), centre, factor)
+    points = independence.draw_all(rng.random((size, dimension + 4)), centre, factor)
     outside = np.isneginf(physical_all(points, lower, width)[1])
     points[outside] = archive[rng.integers(0, len(archive), int(outside.sum()))]
     return Reference(points, centre, factor)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -43,18 +43,10 @@ class Compiled(NamedTuple):
     high: Array = np.empty(0)
 
 
-@runtime_checkable
-class Compilable(Protocol):
-    """A log density that may have a compiled form."""
-
-    def compiled(self) -> Compiled | None:
-        """Return it, None where there is none."""
-        ...
-
-
 def compiled(log_density: LogDensity) -> Compiled | None:
-    """Return the compiled form of a log density, None where it has none."""
-    return log_density.compiled() if isinstance(log_density, Compilable) else None
+    """Return the compiled form of a log density: what its method of this name says, if any."""
+    form = getattr(log_density, 'compiled', None)
+    return None if form is None else cast(Compiled | None, form())
 
 
 # Strict floating point in what follows: inlined elsewhere, it could be reassociated or fused with
@@ -136,9 +128,9 @@ class Scratch(NamedTuple):
     slack: Array
 
 
-def scratch(density: Compiled, count: int) -> Scratch:
-    """Return room for so many points."""
-    records = len(density.rows)
+@njit
+def scratch(records: int, count: int) -> Scratch:
+    """Return room for so many points' errors over so many records."""
     return Scratch(
         np.empty((count, 4)),
         np.empty(count, np.int64),

@@ -32,7 +32,7 @@ from actuator_glue.records import Array
 
 # Evaluations of a compiled likelihood between two questions whether to stop: 0.2 ms; and in one go
 # where nobody asks: the uniforms of more would leave the cache.
-_PATIENCE, _MOST = 200, 1000
+_PATIENCE, _MOST = 200, 2000
 # Shares of the generations after which a run may have drawn enough.
 _LOOKS = (0.375, 0.5, 0.625, 0.75, 0.875)
 

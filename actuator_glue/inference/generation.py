@@ -72,6 +72,7 @@ class Room(NamedTuple):
     residual: Array
 
 
+@njit
 def room(chains: int, dimension: int, pairs: int) -> Room:
     """Return room for the candidates of so many chains."""
     return Room(

@@ -147,19 +147,18 @@ def many(
     path = Path(np.empty((count, n, d)), np.empty((count, n, d)), np.empty((count, n)))
     if every and count >= until_append:
         archive = archive.with_room(n * (1 + (count - until_append) // every))
-    target, room = np.empty((2, n)), generation.room(n, d, s.pairs)
-    scratch = None if density is None else compiled.scratch(density, n)
+    target = np.empty((2, n))
     adapting, total = total is not None, np.empty(0) if total is None else total
     done = 0
     while done < count:
-        if density is not None and scratch is not None:
+        if density is not None:
             target[0] = now.log_target
             more, size = _advance(
                 uniforms[done:], *now[:3], archive.capacity_rows, archive.size,
                 until_append - done, every, around.lower, around.width, around.tuning, s.pairs,
                 s.unit_jump, s.jitter, s.noise, around.tempering, density, counts, path.z[done:],
-                path.x[done:], path.log_density[done:], target, room, scratch, adapting, total,
-                s.independence, s.snooker,
+                path.x[done:], path.log_density[done:], target, adapting, total, s.independence,
+                s.snooker,
             )  # fmt: skip
             archive = archive.grown(size)
             done += more
@@ -187,14 +186,16 @@ def _advance(
     uniforms: Array, z: Array, x: Array, values: Array, rows: Array, size: int, until_append: int,
     every: int, lower: Array, width: Array, tuning: Tuning, pairs: int, unit_jump: float,
     jitter: float, noise: float, tempering: generation.Tempering, density: Compiled, counts: Array,
-    path_z: Array, path_x: Array, path_values: Array, target: Array, room: generation.Room,
-    scratch: compiled.Scratch, adapting: bool, total: Array, independence: float, snooker: float,
+    path_z: Array, path_x: Array, path_values: Array, target: Array, adapting: bool, total: Array,
+    independence: float, snooker: float,
 ) -> tuple[int, int]:  # fmt: skip
     """Do generations, in place on the path; return how many, and the archive's size.
 
     The target of the chains is read from target[0] and ends in target[count % 2].
     """
     done, power = 0, tempering.power
+    # Made here: to hand over many small arrays takes longer than a generation.
+    room, scratch = generation.room(*z.shape, pairs), compiled.scratch(len(density.rows), len(z))
     while done < len(uniforms):
         new_z, new_x, new_values = path_z[done], path_x[done], path_values[done]
         here, there = target[done % 2], target[(done + 1) % 2]

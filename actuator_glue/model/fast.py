@@ -6,6 +6,7 @@ what is left per theta is a small quadratic form. Derivation and error bound: do
 
 from __future__ import annotations
 
+import cmath
 import math
 from collections.abc import Sequence
 from functools import cached_property
@@ -20,10 +21,10 @@ from actuator_glue.records import Array, Record
 
 TOLERANCE = 3e-9  # relative error of the sum of squares; times G = 256 it is 8e-7 in L
 # Terms of the basis, and how far from the reference's the damping and frequency may be that they
-# are for. Less where the initial state has as many terms of its own: such a window is one of many,
-# and its preparation counts.
-_FEWEST, _MOST, _MOST_FREE = 16, 128, 96
-_MARGIN, _MARGIN_FREE = 1.4, 1.2
+# are for. Less where the record begins in motion: such a window is one of many, and its preparation
+# counts.
+_FEWEST, _MOST, _MOST_MOVING = 16, 128, 96
+_MARGIN, _MARGIN_MOVING = 1.4, 1.2
 _ENOUGH = 1e-11  # what the terms should leave of the response
 
 
@@ -79,7 +80,7 @@ class FastErrors:
         self.tolerance = tolerance
         self.fallbacks = 0
         rows = [_row(self.exact, r, near) for r in range(len(self.exact.records))]
-        self.rows = np.zeros((len(rows), max(len(row) for row in rows)))
+        self.rows = _aligned(len(rows), max(len(row) for row in rows))
         for wide, row in zip(self.rows, rows, strict=True):
             wide[: len(row)] = row
 
@@ -127,6 +128,13 @@ class FastErrors:
         return self.exact.residuals(theta)
 
 
+def _aligned(count: int, width: int) -> Array:
+    """Return zeros (count, width) that begin where a line of the cache does."""
+    room = np.zeros(count * width + laguerre.BLOCK)
+    first = -(room.ctypes.data // room.itemsize) % laguerre.BLOCK
+    return room[first : first + count * width].reshape(count, width)
+
+
 def _row(exact: ExactErrors, r: int, near: ArrayLike | None) -> Array:
     """Return everything about one record that the quadratic form needs."""
     record, (x0, v0) = exact.records[r], exact.starts[r]
@@ -135,23 +143,23 @@ def _row(exact: ExactErrors, r: int, near: ArrayLike | None) -> Array:
     if not (np.isfinite(system).all() and (system > 0.0).all()):
         system = reference.fit(record, exact.settle[r], exact.starts[r])
     u0 = record.command[0] if foh else 0.0
-    free = bool(x0 or v0 or u0)
+    moving = bool(x0 or v0 or u0)
     pole = 1.0 + math.expm1(-min(math.sqrt(system[1]) * record.period, 5.0))
+    K = _terms(system, _MARGIN_MOVING, _MOST_MOVING) if moving else _terms(system, _MARGIN, _MOST)
     header = {
-        laguerre.FREE: float(free),
+        laguerre.TERMS: K,
+        laguerre.FREE: moving,
         laguerre.STIFFNESS: exact.stiffness[r],
         laguerre.PERIOD: record.period,
-        laguerre.FOH: float(foh),
+        laguerre.FOH: foh,
         laguerre.POLE: pole,
         laguerre.DELTA: 1.0 - pole,  # exactly: else the sections would not be lossless
         laguerre.X0: x0,
         laguerre.V0: v0,
         laguerre.U0: u0,
     }
-    K = _terms(system, _MARGIN_FREE, _MOST_FREE) if free else _terms(system, _MARGIN, _MOST)
-    dims = K * (1 + free)
-    row = np.zeros(laguerre.HEADER + (K + laguerre.TAIL) * (1 + free) + dims * (2 + dims))
-    row[laguerre.TERMS] = K
+    dims = K * (1 + moving)
+    row = np.zeros(laguerre.HEADER + (K + laguerre.TAIL) * (1 + moving) + dims * (2 + dims))
     for column, value in header.items():
         row[column] = value
     c = kernel.discretise(system[np.newaxis], record.period, foh)[0]
@@ -165,11 +173,12 @@ def _terms(system: Array, margin: float, most: int) -> int:
     A pole p leaves |(p - sigma)/(p + sigma)| per term; the worst of systems with damping and
     frequency within the margin is taken.
     """
-    scale = np.array([1.0 / margin, 1.0, margin])
-    sigma = math.sqrt(system[1])
-    half, a0 = 0.5 * system[0] * scale[:, np.newaxis], system[1] * scale
-    root = np.sqrt(half * half - a0 + 0j)
-    poles = np.stack([root - half, -root - half])
-    worst = float(np.abs((poles + sigma) / (poles - sigma)).max())
+    sigma, worst = math.sqrt(system[1]), 0.0
+    for damping in (1.0 / margin, 1.0, margin):
+        for stiffness in (1.0 / margin, 1.0, margin):
+            half = 0.5 * system[0] * damping
+            root = cmath.sqrt(half * half - system[1] * stiffness)
+            for pole in (root - half, -root - half):
+                worst = max(worst, abs((pole + sigma) / (pole - sigma)))
     wanted = math.log(_ENOUGH) / math.log(worst) if 0.0 < worst < 1.0 else float(most)
     return laguerre.BLOCK * math.ceil(min(max(wanted, _FEWEST), most) / laguerre.BLOCK)

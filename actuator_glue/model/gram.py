@@ -30,87 +30,96 @@ from actuator_glue.model.laguerre import (
 from actuator_glue.records import Array
 
 _SAMPLES = 256  # samples per pass of the filter banks: their outputs stay in the cache
+_NOTHING = 1e-20  # of an impulse, what is not worth filtering on
 
 
 @njit
-def _filter_banks(x: Array, size: int, memory: Array, pole: float, delta: float) -> None:
-    """Fill each bank's rows of x with its first one passed through (1 - pole z)/(z - pole).
+def _filter_bank(x: Array, size: int, memory: Array, pole: float, delta: float) -> None:
+    """Fill the rows of x with its first one passed through (1 - pole z)/(z - pole) ever again.
 
     Written as zeta = delta (z + 1)/(z - pole) - 1, which loses nothing when the pole is near one.
-    Both banks and two sections at once, for each waits for its own last result most of the time;
-    so there is a section more than there are terms.
+    Four sections at once, for each waits for its own last result most of the time.
 
     Args:
-        x: shape (2, K + 1, samples); x[:, 0] are the inputs.
+        x: shape (K + 1, samples), K a multiple of four; x[0] is the input.
         size: samples to be filtered.
-        memory: each section's last input and low-pass output across blocks, shape (2, K + 1, 2).
+        memory: each section's last input and low-pass output across blocks, shape (K + 1, 2).
         pole: a.
         delta: 1 - a.
     """
-    for k in range(1, x.shape[1] - 1, 2):
-        before0, low0 = memory[0, k, 0], memory[0, k, 1]
-        before1, low1 = memory[1, k, 0], memory[1, k, 1]
-        before2, low2 = memory[0, k + 1, 0], memory[0, k + 1, 1]
-        before3, low3 = memory[1, k + 1, 0], memory[1, k + 1, 1]
+    for k in range(1, len(x), 4):
+        before0, low0 = memory[k, 0], memory[k, 1]
+        before1, low1 = memory[k + 1, 0], memory[k + 1, 1]
+        before2, low2 = memory[k + 2, 0], memory[k + 2, 1]
+        before3, low3 = memory[k + 3, 0], memory[k + 3, 1]
         for n in range(size):
-            new0, new1 = x[0, k - 1, n], x[1, k - 1, n]
+            new0 = x[k - 1, n]
             low0 = pole * low0 + delta * (new0 + before0)
+            new1 = low0 - new0
             low1 = pole * low1 + delta * (new1 + before1)
-            before0, before1 = new0, new1
-            new2, new3 = low0 - new0, low1 - new1
+            new2 = low1 - new1
             low2 = pole * low2 + delta * (new2 + before2)
+            new3 = low2 - new2
             low3 = pole * low3 + delta * (new3 + before3)
-            before2, before3 = new2, new3
-            x[0, k, n], x[1, k, n] = new2, new3
-            x[0, k + 1, n], x[1, k + 1, n] = low2 - new2, low3 - new3
-        memory[0, k, 0], memory[0, k, 1] = before0, low0
-        memory[1, k, 0], memory[1, k, 1] = before1, low1
-        memory[0, k + 1, 0], memory[0, k + 1, 1] = before2, low2
-        memory[1, k + 1, 0], memory[1, k + 1, 1] = before3, low3
+            before0, before1, before2, before3 = new0, new1, new2, new3
+            x[k, n], x[k + 1, n], x[k + 2, n], x[k + 3, n] = new1, new2, new3, low3 - new3
+        memory[k, 0], memory[k, 1] = before0, low0
+        memory[k + 1, 0], memory[k + 1, 1] = before1, low1
+        memory[k + 2, 0], memory[k + 2, 1] = before2, low2
+        memory[k + 3, 0], memory[k + 3, 1] = before3, low3
 
 
 @njit
-def _add_products(x: Array, size: int, e: Array, products: Array) -> None:
-    """Add each row's products with both banks' inputs, with e, and its sum: (2, K, 4)."""
-    u, v = x[0, 0], x[1, 0]
-    for bank in range(2):
-        for k in range(products.shape[1]):
-            row = x[bank, k]
-            total = errors = first = second = 0.0
+def _add_products(x: Array, size: int, impulse: bool, e: Array, products: Array) -> None:
+    """Add each row's products with both banks' inputs, with e, and its sum: (banks, K, 4).
+
+    The second bank's input is an impulse, at the first sample if `impulse`.
+    """
+    u = x[0, 0]
+    for bank in range(len(x)):
+        for k in range(0, products.shape[1], 2):
+            row, next_row = x[bank, k], x[bank, k + 1]
+            product = error = total = next_product = next_error = next_total = 0.0
             for n in range(size):
+                product += row[n] * u[n]
+                error += row[n] * e[n]
                 total += row[n]
-                errors += row[n] * e[n]
-                first += row[n] * u[n]
-                second += row[n] * v[n]
-            products[bank, k, 0] += first
-            products[bank, k, 1] += second
-            products[bank, k, 2] += errors
+                next_product += next_row[n] * u[n]
+                next_error += next_row[n] * e[n]
+                next_total += next_row[n]
+            products[bank, k, 0] += product
+            products[bank, k, 2] += error
             products[bank, k, 3] += total
+            products[bank, k + 1, 0] += next_product
+            products[bank, k + 1, 2] += next_error
+            products[bank, k + 1, 3] += next_total
+            if impulse:
+                products[bank, k, 1] += row[0]
+                products[bank, k + 1, 1] += next_row[0]
 
 
 @njit
 def _states(memory: Array, pole: float, delta: float) -> Array:
-    """Return each section's state in coordinates in which it is lossless, (2, sections)."""
+    """Return sections' states in coordinates in which they are lossless; memory is (..., 2)."""
     scale = np.sqrt(delta * (2.0 - delta))
-    states: Array = (pole * memory[:, :, 1] + delta * memory[:, :, 0]) / scale
+    states: Array = (pole * memory[..., 1] + delta * memory[..., 0]) / scale
     return states
 
 
 @njit
-def _fill_gram(products: Array, start: Array, end: Array, banks: int, gram: Array) -> None:
+def _fill_gram(products: Array, start: Array, end: Array, gram: Array) -> None:
     """Fill the lower triangle of A = [u_k' u_l], its diagonal halved.
 
     Sections are lossless: over the counted samples u_(k+1)' u_(l+1) exceeds u_k' u_l by the
     products of the two sections' states at the start less those at the end.
 
     Args:
-        products: products with the two inputs, shape (2, K, 2 or more).
-        start: `_states` at the first counted sample, shape (2, K or more).
+        products: see `_add_products`.
+        start: `_states` at the first counted sample, shape (banks, K + 1).
         end: `_states` after the last.
-        banks: how many are in use; their blocks of terms take turns.
-        gram: shape (dims, dims).
+        gram: shape (dims, dims); the banks' blocks of terms take turns.
     """
-    K = products.shape[1]
+    banks, K = products.shape[:2]
     for a in range(banks):
         for b in range(banks):
             for shift in range(K):
@@ -137,26 +146,30 @@ def prepare(t: Array, c: Array, measured: Array, command: Array, settle: int) ->
     """
     K, banks = int(t[TERMS]), 1 + int(t[FREE])
     N, dims = K + TAIL, K * banks
-    first_terms = np.empty(9)
-    expand(c, t, first_terms)
+    at = HEADER + N * banks
+    expanded = np.empty(9)
+    expand(c, t, expanded)
     t[NORM] = np.sqrt(np.sum(command * command))
-    reference = t[HEADER : HEADER + N * banks].reshape(-1, BLOCK)
-    t[BEYOND] = series(first_terms, banks, t[NORM], reference)
+    reference = t[HEADER:at].reshape(-1, BLOCK)
+    t[BEYOND] = t[NORM] * series(expanded, 0, banks, reference)
+    if banks == 2:
+        t[BEYOND] += series(expanded, 1, banks, reference)
     state = np.zeros(kernel.STREAM)
     state[1], state[2] = t[X0], t[V0]
-    x, e = np.zeros((2, K + 1, _SAMPLES)), np.empty(_SAMPLES)
-    memory, products = np.zeros((2, K + 1, 2)), np.zeros((2, K, 4))
-    start = np.zeros((2, K + 1))
-    first, n = 0, len(command)
+    x, e = np.zeros((banks, K + 1, _SAMPLES)), np.empty(_SAMPLES)
+    memory, products = np.zeros((banks, K + 1, 2)), np.zeros((banks, K, 4))
+    start = np.zeros((banks, K + 1))
+    first, n, filtered = 0, len(command), banks
     while first < n:
         last = min(first + _SAMPLES, n if first >= settle else settle)
         size = last - first
         if first == settle:
-            start = _states(memory, t[POLE], t[DELTA])
+            start[:filtered] = _states(memory[:filtered], t[POLE], t[DELTA])
         x[0, 0, :size] = command[first:last]
-        x[1, 0, :size] = 0.0
-        x[1, 0, 0] = 1.0 if first == 0 else 0.0
-        _filter_banks(x, size, memory, t[POLE], t[DELTA])
+        if banks == 2:
+            x[1, 0, 0] = 1.0 if first == 0 else 0.0
+        for bank in range(filtered):
+            _filter_bank(x[bank], size, memory[bank], t[POLE], t[DELTA])
         kernel.stream(c, state, command[first:last], e[:size])
         for i in range(size):
             e[i] = measured[first + i] - e[i]
@@ -164,13 +177,14 @@ def prepare(t: Array, c: Array, measured: Array, command: Array, settle: int) ->
             for i in range(size):
                 t[SUM] += e[i]
                 t[SQUARES] += e[i] * e[i]
-            _add_products(x, size, e, products)
+            _add_products(x[:filtered], size, banks == 2 and first == 0, e, products)
+        if filtered == 2 and np.abs(memory[1]).max() < _NOTHING:
+            filtered, memory[1] = 1, 0.0
         first = last
     t[COUNT] = n - settle
-    at = HEADER + N * banks
     for bank in range(banks):
         for k in range(K):
             i = at + (k // BLOCK * banks + bank) * BLOCK + k % BLOCK
             t[i], t[i + dims] = products[bank, k, 3], products[bank, k, 2]
     gram = t[at + 2 * dims : at + (2 + dims) * dims].reshape(dims, dims)
-    _fill_gram(products, start, _states(memory, t[POLE], t[DELTA]), banks, gram)
+    _fill_gram(products, start, _states(memory, t[POLE], t[DELTA]), gram)

@@ -17,7 +17,7 @@ TAIL = 2 * BLOCK  # terms beyond the basis that are summed one by one for the tr
 # One row per record: numbers, then reference coefficients, column sums, cross products, Gram.
 (TERMS, FREE, STIFFNESS, PERIOD, FOH, POLE, DELTA, X0, V0, U0) = range(10)
 NORM, COUNT, SUM, SQUARES, BEYOND = range(10, 15)
-HEADER = 15
+HEADER = 2 * BLOCK  # what follows is aligned as the row is: a fifth faster
 
 
 @njit
@@ -86,39 +86,39 @@ def _beyond(radius: float, last: float, before: float) -> float:
 
 
 @njit
-def series(start: Array, banks: int, weight: float, z: Array) -> float:
-    """Write all terms of one system into z and bound the sum of those that follow.
+def series(start: Array, bank: int, banks: int, z: Array) -> float:
+    """Write all terms of one system and bank into z; bound the sum of those that follow.
 
-    Terms one by one as far as block two; from there on whole blocks at once, by the recursion
-    that every eighth term obeys (its poles are the eighth powers).
+    The first two blocks by the recursion that every second term obeys (its poles are the squares),
+    whole blocks from there on by that of every eighth.
 
     Args:
         start: as written by `expand`.
-        banks: 1, or 2 where the initial state has terms of its own.
-        weight: of the command's terms in the bound; the initial state's have weight one.
-        z: shape (blocks, BLOCK); blocks of both banks take turns.
+        bank: 0 for the command's terms, 1 for the initial state's.
+        banks: how many there are; their blocks take turns.
+        z: shape (blocks, BLOCK).
     """
-    r1, r2, d4 = start[0], start[1], start[1] ** 4
-    t4 = (r1 * r1 - 2.0 * r2) ** 2 - 2.0 * r2 * r2
+    r1, r2 = start[0], start[1]
+    t2, d2 = r1 * r1 - 2.0 * r2, r2 * r2
+    t4, d4 = t2 * t2 - 2.0 * d2, d2 * d2
     t8, d8 = t4 * t4 - 2.0 * d4, d4 * d4
-    beyond = 0.0
-    for bank in range(banks):
-        k0 = 2 + 3 * bank
-        z[bank, 0], z[bank, 1], z[bank, 2] = start[k0], start[k0 + 1], start[k0 + 2]
-        before, last = start[k0 + 1], start[k0 + 2]
-        for i in range(3, BLOCK):
-            before, last = last, -r1 * last - r2 * before
-            z[bank, i] = last
+    k0 = 2 + 3 * bank
+    c1, c2 = start[k0 + 1], start[k0 + 2]
+    z[bank, 0], z[bank, 1], z[bank, 2] = start[k0], c1, c2
+    c3 = -r1 * c2 - r2 * c1
+    c4 = -r1 * c3 - r2 * c2
+    z[bank, 3], z[bank, 4] = c3, c4
+    # Two by two: neither waits for the other.
+    for k in range(5, 2 * BLOCK, 2):
+        c1, c3 = c3, t2 * c3 - d2 * c1
+        c2, c4 = c4, t2 * c4 - d2 * c2
+        z[bank + banks * (k // BLOCK), k % BLOCK] = c3
+        if k < 2 * BLOCK - 1:
+            z[bank + banks * ((k + 1) // BLOCK), (k + 1) % BLOCK] = c4
+    for row in range(2 * banks + bank, len(z), banks):
         for i in range(BLOCK):
-            before, last = last, -r1 * last - r2 * before
-            z[banks + bank, i] = last
-        for row in range(2 * banks + bank, len(z), banks):
-            for i in range(BLOCK):
-                z[row, i] = t8 * z[row - banks, i] - d8 * z[row - 2 * banks, i]
-            if row < 3 * banks:  # the recursion does not hold for the very first term
-                z[row, 0] = -r1 * last - r2 * before
-        row = len(z) - banks + bank
-        beyond += (1.0 if bank else weight) * _beyond(
-            start[8], z[row, BLOCK - 1], z[row, BLOCK - 2]
-        )
-    return beyond
+            z[row, i] = t8 * z[row - banks, i] - d8 * z[row - 2 * banks, i]
+        if row < 3 * banks:  # the recursion does not hold for the very first term
+            z[row, 0] = c4
+    row = len(z) - banks + bank
+    return _beyond(start[8], z[row, BLOCK - 1], z[row, BLOCK - 2])

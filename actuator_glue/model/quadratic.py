@@ -34,7 +34,7 @@ _ROUNDING = 1e-15  # of the quadratic form, relative to the largest of what it a
 
 @njit
 def _half_form(gram: Array, z: Array, used: int) -> float:
-    """Return half of z' A z over the first `used` terms, a multiple of four.
+    """Return half of z' A z over the first `used` terms, a multiple of eight.
 
     Args:
         gram: lower triangle of A with the diagonal halved and zeros beside it, shape (dims, dims).
@@ -42,12 +42,17 @@ def _half_form(gram: Array, z: Array, used: int) -> float:
         used: number of terms.
     """
     total = 0.0
-    for i in range(0, used, 4):
+    for i in range(0, used, BLOCK):
         z0, z1, z2, z3 = z[i], z[i + 1], z[i + 2], z[i + 3]
+        z4, z5, z6, z7 = z[i + 4], z[i + 5], z[i + 6], z[i + 7]
         part = 0.0
-        for k in range(i + 4):
-            above = gram[i, k] * z0 + gram[i + 1, k] * z1
-            part += z[k] * (above + (gram[i + 2, k] * z2 + gram[i + 3, k] * z3))
+        # Whole vectors, even where they are half zeros: what is left over goes one by one.
+        for k in range(min((i // BLOCK + 2) // 2 * (2 * BLOCK), len(gram))):
+            a = gram[i, k] * z0 + gram[i + 1, k] * z1
+            b = gram[i + 2, k] * z2 + gram[i + 3, k] * z3
+            c = gram[i + 4, k] * z4 + gram[i + 5, k] * z5
+            d = gram[i + 6, k] * z6 + gram[i + 7, k] * z7
+            part += z[k] * ((a + b) + (c + d))
         total += part
     return total
 
@@ -64,7 +69,7 @@ def _sums(
         cross: products of the columns with the reference's errors, shape (dims,).
         gram: as `_half_form` takes it.
         z: terms less the reference's.
-        used: number of terms, a multiple of four.
+        used: number of terms, a multiple of eight.
         out: shape (2,) [m, m^2].
     """
     s = q = 0.0
@@ -106,12 +111,11 @@ def evaluate(t: Array, theta: Array, tolerance: float, out: Array, slack: Array)
             the bound of the error of the sum about the mean [m^2]; NaN for no such system.
     """
     banks, norm = 1 + int(t[FREE]), t[NORM]
-    N = (int(t[TERMS]) + TAIL) * banks
-    dims = int(t[TERMS]) * banks
-    full = dims // BLOCK
-    reference = t[HEADER : HEADER + N].reshape(-1, BLOCK)
-    sums, cross = t[HEADER + N : HEADER + N + dims], t[HEADER + N + dims : HEADER + N + 2 * dims]
-    gram = t[HEADER + N + 2 * dims : HEADER + N + (2 + dims) * dims].reshape(dims, dims)
+    N, dims = (int(t[TERMS]) + TAIL) * banks, int(t[TERMS]) * banks
+    full, at = dims // BLOCK, HEADER + N
+    reference = t[HEADER:at].reshape(-1, BLOCK)
+    sums, cross = t[at : at + dims], t[at + dims : at + 2 * dims]
+    gram = t[at + 2 * dims : at + (2 + dims) * dims].reshape(dims, dims)
     enough = 0.4 * tolerance * np.sqrt(t[SQUARES] - t[SUM] * t[SUM] / t[COUNT])
     row, start, size = np.empty(kernel.COLUMNS), np.empty(9), np.empty(N // BLOCK)
     z = np.empty(N)
@@ -120,7 +124,9 @@ def evaluate(t: Array, theta: Array, tolerance: float, out: Array, slack: Array)
         n0, d2, d1, d0 = kernel.equation_2a(theta[m], t[STIFFNESS])
         kernel.discretise_one(d1 / d2, d0 / d2, n0 / d2, t[PERIOD], t[FOH] > 0.0, row)
         expand(row, t, start)
-        tail = t[BEYOND] + series(start, banks, norm, blocks)
+        tail = t[BEYOND] + norm * series(start, 0, banks, blocks)
+        if banks == 2:
+            tail += series(start, 1, banks, blocks)
         for block in range(len(size)):
             total = 0.0
             for i in range(BLOCK):

@@ -6,6 +6,8 @@ import math
 from functools import partial
 from typing import Any
 
+import numpy as np
+
 from actuator_glue.jit import njit
 from actuator_glue.records import Array
 
@@ -57,6 +59,12 @@ def oil_range(inertia: float, s: float, k: float, low: Array, high: Array) -> tu
 
 
 @_njit
+def _power(oil: float, k: float) -> float:
+    """Return the power of alpha_2 + k in which it is uniform, given the other coordinates."""
+    return oil * oil * oil if k > 0.0 else oil * oil
+
+
+@_njit
 def physical(phi: Array, k: float, low: Array, high: Array, theta: Array) -> Any:
     """Fill theta (4,) from coordinates phi (4,), return the log Jacobian less a constant.
 
@@ -64,19 +72,20 @@ def physical(phi: Array, k: float, low: Array, high: Array, theta: Array) -> Any
     """
     inertia = math.exp(phi[1])
     theta[0] = math.exp(phi[0] - phi[1])
-    s, power = 0.0, 2.0
+    s = 0.0
     if k > 0.0:
-        s, power = phi[3], 3.0
+        s = phi[3]
         theta[0] -= s
     least, most = oil_range(inertia, s, k, low, high)
     if not (0.0 < most > least and low[0] <= theta[0] <= high[0]):
         return -math.inf
     log_jacobian = phi[0] - 2.0 * phi[1] - 0.5 * phi[2] * phi[2]
     # Given the other coordinates the prior's density of alpha_2 + k rises with its square (k = 0:
-    # with itself); of its power + 1 it is uniform. In units of `most`, against overflow.
-    rest = (least / most) ** power
-    oil = most * (rest + (1.0 - rest) * share(phi[2])) ** (1.0 / power)
-    log_jacobian += power * math.log(most) + math.log1p(-rest)
+    # with itself). In units of `most`, against overflow.
+    rest = _power(least / most, k)
+    part = rest + (1.0 - rest) * share(phi[2])
+    oil = most * (np.cbrt(part) if k > 0.0 else math.sqrt(part))
+    log_jacobian += math.log(_power(most, k) * (1.0 - rest))
     # Inside the box but for rounding.
     theta[1] = min(max(oil / inertia, low[1]), high[1])
     theta[2] = min(max(oil - k, low[2]), high[2])
@@ -107,13 +116,13 @@ def coordinates_all(theta: Array, k: float, low: Array, high: Array, phi: Array)
     for i in range(len(theta)):
         oil = max(k + theta[i, 2], 1e-9)
         inertia = oil / max(theta[i, 1], 1e-300)
-        s, power = 0.0, 2.0
-        phi[i, 3] = score((theta[i, 3] - low[3]) / (high[3] - low[3]))
+        s = theta[i, 3] * k / oil
         if k > 0.0:
-            s, power = theta[i, 3] * k / oil, 3.0
             phi[i, 3] = s
+        else:
+            phi[i, 3] = score((theta[i, 3] - low[3]) / (high[3] - low[3]))
         phi[i, 0] = math.log(max((theta[i, 0] + s) * inertia, 1e-300))
         phi[i, 1] = math.log(inertia)
         least, most = oil_range(inertia, s, k, low, high)
-        rest = (least / most) ** power
-        phi[i, 2] = score(((oil / most) ** power - rest) / (1.0 - rest))
+        rest = _power(least / most, k)
+        phi[i, 2] = score((_power(oil / most, k) - rest) / (1.0 - rest))

@@ -134,7 +134,9 @@ def _sample(
 ) -> tuple[Chains, Coordinates, bool]:
     """Return chains, their coordinates, and whether they are all that was wanted."""
     settings, model, record = job.settings, job.model, job.window.record
-    near = None if job.archive is None else np.median(job.archive, axis=0)
+    near = None
+    if job.archive is not None:
+        near = np.sort(job.archive, axis=0)[len(job.archive) // 2]
     errors = fitting.errors(model, record, settle, near)
     likelihood: LogDensity = (
         GlueLikelihood(errors, settings.shaping_factor)

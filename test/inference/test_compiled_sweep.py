@@ -139,7 +139,7 @@ def test_only_what_is_hopeless_is_spared_the_exact_kernel(case: str, rng_seed: i
 
     def got(floor: Array) -> Array:
         values = np.empty(len(x))
-        log_densities(fast, x, inside, floor, values, scratch(fast, len(x)))
+        log_densities(fast, x, inside, floor, values, scratch(len(fast.rows), len(x)))
         return values
 
     assert np.array_equal(got(np.full(len(x), -np.inf)), right, equal_nan=True)

@@ -23,5 +23,5 @@ def uniforms_per_chain(dimension: int, pairs: int) -> int:
     """How many uniforms one chain may use in one generation."""
     parallel = 4 + 2 * pairs + 3 * dimension
     snooker = 4
-    independence = dimension + 5
+    independence = dimension + 4
     return U_FREE + max(parallel, snooker, independence)

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from actuator_glue.inference.moves import U_FREE
-from actuator_glue.inference.moves.draw import normal_pair
+from actuator_glue.inference.moves.draw import normal
 from actuator_glue.jit import njit
 from actuator_glue.records import Array
 
@@ -79,27 +79,31 @@ def log_density(z: Array, centre: Array, factor: Array) -> Array:
 
 
 @njit
-def draw(uniforms: Array, first: int, centre: Array, factor: Array, candidate: Array) -> None:
-    """Write one draw of the fitted Student t into candidate, from uniforms[first:]."""
+def draw(uniforms: Array, first: int, centre: Array, factor: Array, candidate: Array) -> float:
+    """Write one draw of the fitted Student t into candidate, from uniforms[first:].
+
+    Returns its squared Mahalanobis distance from the centre.
+    """
     d = centre.size
     # Chi-squared with eight degrees of freedom: four exponentials.
     product = 1.0
     for i in range(4):
         product *= 1.0 - uniforms[first + i]
     stretch = math.sqrt(-0.5 * DEGREES / math.log(product))
+    distance2 = 0.0
     for j in range(d):
         candidate[j] = centre[j]
-    for k in range(0, d, 2):
-        one, two = normal_pair(uniforms[first + 4 + k], uniforms[first + 5 + k])
+    for k in range(d):
+        step = stretch * normal(uniforms[first + 4 + k])
+        distance2 += step * step
         for j in range(k, d):
-            candidate[j] += stretch * factor[j, k] * one
-        for j in range(k + 1, d):
-            candidate[j] += stretch * factor[j, k + 1] * two
+            candidate[j] += factor[j, k] * step
+    return distance2
 
 
 @njit
 def draw_all(uniforms: Array, centre: Array, factor: Array) -> Array:
-    """Return draws (m, p) of the fitted Student t from uniforms (m, p + 5)."""
+    """Return draws (m, p) of the fitted Student t from uniforms (m, p + 4)."""
     points = np.empty((len(uniforms), len(centre)))
     for i in range(len(uniforms)):
         draw(uniforms[i], 0, centre, factor, points[i])
@@ -114,7 +118,6 @@ def propose(
 
     residual is scratch (p,).
     """
-    draw(uniforms, U_FREE, centre, factor, candidate)
+    there = DEGREES + draw(uniforms, U_FREE, centre, factor, candidate)
     here = DEGREES + _distance2(z, centre, factor, residual)
-    there = DEGREES + _distance2(candidate, centre, factor, residual)
     return 0.5 * (DEGREES + z.size) * math.log(there / here)
