@@ -195,7 +195,8 @@ def _advance(
     """
     done, power = 0, tempering.power
     # Made here: to hand over many small arrays takes longer than a generation.
-    room, scratch = generation.room(*z.shape, pairs), compiled.scratch(len(density.rows), len(z))
+    n, d = z.shape
+    room, scratch = generation.room(n, d, pairs), compiled.scratch(len(density.rows), n)
     while done < len(uniforms):
         new_z, new_x, new_values = path_z[done], path_x[done], path_values[done]
         here, there = target[done % 2], target[(done + 1) % 2]

@@ -21,7 +21,7 @@ from actuator_glue.records import Array, Record
 
 TOLERANCE = 3e-9  # relative error of the sum of squares; times G = 256 it is 8e-7 in L
 # Terms of the basis, and how far from the reference's the damping and frequency may be that they
-# are for. Less where the record begins in motion: such a window is one of many, and its preparation
+# are for. Less where the record begins in motion: such a window is one of many, whose preparation
 # counts.
 _FEWEST, _MOST, _MOST_MOVING = 16, 128, 96
 _MARGIN, _MARGIN_MOVING = 1.4, 1.2

@@ -25,6 +25,9 @@ from actuator_glue.records import Array, Record
 EXCITATION = 3.0
 # Generations in which a sampler that starts from the last posterior adapts.
 ADAPT = 20
+# Share of the last posterior's points, spread, that must be alive in the next: so few that mostly
+# one temperature leads there.
+SURVIVORS = 0.35
 # Points that a window hands to the next, about as many as its draws are worth.
 ARCHIVE = 400
 
@@ -187,10 +190,11 @@ def _stop(job: Job, expired: Callable[[], bool] | None) -> Callable[[dream.State
 
 def _sampler(job: Job) -> dream.Settings:
     """Settings of the sampler."""
-    warm = job.archive is not None
-    sampler = dream.Settings(chains=job.chains, adaptation=ADAPT if warm else 50)
-    if not (warm and job.model.effects):
-        return sampler
+    if job.archive is None:
+        return dream.Settings(chains=job.chains, adaptation=50)
+    if not job.model.effects:
+        return dream.Settings(chains=job.chains, adaptation=ADAPT, survivors=SURVIVORS)
+    sampler = dream.Settings(chains=job.chains, adaptation=ADAPT)
     # A warm start takes a quarter of the population, and moves a chain of so many sweeps each:
     # batches are full.
     return replace(sampler, population=4 * sampler.sweeps * job.chains)

@@ -49,6 +49,8 @@ class Block:
 
     def part(self, start: int, stop: int) -> Block:
         """Return samples start:stop as a block of its own."""
+        if start == 0 and stop == len(self):
+            return self
         return Block(
             self.index + start,
             self.period,

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import targets
-from scipy import stats
+from scipy import special, stats
 
 from actuator_glue.inference import generation, moves
 from actuator_glue.inference.adaptation import Tuning, empty_counts, tune
 from actuator_glue.inference.coordinates import physical_all, sampling
-from actuator_glue.inference.moves.draw import distinct
+from actuator_glue.inference.moves import independence
+from actuator_glue.inference.moves.draw import distinct, normal
 from actuator_glue.inference.settings import Settings
 from actuator_glue.records import Array
 
@@ -229,3 +230,24 @@ def test_independence_draws_have_the_density_it_claims(rng_seed: int) -> None:
     cross = weights * (drawn[:, 0] - tuning.centre[0]) * (drawn[:, 4] - tuning.centre[4])
     exact = (tuning.factor @ tuning.factor.T)[0, 4]
     assert abs(cross.mean() - exact) < LIMIT * cross.std() / np.sqrt(count)
+
+
+def test_normal_inverts_the_normal_distribution_function():
+    low = np.geomspace(1.4e-11, 0.5, 400)
+    shares = np.concatenate([low, np.linspace(0.05, 0.95, 400), 1.0 - low])
+    ours = np.array([normal(share) for share in shares])
+    np.testing.assert_allclose(ours, special.ndtri(shares), rtol=1e-14, atol=1e-15)
+    assert -6.7 < normal(0.0) < -6.6 and 6.6 < normal(1.0 - 2.0**-53) < 6.7
+
+
+@pytest.mark.parametrize('dimension', [1, 2, 5])
+def test_an_independent_draw_knows_how_far_from_the_centre_it_is(dimension, rng_seed):
+    rng = np.random.default_rng(rng_seed)
+    centre = rng.standard_normal(dimension)
+    spread = rng.standard_normal((dimension, dimension))
+    factor = np.linalg.cholesky(spread @ spread.T + np.eye(dimension))
+    point = np.empty(dimension)
+    for uniforms in rng.random((20, dimension + 4)):
+        distance2 = independence.draw(uniforms, 0, centre, factor, point)
+        away = np.linalg.solve(factor, point - centre)
+        np.testing.assert_allclose(distance2, away @ away, rtol=1e-9)
