@@ -102,10 +102,9 @@ def online(out: Path, seconds: float = 60.0) -> dict[str, Any]:
     from benchmarks import online as bench
 
     core = bench.run()
-    replayed = core.pop('replay_times_real_time')
     return {
         **nodes.run(seconds),
-        'replay_times_real_time': replayed,
+        **bench.replayed(),
         **{f'core_{name}': value for name, value in core.items()},
     }
 
