@@ -162,7 +162,8 @@ def _replay(
     windows: list[dict[str, Any]] = []
     events: list[str] = []
     seconds = 0.0
-    with progress('replaying', total or 1) as done, Reports() as reports:
+    # Without a live run to hold them against, nobody sees the limits of bands.
+    with progress('replaying', total or 1) as done, Reports(limits=live is not None) as reports:
 
         def counted() -> Iterator[Item]:
             nonlocal seconds

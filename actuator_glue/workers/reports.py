@@ -10,7 +10,6 @@ from dataclasses import fields, replace
 from typing import Any
 
 from actuator_glue.online.job import WindowResult, report
-from actuator_glue.online.replay import at_once
 from actuator_glue.online.sampling import Fit, Job
 from actuator_glue.workers.warm import warm_windows
 from actuator_glue.workers.worker import DIED, DONE, Answer, Tell, Worker
@@ -23,9 +22,14 @@ class Reports:
     than a report takes. Until the process is ready, and should it die, reports are computed here.
     A script that uses this keeps its own work behind `if __name__ == '__main__'`, as always with
     `multiprocessing`. Use as a context manager.
+
+    Args:
+        limits: whether the limits of bands, response and forecast are wanted; otherwise results
+            hold the bands' scores only. To carry all of them takes as long as to read the samples.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, limits: bool = True) -> None:
+        self._limits = limits
         self._lock = threading.Lock()
         self._asked: deque[tuple[Future[WindowResult], Job, Fit]] = deque()
         self._gone = _cores() < 2  # nothing is gained on one
@@ -33,16 +37,20 @@ class Reports:
 
     def __call__(self, job: Job, fitted: Fit) -> Future[WindowResult]:
         """Return what will be the report."""
+        found: Future[WindowResult] = Future()
         with self._lock:
             if self._worker is not None and not self._gone and self._worker.ready.is_set():
-                found: Future[WindowResult] = Future()
                 self._asked.append((found, job, fitted))
                 # Points to start from are no part of a report.
                 self._worker.submit(
-                    _report, replace(job, archive=None), replace(fitted, archive=None)
+                    _others,
+                    replace(job, archive=None),
+                    replace(fitted, archive=None),
+                    self._limits,
                 )
                 return found
-        return at_once(job, fitted)
+        self._settle(found, job, fitted)
+        return found
 
     def wait(self, seconds: float) -> bool:
         """Wait until the process is ready, for so long at most; return whether it is."""
@@ -57,7 +65,14 @@ class Reports:
             if answer.kind == DONE:
                 found.set_result(WindowResult(**_known(job, fitted), **answer.payload))
             else:
-                _settle(found, job, fitted)
+                self._settle(found, job, fitted)
+
+    def _settle(self, found: Future[WindowResult], job: Job, fitted: Fit) -> None:
+        """Compute here what the process does not or could not."""
+        try:
+            found.set_result(_report(job, fitted, self._limits))
+        except Exception as error:
+            found.set_exception(error)
 
     def __enter__(self) -> Reports:
         return self
@@ -88,16 +103,15 @@ def _known(job: Job, fitted: Fit) -> dict[str, Any]:
     }
 
 
-def _report(job: Job, fitted: Fit, tell: Tell) -> dict[str, Any]:
-    """Return the other fields of a result: half of the bytes need not be sent back."""
+def _report(job: Job, fitted: Fit, limits: bool) -> WindowResult:
     result = report(job, fitted)
-    known = _known(job, fitted)
+    if limits:
+        return result
+    scored = tuple(replace(p, band=p.band.slice(0, 0)) for p in result.scored)
+    return replace(result, scored=scored, response=None, forecast=())
+
+
+def _others(job: Job, fitted: Fit, limits: bool, tell: Tell) -> dict[str, Any]:
+    """Return the other fields of a result: half of the bytes need not be sent back."""
+    result, known = _report(job, fitted, limits), _known(job, fitted)
     return {f.name: getattr(result, f.name) for f in fields(result) if f.name not in known}
-
-
-def _settle(found: Future[WindowResult], job: Job, fitted: Fit) -> None:
-    """Compute here what the process could not."""
-    try:
-        found.set_result(report(job, fitted))
-    except Exception as error:
-        found.set_exception(error)

@@ -2,7 +2,7 @@
 
 import os
 import signal
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -94,3 +94,23 @@ def test_until_the_process_is_ready_reports_are_computed_here(
     with Reports() as reports:
         found = list(replay(stream(record), SETTINGS, reports=lambda *asked: reports(*asked)))
     assert all(same(asdict(a), asdict(b)) for a, b in zip(found, alone, strict=True))
+
+
+@pytest.mark.parametrize('beside', [pytest.param(True, marks=needs_two_cores), False])
+def test_without_limits_all_else_is_there(
+    record: Record, alone: list[object], beside: bool
+) -> None:
+    with Reports(limits=False) as reports:
+        assert not beside or reports.wait(120.0)
+        found = list(replay(stream(record), SETTINGS, reports=reports))
+    scored = 0
+    for ours, whole in zip(found, alone, strict=True):
+        if isinstance(ours, WindowResult) and isinstance(whole, WindowResult):
+            for short, long in zip(ours.scored, whole.scored, strict=True):
+                assert not len(short.band) and len(long.band)
+                assert np.array_equal(short.coverage, long.coverage)
+                assert np.array_equal(short.width, long.width)
+                scored += 1
+            ours, whole = (replace(r, scored=(), response=None) for r in (ours, whole))
+        assert same(asdict(ours), asdict(whole))
+    assert scored
