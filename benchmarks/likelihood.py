@@ -12,6 +12,7 @@ import statistics
 import sys
 import time
 from collections.abc import Callable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -79,7 +80,7 @@ def run(repeats: int = 25) -> dict[str, Any]:
     short, long = problem_r.records(), problem_r.records(duration=600.0)
     fast, fast_long, exact = FastErrors(short), FastErrors(long), ExactErrors(short)
     linear_hold = ExactErrors([_with_hold(record) for record in short])
-    many, some, one = draws(1024), draws(64), draws(1)[0]
+    many, some, one = draws(1024), draws(512), draws(1)[0]
     samples = int(exact.sizes.sum())
     window = _window()
     taken = medians(
@@ -123,23 +124,23 @@ def run(repeats: int = 25) -> dict[str, Any]:
 
 def cost_against_length(seconds: tuple[float, ...], repeats: int = 9) -> list[dict[str, float]]:
     """Return samples and microseconds per theta of all three for problems of several lengths."""
-    rows = []
-    many, some, one = draws(1024), draws(32), draws(1)[0]
-    for duration in seconds:
+    many, some, one = draws(1024), draws(64), draws(1)[0]
+    sizes = {'fast_us': len(many), 'exact_us': len(some), 'lfilter_us': 1}
+    tasks: dict[str, Callable[[], object]] = {}
+    samples = []
+    for i, duration in enumerate(seconds):
         records = problem_r.records(duration=duration)
         fast, exact = FastErrors(records), ExactErrors(records)
-        taken = medians(
-            {
-                'fast_us': lambda fast=fast: fast(many),
-                'exact_us': lambda exact=exact: exact(some),
-                'lfilter_us': lambda records=records: lfilter_sums(records, one),
-            },
-            repeats,
-        )
-        sizes = {'fast_us': len(many), 'exact_us': len(some), 'lfilter_us': 1}
-        row = {name: taken[name] / size * 1e6 for name, size in sizes.items()}
-        rows.append({'samples': float(exact.sizes.sum()), **row})
-    return rows
+        samples.append(float(exact.sizes.sum()))
+        tasks[f'fast_us {i}'] = partial(fast, many)
+        tasks[f'exact_us {i}'] = partial(exact, some)
+        tasks[f'lfilter_us {i}'] = partial(lfilter_sums, records, one)
+    taken = medians(tasks, repeats)
+    return [
+        {'samples': count}
+        | {name: taken[f'{name} {i}'] / size * 1e6 for name, size in sizes.items()}
+        for i, count in enumerate(samples)
+    ]
 
 
 def _uniform(m: int) -> Array:
