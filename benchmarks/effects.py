@@ -25,7 +25,7 @@ EFFECTS = (
     'sensor-lag',
 )
 THETA = np.array([134.0, 1.1e9, 2.5e5, 0.5])
-THETAS, SAMPLES = 64, 10_000
+THETAS, SAMPLES = 256, 10_000
 
 
 # A task is repeated for so long before its time counts: vector units that were idle run at a third
