@@ -85,7 +85,7 @@ def physical(phi: Array, k: float, low: Array, high: Array, theta: Array) -> Any
     rest = _power(least / most, k)
     part = rest + (1.0 - rest) * share(phi[2])
     oil = most * (np.cbrt(part) if k > 0.0 else math.sqrt(part))
-    log_jacobian += math.log(_power(most, k) * (1.0 - rest))
+    log_jacobian += (3.0 if k > 0.0 else 2.0) * math.log(most) + math.log1p(-rest)
     # Inside the box but for rounding.
     theta[1] = min(max(oil / inertia, low[1]), high[1])
     theta[2] = min(max(oil - k, low[2]), high[2])

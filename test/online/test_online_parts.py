@@ -35,6 +35,17 @@ def test_coordinates_are_a_bijection_inside_the_box(seed, stiffness):
     assert np.allclose(there.physical(phi)[inside], theta[inside], rtol=1e-6)
 
 
+@pytest.mark.parametrize('stiffness', [0.0, 250e3])
+def test_bounds_beyond_all_reason_leave_the_density_a_number(stiffness):
+    low, high = np.zeros(4), np.array([400.0, 1e125, 1e120, 100.0])
+    theta = np.array([[134.0, 1e120, 1e118, 0.5]])
+    phi, back, log_jacobian = np.empty((1, 4)), np.empty((1, 4)), np.empty(1)
+    ridge.coordinates_all(theta, stiffness, low, high, phi)
+    ridge.physical_all(phi, stiffness, low, high, back, log_jacobian)
+    assert np.isfinite(log_jacobian).all()
+    assert np.allclose(back, theta, rtol=1e-9)
+
+
 def test_what_is_uniform_between_bounds_is_a_normal_score():
     share = np.concatenate([np.logspace(-6.9, -0.4, 500), 1.0 - np.logspace(-6.9, -0.4, 500)])
     scores = np.array([ridge.score(s) for s in share])
