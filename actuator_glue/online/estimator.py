@@ -156,11 +156,34 @@ class Estimator:
             afresh=afresh,
             stop_at=None if self.schedule is None else self.schedule.done[_key(window)][1],
             ahead=self._ahead.after(window.end, record.period),
-            frozen=self.judged(window),
+            frozen=self._judged(window),
         )
         return self.running
 
-    def judged(self, window: Window) -> tuple[Frozen, ...]:
+    def finish(self, result: WindowResult | Fit) -> list[Event]:
+        """Take the result of the running job, or its first part, which is all the next one needs."""
+        self.running = None
+        window, memory = result.window, self._memory
+        if result.archive is not None:
+            memory.archive, memory.model, memory.epoch = result.archive, result.model, window.epoch
+        memory.frozen = [
+            f for f in memory.frozen if f.segment == window.segment and f.stop > window.end
+        ]
+        if result.frozen is not None:
+            memory.frozen.append(result.frozen)
+            del memory.frozen[:-MAX_FROZEN]
+        if result.failure:
+            return [Failed(window.number, window.record.first_index, result.failure)]
+        return []
+
+    def abandon(self, reason: str) -> list[Event]:
+        """Give up the running job, whose process has died."""
+        job, self.running = self.running, None
+        if job is None:
+            return []
+        return [Failed(job.window.number, job.window.record.first_index, reason)]
+
+    def _judged(self, window: Window) -> tuple[Frozen, ...]:
         """Return the earlier posteriors whose forecasts a window's samples judge."""
         record = window.record
         settled = record.first_index + round(self.settings.settle / record.period)
@@ -169,37 +192,6 @@ class Estimator:
             for f in self._memory.frozen
             if f.segment == window.segment and f.stop <= window.end and f.start >= settled
         )
-
-    def finish(self, result: WindowResult | Fit) -> list[Event]:
-        """Take the result of the running job, or as much of it as the next job starts from."""
-        self.running = None
-        window, memory = result.window, self._memory
-        if result.archive is not None:
-            memory.archive, memory.model, memory.epoch = result.archive, result.model, window.epoch
-        memory.frozen = [
-            f for f in memory.frozen if f.segment == window.segment and f.stop > window.end
-        ]
-        if isinstance(result, WindowResult):
-            self.remember(result)
-        if result.failure:
-            return [Failed(window.number, window.record.first_index, result.failure)]
-        return []
-
-    def remember(self, result: WindowResult) -> None:
-        """Take the posterior that later samples judge, where `finish` was given a `Fit`.
-
-        It is due when a window ends where its forecast does (`Job.forecast`), or later.
-        """
-        if result.frozen is not None:
-            self._memory.frozen.append(result.frozen)
-            del self._memory.frozen[:-MAX_FROZEN]
-
-    def abandon(self, reason: str) -> list[Event]:
-        """Give up the running job, whose process has died."""
-        job, self.running = self.running, None
-        if job is None:
-            return []
-        return [Failed(job.window.number, job.window.record.first_index, reason)]
 
     def _planned(self, window: Window) -> Window | None:
         """Return a window as the schedule numbers it; None where the live run dropped it."""

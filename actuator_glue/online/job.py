@@ -10,11 +10,10 @@ import numpy as np
 from actuator_glue.errors import InputError
 from actuator_glue.inference.convergence import rhat_and_ess
 from actuator_glue.inference.moments import Moments, moments
-from actuator_glue.inference.predictive import fit_residual
 from actuator_glue.online import fitting, sampling
 from actuator_glue.online.forecast import Frozen, Prediction, predictions
 from actuator_glue.online.response import ResponseBand, response_band
-from actuator_glue.online.sampling import Fit, Job, spread
+from actuator_glue.online.sampling import Fit, Job
 from actuator_glue.online.settings import EstimatorSettings, ModelChoice
 from actuator_glue.online.stream import Window
 from actuator_glue.records import Array, Record
@@ -93,40 +92,45 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> Fit:
         return Fit(job.window, job.model, failure=str(error))
 
 
-def report(job: Job, fitted: Fit) -> WindowResult:
-    """Do the second part of `run`: what is published of a posterior."""
+def report(job: Job, fitted: Fit, limits: bool = True) -> WindowResult:
+    """Do the second part of `run`: what is published of a posterior.
+
+    Args:
+        job: what was computed.
+        fitted: its first part.
+        limits: whether the limits of bands, response and forecast are wanted; otherwise the
+            result holds the bands' scores only.
+    """
     try:
-        return _report(job, fitted)
+        return _report(job, fitted, limits)
     except InputError as error:
-        return WindowResult(
-            job.window, job.settings, job.model, archive=fitted.archive, failure=str(error)
-        )
+        return _failed(job, fitted, str(error))
 
 
-def _report(job: Job, fitted: Fit) -> WindowResult:
+def _failed(job: Job, fitted: Fit, reason: str) -> WindowResult:
+    """Return what is left of a window, for later ones."""
+    return WindowResult(
+        job.window,
+        job.settings,
+        job.model,
+        frozen=fitted.frozen,
+        archive=fitted.archive,
+        failure=reason,
+    )
+
+
+def _report(job: Job, fitted: Fit, limits: bool) -> WindowResult:
     settings, model, record = job.settings, job.model, job.window.record
-    if fitted.sampled is None or fitted.coordinates is None:
-        return WindowResult(job.window, settings, model, failure=fitted.failure)
-    chains = fitted.coordinates.chains(fitted.sampled)
+    chains, frozen = fitted.chains, fitted.frozen
+    if chains is None or frozen is None:
+        return _failed(job, fitted, fitted.failure)
     # R-hat and ESS of very many draws would cost more than the sampling.
     rhat, ess = rhat_and_ess(chains.kept[:: max(1, len(chains.kept) // DIAGNOSED)])
-    posterior = chains.posterior()
-    summary = moments(posterior, *model.bounds)
-    settle = round(settings.settle / record.period)
-    residual = (record.measured - fitting.simulate(model, chains.best[None], record)[0])[settle:]
-    rms_error = float(residual.std())
-    start, stop = job.forecast
-    frozen = Frozen(
-        number=job.window.number,
-        segment=job.window.segment,
-        start=start,
-        stop=stop,
-        model=model,
-        draws=posterior[spread(len(posterior), settings.draws)],
-        residual=fit_residual(residual, parameters=len(model.names)),
-        noise=fitted.noise,
-    )
+    summary = moments(chains.posterior(), *model.bounds)
     seed = (settings.seed, record.first_index)
+    scored = [p for old in job.frozen for p in _score(job, old, seed)]
+    if not limits:
+        scored = [replace(p, band=p.band.slice(0, 0)) for p in scored]
     return WindowResult(
         window=job.window,
         settings=settings,
@@ -136,15 +140,17 @@ def _report(job: Job, fitted: Fit) -> WindowResult:
         best=chains.best,
         rhat=rhat,
         ess=ess,
-        rms_error=rms_error,
-        nrmse=rms_error / float(record.measured[settle:].std()),
+        rms_error=fitted.rms_error,
+        nrmse=fitted.nrmse,
         noise=frozen.noise,
         evaluations=chains.evaluations,
         stopped_early=not fitted.complete,
         converged=bool(chains.annealed and rhat.max() <= settings.rhat_limit),
-        response=response_band(frozen.draws, record.known_stiffness(), settings),
-        scored=tuple(p for old in job.frozen for p in _score(job, old, seed)),
-        forecast=tuple(_forecast(job, frozen, seed)),
+        response=(
+            response_band(frozen.draws, record.known_stiffness(), settings) if limits else None
+        ),
+        scored=tuple(scored),
+        forecast=tuple(_forecast(job, frozen, seed)) if limits else (),
         frozen=frozen,
         archive=fitted.archive,
     )

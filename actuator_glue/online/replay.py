@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future
-from dataclasses import replace
 from typing import Any, TypeAlias
 
 from actuator_glue.errors import InputError
@@ -20,16 +17,21 @@ from actuator_glue.records import Record
 
 Item: TypeAlias = Setup | Block | Preview
 Named: TypeAlias = tuple[str, Any]
+# A window that has been sampled and is to be reported.
+Sampled: TypeAlias = tuple[Job, Fit]
 
-# Results that may wait for their bands while the next windows are sampled.
-LAG = 3
+
+def at_once(found: Iterable[Event | Sampled]) -> Iterator[WindowResult | Event]:
+    """Yield events as they are, and of each window that was sampled its report."""
+    for thing in found:
+        yield told(report(*thing)) if isinstance(thing, tuple) else thing
 
 
-def at_once(job: Job, fitted: Fit) -> Future[WindowResult]:
-    """Return the finished report of a window."""
-    found: Future[WindowResult] = Future()
-    found.set_result(report(job, fitted))
-    return found
+def told(result: WindowResult) -> WindowResult | Failed:
+    """Return a result, or the event that says why there is none."""
+    if not result.failure:
+        return result
+    return Failed(result.window.number, result.window.record.first_index, result.failure)
 
 
 def replay(
@@ -37,7 +39,7 @@ def replay(
     settings: EstimatorSettings,
     model: ModelChoice | None = None,
     schedule: Schedule | None = None,
-    reports: Callable[[Job, Fit], Future[WindowResult]] = at_once,
+    reports: Callable[[Iterable[Event | Sampled]], Iterator[WindowResult | Event]] = at_once,
 ) -> Iterator[WindowResult | Event]:
     """Run the estimator over what was streamed; yield results and events in order.
 
@@ -49,23 +51,18 @@ def replay(
         reports: computes what windows publish, perhaps beside the sampling of the next ones.
     """
     estimator = Estimator(settings, model or choose_model(), schedule=schedule)
-    waiting: deque[Event | Future[WindowResult]] = deque()
-    due: deque[tuple[int, Future[WindowResult]]] = deque()
+    return reports(_sampled(items, estimator))
+
+
+def _sampled(items: Iterable[Item], estimator: Estimator) -> Iterator[Event | Sampled]:
+    """Run the estimator as far as windows depend on one another."""
     for item in items:
-        waiting += _given(estimator, item)
+        yield from _given(estimator, item)
         while (job := estimator.next_job()) is not None:
             fitted = fit(job)
-            while due and due[0][0] <= job.window.end:
-                estimator.remember(due.popleft()[1].result())
-            # The sampling does not ask for them, so they may come as late as this.
-            job = replace(job, frozen=estimator.judged(job.window))
-            waiting += estimator.finish(fitted)
+            yield from estimator.finish(fitted)
             if not fitted.failure:
-                found = reports(job, fitted)
-                waiting.append(found)
-                due.append((job.forecast[1], found))
-        yield from _ready(waiting, LAG)
-    yield from _ready(waiting, 0)
+                yield job, fitted
 
 
 def _given(estimator: Estimator, item: Item) -> list[Event]:
@@ -74,26 +71,6 @@ def _given(estimator: Estimator, item: Item) -> list[Event]:
     if isinstance(item, Preview):
         return estimator.preview(item)
     return estimator.push(item)
-
-
-def _ready(
-    waiting: deque[Event | Future[WindowResult]], most: int
-) -> Iterator[WindowResult | Event]:
-    """Yield what is ready, in order, and wait for as much as leaves `most` waiting."""
-    while waiting:
-        first = waiting[0]
-        if isinstance(first, Future):
-            if not first.done() and len(waiting) <= most:
-                return
-            result = first.result()
-            yield _told(result) if result.failure else result
-        else:
-            yield first
-        waiting.popleft()
-
-
-def _told(result: WindowResult) -> Failed:
-    return Failed(result.window.number, result.window.record.first_index, result.failure)
 
 
 def stream(record: Record, block: int = 64) -> Iterator[Item]:

@@ -14,6 +14,7 @@ from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.convergence import quick_rhat_and_ess
 from actuator_glue.inference.evaluate import LogDensity
 from actuator_glue.inference.likelihood import GaussianLikelihood, GlueLikelihood
+from actuator_glue.inference.predictive import fit_residual
 from actuator_glue.online import fitting
 from actuator_glue.online.coordinates import Coordinates
 from actuator_glue.online.forecast import Frozen, sensor_noise
@@ -86,9 +87,10 @@ class Fit:
     Attributes:
         window: the samples.
         model: fitted model.
-        sampled: draws in sampling coordinates.
-        coordinates: the map to physical parameters.
-        noise: standard deviation of the sensor noise [m].
+        chains: draws of the physical parameters, with log likelihoods.
+        rms_error: rms of measured minus best simulated displacement, mean removed [m].
+        nrmse: rms_error over the standard deviation of the measured displacement.
+        frozen: the posterior, to be held against later samples.
         archive: points to start from, shape (m, p).
         complete: the sampling was not ended early.
         failure: why there is nothing of all this; empty where there is.
@@ -96,9 +98,10 @@ class Fit:
 
     window: Window
     model: ModelChoice
-    sampled: Chains | None = None
-    coordinates: Coordinates | None = None
-    noise: float = 0.0
+    chains: Chains | None = None
+    rms_error: float = float('nan')
+    nrmse: float = float('nan')
+    frozen: Frozen | None = None
     archive: Array | None = None
     complete: bool = False
     failure: str = ''
@@ -118,24 +121,37 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> Fit:
     settle = round(job.settings.settle / record.period)
     noise = sensor_noise(record.measured)
     _check_excited(record, settle, noise)
-    sampled, coordinates, complete = _sample(job, settle, expired)
-    points = sampled.posterior()
-    points = coordinates.physical(points[spread(len(points), ARCHIVE)])
+    chains, complete = _sample(job, settle, expired)
+    posterior = chains.posterior()
+    best = fitting.simulate(job.model, chains.best[np.newaxis], record)[0]
+    residual = (record.measured - best)[settle:]
+    rms_error = float(residual.std())
+    start, stop = job.forecast
     return Fit(
         window=job.window,
         model=job.model,
-        sampled=sampled,
-        coordinates=coordinates,
-        noise=noise,
-        archive=_archive(points, job.archive),
+        chains=chains,
+        rms_error=rms_error,
+        nrmse=rms_error / float(record.measured[settle:].std()),
+        frozen=Frozen(
+            number=job.window.number,
+            segment=job.window.segment,
+            start=start,
+            stop=stop,
+            model=job.model,
+            draws=posterior[spread(len(posterior), job.settings.draws)],
+            residual=fit_residual(residual, parameters=len(job.model.names)),
+            noise=noise,
+        ),
+        archive=_archive(posterior[spread(len(posterior), ARCHIVE)], job.archive),
         complete=complete,
     )
 
 
 def _sample(
     job: Job, settle: int, expired: Callable[[], bool] | None
-) -> tuple[Chains, Coordinates, bool]:
-    """Return chains, their coordinates, and whether they are all that was wanted."""
+) -> tuple[Chains, bool]:
+    """Return chains of physical parameters, and whether they are all that was wanted."""
     settings, model, record = job.settings, job.model, job.window.record
     near = None
     if job.archive is not None:
@@ -177,7 +193,7 @@ def _sample(
         enough=enough,
     )
     complete = complete or sampled.evaluations + job.chains > job.evaluations
-    return sampled, coordinates, complete
+    return coordinates.chains(sampled), complete
 
 
 def _stop(job: Job, expired: Callable[[], bool] | None) -> Callable[[dream.State], bool] | None:

@@ -5,14 +5,26 @@ from __future__ import annotations
 import os
 import threading
 from collections import deque
+from collections.abc import Iterable, Iterator
 from concurrent.futures import Future
 from dataclasses import fields, replace
 from typing import Any
 
 from actuator_glue.online.job import WindowResult, report
+from actuator_glue.online.replay import Sampled, told
 from actuator_glue.online.sampling import Fit, Job
+from actuator_glue.online.stream import Event
 from actuator_glue.workers.warm import warm_windows
 from actuator_glue.workers.worker import DIED, DONE, Answer, Tell, Worker
+
+# Samples of the windows that are handed over together: to wake a process, and the thread that
+# takes its answer, costs a tenth of a short window's work. And windows and events at most.
+_SAMPLES, _MOST = 20_000, 16
+# Such portions that may be out while the next windows are sampled.
+_OUT = 2
+
+# The reports of one portion; None where the process did not give them.
+_Answered = list[WindowResult] | None
 
 
 class Reports:
@@ -24,55 +36,67 @@ class Reports:
     `multiprocessing`. Use as a context manager.
 
     Args:
-        limits: whether the limits of bands, response and forecast are wanted; otherwise results
-            hold the bands' scores only. To carry all of them takes as long as to read the samples.
+        limits: as `job.report` takes it. To carry all limits of bands takes as long as to read
+            the samples.
     """
 
     def __init__(self, limits: bool = True) -> None:
         self._limits = limits
         self._lock = threading.Lock()
-        self._asked: deque[tuple[Future[WindowResult], Job, Fit]] = deque()
+        self._asked: deque[tuple[Future[_Answered], list[Sampled]]] = deque()
         self._gone = _cores() < 2  # nothing is gained on one
         self._worker = None if self._gone else Worker(self._take, _warm)
 
-    def __call__(self, job: Job, fitted: Fit) -> Future[WindowResult]:
-        """Return what will be the report."""
-        found: Future[WindowResult] = Future()
-        with self._lock:
-            if self._worker is not None and not self._gone and self._worker.ready.is_set():
-                self._asked.append((found, job, fitted))
-                # Points to start from are no part of a report.
-                self._worker.submit(
-                    _others,
-                    replace(job, archive=None),
-                    replace(fitted, archive=None),
-                    self._limits,
-                )
-                return found
-        self._settle(found, job, fitted)
-        return found
+    def __call__(self, found: Iterable[Event | Sampled]) -> Iterator[WindowResult | Event]:
+        """Yield events as they are, and of each window that was sampled its report, in order."""
+        waiting: deque[tuple[list[Event | Sampled], Future[_Answered]]] = deque()
+        for portion in _portions(found):
+            waiting.append((portion, self._ask([t for t in portion if isinstance(t, tuple)])))
+            while waiting and (len(waiting) > _OUT or waiting[0][1].done()):
+                yield from self._answered(*waiting.popleft())
+        while waiting:
+            yield from self._answered(*waiting.popleft())
 
     def wait(self, seconds: float) -> bool:
         """Wait until the process is ready, for so long at most; return whether it is."""
         return self._worker is not None and self._worker.ready.wait(seconds)
+
+    def _ask(self, sampled: list[Sampled]) -> Future[_Answered]:
+        answer: Future[_Answered] = Future()
+        with self._lock:
+            if sampled and self._worker and not self._gone and self._worker.ready.is_set():
+                self._asked.append((answer, sampled))
+                # Points to start from are no part of a report.
+                lean = [(replace(j, archive=None), replace(f, archive=None)) for j, f in sampled]
+                self._worker.submit(_others, lean, self._limits)
+            else:
+                answer.set_result(None)
+        return answer
 
     def _take(self, answer: Answer) -> None:
         with self._lock:
             self._gone |= answer.kind == DIED
             count = len(self._asked) if self._gone else 1
             answered = [self._asked.popleft() for _ in range(count)]
-        for found, job, fitted in answered:
+        for future, sampled in answered:
+            results = None
             if answer.kind == DONE:
-                found.set_result(WindowResult(**_known(job, fitted), **answer.payload))
-            else:
-                self._settle(found, job, fitted)
+                results = [
+                    WindowResult(**_known(*one), **others)
+                    for one, others in zip(sampled, answer.payload, strict=True)
+                ]
+            future.set_result(results)
 
-    def _settle(self, found: Future[WindowResult], job: Job, fitted: Fit) -> None:
-        """Compute here what the process does not or could not."""
-        try:
-            found.set_result(_report(job, fitted, self._limits))
-        except Exception as error:
-            found.set_exception(error)
+    def _answered(
+        self, portion: list[Event | Sampled], answer: Future[_Answered]
+    ) -> Iterator[WindowResult | Event]:
+        """Yield a portion's events and reports; what the process did not give is computed here."""
+        results = iter(answer.result() or [])
+        for thing in portion:
+            if isinstance(thing, tuple):
+                yield told(next(results, None) or report(*thing, self._limits))
+            else:
+                yield thing
 
     def __enter__(self) -> Reports:
         return self
@@ -80,6 +104,19 @@ class Reports:
     def __exit__(self, *error: object) -> None:
         if self._worker is not None:
             self._worker.close(patience=0.0)
+
+
+def _portions(found: Iterable[Event | Sampled]) -> Iterator[list[Event | Sampled]]:
+    portion: list[Event | Sampled] = []
+    samples = 0
+    for thing in found:
+        portion.append(thing)
+        samples += len(thing[0].window.record) if isinstance(thing, tuple) else 0
+        if samples >= _SAMPLES or len(portion) >= _MOST:
+            yield portion
+            portion, samples = [], 0
+    if portion:
+        yield portion
 
 
 def _cores() -> int:
@@ -99,19 +136,15 @@ def _known(job: Job, fitted: Fit) -> dict[str, Any]:
         'window': job.window,
         'settings': job.settings,
         'model': job.model,
+        'frozen': fitted.frozen,
         'archive': fitted.archive,
     }
 
 
-def _report(job: Job, fitted: Fit, limits: bool) -> WindowResult:
-    result = report(job, fitted)
-    if limits:
-        return result
-    scored = tuple(replace(p, band=p.band.slice(0, 0)) for p in result.scored)
-    return replace(result, scored=scored, response=None, forecast=())
-
-
-def _others(job: Job, fitted: Fit, limits: bool, tell: Tell) -> dict[str, Any]:
-    """Return the other fields of a result: half of the bytes need not be sent back."""
-    result, known = _report(job, fitted, limits), _known(job, fitted)
-    return {f.name: getattr(result, f.name) for f in fields(result) if f.name not in known}
+def _others(sampled: list[Sampled], limits: bool, tell: Tell) -> list[dict[str, Any]]:
+    """Return the other fields of results: half of the bytes need not be sent back."""
+    found = []
+    for job, fitted in sampled:
+        result, known = report(job, fitted, limits), _known(job, fitted)
+        found.append({f.name: getattr(result, f.name) for f in fields(result) if f.name not in known})
+    return found

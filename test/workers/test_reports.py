@@ -67,7 +67,7 @@ def test_the_bits_are_those_of_one_process(record: Record, alone: list[object]) 
 
 
 @needs_two_cores
-@pytest.mark.parametrize('after', [0, 3])
+@pytest.mark.parametrize('after', [0, 3, 12])
 def test_nothing_is_lost_when_the_process_dies(
     record: Record, alone: list[object], after: int
 ) -> None:
@@ -75,15 +75,15 @@ def test_nothing_is_lost_when_the_process_dies(
         assert reports.wait(120.0)
         killed = False
 
-        def deadly(job, fitted):
+        def deadly(found):
             nonlocal killed
-            found = reports(job, fitted)
-            if job.window.number >= after and not killed:
-                os.kill(reports._worker._process.pid, signal.SIGKILL)
-                killed = True
-            return found
+            for thing in found:
+                if isinstance(thing, tuple) and thing[0].window.number >= after and not killed:
+                    os.kill(reports._worker._process.pid, signal.SIGKILL)
+                    killed = True
+                yield thing
 
-        found = list(replay(stream(record), SETTINGS, reports=deadly))
+        found = list(replay(stream(record), SETTINGS, reports=lambda f: reports(deadly(f))))
     assert killed
     assert all(same(asdict(a), asdict(b)) for a, b in zip(found, alone, strict=True))
 
@@ -92,7 +92,7 @@ def test_until_the_process_is_ready_reports_are_computed_here(
     record: Record, alone: list[object]
 ) -> None:
     with Reports() as reports:
-        found = list(replay(stream(record), SETTINGS, reports=lambda *asked: reports(*asked)))
+        found = list(replay(stream(record), SETTINGS, reports=reports))
     assert all(same(asdict(a), asdict(b)) for a, b in zip(found, alone, strict=True))
 
 
