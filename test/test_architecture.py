@@ -14,7 +14,7 @@ import actuator_glue
 ROOT = Path(actuator_glue.__file__).resolve().parent
 SOURCES = sorted(p for p in ROOT.rglob('*.py'))
 
-BOTTOM = {'errors', 'records', 'jit'}
+BOTTOM = {'errors', 'records', 'jit', 'normal'}
 CORE = BOTTOM | {'model', 'inference'}
 EVERYTHING = CORE | {
     'online', 'residual', 'report', 'io', 'reproduction', 'interfaces', 'workers',
@@ -25,6 +25,7 @@ ARROWS = {
     'errors': set(),
     'records': {'errors'},
     'jit': set(),
+    'normal': {'jit'},
     'model': BOTTOM,
     'inference': BOTTOM | {'model'},
     'online': CORE,
@@ -38,7 +39,7 @@ ARROWS = {
     'cli': EVERYTHING | {'demo'},
 }
 # All below io but jit, which keeps compiled code in files.
-PURE = ('errors', 'records', 'model', 'inference', 'online', 'residual')
+PURE = ('errors', 'records', 'normal', 'model', 'inference', 'online', 'residual')
 ROS = ('rclpy', 'launch', 'ament_index_python')
 HEAVY = ('numba', 'scipy', 'matplotlib', 'arviz', 'control', 'statsmodels', 'rosbags', 'rclpy')
 

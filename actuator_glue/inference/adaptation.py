@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from actuator_glue.inference.archive import newest
 from actuator_glue.inference.moves import INDEPENDENCE, NAMES, PARALLEL, independence
 from actuator_glue.inference.settings import Settings
 from actuator_glue.jit import njit
@@ -45,23 +46,20 @@ def empty_counts(settings: Settings) -> Array:
     return np.zeros((len(NAMES) + settings.crossovers, 3))
 
 
-def tune(
-    points: Array, counts: Array, settings: Settings, crossover_cdf: Array | None = None
-) -> Tuning:
+def tune(points: Array, counts: Array, settings: Settings) -> Tuning:
     """Fit the proposals to points (m, p) and the shares to what the moves achieved.
 
-    Crossover classes share by their mean squared jump (Vrugt 2016, section 3.2.1), unless
-    `crossover_cdf` says what they have; the independence and parallel moves share what the snooker
-    move leaves by the square of the effective draws that such jumps make: nearer to the better one
-    alone than to equal parts.
+    Crossover classes share by their mean squared jump (Vrugt 2016, section 3.2.1); the
+    independence and parallel moves share what the snooker move leaves by the square of the
+    effective draws that such jumps make: nearer to the better one alone than to equal parts.
     """
     dimension = points.shape[1]
     new = Tuning(
         np.empty(len(NAMES)), np.empty(settings.crossovers), np.empty(dimension),
         np.empty(dimension), np.empty((dimension, dimension)),
     )  # fmt: skip
-    fit(points, counts, settings.independence, settings.snooker, new)
-    return new if crossover_cdf is None else new._replace(crossover_cdf=crossover_cdf)
+    _fit(points, counts, settings.independence, settings.snooker, True, new)
+    return new
 
 
 @njit(fastmath=False)
@@ -72,8 +70,13 @@ def _drawn(jump: float, dimension: int) -> float:
 
 
 @njit(fastmath=False)
-def fit(points: Array, counts: Array, most: float, snooker: float, tuning: Tuning) -> None:
-    """Do `tune` in place; `most` and `snooker` are the settings' shares of moves."""
+def _fit(
+    points: Array, counts: Array, most: float, snooker: float, crossover: bool, tuning: Tuning
+) -> None:
+    """Do `tune` in place, for crossover classes where asked.
+
+    `most` and `snooker` are the settings' shares of moves.
+    """
     moves, crossovers, scale = tuning.move_cdf, tuning.crossover_cdf, tuning.scale
     reach = np.zeros(len(counts))
     for i in range(len(counts)):
@@ -88,17 +91,18 @@ def fit(points: Array, counts: Array, most: float, snooker: float, tuning: Tunin
     moves[0] = free * (1.0 - share)
     moves[1] = moves[0] + snooker
     moves[2] = moves[1] + free * share
-    first = len(moves)
-    total = 0.0
-    for i in range(len(crossovers)):
-        total += reach[first + i]
-    weights = 0.0
-    for i in range(len(crossovers)):
-        weight = reach[first + i] / total if total > 0.0 else 0.0
-        weights += max(weight, _FLOOR)
-        crossovers[i] = weights
-    for i in range(len(crossovers)):
-        crossovers[i] /= weights
+    if crossover:
+        first = len(moves)
+        total = 0.0
+        for i in range(len(crossovers)):
+            total += reach[first + i]
+        weights = 0.0
+        for i in range(len(crossovers)):
+            weight = reach[first + i] / total if total > 0.0 else 0.0
+            weights += max(weight, _FLOOR)
+            crossovers[i] = weights
+        for i in range(len(crossovers)):
+            crossovers[i] /= weights
     independence.fit(points, tuning.centre, tuning.factor)
     for j in range(len(scale)):
         scale[j] = 0.0
@@ -127,3 +131,38 @@ def rescue(z: Array, x: Array, values: Array, target: Array, total: Array) -> No
             z[i], x[i] = z[best], x[best]
             values[i], target[i] = values[best], target[best]
     total[:] = 0.0
+
+
+@njit(fastmath=False)
+def learn(
+    z: Array, x: Array, values: Array, target: Array, total: Array, rows: Array, size: int,
+    counts: Array, most: float, snooker: float, tuning: Tuning, burning: bool, fitted: int,
+) -> int:  # fmt: skip
+    """Have the moves follow an archive that has grown, in place; return its size at the last fit.
+
+    In burn-in outlier chains are rescued and everything is fitted anew; after it only when the
+    archive has doubled, from what the moves achieved since, which is then forgotten.
+
+    Args:
+        z: the chains, as in a `Walk`, (n, p).
+        x: likewise, (n, p).
+        values: their log likelihoods, (n,).
+        target: their log targets, (n,).
+        total: sum of each chain's log likelihoods since this was last done, (n,); zeroed.
+        rows: the archive's buffer.
+        size: how much of it is filled.
+        counts: uses, acceptances and squared jumps of the moves.
+        most: the settings' largest share of independence moves.
+        snooker: the settings' share of snooker moves.
+        tuning: what is fitted.
+        burning: whether this is burn-in.
+        fitted: size of the archive at the last fit.
+    """
+    if not burning and size < 2 * fitted:
+        return fitted
+    if burning:
+        rescue(z, x, values, target, total)
+    _fit(newest(rows, size), counts, most, snooker, burning, tuning)
+    if not burning:
+        counts[:] = 0.0
+    return size

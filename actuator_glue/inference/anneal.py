@@ -71,7 +71,8 @@ def archive_reference(
     factor *= 1.5
     points = independence.draw_all(rng.random((size, dimension + 4)), centre, factor)
     outside = np.isneginf(physical_all(points, lower, width)[1])
-    points[outside] = archive[rng.integers(0, len(archive), int(outside.sum()))]
+    if outside.any():
+        points[outside] = archive[rng.integers(0, len(archive), int(outside.sum()))]
     return Reference(points, centre, factor)
 
 
@@ -115,7 +116,7 @@ def anneal(
         now = Walk(z[start], x[start], values[start], target)
         counts = empty_counts(settings)
         uniforms = rng.random((settings.sweeps, chains, columns))
-        _, _, path = many(uniforms, now, archive, 0, around, density, log_density, counts)
+        _, _, _, path = many(uniforms, now, archive, 0, around, density, log_density, counts)
         evaluations += chains * settings.sweeps
         # Chain by chain: systematic resampling then treats every chain alike, so that modes which
         # no move connects keep their shares from temperature to temperature.

@@ -42,11 +42,6 @@ class Archive:
         """The points, (size, p)."""
         return self._buffer.rows[: self.size]
 
-    @property
-    def newest(self) -> Array:
-        """What `newest` leaves of the points."""
-        return np.asarray(newest(self._buffer.rows, self.size))
-
     def append(self, points: Array) -> Archive:
         """Return the archive with points (m, p) added."""
         wide = self.with_room(len(points))

@@ -26,8 +26,8 @@ from actuator_glue.inference.coordinates import check_bounds, physical_all, samp
 from actuator_glue.inference.evaluate import LogDensity, check_values, evaluate
 from actuator_glue.inference.moves import uniforms_per_chain
 from actuator_glue.inference.settings import Settings
-from actuator_glue.inference.state import Info, State, adapted, moved
-from actuator_glue.inference.sweep import Path, adapt, many, one
+from actuator_glue.inference.state import Info, State, moved
+from actuator_glue.inference.sweep import Path, enter, many, one
 from actuator_glue.records import Array
 
 # Evaluations of a compiled likelihood between two questions whether to stop: 0.2 ms; and in one go
@@ -124,7 +124,7 @@ def _check_archive(archive: Array, lower: Array, width: Array) -> Array:
     inside = ((archive >= lower) & (archive <= lower + width)).all(axis=1)
     if inside.sum() < 2:
         raise InputError('the archive for a warm start lies outside the prior bounds')
-    return archive[inside]
+    return archive if inside.all() else archive[inside]
 
 
 def step(rng: np.random.Generator, state: State, log_density: LogDensity) -> tuple[State, Info]:
@@ -136,14 +136,12 @@ def step(rng: np.random.Generator, state: State, log_density: LogDensity) -> tup
     walk, accepted, label = one(
         uniforms, state.walk, state.archive, state.around, log_density, state.counts
     )
-    total, archive = state.sum_log_density, state.archive
-    if state.adapting:
-        total += walk.log_density
+    archive, fitted = state.archive, state.fitted
+    if state.burn_in:
+        state.sum_log_density[:] += walk.log_density
     if state.until_append == 1:
-        archive = archive.append(walk.z)
-        if state.adapting:
-            adapt(walk, archive, state.around, state.counts, total)
-    new = adapted(moved(state, walk, archive, state.counts, 1))
+        archive, fitted = enter(walk, archive, state.around, state.counts, state.learning)
+    new = moved(state, walk, archive, fitted, state.counts, 1)
     return new, Info(accepted, label[:, 0], label[:, 1])
 
 
@@ -152,28 +150,24 @@ def stretch(
     state: State,
     log_density: LogDensity,
     density: Compiled | None,
-    most: int,
+    count: int,
 ) -> tuple[State, Path]:
-    """Advance every chain by up to `most` generations.
+    """Advance every chain by `count` generations.
 
     The state is that of as many `step`s, bit by bit; with a compiled likelihood it is there
     sooner.
     """
     state = _own(state)
-    count = min(most, state.until_adaptation)
     columns = uniforms_per_chain(state.z.shape[1], state.settings.pairs)
-    walk, archive, path = many(
+    walk, archive, fitted, path = many(
         rng.random((count, len(state.z), columns)), state.walk, state.archive, state.until_append,
-        state.around, density, log_density, state.counts,
-        state.sum_log_density if state.adapting else None,
+        state.around, density, log_density, state.counts, state.learning,
     )  # fmt: skip
-    return adapted(moved(state, walk, archive, state.counts, count)), path
+    return moved(state, walk, archive, fitted, state.counts, count), path
 
 
 def _own(state: State) -> State:
     """Return the state with arrays of its own for what generations change in place."""
-    if not state.adapting:
-        return state._replace(counts=state.counts.copy())
     return state._replace(
         counts=state.counts.copy(),
         sum_log_density=state.sum_log_density.copy(),

@@ -15,6 +15,7 @@ from scipy.signal import lfilter
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference.bands import Band, band, check_draws, check_levels
+from actuator_glue.jit import njit
 from actuator_glue.records import Array
 
 # Rows of the predictive ensemble: the 2.5 % quantile then lies between order statistics 25 and
@@ -81,14 +82,31 @@ def fit_residual(
     count = sum(len(r) for r in parts)
     if count < parameters + 8:
         raise InputError(f'{count} residual samples are too few for a residual model')
-    if not all(np.isfinite(r).all() for r in parts):
+    mean = sum(float(r.sum()) for r in parts) / count if constant else 0.0
+    power = lagged = 0.0
+    for part in parts:
+        squares, products = _second_moments(np.ascontiguousarray(part), mean)
+        power += squares
+        lagged += products
+    if not np.isfinite(power):
         raise InputError('the residual has NaN or infinite samples')
-    mean = float(sum(r.sum() for r in parts) / count) if constant else 0.0
-    power = float(sum(((r - mean) ** 2).sum() for r in parts))
-    lagged = float(sum(((r[1:] - mean) * (r[:-1] - mean)).sum() for r in parts))
     phi = float(np.clip(lagged / power, -0.9999, 0.9999)) if power > 0 else 0.0
     sd = float(np.sqrt(power / (count - parameters - constant)))
     return ResidualModel(mean=mean, sd=sd, phi=phi, samples=count - parameters)
+
+
+@njit
+def _second_moments(residual: Array, mean: float) -> tuple[float, float]:
+    """Return the sums of squares and of products of neighbours, about the mean."""
+    if len(residual) == 0:
+        return 0.0, 0.0
+    first = residual[0] - mean
+    squares, products = first * first, 0.0
+    for i in range(1, len(residual)):
+        here = residual[i] - mean
+        squares += here * here
+        products += here * (residual[i - 1] - mean)
+    return squares, products
 
 
 def predictive_draws(

@@ -1,4 +1,4 @@
-"""The sampler's state between generations, and what is adapted in it."""
+"""The sampler's state between generations."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.inference.adaptation import Tuning, empty_counts, tune
+from actuator_glue.inference.adaptation import Tuning
 from actuator_glue.inference.archive import Archive
 from actuator_glue.inference.settings import Settings
-from actuator_glue.inference.sweep import Around, Walk
+from actuator_glue.inference.sweep import Around, Learning, Walk
 from actuator_glue.records import Array
 
 
@@ -49,9 +49,9 @@ class State(NamedTuple):
     settings: Settings
 
     @property
-    def adapting(self) -> bool:
-        """Whether the next generation is burn-in."""
-        return self.generation < self.settings.adaptation
+    def burn_in(self) -> int:
+        """Generations of burn-in to come."""
+        return max(self.settings.adaptation - self.generation, 0)
 
     @property
     def walk(self) -> Walk:
@@ -64,17 +64,14 @@ class State(NamedTuple):
         return Around(self.lower, self.width, self.tuning, self.settings)
 
     @property
+    def learning(self) -> Learning:
+        """What the moves learn from on the way."""
+        return Learning(self.sum_log_density, self.burn_in, self.fitted)
+
+    @property
     def until_append(self) -> int:
         """Generations until the chains next enter the archive."""
         return self.settings.thinning - self.generation % self.settings.thinning
-
-    @property
-    def until_adaptation(self) -> int:
-        """Generations until burn-in ends or, after that, `adapted` may next do something."""
-        if self.adapting:
-            return self.settings.adaptation - self.generation
-        appends = -(-(2 * self.fitted - self.archive.size) // len(self.z))
-        return self.until_append + (max(appends, 1) - 1) * self.settings.thinning
 
 
 class Info(NamedTuple):
@@ -91,13 +88,16 @@ class Info(NamedTuple):
     crossover: NDArray[np.int64]
 
 
-def moved(state: State, walk: Walk, archive: Archive, counts: Array, generations: int) -> State:
+def moved(
+    state: State, walk: Walk, archive: Archive, fitted: int, counts: Array, generations: int
+) -> State:
     """Return the state some generations later.
 
     Args:
         state: before.
         walk: where the chains stand now.
         archive: with what they have left in it.
+        fitted: its size when the moves were last fitted.
         counts: with what the moves achieved.
         generations: how many.
     """
@@ -108,20 +108,7 @@ def moved(state: State, walk: Walk, archive: Archive, counts: Array, generations
         log_target=walk.log_target,
         archive=archive,
         counts=counts,
-        fitted=archive.size if state.adapting else state.fitted,
+        fitted=fitted,
         generation=state.generation + generations,
         evaluations=state.evaluations + generations * len(walk.z),
-    )
-
-
-def adapted(new: State) -> State:
-    """Renew the fit of the moves after burn-in, when the archive has doubled."""
-    s = new.settings
-    due = new.generation > s.adaptation and new.generation % s.thinning == 0
-    if not due or new.archive.size < 2 * new.fitted:
-        return new
-    return new._replace(
-        tuning=tune(new.archive.newest, new.counts, s, new.tuning.crossover_cdf),
-        fitted=new.archive.size,
-        counts=empty_counts(s),
     )

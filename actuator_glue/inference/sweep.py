@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from actuator_glue.inference import adaptation, compiled, generation
 from actuator_glue.inference.adaptation import Tuning
-from actuator_glue.inference.archive import Archive, newest
+from actuator_glue.inference.archive import Archive
 from actuator_glue.inference.compiled import Compiled, log_densities
 from actuator_glue.inference.evaluate import LogDensity, evaluate, refuse_infinite
 from actuator_glue.inference.settings import Settings
@@ -97,19 +97,38 @@ class Path(NamedTuple):
     log_density: Array
 
 
-def adapt(now: Walk, archive: Archive, around: Around, counts: Array, total: Array) -> None:
-    """Rescue outlier chains and fit the moves to an archive that has grown, all in place.
+class Learning(NamedTuple):
+    """What the moves learn from besides archive and counts.
 
-    Args:
-        now: the chains.
-        archive: with the chains in it.
-        around: its tuning is changed.
-        counts: what the moves have achieved.
-        total: sum of each chain's log likelihoods since this was last done, (n,); zeroed.
+    Attributes:
+        total: sum of each chain's log likelihoods since outliers were last looked for, (n,);
+            changed in place.
+        burn_in: generations of burn-in to come.
+        fitted: size of the archive when the moves were last fitted.
+    """
+
+    total: Array
+    burn_in: int
+    fitted: int
+
+
+NOTHING_LEARNT = Learning(np.empty(0), 0, 0)
+
+
+def enter(
+    now: Walk, archive: Archive, around: Around, counts: Array, learning: Learning
+) -> tuple[Archive, int]:
+    """Put the chains into the archive and have the moves learn from it, in place.
+
+    Returns the archive, and its size when the moves were last fitted.
     """
     s = around.settings
-    adaptation.rescue(*now, total)
-    adaptation.fit(archive.newest, counts, s.independence, s.snooker, around.tuning)
+    archive = archive.append(now.z)
+    fitted = adaptation.learn(
+        *now, learning.total, archive.capacity_rows, archive.size, counts, s.independence,
+        s.snooker, around.tuning, learning.burn_in > 0, learning.fitted,
+    )  # fmt: skip
+    return archive, int(fitted)
 
 
 def many(
@@ -121,8 +140,8 @@ def many(
     density: Compiled | None,
     log_density: LogDensity,
     counts: Array,
-    total: Array | None = None,
-) -> tuple[Walk, Archive, Path]:
+    learning: Learning = NOTHING_LEARNT,
+) -> tuple[Walk, Archive, int, Path]:
     """Advance all chains by g generations; the bits are those of `one` g times.
 
     Compiled code goes to the end, or to a candidate of infinite density, which `one` refuses.
@@ -133,14 +152,15 @@ def many(
         archive: past states that the moves draw from; the chains enter it every
             `settings.thinning` generations.
         until_append: generations until they do so next; 0 for never.
-        around: what else the moves depend on.
+        around: what else the moves depend on; its tuning changes as they learn.
         density: compiled form of the log likelihood; None has every generation done by `one`.
         log_density: log likelihood (n,) of points (n, p).
         counts: what moves achieved is added here.
-        total: in burn-in, the sum `adapt` asks for; it is done whenever the archive has grown.
+        learning: what they learn from when the chains have entered the archive.
 
     Returns:
-        The chains, the archive, and the way the chains took.
+        The chains, the archive, its size at the last fit of the moves, and the way the chains
+        took.
     """
     s, (n, d) = around.settings, now.z.shape
     count, every = len(uniforms), s.thinning if until_append else 0
@@ -148,19 +168,19 @@ def many(
     if every and count >= until_append:
         archive = archive.with_room(n * (1 + (count - until_append) // every))
     target = np.empty((2, n))
-    adapting, total = total is not None, np.empty(0) if total is None else total
     done = 0
     while done < count:
         if density is not None:
             target[0] = now.log_target
-            more, size = _advance(
+            more, size, fitted = _advance(
                 uniforms[done:], *now[:3], archive.capacity_rows, archive.size,
                 until_append - done, every, around.lower, around.width, around.tuning, s.pairs,
                 s.unit_jump, s.jitter, s.noise, around.tempering, density, counts, path.z[done:],
-                path.x[done:], path.log_density[done:], target, adapting, total, s.independence,
+                path.x[done:], path.log_density[done:], target, learning, s.independence,
                 s.snooker,
             )  # fmt: skip
             archive = archive.grown(size)
+            learning = Learning(learning.total, learning.burn_in - more, int(fitted))
             done += more
             if more:
                 at = done - 1
@@ -169,15 +189,15 @@ def many(
                 break
         now, _, _ = one(uniforms[done], now, archive, around, log_density, counts)
         done += 1
-        if adapting:
-            total += now.log_density
+        if learning.burn_in > 0:
+            learning.total[:] += now.log_density
+        fitted = learning.fitted
         if every and done >= until_append and (done - until_append) % every == 0:
-            archive = archive.append(now.z)
-            if adapting:
-                adapt(now, archive, around, counts, total)
+            archive, fitted = enter(now, archive, around, counts, learning)
+        learning = Learning(learning.total, learning.burn_in - 1, fitted)
         path.z[done - 1], path.x[done - 1], path.log_density[done - 1] = now[:3]
     # Their own arrays: who keeps a state need not keep the way there.
-    return Walk(*(part.copy() for part in now)), archive, path
+    return Walk(*(part.copy() for part in now)), archive, learning.fitted, path
 
 
 # Strict floating point, as numpy has it: see compiled.log_densities.
@@ -186,14 +206,15 @@ def _advance(
     uniforms: Array, z: Array, x: Array, values: Array, rows: Array, size: int, until_append: int,
     every: int, lower: Array, width: Array, tuning: Tuning, pairs: int, unit_jump: float,
     jitter: float, noise: float, tempering: generation.Tempering, density: Compiled, counts: Array,
-    path_z: Array, path_x: Array, path_values: Array, target: Array, adapting: bool, total: Array,
+    path_z: Array, path_x: Array, path_values: Array, target: Array, learning: Learning,
     independence: float, snooker: float,
-) -> tuple[int, int]:  # fmt: skip
-    """Do generations, in place on the path; return how many, and the archive's size.
+) -> tuple[int, int, int]:  # fmt: skip
+    """Do generations, in place; return how many, the archive's size, and that at the last fit.
 
     The target of the chains is read from target[0] and ends in target[count % 2].
     """
     done, power = 0, tempering.power
+    total, fitted = learning.total, learning.fitted
     # Made here: to hand over many small arrays takes longer than a generation.
     n, d = z.shape
     room, scratch = generation.room(n, d, pairs), compiled.scratch(len(density.rows), n)
@@ -216,13 +237,15 @@ def _advance(
         generation.tally(z, new_z, room, tuning.scale, counts)
         z, x, values = new_z, new_x, new_values
         done += 1
-        if adapting:
+        burning = done <= learning.burn_in
+        if burning:
             for i in range(len(total)):
                 total[i] += values[i]
         if every > 0 and done >= until_append and (done - until_append) % every == 0:
             rows[size : size + len(z)] = z
             size += len(z)
-            if adapting:
-                adaptation.rescue(z, x, values, there, total)
-                adaptation.fit(newest(rows, size), counts, independence, snooker, tuning)
-    return done, size
+            fitted = adaptation.learn(
+                z, x, values, there, total, rows, size, counts, independence, snooker, tuning,
+                burning, fitted,
+            )  # fmt: skip
+    return done, size, fitted

@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from actuator_glue.jit import njit
 from actuator_glue.model import gram, kernel, laguerre, linear, quadratic, reference
 from actuator_glue.model.exact import ExactErrors, Initial
 from actuator_glue.records import Array, Record
@@ -80,9 +81,11 @@ class FastErrors:
         self.tolerance = tolerance
         self.fallbacks = 0
         rows = [_row(self.exact, r, near) for r in range(len(self.exact.records))]
-        self.rows = _aligned(len(rows), max(len(row) for row in rows))
-        for wide, row in zip(self.rows, rows, strict=True):
-            wide[: len(row)] = row
+        self.rows = rows[0][np.newaxis]
+        if len(rows) > 1:
+            self.rows = _aligned(len(rows), max(len(row) for row in rows))
+            for wide, row in zip(self.rows, rows, strict=True):
+                wide[: len(row)] = row
 
     @cached_property
     def samples(self) -> Samples:
@@ -145,7 +148,8 @@ def _row(exact: ExactErrors, r: int, near: ArrayLike | None) -> Array:
     u0 = record.command[0] if foh else 0.0
     moving = bool(x0 or v0 or u0)
     pole = 1.0 + math.expm1(-min(math.sqrt(system[1]) * record.period, 5.0))
-    K = _terms(system, _MARGIN_MOVING, _MOST_MOVING) if moving else _terms(system, _MARGIN, _MOST)
+    margin, most = (_MARGIN_MOVING, _MOST_MOVING) if moving else (_MARGIN, _MOST)
+    K = _terms(system[0], system[1], margin, most)
     header = {
         laguerre.TERMS: K,
         laguerre.FREE: moving,
@@ -159,7 +163,8 @@ def _row(exact: ExactErrors, r: int, near: ArrayLike | None) -> Array:
         laguerre.U0: u0,
     }
     dims = K * (1 + moving)
-    row = np.zeros(laguerre.HEADER + (K + laguerre.TAIL) * (1 + moving) + dims * (2 + dims))
+    width = laguerre.HEADER + (K + laguerre.TAIL) * (1 + moving) + dims * (2 + dims)
+    row: Array = _aligned(1, width)[0]
     for column, value in header.items():
         row[column] = value
     c = kernel.discretise(system[np.newaxis], record.period, foh)[0]
@@ -167,17 +172,18 @@ def _row(exact: ExactErrors, r: int, near: ArrayLike | None) -> Array:
     return row
 
 
-def _terms(system: Array, margin: float, most: int) -> int:
+@njit
+def _terms(a1: float, a0: float, margin: float, most: int) -> int:
     """Return the number of terms that poles near the reference system's need.
 
-    A pole p leaves |(p - sigma)/(p + sigma)| per term; the worst of systems with damping and
+    A pole p leaves |(p - sigma)/(p + sigma)| per term; the worst of systems with damping a1 and
     frequency within the margin is taken.
     """
-    sigma, worst = math.sqrt(system[1]), 0.0
+    sigma, worst = math.sqrt(a0), 0.0
     for damping in (1.0 / margin, 1.0, margin):
         for stiffness in (1.0 / margin, 1.0, margin):
-            half = 0.5 * system[0] * damping
-            root = cmath.sqrt(half * half - system[1] * stiffness)
+            half = 0.5 * a1 * damping
+            root = cmath.sqrt(half * half - a0 * stiffness)
             for pole in (root - half, -root - half):
                 worst = max(worst, abs((pole + sigma) / (pole - sigma)))
     wanted = math.log(_ENOUGH) / math.log(worst) if 0.0 < worst < 1.0 else float(most)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from actuator_glue.jit import njit
+from actuator_glue.normal import below, quantile
 from actuator_glue.records import Array
 
 # Strict floating point: the same bits wherever it is inlined.
@@ -19,29 +20,12 @@ EDGE = 5.2
 
 
 @_njit
-def share(z: float) -> float:
-    """Normal distribution function: the share of the way between two bounds.
+def score(share: float) -> float:
+    """Return the normal score of a share of the way between two bounds, inside +-EDGE.
 
     What is uniform between them is a standard normal coordinate.
     """
-    return 0.5 * math.erfc(-z * math.sqrt(0.5))
-
-
-@_njit
-def score(part: float) -> float:
-    """Return the inverse of `share`, inside +-EDGE."""
-    tail = min(part, 1.0 - part)
-    if not tail > 1e-7:
-        return EDGE if part > 0.5 else -EDGE
-    # Abramowitz and Stegun 26.2.23, then Newton's steps on the logarithm.
-    t = math.sqrt(-2.0 * math.log(tail))
-    z = (2.515517 + t * (0.802853 + t * 0.010328)) / (
-        1.0 + t * (1.432788 + t * (0.189269 + t * 0.001308))
-    ) - t
-    for _ in range(2):
-        below = share(z)
-        z -= below * math.log(below / tail) / (math.exp(-0.5 * z * z) / math.sqrt(2.0 * math.pi))
-    return min(max(-z if part > 0.5 else z, -EDGE), EDGE)
+    return min(max(quantile(share), -EDGE), EDGE) if share > 0.0 else -EDGE
 
 
 @_njit
@@ -83,7 +67,7 @@ def physical(phi: Array, k: float, low: Array, high: Array, theta: Array) -> Any
     # Given the other coordinates the prior's density of alpha_2 + k rises with its square (k = 0:
     # with itself). In units of `most`, against overflow.
     rest = _power(least / most, k)
-    part = rest + (1.0 - rest) * share(phi[2])
+    part = rest + (1.0 - rest) * below(phi[2])
     oil = most * (np.cbrt(part) if k > 0.0 else math.sqrt(part))
     log_jacobian += (3.0 if k > 0.0 else 2.0) * math.log(most) + math.log1p(-rest)
     # Inside the box but for rounding.
@@ -94,7 +78,7 @@ def physical(phi: Array, k: float, low: Array, high: Array, theta: Array) -> Any
         if not low[3] <= theta[3] <= high[3]:
             return -math.inf
         return log_jacobian
-    theta[3] = low[3] + (high[3] - low[3]) * share(phi[3])
+    theta[3] = low[3] + (high[3] - low[3]) * below(phi[3])
     return log_jacobian - 0.5 * phi[3] * phi[3]
 
 

@@ -161,7 +161,7 @@ class Estimator:
         return self.running
 
     def finish(self, result: WindowResult | Fit) -> list[Event]:
-        """Take the result of the running job, or its first part, which is all the next one needs."""
+        """Take the result of the running job, or its first part, all that the next one needs."""
         self.running = None
         window, memory = result.window, self._memory
         if result.archive is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -120,7 +121,7 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> Fit:
     record = job.window.record
     settle = round(job.settings.settle / record.period)
     noise = sensor_noise(record.measured)
-    _check_excited(record, settle, noise)
+    moved = _check_excited(record, settle, noise)
     chains, complete = _sample(job, settle, expired)
     posterior = chains.posterior()
     best = fitting.simulate(job.model, chains.best[np.newaxis], record)[0]
@@ -132,7 +133,7 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> Fit:
         model=job.model,
         chains=chains,
         rms_error=rms_error,
-        nrmse=rms_error / float(record.measured[settle:].std()),
+        nrmse=rms_error / moved,
         frozen=Frozen(
             number=job.window.number,
             segment=job.window.segment,
@@ -148,9 +149,7 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> Fit:
     )
 
 
-def _sample(
-    job: Job, settle: int, expired: Callable[[], bool] | None
-) -> tuple[Chains, bool]:
+def _sample(job: Job, settle: int, expired: Callable[[], bool] | None) -> tuple[Chains, bool]:
     """Return chains of physical parameters, and whether they are all that was wanted."""
     settings, model, record = job.settings, job.model, job.window.record
     near = None
@@ -223,15 +222,20 @@ def _archive(new: Array, old: Array | None) -> Array:
     return np.concatenate([new, old[spread(len(old), ARCHIVE - len(new))]])
 
 
-def _check_excited(record: Record, settle: int, noise: float) -> None:
-    moved = float(record.command[settle:].std())
-    if moved <= EXCITATION * noise or moved == 0.0 or float(record.measured[settle:].std()) == 0.0:
+def _check_excited(record: Record, settle: int, noise: float) -> float:
+    """Return the standard deviation of the measured displacement [m]."""
+    commanded, moved = (float(x[settle:].std()) for x in (record.command, record.measured))
+    if commanded <= EXCITATION * noise or commanded == 0.0 or moved == 0.0:
         raise InputError(
-            f'nothing moves: the command varies by {moved * 1e6:.3g} um rms, the sensor noise is '
-            f'{noise * 1e6:.3g} um; the window calibrates nothing and is left out'
+            f'nothing moves: the command varies by {commanded * 1e6:.3g} um rms, the sensor noise '
+            f'is {noise * 1e6:.3g} um; the window calibrates nothing and is left out'
         )
+    return moved
 
 
+@lru_cache(maxsize=64)
 def spread(count: int, wanted: int) -> NDArray[np.intp]:
     """Return the indices of at most so many of `count` things, spread evenly."""
-    return np.linspace(0, count - 1, min(count, wanted)).astype(np.intp)
+    indices = np.linspace(0, count - 1, min(count, wanted)).astype(np.intp)
+    indices.flags.writeable = False
+    return indices

@@ -146,5 +146,7 @@ def _others(sampled: list[Sampled], limits: bool, tell: Tell) -> list[dict[str, 
     found = []
     for job, fitted in sampled:
         result, known = report(job, fitted, limits), _known(job, fitted)
-        found.append({f.name: getattr(result, f.name) for f in fields(result) if f.name not in known})
+        found.append(
+            {f.name: getattr(result, f.name) for f in fields(result) if f.name not in known}
+        )
     return found

@@ -82,7 +82,7 @@ def test_burn_in_ends_what_must_end() -> None:
     for _ in range(2000):
         old = state
         state, _ = step(rng, state, target.log_density)
-        if not old.adapting:
+        if not old.burn_in:
             assert np.array_equal(state.tuning.crossover_cdf, old.tuning.crossover_cdf)
             if state.fitted != old.fitted:
                 fits.append(state.fitted)

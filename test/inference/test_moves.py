@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import targets
-from scipy import special, stats
+from scipy import stats
 
 from actuator_glue.inference import generation, moves
 from actuator_glue.inference.adaptation import Tuning, empty_counts, tune
 from actuator_glue.inference.coordinates import physical_all, sampling
 from actuator_glue.inference.moves import independence
-from actuator_glue.inference.moves.draw import distinct, normal
+from actuator_glue.inference.moves.draw import distinct
 from actuator_glue.inference.settings import Settings
 from actuator_glue.records import Array
 
@@ -230,14 +230,6 @@ def test_independence_draws_have_the_density_it_claims(rng_seed: int) -> None:
     cross = weights * (drawn[:, 0] - tuning.centre[0]) * (drawn[:, 4] - tuning.centre[4])
     exact = (tuning.factor @ tuning.factor.T)[0, 4]
     assert abs(cross.mean() - exact) < LIMIT * cross.std() / np.sqrt(count)
-
-
-def test_normal_inverts_the_normal_distribution_function():
-    low = np.geomspace(1.4e-11, 0.5, 400)
-    shares = np.concatenate([low, np.linspace(0.05, 0.95, 400), 1.0 - low])
-    ours = np.array([normal(share) for share in shares])
-    np.testing.assert_allclose(ours, special.ndtri(shares), rtol=1e-14, atol=1e-15)
-    assert -6.7 < normal(0.0) < -6.6 and 6.6 < normal(1.0 - 2.0**-53) < 6.7
 
 
 @pytest.mark.parametrize('dimension', [1, 2, 5])

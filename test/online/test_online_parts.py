@@ -11,6 +11,7 @@ from scipy.stats import norm
 from actuator_glue.inference.predictive import ResidualModel, total_band
 from actuator_glue.model import linear, ridge
 from actuator_glue.model.parameters import bounds
+from actuator_glue.normal import below
 from actuator_glue.online.alarm import CoverageAlarm
 from actuator_glue.online.collect import PIECE, Collector
 from actuator_glue.online.coordinates import Coordinates
@@ -50,8 +51,9 @@ def test_what_is_uniform_between_bounds_is_a_normal_score():
     share = np.concatenate([np.logspace(-6.9, -0.4, 500), 1.0 - np.logspace(-6.9, -0.4, 500)])
     scores = np.array([ridge.score(s) for s in share])
     assert np.allclose(scores, ndtri(share), rtol=0.0, atol=1e-12)
-    assert np.allclose([ridge.share(z) for z in scores], share, rtol=1e-12)
+    assert np.allclose([below(z) for z in scores], share, rtol=1e-12)
     assert ridge.score(0.0) == -ridge.EDGE and ridge.score(1.0) == ridge.EDGE
+    assert ridge.score(np.nan) == -ridge.EDGE
 
 
 @pytest.mark.parametrize('stiffness', [0.0, 250e3])

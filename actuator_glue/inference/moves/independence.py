@@ -12,8 +12,8 @@ import math
 import numpy as np
 
 from actuator_glue.inference.moves import U_FREE
-from actuator_glue.inference.moves.draw import normal
 from actuator_glue.jit import njit
+from actuator_glue.normal import quantile
 from actuator_glue.records import Array
 
 DEGREES = 8.0
@@ -94,7 +94,7 @@ def draw(uniforms: Array, first: int, centre: Array, factor: Array, candidate: A
     for j in range(d):
         candidate[j] = centre[j]
     for k in range(d):
-        step = stretch * normal(uniforms[first + 4 + k])
+        step = stretch * quantile(uniforms[first + 4 + k])
         distance2 += step * step
         for j in range(k, d):
             candidate[j] += factor[j, k] * step
