@@ -146,6 +146,8 @@ class SimulatorNode(streamer.Streamer):
         self._index = self._previewed = 0
         self._start_clock()
         self._announce()
+        self.introduce()
+        self._start_clock()
         rate, size = self._values['rate'], self._values['block']
         while self._index < len(self.command) or self._values['repeat']:
             start = self._index % len(self.command)

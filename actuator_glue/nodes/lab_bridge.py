@@ -82,13 +82,19 @@ class LabBridgeNode(streamer.Streamer):
     def _record(self, record: Record, offset: float) -> Iterator[Step]:
         size = self.parameters['block']
         ahead = round(self.parameters['preview'] * record.rate)
-        now = self.get_clock().now().nanoseconds
-        self.out.begin(record.actuator, record.period, now, record.first_index)
+        self._start_clock(record)
         self.out.setup(record.stiffness, record.hold, record.first_index, record.source)
+        if not offset:
+            self.introduce()
+            self._start_clock(record)
         for start in range(0, len(record), size):
             stop = min(start + size, len(record))
             due = offset + stop * record.period
             yield Step(due, partial(self._publish, record, start, stop, ahead))
+
+    def _start_clock(self, record: Record) -> None:
+        now = self.get_clock().now().nanoseconds
+        self.out.begin(record.actuator, record.period, now, record.first_index)
 
     def _publish(self, record: Record, start: int, stop: int, ahead: int) -> None:
         first = 0 if start == 0 else min(start + ahead, len(record))

@@ -48,7 +48,12 @@ class ReplayNode(streamer.Streamer):
         """Yield the messages of the bag, set-ups before their samples, as they were recorded."""
         first: int | None = None
         note = partial(self.complain, 'bag')
+        setup = base.type_name(topics.TEST_SETUP.type)
         for found in as_published(messages(self.path, types=tuple(self._outputs), note=note)):
+            if first is None and found.type == setup:
+                self._publish(found.type, found.data, found.log_time)
+                self.introduce()
+                continue
             first = found.log_time if first is None else first
             due = (found.log_time - first) * 1e-9
             yield Step(due, partial(self._publish, found.type, found.data, found.log_time))

@@ -12,11 +12,12 @@ import time
 from collections.abc import Callable, Sequence
 
 import rclpy
-from rclpy.executors import ExternalShutdownException, SingleThreadedExecutor
+from rclpy.executors import ExternalShutdownException
 from rclpy.signals import SignalHandlerOptions
 
 from actuator_glue.errors import InputError
 from actuator_glue.nodes.base import SUCCESS, SuiteNode
+from actuator_glue.nodes.executor import Executor
 
 
 def main(make: Callable[[], SuiteNode], args: Sequence[str] | None = None) -> int:
@@ -31,7 +32,7 @@ def main(make: Callable[[], SuiteNode], args: Sequence[str] | None = None) -> in
         print(f'error: {error}', file=sys.stderr)
         rclpy.try_shutdown()
         return 2
-    executor = SingleThreadedExecutor()
+    executor = Executor()
     executor.add_node(node)
     stop = threading.Event()
     _on_signal(stop, node.wake)

@@ -13,9 +13,9 @@ from actuator_glue.nodes.health import Rate
 from actuator_glue.nodes.pacer import Pacer, Step
 from actuator_glue.nodes.parameters import Spec
 
-# How long the end of a stream waits for subscribers that lag [s]. DDS lets go of a dead one after
-# its lease of 20 s, so that more is never needed.
-FAREWELL_SECONDS = 30.0
+# How long a stream waits for subscribers that lag, at its beginning and its end [s]. DDS lets go
+# of a dead one after its lease of 20 s, so that more is never needed.
+PATIENCE_SECONDS = 30.0
 
 
 def specs(*, exit_at_end: bool) -> tuple[Spec, ...]:
@@ -51,6 +51,8 @@ class Streamer(base.SuiteNode):
         made = super().publisher(topic)
         if topic is topics.SAMPLES:
             self._samples_out = made
+        if topic is topics.TEST_SETUP:
+            self._setup_out = made
         return made
 
     @property
@@ -63,6 +65,16 @@ class Streamer(base.SuiteNode):
         # Simulated time is 0 until the first /clock: such stamps would jump with it.
         clock_runs = not self.stamps_now or self.get_clock().now().nanoseconds > 0
         return bool(self.subscribers >= self.parameters['wait_for'] and clock_runs)
+
+    def introduce(self) -> None:
+        """Wait until whoever was waited for has the first test set-up; call it in the stream.
+
+        That our publisher has met a subscriber says nothing of the other way round: DDS may yet
+        have to tell the subscriber, who misses what is sent until then. It is told of publishers
+        in the order they were made, and that of samples comes before that of set-ups.
+        """
+        if self.parameters['wait_for']:
+            self._wait_until_taken(self._setup_out)
 
     def do_activate(self) -> None:
         """Begin the stream."""
@@ -92,16 +104,17 @@ class Streamer(base.SuiteNode):
     def _ended(self, failure: BaseException | None) -> None:
         if failure is not None:
             self.complain_of_bug(failure)
-        self._wait_until_taken()
+        # What subscribers lack would go with its publisher.
+        self._wait_until_taken(*self._made)
         self.get_logger().info(f'stream ended after {self.samples.count} samples')
         if self.parameters['exit_at_end']:
             self.finished = True
             self.wake()
 
-    def _wait_until_taken(self) -> None:
-        """Stay until subscribers have everything: what they lack goes with its publisher."""
-        end = time.monotonic() + FAREWELL_SECONDS
-        for out in tuple(self._made):
+    def _wait_until_taken(self, *outs: Any) -> None:
+        """Wait until subscribers have all that was published."""
+        end = time.monotonic() + PATIENCE_SECONDS
+        for out in outs:
             while not out.wait_for_all_acked(Duration(seconds=0.1)):
                 if self.pacer is None or self.pacer.stopped:
                     return

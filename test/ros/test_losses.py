@@ -14,10 +14,13 @@ from rclpy.duration import Duration
 from ros_nodes import RATE, recorded
 
 from actuator_glue.io.bag_reader import TEST_SETUP, as_published, messages
+from actuator_glue.io.bag_records import write_record
+from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.io.messages import full_name
 from actuator_glue.nodes import diagnoser, diagnosing
 from actuator_glue.nodes.recorder import RecorderNode
 from actuator_glue.nodes.topics import SAMPLES
+from actuator_glue.records import Record
 
 
 def test_a_stream_does_not_leave_before_it_is_taken(start, probe, tmp_path):
@@ -42,6 +45,41 @@ def test_a_stream_does_not_leave_before_it_is_taken(start, probe, tmp_path):
     assert bridge.wait(30) == 0, bridge.text
     assert recorder.end() == 0, recorder.text
     assert np.array_equal(recorded(bag), np.arange(samples))
+
+
+@pytest.mark.parametrize('node', ['actuator_sim', 'lab_bridge', 'replay'])
+def test_no_sample_is_sent_before_subscribers_have_the_set_up(node, start, probe, tmp_path):
+    """Who has not, may not have heard of the publisher, and would miss what it sends."""
+    samples, bag = 600, tmp_path / 'bag'
+    seconds = np.arange(samples) / RATE
+    command = 1e-3 * np.sin(2 * np.pi * 1.5 * seconds)
+    given = {
+        'actuator_sim': {'rate': RATE, 'duration': samples / RATE, 'command': 'noise'},
+        'lab_bridge': {'file': str(tmp_path / 'given')},
+        'replay': {'bag': str(tmp_path / 'given')},
+    }
+    with BagWriter(tmp_path / 'given') as writer:
+        write_record(writer, Record(command, 0.9 * command, 1.0 / RATE, 1e5, start_ns=10**18))
+    recorder = start('recorder', bag=str(bag))
+    probe.until(lambda: 'bag' in probe.health.get('recorder', {}), 60, 'recorder')
+    stream = start(node, autostart=False, wait_for=2, exit_at_end=True, **given[node])
+    assert probe.state(node) == 'unconfigured'
+    probe.for_a_while(2.0)  # they find each other
+    heard = []
+    probe.create_subscription(SampleBlock, 'samples', heard.append, SAMPLES.qos, raw=True)
+    recorder.process.send_signal(signal.SIGSTOP)
+    assert probe.transition(node, 'configure') and probe.transition(node, 'activate')
+    probe.until(lambda: probe.number(node, 'subscribers') == 2, 20, 'both met')
+    probe.for_a_while(1.0)
+    assert not heard
+    recorder.process.send_signal(signal.SIGCONT)
+    probe.until(lambda: len(heard) > 2, 20, 'stream')
+    assert stream.wait(30) == 0, stream.text
+    assert recorder.end() == 0, recorder.text
+    found = recorded(bag)
+    assert len(found) >= samples and np.array_equal(found, np.arange(len(found)))
+    # To wait is not to be late.
+    assert probe.number(node, 'latest message (s)') < 0.5
 
 
 def test_a_recorder_writes_what_has_reached_it_when_it_is_stopped(probe, tmp_path, monkeypatch):
