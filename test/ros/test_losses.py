@@ -24,7 +24,7 @@ from actuator_glue.records import Record
 
 
 def test_a_stream_does_not_leave_before_it_is_taken(start, probe, tmp_path):
-    """A recorder that hears of the stream only after its end still gets all of it."""
+    """A recorder that is held up until after the end of the stream still gets all of it."""
     samples, size = 150_000, 250
     seconds = np.arange(samples) / RATE
     command = np.sin(2 * np.pi * 1.5 * seconds)
@@ -33,12 +33,12 @@ def test_a_stream_does_not_leave_before_it_is_taken(start, probe, tmp_path):
     np.savetxt(file, rows, delimiter=',', header='time_s,command_mm,measured_mm', comments='')
     recorder = start('recorder', bag=str(bag))
     bridge = start(
-        'lab_bridge', file=str(file), specimen_stiffness=1e5, speed=0.0, wait_for=2, block=size
+        'lab_bridge', file=str(file), specimen_stiffness=1e5, speed=250.0, wait_for=2, block=size
     )
-    probe.until(lambda: probe.number('lab_bridge', 'subscribers') == 1, 60, 'recorder met')
-    recorder.process.send_signal(signal.SIGSTOP)
     heard = []
     probe.create_subscription(SampleBlock, 'samples', heard.append, SAMPLES.qos, raw=True)
+    probe.until(lambda: heard, 60, 'both met')
+    recorder.process.send_signal(signal.SIGSTOP)
     probe.until(lambda: len(heard) == samples // size, 30, 'stream')
     probe.for_a_while(1.0)
     recorder.process.send_signal(signal.SIGCONT)
