@@ -14,15 +14,15 @@ for _name in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS'):
     os.environ[_name] = '1'
 
 # Imports come late (E402): BLAS reads the number of its threads when it is loaded.
-import numpy as np  # noqa: E402
+import numpy as np  # noqa: E402 - after the threads are set
 
-from actuator_glue.inference.convergence import rhat  # noqa: E402
-from actuator_glue.inference.dream import Chains, Settings, sample  # noqa: E402
-from actuator_glue.inference.likelihood import GlueLikelihood  # noqa: E402
-from actuator_glue.model import problem_r  # noqa: E402
-from actuator_glue.model.fast import FastErrors  # noqa: E402
-from actuator_glue.model.parameters import bounds  # noqa: E402
-from actuator_glue.records import Array  # noqa: E402
+from actuator_glue.inference.convergence import rhat  # noqa: E402 - after the threads are set
+from actuator_glue.inference.dream import Chains, Settings, sample  # noqa: E402 - after the threads are set
+from actuator_glue.inference.likelihood import GlueLikelihood  # noqa: E402 - after the threads are set
+from actuator_glue.model import problem_r  # noqa: E402 - after the threads are set
+from actuator_glue.model.fast import FastErrors  # noqa: E402 - after the threads are set
+from actuator_glue.model.parameters import bounds  # noqa: E402 - after the threads are set
+from actuator_glue.records import Array  # noqa: E402 - after the threads are set
 
 G = 256.0
 # More chains share the cost of a call; fewer make R-hat fall sooner. Sustained runs take these.

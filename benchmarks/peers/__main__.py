@@ -15,9 +15,9 @@ for name in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS'):
 os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})
 
 # Imports come late (E402): BLAS reads the number of its threads when it is loaded.
-import numpy as np  # noqa: E402
+import numpy as np  # noqa: E402 - after the threads are set
 
-from benchmarks.peers.common import measure  # noqa: E402
+from benchmarks.peers.common import measure  # noqa: E402 - after the threads are set
 
 module, draws, result = sys.argv[1:4]
 samplers = importlib.import_module(f'benchmarks.peers.{module}').SAMPLERS

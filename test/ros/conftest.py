@@ -14,7 +14,7 @@ pytest.importorskip(
 )
 
 # Needs what is checked above.
-from ros_nodes import Probe, Process  # noqa: E402
+from ros_nodes import Probe, Process  # noqa: E402 - after the checks
 
 
 def pytest_collection_modifyitems(items):
