@@ -20,6 +20,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from actuator_glue.demo.processes import end_in_order
 from benchmarks.environment import ROOT, python
 
 PEERS = ('emcee_samplers', 'pydream_sampler', 'spotpy_sampler', 'pints_samplers')
@@ -140,6 +141,7 @@ def main() -> int:
     parser.add_argument('--only', nargs='+', choices=PARTS, default=list(PARTS))
     parser.add_argument('--seconds', type=float, default=60.0, help='length of the live run')
     args = parser.parse_args()
+    end_in_order()
     parts = PARTS | {'online': partial(online, seconds=args.seconds)}
     out: Path = args.out.resolve()
     out.mkdir(parents=True, exist_ok=True)

@@ -25,11 +25,13 @@ def watched(core: int) -> Iterator[list[float]]:
     ours, theirs = context.Pipe()
     process = context.Process(target=_watch, args=(core, theirs), daemon=True)
     process.start()
+    theirs.close()  # or we wait for ever for one that was ended together with us
     try:
         yield found
     finally:
-        ours.send(None)
-        found += ours.recv()
+        with suppress(EOFError, OSError):
+            ours.send(None)
+            found += ours.recv()
         process.join()
 
 

@@ -58,19 +58,13 @@ def run(args: argparse.Namespace) -> int:
     Raises:
         InputError: no sourced workspace, unusable data, or a node that dies.
     """
-    import signal
     import time
-    from types import FrameType
 
     from actuator_glue.demo import run as demo
+    from actuator_glue.demo.processes import end_in_order
     from actuator_glue.demo.progress import Display
 
-    def leave(number: int, frame: FrameType | None) -> None:
-        raise KeyboardInterrupt
-
-    # However we are ended, the nodes are stopped in order.
-    for ending in (signal.SIGTERM, signal.SIGHUP):
-        signal.signal(ending, leave)
+    end_in_order()
     if args.seconds < args.window:
         raise InputError(
             f'--seconds {args.seconds:g} is shorter than the window {args.window:g} s'

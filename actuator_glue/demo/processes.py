@@ -8,7 +8,7 @@ import subprocess
 import time
 from collections.abc import Mapping
 from pathlib import Path
-from types import TracebackType
+from types import FrameType, TracebackType
 from typing import Any, Self
 
 import yaml
@@ -34,6 +34,16 @@ def executable(node: str) -> Path:
         f'node {node} of {PACKAGE} is not on AMENT_PREFIX_PATH; run `make demo`, or `make setup` '
         'and `. install/setup.bash` in this shell first'
     )
+
+
+def end_in_order() -> None:
+    """However this process is told to end, let it end as by Ctrl-C: its nodes are then stopped."""
+
+    def leave(number: int, frame: FrameType | None) -> None:
+        raise KeyboardInterrupt
+
+    for ending in (signal.SIGTERM, signal.SIGHUP):
+        signal.signal(ending, leave)
 
 
 class Node:

@@ -1,6 +1,8 @@
 """The demonstration: real processes, and what it makes of a bag."""
 
 import json
+import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -122,6 +124,34 @@ def test_a_dying_node_is_reported(tmp_path: Path) -> None:
         assert nodes.wait_for_end(node, 30.0)
         with pytest.raises(InputError, match=r'missing\.csv'):
             nodes.check()
+
+
+_HOLDER = """
+import sys, time
+from pathlib import Path
+from actuator_glue.demo.processes import Nodes, end_in_order
+end_in_order()
+with Nodes() as nodes:
+    node = nodes.start('recorder', {'bag': str(Path(sys.argv[1], 'bag'))}, Path(sys.argv[1]))
+    print(node.process.pid, flush=True)
+    time.sleep(60.0)
+"""
+
+
+@pytest.mark.ros
+@pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGHUP])
+def test_whoever_is_ended_ends_its_nodes(tmp_path: Path, number: signal.Signals) -> None:
+    """A node must not outlive the process that started it, however that is told to end."""
+    _need_nodes()
+    command = [sys.executable, '-c', _HOLDER, str(tmp_path)]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as holder:
+        assert holder.stdout is not None
+        node = int(holder.stdout.readline())
+        os.kill(node, 0)
+        holder.send_signal(number)
+        assert holder.wait(30.0) != 0
+    with pytest.raises(ProcessLookupError):
+        os.kill(node, 0)
 
 
 @pytest.mark.ros
