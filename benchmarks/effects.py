@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Callable, Sequence
-from statistics import median
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -12,6 +10,7 @@ from actuator_glue.model import commands
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
+from benchmarks.turns import in_turns
 
 # In the order in which they are added; the first is the nonlinear one of the `kernel` figure.
 EFFECTS = (
@@ -28,41 +27,34 @@ THETA = np.array([134.0, 1.1e9, 2.5e5, 0.5])
 THETAS, SAMPLES = 256, 10_000
 
 
-# A task is repeated for so long before its time counts: vector units that were idle run at a third
-# of their speed for about a millisecond.
+# Vector units that were idle run at a third of their speed for about a millisecond.
 _WARM, _COUNTED = 0.005, 0.01  # s
 
 
-def run(most: int = len(EFFECTS)) -> list[dict[str, float]]:
-    """Return ns per theta and sample for 0, 1, .. effects, each a little away from neutral."""
-    costs = _costs([Structure(EFFECTS[:count]) for count in range(most + 1)])
-    return [{'effects': float(count), 'ns': cost} for count, cost in enumerate(costs)]
+def run(most: int = len(EFFECTS)) -> list[dict[str, float | None]]:
+    """Return ns per theta and sample for 0, 1, .. effects, each a little away from neutral.
+
+    `ns` over all repeats, `whole_core_ns` over those with a whole core (see `turns`).
+    """
+    costs = _costs({str(count): Structure(EFFECTS[:count]) for count in range(most + 1)})
+    return [{'effects': float(count), **cost} for count, cost in costs.items()]
 
 
-def each() -> dict[str, float]:
-    """Return ns per theta and sample of every effect of the catalogue alone."""
-    costs = _costs([Structure((name,)) for name in CATALOGUE])
-    return dict(zip(CATALOGUE, costs, strict=True))
+def each() -> dict[str, dict[str, float | None]]:
+    """Return the same of every effect of the catalogue alone, by its name."""
+    return _costs({name: Structure((name,)) for name in CATALOGUE})
 
 
-def _costs(structures: Sequence[Structure], repeats: int = 15) -> list[float]:
-    """Processor time of one core per theta and sample [ns], medians over repeats in turns."""
-    tasks = [_task(structure) for structure in structures]
-    taken: list[list[float]] = [[] for _ in tasks]
-    for _ in range(repeats):
-        for task, times in zip(tasks, taken, strict=True):
-            _repeat(task, _WARM)
-            times.append(_repeat(task, _COUNTED))
-    return [median(times) / THETAS / SAMPLES * 1e9 for times in taken]
+def _costs(structures: Mapping[str, Structure]) -> dict[str, dict[str, float | None]]:
+    tasks = {name: _task(structure) for name, structure in structures.items()}
+    return {
+        name: {'ns': _ns(taken.median), 'whole_core_ns': _ns(taken.whole)}
+        for name, taken in in_turns(tasks, 15, _WARM, _COUNTED).items()
+    }
 
 
-def _repeat(task: Callable[[], object], seconds: float) -> float:
-    """Do a task for so long at least; return the time of one [s]."""
-    began, count = time.process_time(), 0
-    while (taken := time.process_time() - began) < seconds or not count:
-        task()
-        count += 1
-    return taken / count
+def _ns(seconds: float | None) -> float | None:
+    return None if seconds is None else seconds / THETAS / SAMPLES * 1e9
 
 
 def _task(structure: Structure) -> Callable[[], object]:

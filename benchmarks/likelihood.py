@@ -8,10 +8,8 @@ from __future__ import annotations
 
 import argparse
 import json
-import statistics
 import sys
-import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import partial
 from typing import Any
 
@@ -22,6 +20,7 @@ from actuator_glue.model import linear, problem_r
 from actuator_glue.model.exact import ExactErrors
 from actuator_glue.model.fast import FastErrors
 from actuator_glue.records import Array, Record
+from benchmarks.turns import in_turns
 
 G = 256.0
 # Moments of the reference posterior of problem R, alpha_3 exponential.
@@ -54,19 +53,6 @@ def lfilter_sums(records: tuple[Record, ...], theta: Array) -> Array:
     return out
 
 
-def medians(tasks: Mapping[str, Callable[[], object]], repeats: int) -> dict[str, float]:
-    """Return the median duration of each task [s], all taking turns."""
-    for task in tasks.values():
-        task()
-    taken: dict[str, list[float]] = {name: [] for name in tasks}
-    for _ in range(repeats):
-        for name, task in tasks.items():
-            began = time.perf_counter()
-            task()
-            taken[name].append(time.perf_counter() - began)
-    return {name: statistics.median(times) for name, times in taken.items()}
-
-
 def run(repeats: int = 25) -> dict[str, Any]:
     """Return the costs of one likelihood of problem R and of ten times its length.
 
@@ -83,7 +69,7 @@ def run(repeats: int = 25) -> dict[str, Any]:
     many, some, one = draws(1024), draws(512), draws(1)[0]
     samples = int(exact.sizes.sum())
     window = _window()
-    taken = medians(
+    taken = in_turns(
         {
             'fast': lambda: fast(many),
             'fast_long': lambda: fast_long(many),
@@ -106,15 +92,15 @@ def run(repeats: int = 25) -> dict[str, Any]:
         fast(thetas)
         shares[name] = fast.fallbacks / (len(short) * len(thetas))
     return {
-        'fast_us': taken['fast'] / len(many) * 1e6,
-        'fast_us_10x_window': taken['fast_long'] / len(many) * 1e6,
-        'fast_us_batch_8': taken['fast_8'] / 8 * 1e6,
-        'exact_us': taken['exact'] / len(some) * 1e6,
-        'lfilter_us': taken['lfilter'] * 1e6,
-        'linear_ns': taken['exact'] / len(some) / samples * 1e9,
-        'linear_foh_ns': taken['exact_foh'] / len(some) / samples * 1e9,
-        'prepare_window_ms': taken['prepare'] * 1e3,
-        'prepare_window_hint_ms': taken['prepare_hint'] * 1e3,
+        'fast_us': taken['fast'].median / len(many) * 1e6,
+        'fast_us_10x_window': taken['fast_long'].median / len(many) * 1e6,
+        'fast_us_batch_8': taken['fast_8'].median / 8 * 1e6,
+        'exact_us': taken['exact'].median / len(some) * 1e6,
+        'lfilter_us': taken['lfilter'].median * 1e6,
+        'linear_ns': taken['exact'].median / len(some) / samples * 1e9,
+        'linear_foh_ns': taken['exact_foh'].median / len(some) / samples * 1e9,
+        'prepare_window_ms': taken['prepare'].median * 1e3,
+        'prepare_window_hint_ms': taken['prepare_hint'].median * 1e3,
         'max_abs_error': float(max(error.max() for error in errors)),
         'fallback_posterior': shares['posterior'],
         'fallback_prior': shares['prior'],
@@ -135,10 +121,10 @@ def cost_against_length(seconds: tuple[float, ...], repeats: int = 9) -> list[di
         tasks[f'fast_us {i}'] = partial(fast, many)
         tasks[f'exact_us {i}'] = partial(exact, some)
         tasks[f'lfilter_us {i}'] = partial(lfilter_sums, records, one)
-    taken = medians(tasks, repeats)
+    taken = in_turns(tasks, repeats)
     return [
         {'samples': count}
-        | {name: taken[f'{name} {i}'] / size * 1e6 for name, size in sizes.items()}
+        | {name: taken[f'{name} {i}'].median / size * 1e6 for name, size in sizes.items()}
         for i, count in enumerate(samples)
     ]
 
