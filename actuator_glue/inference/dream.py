@@ -34,7 +34,7 @@ from actuator_glue.records import Array
 # where nobody asks: the uniforms of more would leave the cache.
 _PATIENCE, _MOST = 200, 2000
 # Shares of the generations after which a run may have drawn enough.
-_LOOKS = (0.375, 0.5, 0.625, 0.75, 0.875)
+_LOOKS = tuple(k / 16.0 for k in range(5, 16))
 
 __all__ = ['Chains', 'Info', 'Settings', 'State', 'init', 'sample', 'step']
 
@@ -213,8 +213,8 @@ def sample(
         archive: points (m, p) of an earlier run (`Chains.archive`) for a warm start.
         stop: asked after every generation, or about every 200 evaluations where the likelihood
             has a compiled form, always at the same ones; True ends the run.
-        enough: asked at every eighth of the run from the third on whether its draws will do; True
-            ends it.
+        enough: asked at every sixteenth of the run from the fifth on whether its draws will do;
+            True ends it.
         progress: called now and then with (evaluations made, evaluations at most).
 
     Raises:

@@ -27,6 +27,7 @@ TOLERANCE = 3e-9  # relative error of the sum of squares; times G = 256 it is 8e
 _FEWEST, _MOST, _MOST_MOVING = 16, 128, 96
 _MARGIN, _MARGIN_MOVING = 1.4, 1.2
 _ENOUGH = 1e-11  # what the terms should leave of the response
+_APART = 5.0  # the sections' poles over their geometric mean, at most
 
 
 class Samples(NamedTuple):
@@ -147,7 +148,9 @@ def _row(exact: ExactErrors, r: int, near: ArrayLike | None) -> Array:
         system = reference.fit(record, exact.settle[r], exact.starts[r])
     u0 = record.command[0] if foh else 0.0
     moving = bool(x0 or v0 or u0)
-    pole = 1.0 + math.expm1(-min(math.sqrt(system[1]) * record.period, 5.0))
+    slow, fast = _sections(system[0], system[1])
+    pole, pole_2 = (1.0 + math.expm1(-min(s * record.period, 5.0)) for s in (slow, fast))
+    delta, delta_2 = 1.0 - pole, 1.0 - pole_2  # exactly: else the sections would not be lossless
     margin, most = (_MARGIN_MOVING, _MOST_MOVING) if moving else (_MARGIN, _MOST)
     K = _terms(system[0], system[1], margin, most)
     header = {
@@ -157,7 +160,10 @@ def _row(exact: ExactErrors, r: int, near: ArrayLike | None) -> Array:
         laguerre.PERIOD: record.period,
         laguerre.FOH: foh,
         laguerre.POLE: pole,
-        laguerre.DELTA: 1.0 - pole,  # exactly: else the sections would not be lossless
+        laguerre.DELTA: delta,
+        laguerre.POLE_2: pole_2,
+        laguerre.DELTA_2: delta_2,
+        laguerre.SHIFT: (delta_2 - delta) / (delta + delta_2 - delta * delta_2),
         laguerre.X0: x0,
         laguerre.V0: v0,
         laguerre.U0: u0,
@@ -173,18 +179,32 @@ def _row(exact: ExactErrors, r: int, near: ArrayLike | None) -> Array:
 
 
 @njit
+def _sections(a1: float, a0: float) -> tuple[float, float]:
+    """Return where the sections' poles s = -sigma best lie for systems near one: (2,) [1/s].
+
+    On its own poles where they are real, but not further apart than is of use.
+    """
+    middle, half = math.sqrt(a0), 0.5 * a1
+    if half <= middle:
+        return middle, middle
+    slow = max(middle * middle / (half + math.sqrt(half * half - a0)), middle / _APART)
+    return slow, a0 / slow
+
+
+@njit
 def _terms(a1: float, a0: float, margin: float, most: int) -> int:
     """Return the number of terms that poles near the reference system's need.
 
     A pole p leaves |(p - sigma)/(p + sigma)| per term; the worst of systems with damping a1 and
     frequency within the margin is taken.
     """
-    sigma, worst = math.sqrt(a0), 0.0
+    (slow, fast), worst = _sections(a1, a0), 0.0
     for damping in (1.0 / margin, 1.0, margin):
         for stiffness in (1.0 / margin, 1.0, margin):
             half = 0.5 * a1 * damping
             root = cmath.sqrt(half * half - a0 * stiffness)
             for pole in (root - half, -root - half):
-                worst = max(worst, abs((pole + sigma) / (pole - sigma)))
-    wanted = math.log(_ENOUGH) / math.log(worst) if 0.0 < worst < 1.0 else float(most)
+                two = (pole + slow) * (pole + fast) / ((pole - slow) * (pole - fast))
+                worst = max(worst, abs(two))
+    wanted = 2.0 * math.log(_ENOUGH) / math.log(worst) if 0.0 < worst < 1.0 else float(most)
     return laguerre.BLOCK * math.ceil(min(max(wanted, _FEWEST), most) / laguerre.BLOCK)

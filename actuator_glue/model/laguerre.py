@@ -1,6 +1,7 @@
-"""Compiled Laguerre expansion of Eq. (2): terms of one system and the bound of those that follow.
+"""Compiled expansion of Eq. (2) in Laguerre sections of two poles that take turns.
 
-Derivation: docs/fast_path.md, sections 2 and 5. `delta` is 1 - `pole` wherever both are passed.
+The terms of one system and the bound of those that follow; with equal poles these are Laguerre
+functions. Derivation: docs/fast_path.md, sections 2 and 5.
 """
 
 from __future__ import annotations
@@ -12,12 +13,13 @@ from actuator_glue.model import kernel
 from actuator_glue.records import Array
 
 BLOCK = 8  # terms that stand together; where there are two banks, their blocks take turns
-TAIL = 2 * BLOCK  # terms beyond the basis that are summed one by one for the truncation bound
+TAIL = BLOCK  # terms beyond the basis that are summed one by one for the truncation bound
 
 # One row per record: numbers, then reference coefficients, column sums, cross products, Gram.
-(TERMS, FREE, STIFFNESS, PERIOD, FOH, POLE, DELTA, X0, V0, U0) = range(10)
-NORM, COUNT, SUM, SQUARES, BEYOND = range(10, 15)
-HEADER = 2 * BLOCK  # what follows is aligned as the row is: a fifth faster
+(TERMS, FREE, STIFFNESS, PERIOD, FOH, POLE, DELTA, POLE_2, DELTA_2, SHIFT) = range(10)
+X0, V0, U0, NORM, COUNT, SUM, SQUARES, BEYOND = range(10, 18)
+HEADER = 3 * BLOCK  # what follows is aligned as the row is: a fifth faster
+START = 13  # numbers that start an expansion, see `expand`
 
 
 @njit
@@ -33,24 +35,40 @@ def _numerator(n0: float, n1: float, n2: float, pole: float, delta: float) -> tu
 
 @njit
 def _first_terms(
-    n: tuple[float, ...], r1: float, r2: float, scale: float
-) -> tuple[float, float, float]:
-    c0 = n[0] * scale
-    c1 = n[1] * scale - r1 * c0
-    return c0, c1, n[2] * scale - r1 * c1 - r2 * c0
+    n: tuple[float, ...], r1: float, r2: float, shift: float, scale: float, out: Array
+) -> None:
+    """Write the first five terms, (5,), by division: see docs/fast_path.md, section 2.
+
+    Args:
+        n: numerator in powers of zeta.
+        r1: of the denominator 1 + r1 zeta + r2 zeta^2.
+        r2: likewise.
+        shift: b of the second section (zeta + b)/(1 + b zeta).
+        scale: of the numerator.
+        out: receives them.
+    """
+    at_shift = 1.0 - shift * r1 + shift * shift * r2
+    out[0] = n[0] * scale
+    p0, p1 = n[1] * scale - out[0] * r1, n[2] * scale - out[0] * r2
+    for k in (1, 3):
+        out[k] = (p0 - shift * p1) / at_shift
+        m1 = -out[k] * r2
+        m0 = p1 - out[k] * r1 - shift * m1
+        out[k + 1] = m0
+        p0, p1 = m1 + shift * m0 - m0 * r1, shift * m1 - m0 * r2
 
 
 @njit
 def expand(c: Array, t: Array, start: Array) -> None:
-    """Write what starts the expansion of one system: r1, r2, three terms each, radius.
+    """Write what starts the expansion of one system: sum and product of lambda, terms, radius.
 
     Args:
         c: one row of `kernel.discretise`.
         t: the record's row.
-        start: shape (9,): ratios of the recursion c[k] = -r1 c[k-1] - r2 c[k-2], first terms for
-            the command and for the initial state, largest modulus of zeta's inverse poles.
+        start: shape (START,): s, p of the recursion c[k] = s c[k-2] - p c[k-4], first five terms
+            for the command and for the initial state, largest modulus of its two roots.
     """
-    pole, delta = t[POLE], t[DELTA]
+    pole, delta, shift = t[POLE], t[DELTA], t[SHIFT]
     q0 = c[kernel.PULL]
     q1 = (1.0 - c[kernel.DECAY]) + q0
     d0, d1, d2 = _numerator(q0, q1, 1.0, pole, delta)
@@ -66,18 +84,22 @@ def expand(c: Array, t: Array, start: Array) -> None:
         + (c[kernel.START_U0] - g1) * t[U0]
     )
     free = _numerator(x0 + h, 2.0 * x0 + h, x0, pole, delta)
-    start[0], start[1] = r1, r2
-    start[2], start[3], start[4] = _first_terms(command, r1, r2, 1.0 / d0)
-    start[5], start[6], start[7] = _first_terms(free, r1, r2, 1.0 / d0)
-    root = r1 * r1 - 4.0 * r2
-    start[8] = 0.5 * (abs(r1) + np.sqrt(root)) if root > 0.0 else np.sqrt(abs(r2))
+    both = 1.0 - shift * r1 + shift * shift * r2
+    total = (r1 * r1 - 2.0 * r2 - shift * r1 * (1.0 + r2) + 2.0 * shift * shift * r2) / both
+    product = r2 * (r2 - shift * r1 + shift * shift) / both
+    start[0], start[1] = total, product
+    _first_terms(command, r1, r2, shift, 1.0 / d0, start[2:7])
+    _first_terms(free, r1, r2, shift, 1.0 / d0, start[7:12])
+    root = total * total - 4.0 * product
+    start[12] = 0.5 * (abs(total) + np.sqrt(root)) if root > 0.0 else np.sqrt(abs(product))
 
 
 @njit
 def _beyond(radius: float, last: float, before: float) -> float:
     """Bound the sum of the moduli of all terms after `last`, which follows `before`.
 
-    With both inverse poles within radius r, |c[k+n]| <= (n+1) r^n |c[k]| + n r^(n+1) |c[k-1]|.
+    With both roots of their recursion within radius r, |c[k+n]| <= (n+1) r^n |c[k]| + n r^(n+1)
+    |c[k-1]|.
     """
     if not radius < 1.0:
         return np.inf
@@ -89,8 +111,8 @@ def _beyond(radius: float, last: float, before: float) -> float:
 def series(start: Array, bank: int, banks: int, z: Array) -> float:
     """Write all terms of one system and bank into z; bound the sum of those that follow.
 
-    The first two blocks by the recursion that every second term obeys (its poles are the squares),
-    whole blocks from there on by that of every eighth.
+    The first two blocks by the recursion that every second term obeys, whole blocks from there on
+    by that of every eighth (the same roots to the fourth power).
 
     Args:
         start: as written by `expand`.
@@ -98,16 +120,13 @@ def series(start: Array, bank: int, banks: int, z: Array) -> float:
         banks: how many there are; their blocks take turns.
         z: shape (blocks, BLOCK).
     """
-    r1, r2 = start[0], start[1]
-    t2, d2 = r1 * r1 - 2.0 * r2, r2 * r2
+    t2, d2 = start[0], start[1]
     t4, d4 = t2 * t2 - 2.0 * d2, d2 * d2
     t8, d8 = t4 * t4 - 2.0 * d4, d4 * d4
-    k0 = 2 + 3 * bank
-    c1, c2 = start[k0 + 1], start[k0 + 2]
-    z[bank, 0], z[bank, 1], z[bank, 2] = start[k0], c1, c2
-    c3 = -r1 * c2 - r2 * c1
-    c4 = -r1 * c3 - r2 * c2
-    z[bank, 3], z[bank, 4] = c3, c4
+    k0 = 2 + 5 * bank
+    for k in range(5):
+        z[bank, k] = start[k0 + k]
+    c1, c2, c3, c4 = start[k0 + 1], start[k0 + 2], start[k0 + 3], start[k0 + 4]
     # Two by two: neither waits for the other.
     for k in range(5, 2 * BLOCK, 2):
         c1, c3 = c3, t2 * c3 - d2 * c1
@@ -120,5 +139,7 @@ def series(start: Array, bank: int, banks: int, z: Array) -> float:
             z[row, i] = t8 * z[row - banks, i] - d8 * z[row - 2 * banks, i]
         if row < 3 * banks:  # the recursion does not hold for the very first term
             z[row, 0] = c4
-    row = len(z) - banks + bank
-    return _beyond(start[8], z[row, BLOCK - 1], z[row, BLOCK - 2])
+    last = z[len(z) - banks + bank]
+    return _beyond(start[12], last[BLOCK - 1], last[BLOCK - 3]) + _beyond(
+        start[12], last[BLOCK - 2], last[BLOCK - 4]
+    )

@@ -20,6 +20,7 @@ from actuator_glue.model.laguerre import (
     NORM,
     PERIOD,
     SQUARES,
+    START,
     STIFFNESS,
     SUM,
     TAIL,
@@ -117,7 +118,7 @@ def evaluate(t: Array, theta: Array, tolerance: float, out: Array, slack: Array)
     sums, cross = t[at : at + dims], t[at + dims : at + 2 * dims]
     gram = t[at + 2 * dims : at + (2 + dims) * dims].reshape(dims, dims)
     enough = 0.4 * tolerance * np.sqrt(t[SQUARES] - t[SUM] * t[SUM] / t[COUNT])
-    row, start, size = np.empty(kernel.COLUMNS), np.empty(9), np.empty(N // BLOCK)
+    row, start, size = np.empty(kernel.COLUMNS), np.empty(START), np.empty(N // BLOCK)
     z = np.empty(N)
     blocks = z.reshape(-1, BLOCK)
     for m in range(len(theta)):

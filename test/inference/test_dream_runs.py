@@ -159,10 +159,10 @@ def test_a_run_ends_where_its_draws_will_do_and_is_the_beginning_of_the_whole_on
         return False
 
     whole = run(asks)
-    assert asked == [int(eighth / 8 * len(whole.draws)) for eighth in range(3, 8)]
+    assert asked == [int(part / 16 * len(whole.draws)) for part in range(5, 16)]
     half = run(lambda chains: len(chains.draws) >= len(whole.draws) // 2)
-    assert len(half.draws) == asked[1]
-    assert np.array_equal(half.draws, whole.draws[: asked[1]])
+    assert len(half.draws) == asked[3]
+    assert np.array_equal(half.draws, whole.draws[: asked[3]])
     assert np.array_equal(whole.draws, run(None).draws)
 
 

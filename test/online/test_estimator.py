@@ -261,7 +261,7 @@ def test_a_window_ends_when_its_draws_will_do():
     never = results(items, settings=replace(SETTINGS, evaluations=8000, ess=10**6))
     assert len(sooner) == len(never) > 2
     for few, all_of_them in zip(sooner, never, strict=True):
-        # An eighth or more before the others, the start aside; such a window is a whole one.
+        # Well before the others, the start aside; such a window is a whole one.
         assert few.evaluations < 0.9 * all_of_them.evaluations
         assert few.ess.min() >= 200 and few.rhat.max() <= 0.5 * (1.0 + SETTINGS.rhat_limit)
         assert not few.stopped_early and not all_of_them.stopped_early
