@@ -129,9 +129,9 @@ def _across(states: Array, a: int, k: int, b: int, m: int, cosine: float, sine: 
     rotation.
     """
     first, second = states[b, m + 1], states[b, m + 2]
-    return states[a, k + 1] * (cosine * first - sine * second) + states[a, k + 2] * (
-        sine * first + cosine * second
-    )
+    product: float = states[a, k + 1] * (cosine * first - sine * second)
+    product += states[a, k + 2] * (sine * first + cosine * second)
+    return product
 
 
 @njit
