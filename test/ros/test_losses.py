@@ -62,14 +62,16 @@ def test_no_sample_is_sent_before_subscribers_have_the_set_up(node, start, probe
         write_record(writer, Record(command, 0.9 * command, 1.0 / RATE, 1e5, start_ns=10**18))
     recorder = start('recorder', bag=str(bag))
     probe.until(lambda: 'bag' in probe.health.get('recorder', {}), 60, 'recorder')
-    stream = start(node, autostart=False, wait_for=2, exit_at_end=True, **given[node])
+    stream = start(node, autostart=False, wait_for=3, exit_at_end=True, **given[node])
     assert probe.state(node) == 'unconfigured'
-    probe.for_a_while(2.0)  # they find each other
     heard = []
     probe.create_subscription(SampleBlock, 'samples', heard.append, SAMPLES.qos, raw=True)
-    recorder.process.send_signal(signal.SIGSTOP)
     assert probe.transition(node, 'configure') and probe.transition(node, 'activate')
-    probe.until(lambda: probe.number(node, 'subscribers') == 2, 20, 'both met')
+    probe.until(lambda: probe.number(node, 'subscribers') == 2, 60, 'both met')
+    # The stream begins with the third, when one of the others cannot take the set-up.
+    recorder.process.send_signal(signal.SIGSTOP)
+    probe.create_subscription(SampleBlock, 'samples', lambda _: None, SAMPLES.qos, raw=True)
+    probe.until(lambda: probe.number(node, 'subscribers') == 3, 20, 'all met')
     probe.for_a_while(1.0)
     assert not heard
     recorder.process.send_signal(signal.SIGCONT)
