@@ -8,19 +8,27 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
+from typing import NamedTuple
 
 _PERIOD = 2e-3  # s
 _NOTICED = 10e-3  # s; a scheduler that is merely busy is rarely that late
 
 
+class Stall(NamedTuple):
+    """Between when a process should have woken up and when it did [ns since 1970]."""
+
+    due: int
+    woken: int
+
+
 @contextmanager
-def watched(core: int) -> Iterator[list[float]]:
-    """Yield a list that holds, once the block is left, by how much wake-ups were late [s].
+def watched(core: int) -> Iterator[list[Stall]]:
+    """Yield a list that holds, once the block is left, the wake-ups that were late.
 
     The process has real-time priority where the system grants it: then nothing but the kernel, or
     a host that shares its processors, can hold it up.
     """
-    found: list[float] = []
+    found: list[Stall] = []
     context = multiprocessing.get_context('spawn')
     ours, theirs = context.Pipe()
     process = context.Process(target=_watch, args=(core, theirs), daemon=True)
@@ -39,12 +47,13 @@ def _watch(core: int, pipe: Connection) -> None:
     os.sched_setaffinity(0, {core})
     with suppress(PermissionError):
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(50))
-    late: list[float] = []
+    late: list[Stall] = []
     last = time.monotonic()
     while not pipe.poll():
         time.sleep(_PERIOD)
         now = time.monotonic()
         if now - last > _NOTICED + _PERIOD:
-            late.append(now - last - _PERIOD)
+            woken = time.time_ns()
+            late.append(Stall(woken - round((now - last - _PERIOD) * 1e9), woken))
         last = now
     pipe.send(late)
