@@ -195,8 +195,8 @@ def _sections(a1: float, a0: float) -> tuple[float, float]:
 def _terms(a1: float, a0: float, margin: float, most: int) -> int:
     """Return the number of terms that poles near the reference system's need.
 
-    A pole p leaves |(p - sigma)/(p + sigma)| per term; the worst of systems with damping a1 and
-    frequency within the margin is taken.
+    A pole p leaves the product of both sections' |(p - sigma)/(p + sigma)| per two terms; the
+    worst of systems with damping a1 and frequency within the margin is taken.
     """
     (slow, fast), worst = _sections(a1, a0), 0.0
     for damping in (1.0 / margin, 1.0, margin):

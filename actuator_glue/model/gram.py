@@ -123,11 +123,13 @@ def _states(memory: Array, t: Array) -> Array:
 
 @njit
 def _across(states: Array, a: int, k: int, b: int, m: int, cosine: float, sine: float) -> float:
-    """Return the product of the states of two sections each behind columns k even and m odd.
+    """Return the product of the states of two sections each behind columns k and m, k - m odd.
 
     The two sections follow one another in opposite order: their states are each other's but for a
-    rotation.
+    rotation, of those behind the odd column.
     """
+    if k % 2:
+        a, k, b, m = b, m, a, k
     first, second = states[b, m + 1], states[b, m + 2]
     product: float = states[a, k + 1] * (cosine * first - sine * second)
     product += states[a, k + 2] * (sine * first + cosine * second)
@@ -161,22 +163,14 @@ def _fill_gram(products: Array, start: Array, end: Array, t: Array, gram: Array)
                         value += start[a, k + 1] * start[b, k + shift + 1]
                         value -= end[a, k + 1] * end[b, k + shift + 1]
             for shift in range(1, K, 2):
-                value = products[b, shift, a]
-                for k in range(0, K - shift, 2):
-                    m = k + shift
-                    _put(gram, banks, a, k, b, m, value)
-                    if m + 2 < K:
-                        value += _across(start, a, k, b, m, cosine, sine)
-                        value -= _across(end, a, k, b, m, cosine, sine)
-                if shift + 1 == K:
-                    continue
-                value = products[b, shift + 1, 4 + a]
-                for k in range(1, K - shift, 2):
-                    m = k + shift
-                    _put(gram, banks, a, k, b, m, value)
-                    if m + 2 < K:
-                        value += _across(start, b, m, a, k, cosine, sine)
-                        value -= _across(end, b, m, a, k, cosine, sine)
+                for first in range(min(2, K - shift)):
+                    value = products[b, shift + first, 4 * first + a]
+                    for k in range(first, K - shift, 2):
+                        m = k + shift
+                        _put(gram, banks, a, k, b, m, value)
+                        if m + 2 < K:
+                            value += _across(start, a, k, b, m, cosine, sine)
+                            value -= _across(end, a, k, b, m, cosine, sine)
 
 
 @njit
