@@ -5,13 +5,17 @@ from __future__ import annotations
 import multiprocessing
 import os
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
 from typing import NamedTuple
 
+import numpy as np
+
+from actuator_glue.records import Array
+
 _PERIOD = 2e-3  # s
-_NOTICED = 10e-3  # s; a scheduler that is merely busy is rarely that late
+_NOTICED = 1e-3  # s; with real-time priority a process wakes up within a tenth of that
 
 
 class Stall(NamedTuple):
@@ -23,10 +27,11 @@ class Stall(NamedTuple):
 
 @contextmanager
 def watched(core: int) -> Iterator[list[Stall]]:
-    """Yield a list that holds, once the block is left, the wake-ups that were late.
+    """Yield a list that holds, once the block is left, when the machine withheld a core.
 
-    The process has real-time priority where the system grants it: then nothing but the kernel, or
-    a host that shares its processors, can hold it up.
+    The process has real-time priority: nothing but the kernel, or a host that shares its
+    processors, can hold it up. Where the system grants none the list stays empty, since the work
+    on that core would pass for the machine's.
     """
     found: list[Stall] = []
     context = multiprocessing.get_context('spawn')
@@ -45,8 +50,12 @@ def watched(core: int) -> Iterator[list[Stall]]:
 
 def _watch(core: int, pipe: Connection) -> None:
     os.sched_setaffinity(0, {core})
-    with suppress(PermissionError):
+    try:
         os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(50))
+    except PermissionError:
+        pipe.recv()
+        pipe.send([])
+        return
     late: list[Stall] = []
     last = time.monotonic()
     while not pipe.poll():
@@ -57,3 +66,27 @@ def _watch(core: int, pipe: Connection) -> None:
             late.append(Stall(woken - round((now - last - _PERIOD) * 1e9), woken))
         last = now
     pipe.send(late)
+
+
+def withheld(spans: Sequence[tuple[int, int]], stalls: Sequence[Stall]) -> Array:
+    """Return how much of each piece of work's time the machine withheld [ns], shape (n,).
+
+    Work that comes while other work is done waits for it, and so for what held that up: stalls
+    count from when there was last nothing to do.
+
+    Args:
+        spans: when each piece came and was done [ns], in the order they came.
+        stalls: when the core was withheld [ns].
+    """
+    since, ended = [], []
+    for came, done in spans:
+        since.append(since[-1] if ended and came < ended[-1] else came)
+        ended.append(done)
+    if not spans or not stalls:
+        return np.zeros(len(spans))
+    # What had been withheld until a time: rises during stalls, and only then.
+    start = stalls[0].due
+    times = np.array(stalls, dtype=np.int64).ravel() - start
+    lost = np.cumsum(np.diff(times, prepend=0) * (np.arange(len(times)) % 2))
+    before, after = (np.array(t, dtype=np.int64) - start for t in (since, ended))
+    return np.interp(after, times, lost) - np.interp(before, times, lost)
