@@ -14,8 +14,9 @@ import numpy as np
 
 from actuator_glue.records import Array
 
-_PERIOD = 2e-3  # s
-_NOTICED = 1e-3  # s; with real-time priority a process wakes up within a tenth of that
+_PERIOD = 5e-4  # s
+_NOTICED = 3e-4  # s; with real-time priority a process wakes up within a third of that
+_ASKED = 100  # wake-ups between looks whether to end
 
 
 class Stall(NamedTuple):
@@ -59,12 +60,14 @@ def _watch(core: int, pipe: Connection) -> None:
     late: list[Stall] = []
     last = time.monotonic()
     while not pipe.poll():
-        time.sleep(_PERIOD)
-        now = time.monotonic()
-        if now - last > _NOTICED + _PERIOD:
-            woken = time.time_ns()
-            late.append(Stall(woken - round((now - last - _PERIOD) * 1e9), woken))
-        last = now
+        for _ in range(_ASKED):
+            time.sleep(_PERIOD)
+            now = time.monotonic()
+            if now - last > _NOTICED + _PERIOD:
+                woken = time.time_ns()
+                late.append(Stall(woken - round((now - last - _PERIOD) * 1e9), woken))
+            last = now
+        last = time.monotonic()
     pipe.send(late)
 
 
