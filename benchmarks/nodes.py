@@ -11,7 +11,7 @@ import shutil
 import tempfile
 import time
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -28,9 +28,10 @@ from benchmarks.stalls import watched, withheld
 # Nodes of a benchmark see each other and nobody else.
 _DOMAIN = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'ROS_DOMAIN_ID': '97'}
 _READY_SECONDS = 120.0
-_LONGEST = 3600.0
 _TICK = float(os.sysconf('SC_CLK_TCK'))
-_DEADLINE_MS = 50.0  # from a window's last sample to its band, 20 times a second
+_DEADLINE = 0.05  # s from a window's last sample to its band, 20 times a second
+# Of the estimator on its own core: before the kernel's housekeeping, after what watches the core.
+_PRIORITY = 20
 
 
 @dataclass(slots=True)
@@ -41,11 +42,13 @@ class Run:
         bag: the recorded bag.
         seconds: length of the stream [s].
         cpu: processor time of each node over the stream, its own process alone [s].
+        real_time: whether the estimator had real-time priority.
     """
 
     bag: Path
     seconds: float
     cpu: dict[str, float]
+    real_time: bool
 
 
 @contextmanager
@@ -59,7 +62,8 @@ def chain(
         seconds: length of the stream [s].
         block: samples per message.
         estimator: the estimator's parameters.
-        pin: give the estimator and its worker one core, and everything else the others.
+        pin: give the estimator and its worker one core with real-time priority, where the system
+            grants that, and everything else the others; what `taskset` and `chrt` do.
     """
     folder = Path(tempfile.mkdtemp(prefix='actuator_glue_bench_'))
     before = {name: os.environ.get(name) for name in _DOMAIN}
@@ -87,38 +91,49 @@ def _stream(
     pin: bool,
 ) -> Run:
     bag = folder / 'bag'
-    processes = {'recorder': nodes.start('recorder', {'bag': str(bag)}, folder)}
-    processes['estimator'] = nodes.start('estimator', dict(estimator), folder)
-    if pin:
-        # Before its threads and its worker start: they inherit it.
-        for name, node in processes.items():
-            os.sched_setaffinity(node.process.pid, _cores(name == 'estimator'))
+    processes: dict[str, Node] = {}
+
+    def start(name: str, parameters: Mapping[str, Any]) -> None:
+        node = processes[name] = nodes.start(name, parameters, folder)
+        if pin:
+            _place(node)
+
+    start('recorder', {'bag': str(bag)})
+    start('estimator', estimator)
     watch, end = Watch(bag), time.monotonic() + _READY_SECONDS
     while not watch.ready and time.monotonic() < end:
         time.sleep(0.2)
         nodes.check()
         watch.update()
-    processes['actuator_sim'] = nodes.start(
+    start(
         'actuator_sim',
         {
             'rate': rate, 'block': block, 'duration': seconds, 'rest': 0.0, 'command': 'noise',
             'frequency_start': 0.2, 'frequency_end': 8.0, 'preview': 1.0, 'wait_for': 2,
             'exit_at_end': True,
         },
-        folder,
     )  # fmt: skip
-    if pin:
-        os.sched_setaffinity(processes['actuator_sim'].process.pid, _cores(False))
     time.sleep(3.0)  # its start is no part of a stream
     began = {name: _cpu(node) for name, node in processes.items()}
     last = began
+    policy = os.sched_getscheduler(processes['estimator'].process.pid)
     end = time.monotonic() + seconds + _READY_SECONDS
     while processes['actuator_sim'].running and time.monotonic() < end:
         time.sleep(0.5)
         last = {name: _cpu(node) or last[name] for name, node in processes.items()}
     time.sleep(2.0)
     nodes.check()
-    return Run(bag, seconds, {name: last[name] - began[name] for name in processes})
+    cpu = {name: last[name] - began[name] for name in processes}
+    return Run(bag, seconds, cpu, policy == os.SCHED_FIFO)
+
+
+def _place(node: Node) -> None:
+    """Give a node its cores and its priority, before its threads and its worker inherit them."""
+    ours = node.name == 'estimator'
+    os.sched_setaffinity(node.process.pid, _cores(ours))
+    if ours:
+        with suppress(PermissionError):
+            os.sched_setscheduler(node.process.pid, os.SCHED_FIFO, os.sched_param(_PRIORITY))
 
 
 def _cores(ours: bool) -> set[int]:
@@ -150,7 +165,8 @@ def twenty_times_a_second(seconds: float) -> dict[str, float]:
     that. `late` are windows whose band took longer than the deadline, `late_without_stalls` those
     that would have without what was withheld, too.
     """
-    settings = {'window': 10.0, 'hop': 0.05, 'settle': 1.0, 'time_budget': 0.05, 'draws': 100}
+    settings = {'window': 10.0, 'hop': 0.05, 'settle': 1.0, 'draws': 100}
+    settings['time_budget'] = _DEADLINE
     with watched(*_cores(True)) as stalls, chain(1000.0, seconds, 10, settings, pin=True) as run:
         arrived: dict[int, int] = {}
         due: dict[int, int] = {}
@@ -172,16 +188,18 @@ def twenty_times_a_second(seconds: float) -> dict[str, float]:
     settled = spans[40:]
     after = np.array([stamp - due for due, stamp in settled]) * 1e-6
     excused = withheld(settled, stalls) * 1e-6
-    stalled = [s.woken - s.due for s in stalls]
+    # Compiling, before the stream, is held up by the kernel's limit on real-time priority.
+    stalled = [s.woken - s.due for s in stalls if s.due > settled[0][0]]
     return {
         'seconds': seconds,
         'windows': float(len(spans)),
+        'real_time_priority': float(run.real_time),
         'latency_p50_ms': float(np.quantile(after, 0.5)),
         'latency_p99_ms': float(np.quantile(after, 0.99)),
         'latency_max_ms': float(after.max()),
         'missed': float(said.get('deadlines missed', 'nan')),
-        'late': float((after > _DEADLINE_MS).sum()),
-        'late_without_stalls': float((after - excused > _DEADLINE_MS).sum()),
+        'late': float((after > 1e3 * _DEADLINE).sum()),
+        'late_without_stalls': float((after - excused > 1e3 * _DEADLINE).sum()),
         'withheld_share': 1e-9 * sum(stalled) / seconds,
         'withheld_max_ms': 1e-6 * max(stalled, default=0),
         'updates_per_second': float((len(spans) - 1) / (seconds - 10.0)),

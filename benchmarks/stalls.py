@@ -16,6 +16,7 @@ from actuator_glue.records import Array
 
 _PERIOD = 5e-4  # s
 _NOTICED = 3e-4  # s; with real-time priority a process wakes up within a third of that
+_PRIORITY = 50
 _ASKED = 100  # wake-ups between looks whether to end
 
 
@@ -51,13 +52,11 @@ def watched(core: int) -> Iterator[list[Stall]]:
 
 def _watch(core: int, pipe: Connection) -> None:
     os.sched_setaffinity(0, {core})
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(50))
-    except PermissionError:
-        pipe.recv()
-        pipe.send([])
-        return
     late: list[Stall] = []
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(_PRIORITY))
+    except PermissionError:
+        pipe.poll(None)
     last = time.monotonic()
     while not pipe.poll():
         for _ in range(_ASKED):
@@ -67,7 +66,7 @@ def _watch(core: int, pipe: Connection) -> None:
                 woken = time.time_ns()
                 late.append(Stall(woken - round((now - last - _PERIOD) * 1e9), woken))
             last = now
-        last = time.monotonic()
+        last = time.monotonic()  # the look itself is no stall
     pipe.send(late)
 
 
