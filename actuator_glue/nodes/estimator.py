@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import statistics
 import sys
 import time
 from collections import deque
@@ -23,7 +24,7 @@ from actuator_glue.online.fitting import choose_model, identifiable
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.sampling import Job
 from actuator_glue.online.settings import LIMITS, EstimatorSettings, ModelChoice
-from actuator_glue.online.stream import Dropped, Event, Failed, Rejected, Restarted
+from actuator_glue.online.stream import Dropped, Event, Failed, Rejected, Restarted, Window
 from actuator_glue.workers.worker import DIED, FAILED, Answer, Worker
 
 
@@ -156,9 +157,9 @@ class EstimatorNode(base.SuiteNode):
     # Jobs out, results back.
 
     def _next(self, now: float) -> None:
-        waiting = self.estimator.waiting
-        if waiting is not None:
-            self._arrival.setdefault(waiting.number, now)
+        for window in self.estimator.waiting:
+            self._arrival.setdefault(window.number, now)
+        self._tell(self.estimator.drop(lambda window: self._late(window, now)))
         job = self.estimator.next_job() if self.worker.ready.is_set() else None
         if job is None:
             return
@@ -167,6 +168,11 @@ class EstimatorNode(base.SuiteNode):
         self._arrival = {n: t for n, t in self._arrival.items() if n > job.window.number}
         self._started = arrival
         self.worker.submit(compute, job, arrival + self.settings.time_budget)
+
+    def _late(self, window: Window, now: float) -> bool:
+        """Whether a window could not be published in time any more, or only cut short."""
+        takes = statistics.median(self.compute) if self.compute else 0.0
+        return now + 2.0 * takes > self._arrival[window.number] + self.settings.time_budget
 
     def _answered(self, answer: Answer) -> None:
         """Called from the listening thread: hand over to the executor."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -28,6 +28,8 @@ from actuator_glue.records import MAX_DISPLACEMENT, Array
 
 # Forecasts wait for their samples for two or three hops; more only when windows are dropped.
 MAX_FROZEN = 8
+# After a stall of the whole computer several hops arrive at once.
+MAX_WAITING = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,8 +66,8 @@ class Estimator:
     Args:
         settings: settings; they do not change.
         model: model to fit.
-        live: only the newest window waits, so that a slow computer drops windows instead of
-            falling behind; otherwise every window waits its turn.
+        live: a few windows wait, so that a slow computer drops windows instead of falling
+            behind; otherwise every window waits its turn.
         schedule: repeats a live run.
     """
 
@@ -98,9 +100,9 @@ class Estimator:
         return self._windows.current
 
     @property
-    def waiting(self) -> Window | None:
-        """The window that is next."""
-        return self._waiting[0] if self._waiting else None
+    def waiting(self) -> tuple[Window, ...]:
+        """The windows that wait, the next one first."""
+        return tuple(self._waiting)
 
     def setup(self, setup: Setup) -> list[Event]:
         """Take a test set-up."""
@@ -109,15 +111,16 @@ class Estimator:
     def push(self, block: Block) -> list[Event]:
         """Take one block of samples as it came; unusable ones are told, never raised."""
         events, windows = self._windows.push(block)
-        self._ahead.forget(block.index)
         for window in windows:
             planned = self._planned(window)
             if planned is None:
                 continue
-            if self.live and self._waiting:
-                old = self._waiting.pop()
-                events.append(Dropped(old.number, old.record.first_index))
             self._waiting.append(planned)
+            if self.live and len(self._waiting) > MAX_WAITING:
+                events.append(self._drop())
+        # A window that waits forecasts from its own end on.
+        ends = [window.end for window in self._waiting]
+        self._ahead.forget(min([block.index, *ends]))
         return events
 
     def preview(self, preview: Preview) -> list[Event]:
@@ -131,6 +134,13 @@ class Estimator:
     def set_model(self, model: ModelChoice) -> None:
         """Go on with another model from the next job on."""
         self.model = model
+
+    def drop(self, late: Callable[[Window], bool]) -> list[Event]:
+        """Drop windows that wait and for which it is too late; the newest is always wanted."""
+        events: list[Event] = []
+        while len(self._waiting) > 1 and late(self._waiting[0]):
+            events.append(self._drop())
+        return events
 
     def next_job(self) -> Job | None:
         """Return the next job, or None where there is nothing to do or one is running."""
@@ -182,6 +192,10 @@ class Estimator:
         if job is None:
             return []
         return [Failed(job.window.number, job.window.record.first_index, reason)]
+
+    def _drop(self) -> Dropped:
+        old = self._waiting.pop(0)
+        return Dropped(old.number, old.record.first_index)
 
     def _judged(self, window: Window) -> tuple[Frozen, ...]:
         """Return the earlier posteriors whose forecasts a window's samples judge."""

@@ -199,7 +199,7 @@ class Rejected:
 
 @dataclass(frozen=True, slots=True)
 class Dropped:
-    """A window that was not computed because the one before was still running."""
+    """A window that was not computed because those before it took too long."""
 
     number: int
     index: int

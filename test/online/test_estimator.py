@@ -63,6 +63,7 @@ class Live:
             busy -= 1
             if busy > 0:
                 continue
+            self.events += estimator.drop(lambda _: True)
             job = estimator.next_job()
             if job is None:
                 continue
@@ -242,17 +243,41 @@ def test_what_one_record_cannot_identify_is_flagged():
     assert held.prior_dominated[1] and held.prior_dominated[2] and not held.prior_dominated[0]
 
 
-def test_only_the_newest_window_waits_live():
+def test_few_windows_wait_live():
     estimator = Estimator(SETTINGS, choose_model(), live=True)
     whole = record(8.0)
     events = []
     for item in stream(whole, 200):
         events += estimator.setup(item) if isinstance(item, Setup) else estimator.push(item)
         estimator.next_job()  # the first is never finished
-    assert len(estimator._waiting) == 1 and estimator.running is not None
-    assert len([e for e in events if isinstance(e, Dropped)]) == 11
+    assert estimator.running is not None
+    assert [w.number for w in estimator.waiting] == [9, 10, 11, 12]
+    assert [e.number for e in events if isinstance(e, Dropped)] == list(range(1, 9))
     assert estimator.abandon('its process has died')[0].number == 0
-    assert estimator.next_job() is not None
+    assert estimator.next_job().window.number == 9
+
+
+def test_windows_that_are_late_are_dropped_but_never_the_newest():
+    estimator = Estimator(SETTINGS, choose_model(), live=True)
+    for item in stream(record(3.5), 700):
+        estimator.setup(item) if isinstance(item, Setup) else estimator.push(item)
+    assert [w.number for w in estimator.waiting] == [0, 1, 2, 3]
+    assert not estimator.drop(lambda window: False)
+    told = estimator.drop(lambda window: window.number < 2)
+    assert [(e.number, e.index) for e in told] == [(0, 0), (1, 100)]
+    assert [e.number for e in estimator.drop(lambda window: True)] == [2]
+    assert [w.number for w in estimator.waiting] == [3]
+
+
+def test_a_window_that_waits_forecasts_from_its_own_end():
+    estimator = Estimator(SETTINGS, choose_model(), live=True)
+    whole = record(4.0)
+    estimator.preview(Preview(0, whole.period, whole.command))
+    for item in stream(whole, 50):
+        estimator.setup(item) if isinstance(item, Setup) else estimator.push(item)
+    job = estimator.next_job()
+    assert job.window.end < len(whole)
+    assert np.array_equal(job.ahead, whole.command[job.window.end :])
 
 
 def test_a_window_ends_when_its_draws_will_do():

@@ -11,12 +11,13 @@ from actuator_glue_msgs.msg import SampleBlock
 from actuator_glue_msgs.srv import SetModel
 from builtin_interfaces.msg import Time
 from rclpy.duration import Duration
-from ros_nodes import RATE, recorded
+from ros_nodes import QUICK, RATE, recorded
 
 from actuator_glue.io.bag_reader import TEST_SETUP, as_published, messages
 from actuator_glue.io.bag_records import write_record
 from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.io.messages import full_name
+from actuator_glue.model.commands import noise
 from actuator_glue.nodes import diagnoser, diagnosing
 from actuator_glue.nodes.recorder import RecorderNode
 from actuator_glue.nodes.topics import SAMPLES
@@ -108,6 +109,24 @@ def test_a_recorder_writes_what_has_reached_it_when_it_is_stopped(probe, tmp_pat
     kinds = {full_name('TestSetup'), full_name('SampleBlock')}
     published = [m.publish_time for m in as_published(found) if m.type in kinds]
     assert published == sorted(published)
+
+
+def test_windows_that_are_complete_at_once_are_all_estimated(start, probe):
+    """What held up the samples, or the computer, is no reason to leave windows out."""
+    settings = {**QUICK, 'hop': 2.0, 'time_budget': 2.0}
+    estimator = start('estimator', **settings)
+    probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 120, 'estimator compiled')
+    probe.open_stream()
+    probe.setup()
+    command = noise(RATE, 14.0, 0.2, 8.0, seed=1)
+    for block in np.split(command[:400], 20):
+        probe.block(block, 0.9 * block)
+    probe.until(lambda: probe.number('estimator', 'windows') == 1, 20, 'first window')
+    for block in np.split(command[400:2400], 20):
+        probe.block(block, 0.9 * block)
+    probe.until(lambda: probe.number('estimator', 'windows') == 6, 20, 'the windows')
+    assert probe.number('estimator', 'deadlines missed') == 0
+    assert estimator.end() == 0, estimator.text
 
 
 @pytest.fixture
