@@ -159,7 +159,7 @@ class EstimatorNode(base.SuiteNode):
     def _next(self, now: float) -> None:
         for window in self.estimator.waiting:
             self._arrival.setdefault(window.number, now)
-        self._tell(self.estimator.drop(lambda window: self._late(window, now)))
+        self._tell(self.estimator.drop(lambda window: self._too_late(window, now)))
         job = self.estimator.next_job() if self.worker.ready.is_set() else None
         if job is None:
             return
@@ -169,7 +169,7 @@ class EstimatorNode(base.SuiteNode):
         self._started = arrival
         self.worker.submit(compute, job, arrival + self.settings.time_budget)
 
-    def _late(self, window: Window, now: float) -> bool:
+    def _too_late(self, window: Window, now: float) -> bool:
         """Whether a window could not be published in time any more, or only cut short."""
         takes = statistics.median(self.compute) if self.compute else 0.0
         return now + 2.0 * takes > self._arrival[window.number] + self.settings.time_budget

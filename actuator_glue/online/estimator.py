@@ -158,16 +158,17 @@ class Estimator:
             seed = (self.settings.seed, record.first_index, 2)
             archive = starting_points(model, memory.model, memory.archive, seed)
             afresh = model != memory.model
-        self.running = Job(
+        job = Job(
             window=window,
             settings=self.settings,
             model=model,
             archive=archive,
             afresh=afresh,
             stop_at=None if self.schedule is None else self.schedule.done[_key(window)][1],
-            ahead=self._ahead.after(window.end, record.period),
             frozen=self._judged(window),
         )
+        ahead = self._ahead.between(window.end, job.forecast[1], record.period)
+        self.running = replace(job, ahead=ahead)
         return self.running
 
     def finish(self, result: WindowResult | Fit) -> list[Event]:
@@ -261,10 +262,10 @@ class Ahead:
         self._command = self._command[gone:]
         self._start += gone
 
-    def after(self, index: int, period: float) -> Array | None:
-        """Return the commands from a sample on, as far as they are known without a gap."""
+    def between(self, start: int, stop: int, period: float) -> Array | None:
+        """Return the commands of samples start:stop; None where not all of them are known."""
         if self._period == 0.0 or abs(period / self._period - 1.0) > 1e-4:
             return None
-        if not self._start <= index < self._start + len(self._command):
+        if not self._start <= start <= stop <= self._start + len(self._command):
             return None
-        return self._command[index - self._start :]
+        return self._command[start - self._start : stop - self._start]

@@ -181,16 +181,15 @@ def _respond(job: Job, frozen: Frozen, record: Record, start: int, stop: int) ->
 
 
 def _forecast(job: Job, frozen: Frozen, seed: tuple[int, int]) -> list[Prediction]:
-    """Bands over the samples to come, as far as all their commands are known."""
+    """Bands over the samples to come, where their commands are known."""
     record, ahead = job.window.record, job.ahead
-    beyond = frozen.stop - job.window.end
-    if ahead is None or len(ahead) < beyond:
+    if ahead is None:
         return []
     longer = replace(
         record,
-        command=np.concatenate([record.command, ahead[:beyond]]),
+        command=np.concatenate([record.command, ahead]),
         # Only the first measured samples are used, for the initial state.
-        measured=np.concatenate([record.measured, np.full(beyond, record.measured[-1])]),
+        measured=np.concatenate([record.measured, np.full(len(ahead), record.measured[-1])]),
         force=None,
     )
     start = frozen.start - record.first_index

@@ -45,7 +45,7 @@ class Job:
         archive: points to start from, shape (m, p); None starts from the prior.
         afresh: the model or the actuator is new, more evaluations are needed.
         stop_at: evaluations after which a live run was stopped; a replay repeats it.
-        ahead: commands after the window as far as they are known, shape (na,) [m].
+        ahead: commands from the window's end to the forecast's, shape (na,) [m], where known.
         frozen: earlier posteriors whose forecasts this window's samples judge.
     """
 
