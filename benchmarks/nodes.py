@@ -23,7 +23,7 @@ from actuator_glue.demo.watch import BAND, HEALTH, POSTERIOR, SAMPLES, Watch
 from actuator_glue.io.bag_reader import messages
 from actuator_glue.io.messages import deserialize
 from actuator_glue.online import wire
-from benchmarks.stalls import watched, withheld
+from benchmarks.stalls import awake, watched, withheld
 
 # Nodes of a benchmark see each other and nobody else.
 _DOMAIN = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'ROS_DOMAIN_ID': '97'}
@@ -167,7 +167,11 @@ def twenty_times_a_second(seconds: float) -> dict[str, float]:
     """
     settings = {'window': 10.0, 'hop': 0.05, 'settle': 1.0, 'draws': 100}
     settings['time_budget'] = _DEADLINE
-    with watched(*_cores(True)) as stalls, chain(1000.0, seconds, 10, settings, pin=True) as run:
+    with (
+        awake() as kept_awake,
+        watched(*_cores(True)) as stalls,
+        chain(1000.0, seconds, 10, settings, pin=True) as run,
+    ):
         arrived: dict[int, int] = {}
         due: dict[int, int] = {}
         spans: list[tuple[int, int]] = []
@@ -194,6 +198,7 @@ def twenty_times_a_second(seconds: float) -> dict[str, float]:
         'seconds': seconds,
         'windows': float(len(spans)),
         'real_time_priority': float(run.real_time),
+        'processors_kept_awake': float(kept_awake),
         'latency_p50_ms': float(np.quantile(after, 0.5)),
         'latency_p99_ms': float(np.quantile(after, 0.99)),
         'latency_max_ms': float(after.max()),

@@ -1,19 +1,22 @@
-"""What the machine itself withholds: a process that only wakes up, and how late it does."""
+"""What the machine itself withholds, and how to keep it from doing so."""
 
 from __future__ import annotations
 
 import multiprocessing
 import os
+import sys
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from multiprocessing.connection import Connection
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
 from actuator_glue.records import Array
 
+_LATENCY = Path('/dev/cpu_dma_latency')
 _PERIOD = 5e-4  # s
 _NOTICED = 3e-4  # s; with real-time priority a process wakes up within a third of that
 _PRIORITY = 50
@@ -25,6 +28,24 @@ class Stall(NamedTuple):
 
     due: int
     woken: int
+
+
+@contextmanager
+def awake() -> Iterator[bool]:
+    """Keep idle processors from sleeping while the block runs; yield whether that is granted.
+
+    Real-time computers do so since waking up takes time. A host that shares its processors gives a
+    sleeping one to others, and it is back when they are done.
+    """
+    with ExitStack() as stack:
+        try:
+            # Holds as long as the file is open.
+            request = stack.enter_context(_LATENCY.open('wb', buffering=0))
+        except OSError:
+            yield False
+        else:
+            request.write((0).to_bytes(4, sys.byteorder))
+            yield True
 
 
 @contextmanager

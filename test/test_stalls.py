@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks.stalls import Stall, withheld
+from benchmarks import stalls
+from benchmarks.stalls import Stall, awake, withheld
 
 
 def test_a_stall_counts_where_it_was_waited_for():
@@ -40,3 +41,14 @@ def test_as_counted_one_by_one():
         during = range(spans[first][0], end)
         expected = sum(any(s.due <= t < s.woken for s in stalls) for t in during)
         assert found[i] == expected
+
+
+def test_processors_are_kept_awake_where_that_is_granted(tmp_path, monkeypatch):
+    request = tmp_path / 'latency'
+    request.touch()
+    monkeypatch.setattr(stalls, '_LATENCY', request)
+    with awake() as granted:
+        assert granted and request.read_bytes() == bytes(4)
+    monkeypatch.setattr(stalls, '_LATENCY', tmp_path / 'missing' / 'latency')
+    with awake() as granted:
+        assert not granted
