@@ -7,7 +7,7 @@ import os
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import contextmanager, suppress
 from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import NamedTuple
@@ -37,15 +37,16 @@ def awake() -> Iterator[bool]:
     Real-time computers do so since waking up takes time. A host that shares its processors gives a
     sleeping one to others, and it is back when they are done.
     """
-    with ExitStack() as stack:
-        try:
-            # Holds as long as the file is open.
-            request = stack.enter_context(_LATENCY.open('wb', buffering=0))
-        except OSError:
-            yield False
-        else:
-            request.write((0).to_bytes(4, sys.byteorder))
-            yield True
+    try:
+        request = os.open(_LATENCY, os.O_WRONLY)
+    except OSError:
+        yield False
+        return
+    try:
+        os.write(request, (0).to_bytes(4, sys.byteorder))
+        yield True  # holds as long as the file is open
+    finally:
+        os.close(request)
 
 
 @contextmanager

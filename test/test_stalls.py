@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from benchmarks import stalls
 from benchmarks.stalls import Stall, awake, withheld
 
 
@@ -46,9 +45,9 @@ def test_as_counted_one_by_one():
 def test_processors_are_kept_awake_where_that_is_granted(tmp_path, monkeypatch):
     request = tmp_path / 'latency'
     request.touch()
-    monkeypatch.setattr(stalls, '_LATENCY', request)
+    monkeypatch.setattr('benchmarks.stalls._LATENCY', request)
     with awake() as granted:
         assert granted and request.read_bytes() == bytes(4)
-    monkeypatch.setattr(stalls, '_LATENCY', tmp_path / 'missing' / 'latency')
+    monkeypatch.setattr('benchmarks.stalls._LATENCY', tmp_path / 'missing' / 'latency')
     with awake() as granted:
         assert not granted
