@@ -27,10 +27,6 @@ THETA = np.array([134.0, 1.1e9, 2.5e5, 0.5])
 THETAS, SAMPLES = 256, 10_000
 
 
-# Vector units that were idle run at a third of their speed for about a millisecond.
-_WARM, _COUNTED = 0.005, 0.01  # s
-
-
 def run(most: int = len(EFFECTS)) -> list[dict[str, float | None]]:
     """Return ns per theta and sample for 0, 1, .. effects, each a little away from neutral.
 
@@ -49,7 +45,7 @@ def _costs(structures: Mapping[str, Structure]) -> dict[str, dict[str, float | N
     tasks = {name: _task(structure) for name, structure in structures.items()}
     return {
         name: {'ns': _ns(taken.median), 'whole_core_ns': _ns(taken.whole)}
-        for name, taken in in_turns(tasks, 15, _WARM, _COUNTED).items()
+        for name, taken in in_turns(tasks, 15).items()
     }
 
 

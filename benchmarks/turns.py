@@ -12,6 +12,10 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from statistics import median
 
+# Of each repeat [s]. Vector units that were idle run at a third of their speed for about a
+# millisecond, and what other tasks have pushed out of the caches is fetched again.
+_WARM, _COUNTED = 0.005, 0.01
+
 _LOOP = 20_000
 # A loop this much slower than the fastest of its run shared its core: a neighbour costs 1.7 to 2
 # times, frequency and what ran just before up to 1.4.
@@ -31,19 +35,12 @@ class Taken:
     whole: float | None
 
 
-def in_turns(
-    tasks: Mapping[str, Callable[[], object]],
-    repeats: int,
-    warm: float = 0.0,
-    counted: float = 0.0,
-) -> dict[str, Taken]:
+def in_turns(tasks: Mapping[str, Callable[[], object]], repeats: int) -> dict[str, Taken]:
     """Time tasks that take turns, so that a machine which slows down slows all of them.
 
     Args:
         tasks: what to time, by name.
-        repeats: turns of each.
-        warm: a task is repeated for so long before its time counts [s].
-        counted: and then for so long at least [s].
+        repeats: turns of each; in each a task is repeated, first to get warm, then for its time.
     """
     for task in tasks.values():
         task()
@@ -51,9 +48,8 @@ def in_turns(
     for _ in range(repeats):
         for name, task in tasks.items():
             before = _pace()
-            if warm > 0.0:
-                _repeat(task, warm)
-            seconds = _repeat(task, counted)
+            _repeat(task, _WARM)
+            seconds = _repeat(task, _COUNTED)
             taken[name].append((max(before, _pace()), seconds))
     limit = _WHOLE * min(pace for times in taken.values() for pace, _ in times)
     return {name: _summary(times, limit) for name, times in taken.items()}
