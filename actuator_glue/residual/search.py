@@ -12,12 +12,15 @@ from actuator_glue.model.effects import CATALOGUE, Scale, scale
 from actuator_glue.model.parameters import BASE
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
+from actuator_glue.residual import rugged
 from actuator_glue.residual.data import Data, Model
 from actuator_glue.residual.fit import Fit, base_starts, fit
 from actuator_glue.residual.score import Scorer
 
 _P = len(BASE)
 _COARSE = 8  # iterations of every refit; those in the running go on
+_TOLERANCE = 1e-4
+_PROMISING = 0.95  # of the error at most is left by friction that is looked at twice
 _POLISHED = 4
 _STARTS = 4  # starting sizes that survive the screening (the kernel works on 32 at a time)
 
@@ -102,7 +105,11 @@ class Search:
         key = frozenset(effects)
         if key not in self._tried:
             starts = self.screen(current, name)[1]
-            coarse = fit(self.data, Structure(effects), starts, iterations=_COARSE, tolerance=1e-4)
+            model = Structure(effects)
+            coarse = fit(self.data, model, starts, iterations=_COARSE, tolerance=_TOLERANCE)
+            alone = not current.effects and name in rugged.EFFECTS
+            if alone and coarse.rms < _PROMISING * current.fit.rms:
+                coarse = rugged.refit(self.data, model, coarse, _COARSE, _TOLERANCE)
             self._tried[key] = coarse
         return self.trial(effects, name)
 
