@@ -6,7 +6,7 @@ from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.residual.attribute import Attribution
 from actuator_glue.residual.data import Data
 from actuator_glue.residual.decide import Decision
-from actuator_glue.residual.diagnosis import Estimate, Json
+from actuator_glue.residual.diagnosis import Estimate, HeldOutError, Json
 from actuator_glue.residual.surrogate import Surrogate
 from actuator_glue.residual.windows import Windows
 
@@ -21,6 +21,8 @@ _EXPERIMENT = {
 }
 # Above this a posterior's spread may be off by a tenth and more.
 _CONVERGED = 1.2
+# Held-out errors beyond this many times the noise say that the fitting records lack something.
+_CONTRADICTED = 2.0
 _OTHERWISE = 'a second amplitude, a down-sweep or a record with another specimen stiffness'
 
 
@@ -117,4 +119,20 @@ def unconverged(rhat: float) -> tuple[str, ...]:
     return (
         f'the chains of the posterior have not met (R-hat {rhat:.2f}): its spreads are rough, its '
         'names and errors do not depend on them',
+    )
+
+
+def contradicted(verdict: str, error: HeldOutError) -> tuple[str, ...]:
+    """Say so where held-out records show far more than noise although nothing is left to explain.
+
+    The verdict stays: the held-out part decides nothing.
+    """
+    noise = error.noise_floor
+    beyond = error.after > _CONTRADICTED * noise and error.after_ci[0] > noise
+    if verdict == 'unexplained' or not beyond:
+        return ()
+    return (
+        f'the held-out part does not bear this out: it leaves {1e6 * error.after:.0f} um where '
+        f'{1e6 * noise:.0f} um are noise; it shows what the fitting records do not: '
+        'add a record like it to them',
     )

@@ -95,6 +95,7 @@ def diagnose(
         alarm=alarm_of(found, result.seen, decision, data, seed),
         advice=(
             *advice.of(decision, found, result.generic, stretches),
+            *advice.contradicted(decision.verdict, error),
             *advice.unidentified(data, estimates),
             *advice.unconverged(rhat),
             *prepared.notes,

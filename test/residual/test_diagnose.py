@@ -46,6 +46,17 @@ def test_a_healthy_machine_is_left_alone() -> None:
     assert found.error.after == pytest.approx(1e-5, rel=0.1)
 
 
+def test_held_out_records_that_show_more_are_told() -> None:
+    """A transducer set differently for that test alone: the verdict stays, a note says so."""
+    a, b, held = make([], [], 13)
+    agrees = diagnose([a, b], held, settings=QUICK)
+    found = diagnose([a, b], replace(held, measured=1.1 * held.measured), settings=QUICK)
+    assert found.verdict == agrees.verdict == 'none'
+    assert found.error.after > 2.0 * found.error.noise_floor
+    assert any('held-out part does not bear this out' in line for line in found.advice)
+    assert not any('bear this out' in line for line in agrees.advice)
+
+
 def test_play_is_named_and_removed() -> None:
     """60 um of play: the name, its size within 3 %, and the error down to the noise."""
     a, b, held = make(['backlash'], [6e-5], 12)
