@@ -77,8 +77,10 @@ class Space:
         return np.where(z + steps > self.upper, -steps, steps)
 
 
-def _sse(error: Array) -> Array:
-    sums = np.einsum('...n,...n->...', error, error)
+def sum_of_squares(error: Array) -> Array:
+    """Sum of squares of errors (..., n); infinite where a simulation diverged."""
+    with np.errstate(over='ignore', invalid='ignore'):
+        sums = np.einsum('...n,...n->...', error, error)
     return np.where(np.isfinite(sums), sums, np.inf)
 
 
@@ -144,7 +146,7 @@ def fit(
     z = space.z(np.atleast_2d(starts))
     output = data.simulate(model, space.theta(z))
     error = data.target - output
-    sse = _sse(error)
+    sse = sum_of_squares(error)
     alive = np.isfinite(sse)
     z, output, error, sse = z[alive], output[alive], error[alive], sse[alive]
     if not len(z):
@@ -170,7 +172,7 @@ def fit(
         tried = tried.reshape(len(rows), len(_DAMPINGS), -1)
         for i, r in enumerate(rows):
             errors = data.target - tried[i]
-            sums = _sse(errors)
+            sums = sum_of_squares(errors)
             best = int(np.argmin(sums))
             if sums[best] < sse[r]:
                 gain = (sse[r] - sums[best]) / sse[r]

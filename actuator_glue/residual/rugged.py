@@ -8,6 +8,8 @@ noise. Differential evolution (Storn & Price 1997) needs no slope.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.optimize import Bounds, differential_evolution
 
@@ -15,9 +17,7 @@ from actuator_glue.model.effects import scale
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 from actuator_glue.residual.data import Data
-from actuator_glue.residual.fit import Fit, Space, base_starts, fit
-
-EFFECTS = frozenset({'coulomb-friction', 'stribeck-friction'})
+from actuator_glue.residual.fit import Fit, Space, base_starts, fit, sum_of_squares
 
 _POPULATION = 32  # as many as the kernel works on at a time
 _GENERATIONS = 40
@@ -38,15 +38,12 @@ def refit(data: Data, model: Structure, found: Fit, iterations: int, tolerance: 
         The better of `found` and what the population led to.
     """
     space = Space(model, max(r.duration for r in data.records))
-    typical = [model.starts(base, scale(data.records, base)) for base in base_starts(data)]
+    sizes = scale(data.records, found.theta)
+    typical = [model.starts(base, replace(sizes, theta=base)) for base in base_starts(data)]
     members = space.z(np.concatenate([found.theta[np.newaxis], *typical]))
 
     def cost(z: Array, /) -> Array:
-        """Sum of squares of working coordinates (p, s); a metre of error where it diverges."""
-        with np.errstate(over='ignore', invalid='ignore'):
-            error = data.target - data.simulate(model, space.theta(z.T))
-            sums = np.einsum('sn,sn->s', error, error)
-        return np.asarray(np.nan_to_num(np.minimum(sums, error.shape[1]), nan=error.shape[1]))
+        return sum_of_squares(data.target - data.simulate(model, space.theta(z.T)))
 
     first = members[np.argsort(cost(members.T), kind='stable')[:_POPULATION]]
     best = differential_evolution(

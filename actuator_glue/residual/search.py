@@ -14,7 +14,7 @@ from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 from actuator_glue.residual import rugged
 from actuator_glue.residual.data import Data, Model
-from actuator_glue.residual.fit import Fit, base_starts, fit
+from actuator_glue.residual.fit import Fit, base_starts, fit, sum_of_squares
 from actuator_glue.residual.score import Scorer
 
 _P = len(BASE)
@@ -82,9 +82,7 @@ class Search:
         """Fit Eq. (2) from a grid of starts."""
         model = Structure(())
         starts = base_starts(self.data)
-        errors = self.data.target - self.data.simulate(model, starts)
-        with np.errstate(over='ignore', invalid='ignore'):
-            sums = np.nan_to_num(np.einsum('sn,sn->s', errors, errors), nan=np.inf)
+        sums = sum_of_squares(self.data.target - self.data.simulate(model, starts))
         best = fit(self.data, model, starts[np.argsort(sums)[:4]], iterations=60)
         self._tried[frozenset()] = best
         return best
@@ -107,8 +105,8 @@ class Search:
             starts = self.screen(current, name)[1]
             model = Structure(effects)
             coarse = fit(self.data, model, starts, iterations=_COARSE, tolerance=_TOLERANCE)
-            alone = not current.effects and name in rugged.EFFECTS
-            if alone and coarse.rms < _PROMISING * current.fit.rms:
+            friction = not current.effects and CATALOGUE[name].group == 'friction'
+            if friction and coarse.rms < _PROMISING * current.fit.rms:
                 coarse = rugged.refit(self.data, model, coarse, _COARSE, _TOLERANCE)
             self._tried[key] = coarse
         return self.trial(effects, name)
