@@ -3,42 +3,33 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from actuator_glue.cli._output import progress
+from actuator_glue.errors import InputError
 from actuator_glue.records import Array, Record
 
 if TYPE_CHECKING:
     from actuator_glue.inference.chains import Chains
     from actuator_glue.inference.evaluate import LogDensity
     from actuator_glue.model.exact import Initial
-    from actuator_glue.model.structure import Structure
     from actuator_glue.online.settings import ModelChoice
-
-# Share of its range that a record may be away from zero at its first sample, or move within a
-# moment, and still count as starting at rest.
-REST_SHARE = 0.05
-MOMENT = 0.02  # s
 
 
 def initial_state(asked: str, records: list[Record]) -> Initial:
-    """Return 'rest' or 'measured'; 'auto' is rest where every record starts at zero and still."""
+    """Return 'rest' or 'measured'; 'auto' is rest where every record starts at rest at zero."""
+    from actuator_glue.residual import hygiene
+
     if asked != 'auto':
         return 'rest' if asked == 'rest' else 'measured'
-    for record in records:
-        span = float(record.measured.max() - record.measured.min())
-        soon = min(max(round(MOMENT / record.period), 1), len(record) - 1)
-        moved = abs(float(record.measured[soon] - record.measured[0]))
-        start = max(abs(float(record.measured[0])), abs(float(record.command[0])), moved)
-        if start > REST_SHARE * span:
-            return 'measured'
-    return 'rest'
+    return 'rest' if all(hygiene.initial_state(r) == 'rest' for r in records) else 'measured'
 
 
 def sample(
     args: argparse.Namespace,
-    structure: Structure,
+    model: ModelChoice,
     records: list[Record],
     initial: Initial,
     settle: float,
@@ -47,7 +38,7 @@ def sample(
 
     Args:
         args: likelihood, shaping factor, evaluations and seed.
-        structure: the model.
+        model: what is sampled, see `sampled_model`.
         records: the tests, each with its stiffness.
         initial: state at each record's first sample.
         settle: uncounted start of each record [s].
@@ -64,11 +55,12 @@ def sample(
         GlueLikelihood,
     )
     from actuator_glue.model.fast import FastErrors
+    from actuator_glue.model.structure import Structure
     from actuator_glue.online.coordinates import Coordinates
 
     counts = [round(settle / r.period) for r in records]
-    errors = structure.errors(records, counts, initial)
-    sums = errors if structure.effects else FastErrors(records, counts, initial)
+    errors = Structure(model.effects).errors(records, counts, initial)
+    sums = errors if model.effects else FastErrors(records, counts, initial)
     density: LogDensity
     if args.likelihood == 'glue':
         density = GlueLikelihood(sums, args.shaping_factor)
@@ -76,7 +68,6 @@ def sample(
         density = GaussianLikelihood(sums)
     else:
         density = Ar1Likelihood(errors)
-    model = sampled_model(structure, args.likelihood)
     lower, upper = model.bounds
     stiffnesses = {r.known_stiffness() for r in records}
     # One stiffness alone leaves a bent ridge, on which no sampler moves in physical parameters.
@@ -98,12 +89,29 @@ def sample(
     return chains if single is None else single.chains(chains)
 
 
-def sampled_model(structure: Structure, likelihood: str) -> ModelChoice:
-    """Return what is sampled: the model's parameters, and the errors' where they have one."""
+def sampled_model(
+    effects: Sequence[str], likelihood: str, bounds: Mapping[str, tuple[float, float]]
+) -> ModelChoice:
+    """Return what is sampled: the model's parameters, and the errors' where they have one.
+
+    Args:
+        effects: effects of the catalogue.
+        likelihood: ar1 has a parameter of its own.
+        bounds: prior bounds by parameter that replace those of Table 3 and the catalogue.
+
+    Raises:
+        InputError: unknown effect or parameter, or bounds that leave nothing between them or
+            reach below zero where a parameter cannot.
+    """
     from actuator_glue.inference.likelihood import PHI
+    from actuator_glue.model.structure import Structure
     from actuator_glue.online.fitting import choose_model
 
-    model = choose_model(structure.effects)
+    for parameter in Structure(effects).parameters:
+        least = bounds.get(parameter.name, (0.0, 0.0))[0]
+        if parameter.lower == 0.0 and least < 0.0:
+            raise InputError(f'{parameter.name} cannot be negative; --bounds starts at {least:g}')
+    model = choose_model(effects, bounds)
     if likelihood != 'ar1':
         return model
     return replace(
@@ -129,6 +137,7 @@ def fit_error(residuals: list[Array], records: list[Record], settle: float) -> d
             {
                 'source': r.source,
                 'rms_m': float(np.sqrt(np.mean(e**2))),
+                'offset_m': float(np.mean(e)),
                 'nrmse': float(np.sqrt(np.mean(e**2)) / y.std()) if y.std() > 0.0 else None,
             }
             for r, e, y in zip(records, residuals, measured, strict=True)

@@ -1,4 +1,8 @@
-"""Calibrate the servo-hydraulic model from one or several records jointly (GLUE, DREAM(ZS))."""
+"""Calibrate the servo-hydraulic model from one or several records jointly (GLUE, DREAM(ZS)).
+
+Exit code 0: a posterior to go on with. 1: the model does not fit, or a bound holds a parameter;
+the first line says so. 2: the input cannot be used.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from actuator_glue.cli._calibration import fit_error, initial_state, sample, sampled_model
 from actuator_glue.cli._compilation import compilation
+from actuator_glue.cli._judgement import CONVERGED, bounds, problems, remarks
 from actuator_glue.cli._output import add_json, note, say, table, write_json
 from actuator_glue.cli._records import add_records, load, number
 from actuator_glue.errors import InputError
@@ -16,12 +21,7 @@ from actuator_glue.records import Record
 
 if TYPE_CHECKING:
     from actuator_glue.inference.chains import Chains
-    from actuator_glue.model.structure import Structure
-
-# R-hat above which draws are not yet the posterior (Vehtari et al. 2021).
-CONVERGED = 1.01
-TIED = 0.99  # correlation above which two parameters are only known together
-SETTLE = 0.5  # s
+    from actuator_glue.online.settings import ModelChoice
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -67,7 +67,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=number,
         metavar='SECONDS',
         help='start of each record that only lets the initial state be forgotten '
-        f'(default 0 from rest, else {SETTLE} s)',
+        '(default 0 from rest, else 1 s)',
     )
     parser.add_argument(
         '--draws',
@@ -75,41 +75,55 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='save the posterior draws (arrays draws, names, units, best, effects, initial) for '
         '`plot --draws` and for others',
     )
+    parser.add_argument(
+        '--bounds',
+        action='append',
+        default=[],
+        metavar='NAME=LO:HI',
+        help='prior bounds of a parameter in the unit of the table, as in beta_1=0:800, in place '
+        'of those of Table 3 or the catalogue; repeatable',
+    )
     add_json(parser)
 
 
 def run(args: argparse.Namespace) -> int:
-    """Calibrate and print the posterior moments.
+    """Calibrate and print the posterior moments, first what forbids their use.
 
     Raises:
         InputError: a record, option or output cannot be used.
     """
     if args.seed < 0:
         raise InputError(f'--seed {args.seed} is negative')
-    records = load(args)
-    for record in records:
-        record.known_stiffness()
-        record.check_channels()
+    model = sampled_model(args.effect, args.likelihood, bounds(args.bounds))
+
+    from actuator_glue.inference.at_bound import pressed
+    from actuator_glue.model.structure import Structure
+    from actuator_glue.residual.hygiene import SETTLE, clean
+
+    records, notes = clean(load(args))
     initial = initial_state(args.initial, records)
     settle = args.settle if args.settle is not None else (SETTLE if initial == 'measured' else 0.0)
     if settle < 0.0:
         raise InputError(f'--settle {settle:g} s is negative')
-
-    from actuator_glue.model.structure import Structure
-
     structure = Structure(args.effect)
     started = time.perf_counter()
     with compilation() as compiled:
-        chains = sample(args, structure, records, initial, settle)
+        chains = sample(args, model, records, initial, settle)
     seconds = time.perf_counter() - started - sum(compiled)
     errors = structure.errors(records, [round(settle / r.period) for r in records], initial)
     fit = fit_error(errors.residuals(chains.best[: len(structure.names)]), records, settle)
-    parameters = _parameters(structure, chains, args.likelihood)
+    parameters = _parameters(model, chains)
     converged = all(p['rhat'] is not None and p['rhat'] <= CONVERGED for p in parameters.values())
+    at_bound = pressed(chains.posterior(), model.names, *model.bounds)
+    wrong = problems(at_bound, dict(zip(model.names, model.units, strict=True)), fit)
+    for line in wrong:
+        say(line, args)
     _show(args, records, parameters, chains, fit, seconds)
     if sum(compiled) > 0.5:
         say(f'{sum(compiled):.1f} s of compilation besides, once per installation', args)
-    _warn(records, parameters, chains, converged)
+    notes = [*remarks(records, parameters, chains, converged, at_bound), *notes]
+    for line in notes:
+        note(line)
     if args.draws is not None:
         _save_draws(args.draws, chains, parameters, args.effect, initial)
     content = {
@@ -119,6 +133,9 @@ def run(args: argparse.Namespace) -> int:
         'seconds': seconds,
         'compile_seconds': sum(compiled),
         'error': fit,
+        'problems': wrong,
+        'at_bound': [p.to_json() for p in at_bound],
+        'notes': notes,
         'converged': converged,
         'effects': list(structure.effects),
         'likelihood': args.likelihood,
@@ -138,19 +155,17 @@ def run(args: argparse.Namespace) -> int:
         ],
     }
     write_json(content, args.json)
-    return 0
+    return 1 if wrong else 0
 
 
-def _parameters(
-    structure: Structure, chains: Chains, likelihood: str
-) -> dict[str, dict[str, Any]]:
+def _parameters(model: ModelChoice, chains: Chains) -> dict[str, dict[str, Any]]:
     import arviz as az
     import numpy as np
 
     from actuator_glue.inference.moments import moments
 
-    model = sampled_model(structure, likelihood)
-    found = moments(chains.posterior(), *model.bounds)
+    lower, upper = model.bounds
+    found = moments(chains.posterior(), lower, upper)
     # arviz wants (chain, draw, parameter).
     kept = np.swapaxes(chains.kept, 0, 1)
     data = az.convert_to_dataset({'theta': kept})
@@ -165,6 +180,7 @@ def _parameters(
             'ess': float(ess[i]),
             'best': float(chains.best[i]),
             'unit': unit,
+            'bounds': [float(lower[i]), float(upper[i])],
             'prior_dominated': bool(found.prior_dominated[i]),
         }
         for i, (name, unit) in enumerate(zip(model.names, model.units, strict=True))
@@ -205,32 +221,6 @@ def _show(
         args,
     )
     say(f'{chains.evaluations} evaluations in {seconds:.1f} s', args)
-
-
-def _warn(
-    records: list[Record], parameters: dict[str, dict[str, Any]], chains: Chains, converged: bool
-) -> None:
-    """Say what these records cannot tell, and what would."""
-    import numpy as np
-
-    if not chains.annealed or not converged:
-        note(f'not converged (R-hat above {CONVERGED}); give more --evaluations')
-    names = list(parameters)
-    told = [f'{n}: little more than its prior' for n in names if parameters[n]['prior_dominated']]
-    correlation = np.corrcoef(chains.posterior(), rowvar=False)
-    for i, j in zip(*np.triu_indices(len(names), 1), strict=True):
-        if abs(correlation[i, j]) > TIED:
-            told.append(f'{names[i]} and {names[j]}: only a combination of them is known')
-    if told and len({r.stiffness for r in records}) < 2:
-        told.append('a second record with another specimen stiffness would tell more')
-    for record in records:
-        if np.corrcoef(record.command, record.measured)[0, 1] < -0.5:
-            told.append(
-                f'{record.source}: measured displacement moves against the command; where the '
-                'sign of a channel is wrong, give `scale: -1` in a channel map'
-            )
-    for line in told:
-        note(line)
 
 
 def _save_draws(

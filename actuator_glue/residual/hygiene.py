@@ -1,4 +1,4 @@
-"""Check records before any look at them, and set the held-out part aside."""
+"""Check and zero records before any look at them, and set the held-out part aside."""
 
 from __future__ import annotations
 
@@ -6,20 +6,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import signal
 
 from actuator_glue.errors import InputError
 from actuator_glue.model.exact import Initial
 from actuator_glue.records import Record
+from actuator_glue.residual.checks import check, refuse_repeats, where
 from actuator_glue.residual.data import Data, Mask
 
+SETTLE = 1.0  # s in which an unknown initial state is forgotten
 _SHORTEST = 5.0  # s
-_SMALLEST = 5e-6  # m of command, from end to end: below it is no test of an actuator
-_LEAD = 5e-3  # s by which a measured displacement may lead (a compensated command)
-_REACH = 0.5  # s of lag that is looked at
-_FASTEST = 10.0  # m/s: no servo-hydraulic actuator follows
 _REST = 1.5  # s of constant command that define the zero of both channels
-_SETTLE = 1.0  # s in which an unknown initial state is forgotten
+# Share of its range that a channel may be away from zero, or move within a moment, at rest.
+_STILL = 0.05
+_MOMENT = 0.02  # s
 _RATE = 300.0  # Hz: counted samples need not be denser, no effect acts above 100 Hz
 _FOLD = 4  # every fourth block is held out where no record is
 _FOLD_LENGTH = 3.0  # s
@@ -38,64 +37,6 @@ class Prepared:
     fit: Data
     held: Data
     notes: tuple[str, ...]
-
-
-def _where(record: Record, number: int) -> str:
-    return record.source or f'record {number}'
-
-
-def check(record: Record, number: int) -> None:
-    """Refuse a record that cannot be diagnosed.
-
-    Raises:
-        InputError: stiffness not known, too short, nothing moves, units that do not match, or
-            channels that are swapped or of opposite sign.
-    """
-    where = _where(record, number)
-    record.known_stiffness()
-    if record.duration < _SHORTEST or len(record) < 500:
-        raise InputError(
-            f'{where}: {record.duration:.3g} s ({len(record)} samples) are too short for a '
-            f'diagnosis; give at least {_SHORTEST:g} s and 500 samples'
-        )
-    replace(record, source=where).check_channels()
-    reach = float(np.ptp(record.command))
-    speed = float(np.quantile(np.abs(np.diff(record.command)), 0.99)) / record.period
-    if reach < _SMALLEST or speed > _FASTEST:
-        raise InputError(
-            f'{where}: the command moves {reach:.3g} m in all, at up to {speed:.3g} m/s; check '
-            'the units of its channel and of time (metres and seconds are expected)'
-        )
-    _follows(record, where)
-
-
-def _follows(record: Record, where: str) -> None:
-    """Refuse channels that are swapped or of opposite sign: an actuator follows its command.
-
-    Raises:
-        InputError: the measured displacement leads the command, or moves against it.
-    """
-    u, y = (c - c.mean() for c in (record.command, record.measured))
-    cross = signal.correlate(y, u, method='fft') / np.sqrt(float(u @ u) * float(y @ y))
-    reach = min(len(u) // 4, round(_REACH / record.period))
-    near = cross[len(u) - 1 - reach : len(u) + reach]
-    lags = np.arange(-reach, reach + 1) * record.period
-    at = int(np.argmax(np.abs(near)))
-    lead = -lags[at]
-    # A periodic command has other peaks as high: then nothing can be said.
-    peaks = signal.find_peaks(np.abs(near), height=0.9 * abs(near[at]))[0]
-    if abs(near[at]) < 0.5 or len(peaks) > 1:
-        return
-    if near[at] < 0.0:
-        raise InputError(
-            f'{where}: the measured displacement moves against the command (correlation '
-            f'{near[at]:.2f}); change the sign of one channel'
-        )
-    if lead > max(_LEAD, 2.0 * record.period):
-        raise InputError(
-            f'{where}: the measured displacement leads the command by {1e3 * lead:.0f} ms; '
-            'check whether the two channels are swapped, or their clocks apart'
-        )
 
 
 def rest_samples(record: Record) -> int:
@@ -122,17 +63,44 @@ def zeroed(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
             replace(record, command=record.command - command, measured=record.measured - measured)
         )
         notes.append(
-            f'{_where(record, i + 1)}: rest offsets removed, command {1e6 * command:.1f} um, '
+            f'{where(record, i + 1)}: rest offsets removed, command {1e6 * command:.1f} um, '
             f'measured {1e6 * measured:.1f} um'
         )
     return out, notes
 
 
-def _initial(record: Record) -> Initial:
-    """A record that begins near its zero begins at rest; any other has an unknown state."""
+def initial_state(record: Record) -> Initial:
+    """Return where a record starts: at rest at zero, or in a state only its samples show.
+
+    The command tells whether it is zero, for the measured displacement has an offset of its own;
+    that neither channel moves tells rest from a zero crossing at speed.
+    """
+    head = slice(0, min(len(record), 1 + max(1, round(_MOMENT / record.period))))
     stroke = float(np.abs(record.command - np.median(record.command)).max())
-    head = record.command[: max(2, round(0.02 / record.period))]
-    return 'rest' if float(np.abs(head).max()) < 0.05 * stroke else 'measured'
+    if float(np.abs(record.command[head]).max()) > _STILL * stroke:
+        return 'measured'
+    for channel in (record.command, record.measured):
+        if abs(float(channel[head][-1] - channel[0])) > _STILL * float(np.ptp(channel)):
+            return 'measured'
+    return 'rest'
+
+
+def clean(
+    records: Sequence[Record], holdout: Sequence[Record] = ()
+) -> tuple[list[Record], list[str]]:
+    """Check records, and zero them where all of them show their zero.
+
+    Returns:
+        The records in the order given, held-out ones last, and what was done, for people.
+
+    Raises:
+        InputError: a record that cannot be fitted, given twice, or fitted and held out.
+    """
+    every = [*records, *holdout]
+    for i, record in enumerate(every):
+        check(record, i + 1)
+    refuse_repeats(records, holdout)
+    return zeroed(every)
 
 
 def _folds(record: Record) -> Mask:
@@ -146,22 +114,26 @@ def prepare(records: Sequence[Record], holdout: Sequence[Record]) -> Prepared:
     """Check, zero and split records into a fitting and a held-out part.
 
     Raises:
-        InputError: see `check`; or no record.
+        InputError: see `clean`; no record, or one that is too short.
     """
     if not records:
         raise InputError('no record to diagnose')
     for i, record in enumerate((*records, *holdout)):
-        check(record, i + 1)
-    clean, notes = zeroed([*records, *holdout])
-    fitted, held = clean[: len(records)], clean[len(records) :]
-    initials = tuple(_initial(r) for r in clean)
+        if record.duration < _SHORTEST or len(record) < 500:
+            raise InputError(
+                f'{where(record, i + 1)}: {record.duration:.3g} s ({len(record)} samples) are too '
+                f'short for a diagnosis; give at least {_SHORTEST:g} s and 500 samples'
+            )
+    every, notes = clean(records, holdout)
+    fitted, held = every[: len(records)], every[len(records) :]
+    initials = tuple(initial_state(r) for r in every)
     masks, strides = [], []
-    for record, initial in zip(clean, initials, strict=True):
+    for record, initial in zip(every, initials, strict=True):
         stride = max(1, int(record.rate / _RATE + 1e-9))
         mask = np.zeros(len(record), dtype=np.bool_)
         mask[::stride] = True
         if initial == 'measured':
-            mask[: round(_SETTLE / record.period)] = False
+            mask[: round(SETTLE / record.period)] = False
         masks.append(mask)
         strides.append(stride)
     n = len(records)

@@ -83,7 +83,7 @@ def test_a_record_that_does_not_start_at_rest(run, problem_r: Path, tmp_path: Pa
         pieces.append(tmp_path / f'p{i}.csv')
         write_csv(pieces[-1], record.slice(start, len(record)), unit='m')
     content = run('calibrate', *pieces, '--evaluations', 20_000, '--json', '-').json
-    assert (content['initial'], content['settle_s']) == ('measured', 0.5)
+    assert (content['initial'], content['settle_s']) == ('measured', 1.0)
     assert abs(content['parameters']['beta_1']['mean'] - MEAN[0]) < 4 * STDDEV[0]
 
 

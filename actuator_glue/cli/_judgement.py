@@ -1,0 +1,100 @@
+"""What a calibration must be told with: what forbids its use first, then what limits it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+from actuator_glue.errors import InputError
+from actuator_glue.records import Record
+
+if TYPE_CHECKING:
+    from actuator_glue.inference.at_bound import Pressed
+    from actuator_glue.inference.chains import Chains
+
+# R-hat above which draws are not yet the posterior (Vehtari et al. 2021).
+CONVERGED = 1.01
+TIED = 0.99  # correlation above which two parameters are only known together
+MISFIT = 0.1  # share of a record's spread: a model that leaves more does not describe the test
+
+
+def bounds(given: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Return the bounds of options NAME=LO:HI by parameter.
+
+    Raises:
+        InputError: not of this form, or a parameter twice.
+    """
+    out: dict[str, tuple[float, float]] = {}
+    for text in given:
+        name, _, values = text.partition('=')
+        try:
+            lower, upper = map(float, values.split(':'))
+        except ValueError:
+            raise InputError(f'--bounds {text}: give NAME=LO:HI, as in beta_1=0:800') from None
+        if name in out:
+            raise InputError(f'--bounds {text}: {name} has bounds already')
+        out[name] = (lower, upper)
+    return out
+
+
+def problems(found: Sequence[Pressed], units: dict[str, str], fit: dict[str, Any]) -> list[str]:
+    """Return why a posterior must not be used as it stands, one line each; empty where it may.
+
+    Args:
+        found: parameters at a bound.
+        units: unit of each parameter.
+        fit: error of the best draw, see `fit_error`.
+    """
+    told = []
+    poor = [r for r in fit['records'] if r['nrmse'] is not None and r['nrmse'] > MISFIT]
+    if poor:
+        where = ', '.join(f'{100 * r["nrmse"]:.0f} % in {r["source"] or "a record"}' for r in poor)
+        offset = ''
+        if any(abs(r['offset_m']) > 0.5 * r['rms_m'] for r in poor):
+            most = max((r['offset_m'] for r in poor), key=abs)
+            offset = f' (a constant offset of {1e3 * most:.3g} mm takes part of it)'
+        told.append(
+            f'the model does not fit: the best draw leaves {where} of the spread measured'
+            f'{offset}; check channels, signs, units and which record has which stiffness, then '
+            '`diagnose`'
+        )
+    for p in found:
+        if p.physical:
+            continue
+        unit = '' if units[p.name] == '1' else f' {units[p.name]}'
+        told.append(
+            f'{p.name} is pressed against the {p.side} bound {p.bound:g}{unit} of its prior: the '
+            'records ask for more, and its mean and spread are those of the bound; widen it with '
+            f'--bounds {p.name}=LO:HI'
+        )
+    return told
+
+
+def remarks(
+    records: list[Record],
+    parameters: dict[str, dict[str, Any]],
+    chains: Chains,
+    converged: bool,
+    found: Sequence[Pressed],
+) -> list[str]:
+    """Return what these records cannot tell, and what would."""
+    import numpy as np
+
+    told = []
+    if not chains.annealed or not converged:
+        told.append(f'not converged (R-hat above {CONVERGED}); give more --evaluations')
+    told += [
+        f'{p.name} lies at 0, below which it has no meaning: the records tell how large it is at '
+        'most'
+        for p in found
+        if p.physical
+    ]
+    names = list(parameters)
+    open_ = [f'{n}: little more than its prior' for n in names if parameters[n]['prior_dominated']]
+    correlation = np.corrcoef(chains.posterior(), rowvar=False)
+    for i, j in zip(*np.triu_indices(len(names), 1), strict=True):
+        if abs(correlation[i, j]) > TIED:
+            open_.append(f'{names[i]} and {names[j]}: only a combination of them is known')
+    if open_ and len({r.stiffness for r in records}) < 2:
+        open_.append('a second record with another specimen stiffness would tell more')
+    return told + open_

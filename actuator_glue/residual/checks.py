@@ -1,0 +1,159 @@
+"""What is refused before any calibration or diagnosis: records that cannot be what they say."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy import signal
+
+from actuator_glue.errors import InputError
+from actuator_glue.records import Array, Record
+
+_SMALLEST = 5e-6  # m of command, from end to end: below it is no test of an actuator
+_LEAD = 5e-3  # s by which a measured displacement may lead (a compensated command)
+_REACH = 0.5  # s of lag that is looked at
+_FASTEST = 10.0  # m/s: no servo-hydraulic actuator follows
+# A specimen that yields or hardens is off its stiffness by a factor of 2 or 3; a wrong unit is
+# off by 10 and more.
+_OFF = 5.0
+_TELLING = 0.8  # share of the force's variance that displacement and acceleration must explain
+_SEPARATE = 0.1  # share of the displacement's variance that acceleration must leave
+
+
+def where(record: Record, number: int) -> str:
+    """Return what to call a record in messages."""
+    return record.source or f'record {number}'
+
+
+def check(record: Record, number: int = 1) -> None:
+    """Refuse a record that cannot be fitted.
+
+    Raises:
+        InputError: stiffness not known, or at odds with the force; nothing moves, units that do
+            not match, or channels that are swapped or of opposite sign.
+    """
+    name = where(record, number)
+    record = replace(record, source=name)
+    record.known_stiffness()
+    record.check_channels()
+    reach = float(np.ptp(record.command))
+    speed = float(np.quantile(np.abs(np.diff(record.command)), 0.99)) / record.period
+    if reach < _SMALLEST or speed > _FASTEST:
+        raise InputError(
+            f'{name}: the command moves {reach:.3g} m in all, at up to {speed:.3g} m/s; check '
+            'the units of its channel and of time (metres and seconds are expected)'
+        )
+    _follows(record)
+    _pushes(record)
+
+
+def refuse_repeats(records: Sequence[Record], held: Sequence[Record] = ()) -> None:
+    """Refuse records that hold the same samples: each would count twice, or judge itself.
+
+    Raises:
+        InputError: two records of the same command and measured displacement.
+    """
+    seen: dict[bytes, int] = {}
+    for i, record in enumerate((*records, *held)):
+        key = hashlib.sha256(record.command.tobytes() + record.measured.tobytes()).digest()
+        first = seen.setdefault(key, i)
+        if first == i:
+            continue
+        names = where((*records, *held)[first], first + 1), where(record, i + 1)
+        if first < len(records) <= i:
+            raise InputError(
+                f'{names[1]}, held out, holds the same samples as {names[0]}, which is fitted: '
+                'it would judge itself; hold out another record, or none'
+            )
+        raise InputError(
+            f'{names[1]} holds the same samples as {names[0]} and would count twice; give each '
+            'record once'
+        )
+
+
+def _follows(record: Record) -> None:
+    """Refuse channels that are swapped or of opposite sign: an actuator follows its command.
+
+    Raises:
+        InputError: the measured displacement leads the command, or moves against it.
+    """
+    size = max(1, int(1e-3 / record.period))  # lags are looked at in milliseconds
+    period = size * record.period
+    u, y = (c - c.mean() for c in (_means(record.command, size), _means(record.measured, size)))
+    cross = signal.correlate(y, u, method='fft') / np.sqrt(float(u @ u) * float(y @ y))
+    reach = min(len(u) // 4, round(_REACH / period))
+    near = cross[len(u) - 1 - reach : len(u) + reach]
+    lags = np.arange(-reach, reach + 1) * period
+    at = int(np.argmax(np.abs(near)))
+    lead = -lags[at]
+    # A periodic command has other peaks as high: then nothing can be said.
+    peaks = signal.find_peaks(np.abs(near), height=0.9 * abs(near[at]))[0]
+    if abs(near[at]) < 0.5 or len(peaks) > 1:
+        return
+    if near[at] < 0.0:
+        raise InputError(
+            f'{record.source}: the measured displacement moves against the command (correlation '
+            f'{near[at]:.2f}); change the sign of one channel (`scale: -1` in a channel map)'
+        )
+    if lead > max(_LEAD, 2.0 * period):
+        raise InputError(
+            f'{record.source}: the measured displacement leads the command by '
+            f'{1e3 * lead:.0f} ms; check whether the two channels are swapped, or their clocks '
+            'apart'
+        )
+
+
+def _means(values: Array, size: int) -> Array:
+    """Return means of `size` samples each."""
+    count = len(values) // size
+    return np.asarray(values[: count * size].reshape(count, size).mean(axis=1))
+
+
+def _slow(values: Array, record: Record) -> tuple[Array, Array]:
+    """Return means over 10 ms, less their mean, and their second differences [unit, unit/s^2]."""
+    size = max(1, round(0.01 / record.period))
+    means = _means(values, size)
+    second = np.gradient(np.gradient(means, size * record.period), size * record.period)
+    return means - means.mean(), second - second.mean()
+
+
+def _pushes(record: Record) -> None:
+    """Refuse a stiffness that the recorded force contradicts: force over displacement shows it.
+
+    Either sign of the force is taken: load cells differ. What does not explain the force, a
+    channel that is not connected say, says nothing of the stiffness.
+
+    Raises:
+        InputError: the stiffness is off by a factor of five, or that of a free actuator where
+            a specimen pushes back.
+    """
+    stated = record.known_stiffness()
+    if record.force is None or float(np.ptp(record.force)) == 0.0:
+        return
+    x, acceleration = _slow(record.measured, record)
+    force, _ = _slow(record.force, record)
+    if len(x) < 10 or float(acceleration @ acceleration) == 0.0:
+        return
+    # What a mass takes must not pass for a specimen, nor be taken off it where they look alike.
+    shared = float(x @ acceleration) ** 2 / float((x @ x) * (acceleration @ acceleration))
+    separate = 1.0 - shared > _SEPARATE
+    basis = np.stack([x, acceleration]) if separate else x[None]
+    weights, *_ = np.linalg.lstsq(basis.T, force, rcond=None)
+    left = force - weights @ basis
+    if float(left @ left) > (1.0 - _TELLING) * float(force @ force):
+        return
+    seen = abs(float(weights[0]))
+    share = max(seen, stated) * float(x.std() / force.std())
+    if stated > 0.0:
+        wrong = share > 0.1 and not 1.0 / _OFF < seen / stated < _OFF
+    else:
+        wrong = separate and share > 0.5
+    if wrong:
+        raise InputError(
+            f'{record.source}: force over displacement is {seen:.3g} N/m, but the specimen '
+            f'stiffness is given as {stated:.3g} N/m; check it (--stiffness, in N/m and in the '
+            'order of the records) and the units of the force channel'
+        )
