@@ -16,8 +16,8 @@ help: ## show this list
 
 setup: $(ROS_STAMP) ## make .venv, build the interface package, install the nodes
 
-$(VENV_STAMP): requirements.txt requirements-build.txt requirements-dev.txt requirements-ros.txt \
-		setup.py setup.cfg scripts/find_python.sh scripts/make_venv.sh scripts/mend_ros_wheels.py
+$(VENV_STAMP): pyproject.toml constraints.txt setup.py setup.cfg scripts/find_python.sh \
+		scripts/make_venv.sh scripts/mend_ros_wheels.py
 	@scripts/make_venv.sh
 	@touch $@
 

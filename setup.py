@@ -1,46 +1,27 @@
-"""Package actuator_glue: an ament_python package for colcon, an ordinary one for pip."""
+"""What pyproject.toml cannot say: the files by which ROS 2 finds an ament_python package."""
 
 from pathlib import Path
 
-from setuptools import find_packages, setup
+from setuptools import setup
 
 NAME = 'actuator_glue'
-NODES = ('actuator_sim', 'estimator', 'recorder', 'replay', 'lab_bridge', 'diagnoser')
+LAUNCHED = [
+    (f'share/{NAME}/{folder}', [p.as_posix() for p in sorted(Path(folder).glob('*.*'))])
+    for folder in ('launch', 'config', 'config/channels')
+]
 
 setup(
-    name=NAME,
-    version='0.1.0',
-    packages=find_packages(include=[NAME, f'{NAME}.*']),
-    package_data={
-        # `interfaces` is a link to msg_defs/: bags embed these texts, with or without ROS.
-        NAME: [
-            'interfaces/msg/*.msg',
-            'interfaces/srv/*.srv',
-            'interfaces/action/*.action',
-            'report/*.mplstyle',
-            'report/templates/*',
-            'py.typed',
-        ],
-    },
+    # As text in [project] it needs setuptools 77; Ubuntu 24.04 has 68, where a table is required
+    # that newer ones refuse.
+    license='Apache-2.0',
+    # colcon prints what it reads and evaluates that again; [project] makes it an object that does
+    # not survive this.
+    python_requires='>=3.11',
     data_files=[
         ('share/ament_index/resource_index/packages', [f'resource/{NAME}']),
-        (f'share/{NAME}', ['package.xml']),
-        *(
-            (f'share/{NAME}/{folder.as_posix()}', sorted(str(p) for p in files))
-            for folder in map(Path, ('launch', 'config', 'config/channels'))
-            if (files := [p for p in folder.glob('*.*') if p.is_file()])
-        ),
+        # colcon runs this file in a folder that holds nothing but links to the package and to
+        # what is listed here: [project] and what it reads have to be among them.
+        (f'share/{NAME}', ['package.xml', 'pyproject.toml', 'README.md']),
+        *LAUNCHED,
     ],
-    install_requires=['setuptools'],
-    zip_safe=False,
-    maintainer='actuator_glue maintainers',
-    maintainer_email='maintainers@actuator-glue.org',
-    description='Online Bayesian calibration and diagnosis of servo-hydraulic actuators.',
-    license='Apache-2.0',
-    entry_points={
-        'console_scripts': [
-            'actuator-glue = actuator_glue.cli.main:main',
-            *(f'{node} = {NAME}.nodes.{node}:main' for node in NODES),
-        ],
-    },
 )

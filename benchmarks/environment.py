@@ -8,6 +8,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
 REQUIREMENTS = ROOT / 'requirements-bench.txt'
+CONSTRAINTS = ROOT / 'constraints.txt'
 
 
 def python(folder: Path) -> Path:
@@ -18,7 +19,7 @@ def python(folder: Path) -> Path:
     """
     interpreter = folder / 'bin' / 'python'
     stamp = folder / 'installed'
-    wanted = REQUIREMENTS.read_text()
+    wanted = REQUIREMENTS.read_text() + CONSTRAINTS.read_text()
     if not (stamp.exists() and stamp.read_text() == wanted):
         subprocess.run([sys.executable, '-m', 'venv', '--clear', str(folder)], check=True)
         subprocess.run(

@@ -20,11 +20,8 @@ fi
 echo "$flavour" >"$venv/flavour"
 touch "$venv/COLCON_IGNORE"
 
-requirements=(-r requirements.txt -r requirements-build.txt -r requirements-dev.txt)
-[ "$flavour" = wheels ] && requirements+=(-r requirements-ros.txt)
-echo 'set-up: installing Python packages (half a minute with a fast connection)'
-"$venv/bin/python" -m pip install --quiet --disable-pip-version-check "${requirements[@]}"
-[ "$flavour" = wheels ] && "$venv/bin/python" scripts/mend_ros_wheels.py
-
-echo 'set-up: installing actuator_glue, editable'
-"$venv/bin/python" -m pip install --quiet --disable-pip-version-check --no-deps --no-build-isolation --editable .
+extras=dev
+[ "$flavour" = wheels ] && extras+=,ros
+echo 'set-up: installing actuator_glue, editable, and what it needs (a minute with a fast connection)'
+"$venv/bin/python" -m pip install --quiet --disable-pip-version-check -c constraints.txt --editable ".[$extras]"
+[ "$flavour" != wheels ] || "$venv/bin/python" scripts/mend_ros_wheels.py

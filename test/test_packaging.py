@@ -1,10 +1,11 @@
-"""What other tools read of this repository: package.xml, setup.py, CMakeLists, message texts."""
+"""What other tools read here: package.xml, pyproject.toml, CMakeLists, message texts."""
 
 import ast
 import json
 import re
 import subprocess
 import sys
+import tomllib
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
@@ -21,6 +22,7 @@ INTERFACES = sorted(
 MESSAGES = [p for p in INTERFACES if p.suffix == '.msg']
 # Parts of Diagnosis, never published alone.
 PARTS = {'Effect', 'Candidate'}
+PROJECT = tomllib.loads((ROOT / 'pyproject.toml').read_text(encoding='utf-8'))
 NODES = ('actuator_sim', 'estimator', 'recorder', 'replay', 'lab_bridge', 'diagnoser')
 
 FIELD = re.compile(r'^(?P<type>[a-zA-Z][\w/]*)(?P<array>\[[^]]*\])?\s+(?P<name>[a-z][a-z0-9_]*)\b')
@@ -52,37 +54,28 @@ def test_manifest(path: Path) -> None:
 
 
 def test_versions_agree() -> None:
-    """One version everywhere."""
+    """The changelog tells of the version of the package, from which setuptools takes its own."""
     version = actuator_glue.__version__
-    assert f"version='{version}'" in (ROOT / 'setup.py').read_text(encoding='utf-8')
+    assert PROJECT['tool']['setuptools']['dynamic']['version']['attr'] == (
+        'actuator_glue.__version__'
+    )
     changelog = (ROOT / 'CHANGELOG.rst').read_text(encoding='utf-8')
     assert re.search(rf'^{re.escape(version)}( \(|$)', changelog, re.MULTILINE)
     assert 'Apache License' in (ROOT / 'LICENSE').read_text(encoding='utf-8')
 
 
-def test_imported_ros_packages_are_declared() -> None:
-    """package.xml names every ROS package that a node imports."""
-    manifest = ElementTree.parse(ROOT / 'package.xml').getroot()
-    declared = {e.text for e in manifest if e.tag.endswith('depend')}
-    for path in (ROOT / 'actuator_glue' / 'nodes').glob('*.py'):
-        for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
-            modules = []
-            if isinstance(node, ast.ImportFrom) and node.module:
-                modules = [node.module]
-            elif isinstance(node, ast.Import):
-                modules = [alias.name for alias in node.names]
-            for top in (m.split('.')[0] for m in modules):
-                if top == 'rclpy' or top.endswith(('_msgs', '_srvs', '_interfaces')):
-                    assert top in declared, f'{path.name} imports {top}'
-
-
-@pytest.mark.parametrize('node', NODES)
-def test_entry_point_exists(node: str) -> None:
-    """Each console script of setup.py leads to a main function."""
-    assert node in (ROOT / 'setup.py').read_text(encoding='utf-8')
-    source = ROOT / 'actuator_glue' / 'nodes' / f'{node}.py'
+@pytest.mark.parametrize('script', PROJECT['project']['scripts'].items(), ids=lambda s: s[0])
+def test_entry_point_exists(script: tuple[str, str]) -> None:
+    """Each console script leads to a main function."""
+    module, _, function = script[1].partition(':')
+    source = ROOT / f'{module.replace(".", "/")}.py'
     tree = ast.parse(source.read_text(encoding='utf-8'))
-    assert 'main' in {n.name for n in tree.body if isinstance(n, ast.FunctionDef)}
+    assert function in {n.name for n in tree.body if isinstance(n, ast.FunctionDef)}
+
+
+def test_every_node_is_a_script() -> None:
+    """`ros2 run` starts what is named in [project.scripts]."""
+    assert set(PROJECT['project']['scripts']) == {'actuator-glue', *NODES}
 
 
 @pytest.mark.ros
