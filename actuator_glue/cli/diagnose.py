@@ -1,7 +1,8 @@
 """Diagnose records: is Eq. (2) enough; if not, which effect is missing, error before and after.
 
 Exit code 0: the model is enough, or the missing effect was named. 1: the residual cannot be
-explained by the catalogue. 2: the input cannot be used.
+explained by the catalogue, or the held-out part does not bear the answer out. 2: the input cannot
+be used.
 """
 
 from __future__ import annotations
@@ -92,7 +93,7 @@ def run(args: argparse.Namespace) -> int:
     write_json(found.to_json(), args.json)
     if args.report is not None:
         _report(found, args.report)
-    return 1 if found.verdict == 'unexplained' else 0
+    return 0 if found.answered else 1
 
 
 def _load(args: argparse.Namespace) -> tuple[list[Record], list[Record]]:

@@ -130,7 +130,7 @@ def _mapped(path: Path, channels: ChannelMap) -> tuple[dict[str, Array], float]:
         where = f'{path}: {role}'
         column = raw[role] * channel.scale + channel.offset
         if channel.remove_rest_offset:
-            column = column - _rest_offset(column, channels.rest_samples, where)
+            column = column - _rest_offset(column, channels.rest_samples, where, role)
         values[role] = column * factor(role, channel.unit, where)
     if channels.rate is not None:
         return values, 1.0 / channels.rate
@@ -175,12 +175,15 @@ def _check_counter(counter: Array, path: Path) -> None:
         )
 
 
-def _rest_offset(column: Array, samples: int, where: str) -> float:
+def _rest_offset(column: Array, samples: int, where: str, role: str) -> float:
     if samples >= len(column):
         raise InputError(f'{where}: {samples} rest samples, but {len(column)} in the file')
     rest = column[:samples]
     span, whole = float(np.ptp(rest)), float(np.ptp(column))
     if span > _REST_SHARE * whole:
+        if role == 'force':
+            # No zero of the force is used anywhere: its channel keeps its offset, and stops nobody.
+            return 0.0
         raise InputError(
             f'{where}: not at rest in the first {samples} samples (moves {span:.3g} of '
             f'{whole:.3g} in all); lower rest_samples, or do not remove a rest offset'

@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
+from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.residual.attribute import Attribution
 from actuator_glue.residual.data import Data
 from actuator_glue.residual.decide import Decision
-from actuator_glue.residual.diagnosis import Estimate, HeldOutError, Json
+from actuator_glue.residual.diagnosis import HeldOutError
+from actuator_glue.residual.estimate import Estimate, Json
+from actuator_glue.residual.headline import misses
 from actuator_glue.residual.surrogate import Surrogate
 from actuator_glue.residual.windows import Windows
 
@@ -21,8 +26,6 @@ _EXPERIMENT = {
 }
 # Above this a posterior's spread may be off by a tenth and more.
 _CONVERGED = 1.2
-# Held-out errors beyond this many times the noise say that the fitting records lack something.
-_CONTRADICTED = 2.0
 _OTHERWISE = 'a second amplitude, a down-sweep or a record with another specimen stiffness'
 
 
@@ -122,17 +125,26 @@ def unconverged(rhat: float) -> tuple[str, ...]:
     )
 
 
-def contradicted(verdict: str, error: HeldOutError) -> tuple[str, ...]:
-    """Say so where held-out records show far more than noise although nothing is left to explain.
+def contradicted(verdict: str, error: HeldOutError, material: float) -> tuple[str, ...]:
+    """Say so where the held-out part shows far more than noise although nothing else is left.
 
     The verdict stays: the held-out part decides nothing.
     """
-    noise = error.noise_floor
-    beyond = error.after > _CONTRADICTED * noise and error.after_ci[0] > noise
-    if verdict == 'unexplained' or not beyond:
+    if verdict == 'unexplained' or not misses(error, material):
         return ()
     return (
-        f'the held-out part does not bear this out: it leaves {1e6 * error.after:.0f} um where '
-        f'{1e6 * noise:.0f} um are noise; it shows what the fitting records do not: '
+        f'the held-out part does not bear this out: it leaves {1e6 * error.after:.1f} um where '
+        f'{1e6 * error.noise_floor:.1f} um are noise; it shows what the fitting records do not: '
         'add a record like it to them',
+    )
+
+
+def at_bound(found: Sequence[Pressed], estimates: dict[str, Estimate]) -> tuple[str, ...]:
+    """Say which parameters a bound holds: their mean and spread are those of the bound."""
+    return tuple(
+        f'{p.name} is pressed against the {p.side} bound {p.bound:g} '
+        f'{estimates[p.name].unit} of its range: its size is that of the bound, and the records '
+        'ask for something else'
+        for p in found
+        if not p.physical
     )

@@ -9,7 +9,8 @@ import numpy as np
 from actuator_glue.records import Array
 from actuator_glue.residual.attribute import Attribution
 from actuator_glue.residual.data import Data
-from actuator_glue.residual.diagnosis import Json, Verdict
+from actuator_glue.residual.diagnosis import Verdict
+from actuator_glue.residual.estimate import Json
 from actuator_glue.residual.measurement import Measured
 from actuator_glue.residual.score import splits_of
 from actuator_glue.residual.search import Trial

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
+from actuator_glue.inference.at_bound import Pressed, pressed
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array, Record
@@ -16,7 +18,8 @@ from actuator_glue.residual.attribute import Attribution
 from actuator_glue.residual.conclude import Progress, conclude, with_the_right_hold
 from actuator_glue.residual.decide import Decision
 from actuator_glue.residual.detect import alarm_of
-from actuator_glue.residual.diagnosis import Candidate, Diagnosis, Estimate, Finding
+from actuator_glue.residual.diagnosis import Candidate, Diagnosis, Finding
+from actuator_glue.residual.estimate import Estimate
 from actuator_glue.residual.fit import Space
 from actuator_glue.residual.hygiene import prepare
 from actuator_glue.residual.measurement import Measured
@@ -84,7 +87,8 @@ def diagnose(
     error, coverage, curves = verify(
         data, prepared.held, before, after, found.base.fit.error, decision.noise, seed, result.line
     )
-    estimates = _estimates(after, max(r.duration for r in data.records))
+    space = Space(after.model, max(r.duration for r in data.records))
+    estimates, held_at = _estimates(space, after), _pressed(space, after)
     tell('done', 1.0)
     return Diagnosis(
         verdict=decision.verdict,
@@ -94,8 +98,9 @@ def diagnose(
         coverage=coverage,
         alarm=alarm_of(found, result.seen, decision, data, seed),
         advice=(
+            *advice.at_bound(held_at, estimates),
             *advice.of(decision, found, result.generic, stretches),
-            *advice.contradicted(decision.verdict, error),
+            *advice.contradicted(decision.verdict, error, found.material),
             *advice.unidentified(data, estimates),
             *advice.unconverged(rhat),
             *prepared.notes,
@@ -113,12 +118,26 @@ def diagnose(
         surrogate=result.generic.to_json(),
         remaining=decision.remaining,
         seconds=clock() - start if clock else math.nan,
+        at_bound=held_at,
     )
 
 
-def _estimates(side: Side, duration: float) -> dict[str, Estimate]:
+def _pressed(space: Space, side: Side) -> tuple[Pressed, ...]:
+    """Return parameters that a bound holds, in physical units."""
+    names = tuple(p.name for p in side.model.parameters)
+    lower, upper = space.theta(space.lower), space.theta(space.upper)
+    out = []
+    for p in pressed(space.z(side.draws), names, space.lower, space.upper):
+        i = names.index(p.name)
+        bound = float((lower if p.side == 'lower' else upper)[i])
+        # Eq. (2)'s parameters are positive: the least their logarithms reach stands for zero.
+        physical = p.physical or (i < len(BASE) and p.side == 'lower')
+        out.append(replace(p, bound=bound, physical=physical))
+    return tuple(out)
+
+
+def _estimates(space: Space, side: Side) -> dict[str, Estimate]:
     out = {}
-    space = Space(side.model, duration)
     lower, upper = space.theta(space.lower), space.theta(space.upper)
     known = posterior.identified(space, side.draws)
     for i, (parameter, column) in enumerate(zip(side.model.parameters, side.draws.T, strict=True)):
@@ -177,11 +196,14 @@ def _findings(
                 place=CATALOGUE[effect.name].place,
                 parameters=_measured_estimates(effect),
                 error_without=total,
-                error_with=float(np.sqrt(max(0.0, total**2 - effect.rms**2))),
+                error_with=total,
                 evidence=effect.nats,
+                noise=effect.rms,
             )
         )
-    return tuple(sorted(out, key=lambda f: -(f.error_without**2 - f.error_with**2)))
+    return tuple(
+        sorted(out, key=lambda f: f.error_with**2 - f.error_without**2 - (f.noise or 0.0) ** 2)
+    )
 
 
 def _records_of(trial: Trial, name: str) -> tuple[str, ...]:

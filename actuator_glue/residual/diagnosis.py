@@ -2,59 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
+from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.records import Array
+from actuator_glue.residual.estimate import Estimate, Json, number
+from actuator_glue.residual.headline import borne_out, headline
 
 SCHEMA = 'actuator_glue.diagnosis/1'
 
 Verdict: TypeAlias = Literal['none', 'missing-effect', 'unexplained']
-Json: TypeAlias = dict[str, Any]
-
-
-def number(value: float) -> float | None:
-    """Return a number that JSON can carry: None for NaN and infinity."""
-    return float(value) if math.isfinite(value) else None
-
-
-@dataclass(frozen=True, slots=True)
-class Estimate:
-    """Posterior of one parameter.
-
-    Attributes:
-        mean: posterior mean [unit].
-        stddev: posterior standard deviation [unit].
-        lower: 2.5 % quantile [unit].
-        upper: 97.5 % quantile [unit].
-        unit: SI unit.
-        neutral: value that switches the effect off [unit]; None for parameters of Eq. (2).
-        identified: the records fix it; else mean and interval are those of the bounds.
-        bounds: prior bounds [unit].
-    """
-
-    mean: float
-    stddev: float
-    lower: float
-    upper: float
-    unit: str
-    neutral: float | None = None
-    identified: bool = True
-    bounds: tuple[float, float] | None = None
-
-    def to_json(self) -> Json:
-        """Return the JSON object of one parameter."""
-        return {
-            'mean': number(self.mean),
-            'stddev': number(self.stddev),
-            'lower': number(self.lower),
-            'upper': number(self.upper),
-            'unit': self.unit,
-            'neutral': self.neutral,
-            'identified': self.identified,
-            'bounds': list(self.bounds) if self.bounds else None,
-        }
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +27,8 @@ class Finding:
         parameters: posterior of the effect's parameters.
         error_without: fit error of the structure without any of the set [m].
         error_with: fit error with `name` in it [m].
+        noise: rms of the noise that an effect of the measurement makes [m], which leaves the
+            simulated motion as it is and removes no error; None for all others.
         evidence: out-of-sample log score gained, in nats of effectively independent samples.
         plausible: its interval excludes the neutral value.
         agrees_across_windows: its leading parameter is the same in all halves of the records
@@ -89,6 +49,7 @@ class Finding:
     agrees_across_windows: bool | None = None
     windows: tuple[float, ...] = ()
     records: tuple[str, ...] = ()
+    noise: float | None = None
 
     def to_json(self) -> Json:
         """Return the JSON object of one finding."""
@@ -105,6 +66,7 @@ class Finding:
             'agrees_across_windows': self.agrees_across_windows,
             'windows': [number(v) for v in self.windows],
             'records': list(self.records),
+            'noise': self.noise,
         }
 
 
@@ -126,12 +88,8 @@ class Candidate:
 
     def to_json(self) -> Json:
         """Return the JSON object of one candidate."""
-        return {
-            'name': self.name,
-            'score': number(self.score),
-            'error': number(self.error),
-            'probability': number(self.probability),
-        }
+        values = {k: number(getattr(self, k)) for k in ('score', 'error', 'probability')}
+        return {'name': self.name, **values}
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,19 +123,15 @@ class HeldOutError:
 
     def to_json(self) -> Json:
         """Return the JSON object of the held-out error."""
+        numbers = ('before', 'after', 'noise_floor', 'removable_removed', 'sham')
+        hum = self.after_without_hum
         return {
             'unit': 'm',
             'split': self.split,
-            'before': number(self.before),
+            **{k: number(getattr(self, k)) for k in numbers},
             'before_ci': [number(v) for v in self.before_ci],
-            'after': number(self.after),
             'after_ci': [number(v) for v in self.after_ci],
-            'noise_floor': number(self.noise_floor),
-            'removable_removed': number(self.removable_removed),
-            'sham': number(self.sham),
-            'after_without_hum': number(self.after_without_hum)
-            if self.after_without_hum is not None
-            else None,
+            'after_without_hum': None if hum is None else number(hum),
             'records': [
                 {'source': s, 'before': number(b), 'after': number(a)} for s, b, a in self.records
             ],
@@ -206,12 +160,10 @@ class Alarm:
 
     def to_json(self) -> Json:
         """Return the JSON object of the alarm."""
+        numbers = ('structured', 'threshold', 'noise', 'p_value')
         return {
             'raised': self.raised,
-            'structured': number(self.structured),
-            'threshold': number(self.threshold),
-            'noise': number(self.noise),
-            'p_value': number(self.p_value),
+            **{k: number(getattr(self, k)) for k in numbers},
             'tests': {k: number(v) for k, v in self.tests.items()},
         }
 
@@ -260,6 +212,7 @@ class Diagnosis:
         surrogate: a generic regression of equal flexibility and what it leaves out of sample.
         remaining: where in loop, frequency, amplitude and time the unexplained rest sits.
         seconds: wall time.
+        at_bound: parameters that their bounds hold.
     """
 
     verdict: Verdict
@@ -279,6 +232,7 @@ class Diagnosis:
     surrogate: Json
     remaining: Json
     seconds: float
+    at_bound: tuple[Pressed, ...] = ()
 
     def to_json(self) -> Json:
         """Return the object of schema `actuator_glue.diagnosis/1` (curves and draws left out)."""
@@ -286,6 +240,7 @@ class Diagnosis:
             'schema': SCHEMA,
             'verdict': self.verdict,
             'summary': self.summary(),
+            'borne_out': self.borne_out,
             'effects': [e.to_json() for e in self.effects],
             'error': self.error.to_json(),
             'candidates': [c.to_json() for c in self.candidates],
@@ -293,6 +248,7 @@ class Diagnosis:
             'alarm': self.alarm.to_json(),
             'base': {name: p.to_json() for name, p in self.base.items()},
             'rhat': number(self.rhat),
+            'at_bound': [p.to_json() for p in self.at_bound],
             'structure': list(self.structure),
             'surrogate': self.surrogate,
             'remaining': self.remaining,
@@ -300,29 +256,16 @@ class Diagnosis:
             'seconds': number(self.seconds),
         }
 
+    @property
+    def borne_out(self) -> bool:
+        """Whether the held-out part shows what the verdict says."""
+        return borne_out(self)
+
+    @property
+    def answered(self) -> bool:
+        """Whether the verdict explains the records, held-out part included."""
+        return self.verdict != 'unexplained' and self.borne_out
+
     def summary(self) -> str:
         """Return the verdict in one line."""
-        before, after = 1e6 * self.error.before, 1e6 * self.error.after
-        floor = 1e6 * self.error.noise_floor
-        if self.verdict == 'none':
-            return f'the model is enough: held-out error {before:.1f} um, noise {floor:.1f} um'
-        if self.verdict == 'unexplained':
-            if not self.effects:
-                return (
-                    f'the model is not enough and no catalogued effect explains why: '
-                    f'held-out error {before:.1f} um, noise {floor:.1f} um'
-                )
-            names = ', '.join(e.name for e in self.effects)
-            return (
-                f'the model is not enough and the catalogue explains it only in part ({names}): '
-                f'held-out error {before:.1f} -> {after:.1f} um, noise {floor:.1f} um'
-            )
-        sets = ', '.join(
-            e.name
-            + (f' in {", ".join(e.records)} only' if e.records else '')
-            + (f' (or {", ".join(e.alternatives)})' if e.alternatives else '')
-            for e in self.effects
-        )
-        return (
-            f'missing: {sets}; held-out error {before:.1f} -> {after:.1f} um, noise {floor:.1f} um'
-        )
+        return headline(self)

@@ -10,7 +10,7 @@ import numpy as np
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 from actuator_glue.residual.data import Data
-from actuator_glue.residual.diagnosis import Json, number
+from actuator_glue.residual.estimate import Json, number
 from actuator_glue.residual.fit import Fit
 from actuator_glue.residual.score import Scorer, evidence
 from actuator_glue.residual.search import Trial

@@ -269,6 +269,11 @@ def test_a_wrong_column_and_a_moving_rest(tmp_path: Path) -> None:
         rest = parse_channel_map({**MAP, 'command': moving, 'rest_samples': samples}, 'map')
         with pytest.raises(InputError, match=words):
             read(path, channels=rest)
+    push = {'column': 'u', 'unit': 'kN', 'remove_rest_offset': True}
+    forced = parse_channel_map({**MAP, 'force': push, 'rest_samples': 20}, 'map')
+    force = read(path, channels=forced).force
+    assert force is not None
+    assert force[1] == 1000.0
     far = parse_channel_map({**MAP, 'command': {'column': 9, 'unit': 'mm'}}, 'map')
     with pytest.raises(InputError, match='cannot read the samples'):
         read(path, channels=far)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from actuator_glue.errors import InputError
+from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
 from actuator_glue.residual.diagnose import diagnose
@@ -55,6 +56,36 @@ def test_held_out_records_that_show_more_are_told() -> None:
     assert found.error.after > 2.0 * found.error.noise_floor
     assert any('held-out part does not bear this out' in line for line in found.advice)
     assert not any('bear this out' in line for line in agrees.advice)
+    assert 'the model is enough' in agrees.summary()
+    assert 'but not the held-out part' in found.summary()
+    assert (agrees.answered, found.answered) == (True, False)
+
+
+def test_noise_of_the_measurement_is_no_missing_effect() -> None:
+    """Jitter of the clock removes no error: it is told as a part of the noise."""
+    rng = np.random.default_rng(18)
+    records = []
+    for record in make([], [], 17):
+        slope = np.gradient(np.asarray(record.measured), T)
+        late = 3e-4 * rng.standard_normal(len(T))
+        records.append(replace(record, measured=record.measured + slope * late))
+    found = diagnose(records[:2], records[2], settings=QUICK)
+    assert [e.name for e in found.effects] == ['timing-jitter']
+    assert found.effects[0].error_with == found.effects[0].error_without
+    assert found.summary().startswith('the model is enough')
+    assert f'{1e6 * (found.effects[0].noise or 0.0):.1f} um by timing-jitter' in found.summary()
+    assert found.answered
+
+
+def test_an_effect_pressed_against_its_bound_is_told_first() -> None:
+    """More play than the catalogue allows for: the size found is that of the bound."""
+    widest = CATALOGUE['backlash'].parameters[0].upper
+    a, b, held = make(['backlash'], [1.3 * widest], 19)
+    found = diagnose([a, b], held, settings=Settings(evaluations=2000))
+    (held_at,) = [p for p in found.at_bound if not p.physical]
+    assert (held_at.name, held_at.side, held_at.bound) == ('backlash', 'upper', widest)
+    assert 'backlash is pressed against the upper bound' in found.advice[0]
+    assert found.to_json()['at_bound'][0]['name'] == 'backlash'
 
 
 def test_play_is_named_and_removed() -> None:

@@ -1,0 +1,97 @@
+"""A headline says no more than the held-out part bears out, in text, JSON and exit code."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuator_glue.cli.main import main
+from actuator_glue.residual import diagnose as module
+from actuator_glue.residual.diagnosis import Alarm, Diagnosis, Finding, HeldOutError, Verdict
+
+NONE = np.empty((0, 4))
+
+
+def finding(name: str, noise: float | None = None) -> Finding:
+    """A finding of no further interest."""
+    return Finding(name, (), 1.0, 'sensor', {}, 1e-5, 1e-5, 50.0, noise=noise)
+
+
+def diagnosis(
+    verdict: Verdict, before: float, after: float, *effects: Finding, noise: float = 10e-6
+) -> Diagnosis:
+    """A diagnosis with held-out errors before and after [m]."""
+    removed = (before**2 - after**2) / max(before**2 - noise**2, 1e-12)
+    error = HeldOutError(before, (0, 1), after, (0, 1), noise, removed, before)
+    alarm = Alarm(verdict != 'none', 1e-5, 5e-6, noise, 0.01)
+    return Diagnosis(
+        verdict, effects, error, (), (0.9, 0.9), alarm, (), {}, (), (), NONE, 1.0, NONE, (),
+        {}, {}, 1.0,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ('found', 'says', 'answered'),
+    [
+        (
+            diagnosis('none', 10.2e-6, 10.2e-6),
+            'the model is enough: held-out error 10.2 um, noise 10.0 um',
+            True,
+        ),
+        (
+            diagnosis('none', 198e-6, 198e-6),
+            'the model explains the fitting records but not the held-out part: held-out error '
+            '198.0 um, 19.8 times the noise of 10.0 um',
+            False,
+        ),
+        (
+            diagnosis('missing-effect', 80e-6, 10.1e-6, finding('backlash')),
+            'missing: backlash; held-out error 80.0 -> 10.1 um, noise 10.0 um',
+            True,
+        ),
+        (
+            diagnosis('missing-effect', 80e-6, 40e-6, finding('backlash')),
+            'missing: backlash, and more; held-out error 80.0 -> 40.0 um, 4.0 times the noise of '
+            '10.0 um',
+            False,
+        ),
+        (
+            diagnosis('missing-effect', 10.1e-6, 10.1e-6, finding('backlash')),
+            'what the fitting records show is not in the held-out part: held-out error '
+            '10.1 -> 10.1 um, noise 10.0 um',
+            False,
+        ),
+        (
+            diagnosis('missing-effect', 10.1e-6, 10.1e-6, finding('timing-jitter', noise=7e-6)),
+            'the model is enough: held-out error 10.1 um, noise 10.0 um (7.0 um by timing-jitter)',
+            True,
+        ),
+        (
+            diagnosis('unexplained', 80e-6, 80e-6),
+            'the model is not enough and no catalogued effect explains why: held-out error '
+            '80.0 um, 8.0 times the noise of 10.0 um',
+            False,
+        ),
+    ],
+)
+def test_the_headline_follows_the_held_out_part(
+    found: Diagnosis,
+    says: str,
+    answered: bool,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """First line, JSON and exit code of the command say the same."""
+    record, out = tmp_path / 'r.csv', tmp_path / 'd.json'
+    t = np.arange(0.0, 10.0, 0.01)
+    rows = np.column_stack([t, np.sin(t), 0.9 * np.sin(t - 0.1)])
+    np.savetxt(record, rows, delimiter=',', header='time_s,command_mm,measured_mm', comments='')
+    monkeypatch.setattr(module, 'diagnose', lambda *_, **__: found)
+    code = main(['diagnose', str(record), '--stiffness', '0', '--json', str(out)])
+    assert capsys.readouterr().out.splitlines()[0] == says
+    content = json.loads(out.read_text())
+    assert content['summary'] == says
+    assert code == (0 if answered else 1)
+    assert content['borne_out'] is answered
