@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias
+from typing import Literal, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -63,6 +63,32 @@ def check_stiffness(stiffness: float, source: str = '') -> float:
     return value
 
 
+def check_period(period: float, source: str = '') -> float:
+    """Return a sample period [s] that can be used.
+
+    Raises:
+        InputError: not finite or outside [1e-6, 10] s.
+    """
+    if not 1e-6 <= period <= 10.0:
+        where = f'{source}: ' if source else ''
+        raise InputError(
+            f'{where}sample period {period:g} s is outside [1e-6, 10] s; time is in seconds'
+        )
+    return float(period)
+
+
+def check_hold(hold: str, source: str = '') -> Hold:
+    """Return how a command runs between its samples.
+
+    Raises:
+        InputError: neither 'zoh' nor 'linear'.
+    """
+    if hold not in ('zoh', 'linear'):
+        where = f'{source}: ' if source else ''
+        raise InputError(f"{where}hold {hold!r} is unknown; use 'zoh' or 'linear'")
+    return cast('Hold', hold)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Record:
     """One uniformly sampled test, SI units, arrays read-only.
@@ -107,13 +133,8 @@ class Record:
             raise InputError(f'{where}channels have different lengths {lengths}')
         if lengths[0] < 2:
             raise InputError(f'{where}{lengths[0]} sample(s); at least two are needed')
-        if not (np.isfinite(self.period) and 1e-6 <= self.period <= 10.0):
-            raise InputError(
-                f'{where}sample period {self.period:g} s is outside [1e-6, 10] s; '
-                'time is in seconds'
-            )
-        if self.hold not in ('zoh', 'linear'):
-            raise InputError(f"{where}hold {self.hold!r} is unknown; use 'zoh' or 'linear'")
+        check_period(self.period, self.source)
+        check_hold(self.hold, self.source)
         if self.stiffness is not None:
             put(self, 'stiffness', check_stiffness(self.stiffness, self.source))
 

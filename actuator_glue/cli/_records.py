@@ -74,4 +74,5 @@ def load(args: argparse.Namespace) -> list[Record]:
         channels=args.channels,
         hold=args.hold,
         gap=note if args.split else None,
+        warn=note,
     )

@@ -30,7 +30,7 @@ def run(args: argparse.Namespace) -> int:
 
     code, files = 0, []
     for path in args.records:
-        content: dict[str, Any] = {'path': str(path), 'damage': []}
+        content: dict[str, Any] = {'path': str(path), 'damage': [], 'warnings': []}
         if is_bag(path):
             content |= _bag(path, args)
         records: list[Record] = []
@@ -42,12 +42,15 @@ def run(args: argparse.Namespace) -> int:
                 hold=args.hold,
                 note=lambda _: None,
                 gap=note if args.split else content['damage'].append,
+                warn=content['warnings'].append,
             )
         except InputError as error:
             content['damage'].append(str(error))
         for line in content['damage']:
             print(f'actuator-glue: {line}', file=sys.stderr)
             code = 2
+        for line in content['warnings']:
+            note(line)
         for record in records:
             _show(record, args)
         content['records'] = [_describe(r) for r in records]

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from actuator_glue.online.published import Comparison, Published
     from actuator_glue.online.replay import Item
     from actuator_glue.online.settings import EstimatorSettings
+    from actuator_glue.online.stream import Block
 
 INPUTS = ('SampleBlock', 'TestSetup')
 RESULTS = ('EstimatorSetup', 'PosteriorMoments', 'PredictionBand')
@@ -169,7 +170,7 @@ def _replay(
             nonlocal seconds
             for place, item in enumerate(items):
                 if isinstance(item, Block):
-                    seconds += len(item) * item.period
+                    seconds += _usable_seconds(item)
                 done(place if total else 0)
                 yield item
 
@@ -189,6 +190,15 @@ def _replay(
         for _ in found:  # all of them, where nothing was compared
             pass
     return windows, events, comparison, seconds
+
+
+def _usable_seconds(block: Block) -> float:
+    from actuator_glue.online.stream import check_block
+
+    try:
+        return len(block) * check_block(block).period
+    except InputError:
+        return 0.0  # told by the estimator
 
 
 def _show(windows: list[dict[str, Any]], args: argparse.Namespace) -> None:

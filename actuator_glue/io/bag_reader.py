@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import warnings
 from collections import deque
 from collections.abc import Callable, Collection, Iterable, Iterator
 from dataclasses import dataclass, field
@@ -54,6 +55,11 @@ class Summary:
 def refuse(message: str) -> NoReturn:
     """Raise what was noted: how damage is met where nobody asked to pass over it."""
     raise InputError(message)
+
+
+def warn_caller(message: str) -> None:
+    """Warn of what was noted: how a thing is met that is left out where the rest can be used."""
+    warnings.warn(message, stacklevel=3)
 
 
 def is_bag(path: Path | str) -> bool:

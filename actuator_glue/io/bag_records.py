@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -11,98 +11,24 @@ from typing import Any
 import numpy as np
 
 from actuator_glue.errors import InputError
+from actuator_glue.io import bag_samples
 from actuator_glue.io.bag_metadata import LATCHED
 from actuator_glue.io.bag_reader import (
     TEST_SETUP,
-    BagMessage,
     Note,
     messages,
     refuse,
     summarise,
+    warn_caller,
 )
+from actuator_glue.io.bag_samples import SAMPLE_BLOCK, Samples, Setup
 from actuator_glue.io.bag_writer import BagWriter
-from actuator_glue.io.messages import deserialize, full_name, header, message, stamp_ns
-from actuator_glue.records import Array, Hold, Record
+from actuator_glue.io.messages import header, message
+from actuator_glue.records import Record
 
-SAMPLE_BLOCK = full_name('SampleBlock')
 CLOCK_TOLERANCE = 0.1  # s; a step between two blocks beyond this is a jump, not jitter
+TYPES = (SAMPLE_BLOCK, TEST_SETUP)
 BLOCK = 64  # samples per message where nobody says otherwise
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Samples:
-    """One SampleBlock: SI units, arrays of shape (n,)."""
-
-    topic: str
-    actuator: str
-    stamp_ns: int
-    period: float
-    index: int
-    command: Array
-    measured: Array
-    force: Array | None
-
-
-@dataclass(frozen=True, slots=True)
-class Setup:
-    """One TestSetup; `stiffness` [N/m] is None where the message says NaN."""
-
-    topic: str
-    actuator: str
-    stamp_ns: int
-    index: int
-    stiffness: float | None
-    hold: Hold
-    rate: float
-    source: str
-
-
-def samples_and_setups(path: Path | str, note: Note = refuse) -> Iterator[Samples | Setup]:
-    """Yield the sample blocks and set-ups of a bag in the order they were recorded.
-
-    Raises:
-        InputError: no bag, damage and nobody to note it, or a message that cannot be decoded.
-    """
-    for found in messages(path, types=(SAMPLE_BLOCK, TEST_SETUP), note=note):
-        yield _decode(found, path)
-
-
-def _decode(found: BagMessage, path: Path | str) -> Samples | Setup:
-    try:
-        content = deserialize(found.type, found.data)
-    except InputError as error:
-        raise InputError(
-            f'{path}: topic {found.topic}: {error}; was it recorded with another version of the '
-            'messages?'
-        ) from error
-    head = content.header
-    if found.type == SAMPLE_BLOCK:
-        if not 1e-6 <= content.period <= 10.0:
-            raise InputError(
-                f'{path}: topic {found.topic}: block at sample {content.index} has period '
-                f'{content.period:g} s, outside [1e-6, 10] s'
-            )
-        return Samples(
-            found.topic,
-            head.frame_id,
-            stamp_ns(head),
-            float(content.period),
-            int(content.index),
-            content.command,
-            content.measured,
-            content.force if len(content.force) else None,
-        )
-    stiffness = float(content.specimen_stiffness)
-    return Setup(
-        found.topic,
-        content.actuator or head.frame_id,
-        stamp_ns(head),
-        int(content.index),
-        None if np.isnan(stiffness) else stiffness,
-        content.hold,
-        float(content.rate),
-        content.source,
-    )
 
 
 @dataclass(slots=True)
@@ -173,7 +99,7 @@ def _test(setup: Setup | None) -> tuple[object, ...]:
 
 
 def read_records(
-    path: Path | str, *, note: Note = refuse, gap: Note | None = None
+    path: Path | str, *, note: Note = refuse, gap: Note | None = None, warn: Note = warn_caller
 ) -> list[Record]:
     """Return the records of a bag, one per topic and stretch without a gap.
 
@@ -182,25 +108,21 @@ def read_records(
         note: called with one line per damage; the default raises it.
         gap: called with one line where samples are missing or the clock jumps, and the test is
             split there; the default raises. A new test or set-up splits without a word.
+        warn: called with one line per set-up that cannot be used; the default is a Python
+            warning.
 
     Raises:
         InputError: no bag, no samples, damage, NaN or absurd samples, a gap or clock jump and
             nobody to be told.
     """
-    setups = _setups(path, note)
+    setups = _setups(path, note, warn)
     open_segments: dict[str, _Segment] = {}
     done: list[_Segment] = []
-    items = samples_and_setups(path, note=lambda _: None)
-    for position, item in enumerate(items, start=1):
-        if isinstance(item, Setup):
+    every = messages(path, types=TYPES, note=lambda _: None)
+    for position, raw in enumerate(every, start=1):
+        if raw.type != SAMPLE_BLOCK:
             continue
-        if len(item.command) != len(item.measured) or (
-            item.force is not None and len(item.force) != len(item.command)
-        ):
-            raise InputError(
-                f'{path}: topic {item.topic}: block at sample {item.index} has channels of '
-                'different lengths'
-            )
+        item = bag_samples.samples(raw, path)
         setup = _setup_of(item, setups, position)
         segment = open_segments.get(item.topic)
         if segment is not None:
@@ -243,17 +165,18 @@ def _nothing(path: Path | str) -> str:
     )
 
 
-def _setups(path: Path | str, note: Note) -> list[tuple[int, Setup]]:
-    """Return the set-ups with their place among blocks and set-ups; checks the whole bag."""
+def _setups(path: Path | str, note: Note, warn: Note) -> list[tuple[int, Setup]]:
+    """Return the usable set-ups with their place among all messages; checks the whole bag.
+
+    A set-up that cannot be used is left out, as a live node leaves it out.
+    """
     found: list[tuple[int, Setup]] = []
-    wanted = messages(path, types=(SAMPLE_BLOCK, TEST_SETUP), note=note)
-    for position, raw in enumerate(wanted, start=1):
+    for position, raw in enumerate(messages(path, types=TYPES, note=note), start=1):
         if raw.type == TEST_SETUP:
-            setup = _decode(raw, path)
-            assert isinstance(setup, Setup)
-            if setup.hold not in ('zoh', 'linear'):
-                raise InputError(f'{path}: topic {raw.topic}: hold {setup.hold!r} is unknown')
-            found.append((position, setup))
+            try:
+                found.append((position, bag_samples.setup(raw, path)))
+            except InputError as error:
+                warn(f'{error}; this set-up is not used')
     return found
 
 

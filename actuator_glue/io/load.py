@@ -8,7 +8,7 @@ from pathlib import Path
 
 from actuator_glue.errors import InputError
 from actuator_glue.io import laboratory
-from actuator_glue.io.bag_reader import Note, is_bag, refuse
+from actuator_glue.io.bag_reader import Note, is_bag, refuse, warn_caller
 from actuator_glue.io.bag_records import read_records
 from actuator_glue.io.channel_map import ChannelMap, read_channel_map
 from actuator_glue.records import Hold, Record, check_stiffness
@@ -22,6 +22,7 @@ def load_records(
     hold: Hold | None = None,
     note: Note = refuse,
     gap: Note | None = None,
+    warn: Note = warn_caller,
 ) -> list[Record]:
     """Return the records of bags and laboratory files, in the order given.
 
@@ -34,6 +35,7 @@ def load_records(
         note: called with one line per damage of a bag; the default raises it.
         gap: called with one line where a bag lacks samples or its clock jumps, and is split
             there; the default raises.
+        warn: called with one line per set-up of a bag that cannot be used; the rest is.
 
     Raises:
         InputError: a path cannot be used, or the number of stiffnesses does not fit.
@@ -47,7 +49,7 @@ def load_records(
     groups: list[list[Record]] = []
     for path in paths:
         if is_bag(path):
-            groups.append(read_records(path, note=note, gap=gap))
+            groups.append(read_records(path, note=note, gap=gap, warn=warn))
         else:
             groups.append([laboratory.read(path, channels=channels, hold=hold)])
     records = [record for group in groups for record in group]

@@ -14,6 +14,7 @@ from actuator_glue.online import wire
 from actuator_glue.online.estimator import Schedule
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.settings import EstimatorSettings, ModelChoice
+from actuator_glue.records import check_period
 
 
 @dataclass(slots=True)
@@ -49,7 +50,7 @@ def published(messages: Iterable[tuple[str, Any]]) -> Published:
     """Collect what a live estimator published from (type name, message) pairs.
 
     Raises:
-        InputError: settings that cannot be read.
+        InputError: settings, a model or a posterior that cannot be.
     """
     found = Published()
     for name, message in messages:
@@ -58,6 +59,7 @@ def published(messages: Iterable[tuple[str, Any]]) -> Published:
             found.settings = wire.estimator_settings(message)
             found.models.append((int(message.window), wire.model_choice(message)))
         elif kind == 'PosteriorMoments':
+            check_period(message.period, f'posterior of window {message.window}')
             found.posteriors[int(message.window)] = message
         elif kind == 'PredictionBand' and message.scored:
             key = (int(message.window), int(message.index), str(message.kind))

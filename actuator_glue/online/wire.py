@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from actuator_glue.errors import InputError
+from actuator_glue.online.fitting import choose_model
 from actuator_glue.online.forecast import Prediction
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.settings import EstimatorSettings, ModelChoice
@@ -74,16 +75,23 @@ def preview(message: Any) -> Preview:
 
 
 def model_choice(message: Any) -> ModelChoice:
-    """Return the model of an EstimatorSetup."""
-    start = json.loads(message.settings).get('start', ())
-    return ModelChoice(
-        effects=tuple(message.effects),
-        names=tuple(message.parameter_names),
-        units=tuple(message.units),
-        lower=tuple(float(v) for v in message.lower),
-        upper=tuple(float(v) for v in message.upper),
-        start=tuple(_NAN if v is None else float(v) for v in start),
-    )
+    """Return the model of an EstimatorSetup.
+
+    Raises:
+        InputError: settings that cannot be read, or a model that the catalogue does not have.
+    """
+    try:
+        start = json.loads(message.settings).get('start') or ()
+        names = list(message.parameter_names)
+        box = {
+            name: (float(lower), float(upper))
+            for name, lower, upper in zip(names, message.lower, message.upper, strict=True)
+        }
+        places = zip(names, start, strict=True) if start else ()
+        begin = {name: _NAN if value is None else float(value) for name, value in places}
+    except (ValueError, TypeError, AttributeError) as error:
+        raise InputError(f'EstimatorSetup: the model cannot be read ({error})') from error
+    return choose_model(list(message.effects), box, begin)
 
 
 def estimator_settings(message: Any) -> EstimatorSettings:

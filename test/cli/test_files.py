@@ -186,6 +186,41 @@ def test_a_cut_bag_is_told_mended_and_used(run, tmp_path: Path, short_bag: Path)
     assert 'no such bag' in run('recover', tmp_path / 'nothing').message
 
 
+def test_a_bad_set_up_is_told_and_the_rest_is_used(run, tmp_path: Path, short_bag: Path) -> None:
+    """`info`, `convert` and `replay` go on as live nodes do; seconds of data are a number."""
+    from actuator_glue.io import messages
+    from actuator_glue.io.bag_records import write_record
+    from actuator_glue.io.bag_writer import BagWriter
+
+    (record,) = load_records(short_bag)
+    wrong = messages.message(
+        'TestSetup', header=messages.header(record.start_ns, ''), actuator='a', index=0, rate=100,
+        specimen_stiffness=0.0, hold='cubic', source='',
+    )  # fmt: skip
+    block = messages.message(
+        'SampleBlock', header=messages.header(0, ''), period=np.nan, index=10**6,
+        command=np.zeros(2), measured=np.zeros(2), force=np.zeros(0),
+    )  # fmt: skip
+    for name in ('set-up', 'set-up and block'):
+        with BagWriter(tmp_path / name) as writer:
+            write_record(writer, record)
+            writer.write('/test_setup', wrong, record.stamp_ns(len(record)))
+            if 'block' in name:
+                writer.write('/samples', block, record.stamp_ns(len(record)) + 1)
+    done = run('info', tmp_path / 'set-up', '--json', '-')
+    assert done.code == 0, done.err
+    assert "hold 'cubic' is unknown" in done.json['files'][0]['warnings'][0]
+    done = run('convert', tmp_path / 'set-up', tmp_path / 'out.csv', '--unit', 'm')
+    assert done.code == 0, done.err
+    assert 'note: ' in done.err and 'cubic' in done.err
+    assert load_records(tmp_path / 'out.csv')[0].stiffness == record.stiffness
+    options = ('--window', 3, '--evaluations', 4000)
+    done = run('replay', tmp_path / 'set-up and block', *options)
+    assert done.code == 0, done.err
+    assert "hold 'cubic' is unknown" in done.err
+    assert 'over 8.0 s of data' in done.out
+
+
 def test_a_gap_is_refused_unless_it_may_split(run, tmp_path: Path, short_bag: Path) -> None:
     """Missing samples are one message; --split takes what is left and goes on telling."""
     from actuator_glue.io.bag_records import write_record

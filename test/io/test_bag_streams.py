@@ -163,23 +163,35 @@ def test_bad_samples_in_a_bag_are_one_message(tmp_path: Path, record: Record) ->
         read_records(tmp_path / 'bag')
 
 
-@pytest.mark.parametrize('stiffness', [-1.0, np.inf, 1e15])
-def test_bad_setups_in_a_bag_are_one_message(
-    tmp_path: Path, record: Record, stiffness: float
+@pytest.mark.parametrize(
+    ('name', 'value'),
+    [
+        ('specimen_stiffness', -1.0),
+        ('specimen_stiffness', np.inf),
+        ('specimen_stiffness', 1e15),
+        ('hold', 'cubic'),
+        ('rate', np.nan),
+        ('rate', 0.0),
+    ],
+)
+def test_a_set_up_that_cannot_be_is_left_out_and_told(
+    tmp_path: Path, record: Record, name: str, value: object
 ) -> None:
-    """A stiffness that cannot be is refused; so is an unknown hold."""
-    with open_bag(tmp_path / 'bag') as writer:
-        writer.write('/test_setup', setup(record, 0, stiffness), 0)
-        writer.write('/samples', samples(record, 0, 100), 1)
-    with pytest.raises(InputError, match='stiffness'):
-        read_records(tmp_path / 'bag')
+    """As live nodes do: one warning, the other set-up and all samples are used."""
     wrong = setup(record, 0, 0.0)
-    wrong.hold = 'cubic'
-    with open_bag(tmp_path / 'hold') as writer:
-        writer.write('/test_setup', wrong, 0)
-        writer.write('/samples', samples(record, 0, 100), 1)
-    with pytest.raises(InputError, match='cubic'):
-        read_records(tmp_path / 'hold')
+    setattr(wrong, name, value)
+    with open_bag(tmp_path / 'bag') as writer:
+        writer.write('/test_setup', setup(record, 0, 7.0), 0)
+        writer.write('/test_setup', wrong, 1)
+        writer.write('/samples', samples(record, 0, 100), 2)
+    told: list[str] = []
+    (found,) = read_records(tmp_path / 'bag', warn=told.append)
+    assert (len(found), found.stiffness, found.hold) == (100, 7.0, 'zoh')
+    (line,) = told
+    assert name.rpartition('_')[2] in line
+    assert 'topic /test_setup' in line
+    with pytest.warns(UserWarning, match='this set-up is not used'):
+        read_records(tmp_path / 'bag')
 
 
 RECORDER = textwrap.dedent(

@@ -1,0 +1,99 @@
+"""SampleBlock and TestSetup messages of a bag, checked one by one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from actuator_glue.errors import InputError
+from actuator_glue.io.bag_reader import BagMessage
+from actuator_glue.io.messages import deserialize, full_name, stamp_ns
+from actuator_glue.records import Array, Hold, check_hold, check_period, check_stiffness
+
+SAMPLE_BLOCK = full_name('SampleBlock')
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Samples:
+    """One SampleBlock: SI units, arrays of shape (n,)."""
+
+    topic: str
+    actuator: str
+    stamp_ns: int
+    period: float
+    index: int
+    command: Array
+    measured: Array
+    force: Array | None
+
+
+@dataclass(frozen=True, slots=True)
+class Setup:
+    """One TestSetup; `stiffness` [N/m] is None where the message says NaN."""
+
+    topic: str
+    actuator: str
+    stamp_ns: int
+    stiffness: float | None
+    hold: Hold
+
+
+def _content(found: BagMessage, where: str) -> Any:
+    try:
+        return deserialize(found.type, found.data)
+    except InputError as error:
+        raise InputError(
+            f'{where}: {error}; was it recorded with another version of the messages?'
+        ) from error
+
+
+def samples(found: BagMessage, path: Path | str) -> Samples:
+    """Return a SampleBlock of a bag.
+
+    Raises:
+        InputError: bytes that are no such message, an absurd period, channels of different
+            lengths.
+    """
+    where = f'{path}: topic {found.topic}'
+    content = _content(found, where)
+    block = f'{where}: block at sample {content.index}'
+    check_period(content.period, block)
+    lengths = {len(content.command), len(content.measured)}
+    if len(content.force):
+        lengths.add(len(content.force))
+    if len(lengths) != 1:
+        raise InputError(f'{block} has channels of different lengths')
+    return Samples(
+        found.topic,
+        content.header.frame_id,
+        stamp_ns(content.header),
+        float(content.period),
+        int(content.index),
+        content.command,
+        content.measured,
+        content.force if len(content.force) else None,
+    )
+
+
+def setup(found: BagMessage, path: Path | str) -> Setup:
+    """Return a TestSetup of a bag.
+
+    Raises:
+        InputError: bytes that are no such message, or a stiffness, rate or hold that cannot be.
+    """
+    where = f'{path}: topic {found.topic}'
+    content = _content(found, where)
+    stiffness, rate = float(content.specimen_stiffness), float(content.rate)
+    if not (np.isfinite(rate) and rate > 0.0):
+        raise InputError(f'{where}: rate {rate:g} Hz is not positive')
+    check_period(1.0 / rate, where)
+    return Setup(
+        found.topic,
+        content.actuator or content.header.frame_id,
+        stamp_ns(content.header),
+        None if np.isnan(stiffness) else check_stiffness(stiffness, where),
+        check_hold(content.hold, where),
+    )
