@@ -3,18 +3,25 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, fields
 from pathlib import Path
+from reprlib import repr as brief
 from typing import Any, Literal
 
 import yaml
 
 from actuator_glue.errors import InputError
+from actuator_glue.io.signature import text_encoding
 from actuator_glue.io.units import ROLES, factor
 from actuator_glue.records import check_stiffness
 
 Column = str | int
+_LARGEST = 100_000  # bytes; a map is a page of text
+# Inside {...} YAML reads the [s] of `column: Time [s]` as a list.
+_BRACKETS = re.compile(r'column:\s*[^\'"\s][^\'",}]*\[')
+_QUOTES = "put quotes around names with brackets, as in column: 'Time [s]'"
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,12 +88,22 @@ def read_channel_map(path: Path | str) -> ChannelMap:
     """
     path = Path(path)
     try:
-        content = yaml.safe_load(path.read_text('utf-8'))
+        size = path.stat().st_size
+        if size > _LARGEST:
+            raise InputError(
+                f'{path}: {size / 1e3:.0f} kB are no channel map; --channels takes the YAML file '
+                'that describes the columns of a record, not the record'
+            )
+        text = path.read_text(text_encoding(path))
+        content = yaml.safe_load(text)
     except OSError as error:
         raise InputError(f'{path}: channel map cannot be read ({error.strerror})') from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
+        raise InputError(f'{path}: channel map is not text in UTF-8') from error
+    except yaml.YAMLError as error:
         detail = ' '.join(str(error).split())
-        raise InputError(f'{path}: channel map is not YAML ({detail})') from error
+        hint = f'; {_QUOTES}' if _BRACKETS.search(text) else ''
+        raise InputError(f'{path}: channel map is not YAML ({detail}){hint}') from error
     return parse_channel_map(content, str(path))
 
 
@@ -127,6 +144,8 @@ def parse_channel_map(content: object, source: str) -> ChannelMap:
 def _channel(content: object, role: str, where: str) -> Channel:
     values = _mapping(content, Channel, where)
     _column(values['column'], where)
+    if isinstance(values['unit'], list):
+        raise InputError(f'{where}: unit is {brief(values["unit"])}; write it without brackets')
     factor(role, str(values['unit']) if values['unit'] else None, where)
     _number(values, 'scale', where)
     _number(values, 'offset', where)
@@ -139,7 +158,7 @@ def _mapping(
     content: object, kind: type, where: str, hidden: tuple[str, ...] = ()
 ) -> dict[str, Any]:
     if not isinstance(content, Mapping):
-        raise InputError(f'{where} must be a mapping of names to values, not {content!r}')
+        raise InputError(f'{where} must be a mapping of names to values, not {brief(content)}')
     known = [f.name for f in fields(kind) if f.name not in hidden]
     for name in content:
         if name not in known:
@@ -154,7 +173,8 @@ def _mapping(
 
 def _column(value: object, where: str) -> None:
     if isinstance(value, bool) or not isinstance(value, (str, int)):
-        raise InputError(f'{where}: column must be a name or a number, not {value!r}')
+        hint = f'; {_QUOTES}' if isinstance(value, list) else ''
+        raise InputError(f'{where}: column must be a name or a number, not {brief(value)}{hint}')
     if isinstance(value, int) and value < 1:
         raise InputError(f'{where}: columns are counted from 1, got {value}')
 

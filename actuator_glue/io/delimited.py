@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import warnings
 from dataclasses import dataclass
 from itertools import islice
@@ -10,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from actuator_glue.errors import InputError
+from actuator_glue.io.signature import text_encoding
 from actuator_glue.records import Array
 
 # A comma may be the decimal sign where there is another delimiter, so it comes last.
@@ -26,6 +28,7 @@ class Head:
         delimiter: text between columns, None for blanks.
         notes: `# name = value` lines.
         decimal: decimal sign of the first sample.
+        encoding: how the text is coded.
     """
 
     names: list[str]
@@ -33,6 +36,7 @@ class Head:
     delimiter: str | None
     notes: dict[str, str]
     decimal: str
+    encoding: str = 'utf-8-sig'
 
 
 def read_head(path: Path, header_lines: int | None = None, delimiter: str | None = None) -> Head:
@@ -45,10 +49,11 @@ def read_head(path: Path, header_lines: int | None = None, delimiter: str | None
         delimiter: text between columns, found by itself where None.
 
     Raises:
-        InputError: the file cannot be read or is empty.
+        InputError: the file cannot be read, is no text or is empty.
     """
+    encoding = text_encoding(path)
     try:
-        with path.open(encoding='utf-8-sig', errors='replace') as file:
+        with path.open(encoding=encoding, errors='replace') as file:
             top = [line.rstrip('\r\n') for line in islice(file, (header_lines or 100) + 1)]
     except OSError as error:
         raise InputError(f'{path}: cannot be read ({error.strerror})') from error
@@ -70,9 +75,21 @@ def read_head(path: Path, header_lines: int | None = None, delimiter: str | None
     if delimiter is None:
         delimiter = next((d for d in _DELIMITERS if d in sample), None)
     # With both signs in a line the comma can only part thousands, which nobody can read safely.
-    decimal = ',' if delimiter != ',' and ',' in sample and '.' not in sample else '.'
-    names = [n.strip().strip('"') for n in line.split(delimiter)] if line.strip() else []
-    return Head(names, header_lines, delimiter, notes, decimal)
+    comma = any(',' in field for field in _fields(sample, delimiter))
+    decimal = ',' if comma and '.' not in sample else '.'
+    return Head(_fields(line, delimiter), header_lines, delimiter, notes, decimal, encoding)
+
+
+def _fields(line: str, delimiter: str | None) -> list[str]:
+    """Return the entries of a line without the quotes about them."""
+    if not line.strip():
+        return []
+    if delimiter is None:
+        return [entry.strip('"') for entry in line.split()]
+    if len(delimiter) != 1:  # csv takes one character
+        return [entry.strip().strip('"') for entry in line.split(delimiter)]
+    (entries,) = csv.reader([line], delimiter=delimiter, skipinitialspace=delimiter != ' ')
+    return [entry.strip() for entry in entries]
 
 
 def position(column: str | int, names: list[str], where: str) -> int:
@@ -121,8 +138,9 @@ def read_columns(
                 skiprows=head.lines,
                 usecols=positions,
                 ndmin=2,
-                encoding='utf-8-sig',
+                encoding=head.encoding,
                 converters=convert,
+                quotechar='"',
             )
     except UnicodeDecodeError as error:
         raise InputError(

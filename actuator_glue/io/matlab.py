@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from actuator_glue.errors import InputError
+from actuator_glue.io.signature import refuse_foreign
 from actuator_glue.records import Array
 
 
@@ -20,6 +21,7 @@ def read_variables(path: Path) -> tuple[dict[str, Array], dict[str, str]]:
     from scipy.io import loadmat
     from scipy.io.matlab import MatReadError
 
+    refuse_foreign(path, 'a MATLAB .mat file')
     try:
         content = loadmat(path, squeeze_me=True, struct_as_record=False)
     except NotImplementedError as error:

@@ -1,0 +1,102 @@
+"""What a file is by its first bytes: how its text is coded, or why it is no text."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from actuator_glue.errors import InputError
+
+_LOOK = 4096  # bytes
+_TABLE = 'save the table as .csv'
+_UNPACK = 'unpack it first'
+_BAG = 'give the folder of a bag in MCAP format'
+
+# First bytes, what they begin, what to do.
+_SIGNATURES: tuple[tuple[bytes, str, str], ...] = (
+    (b'\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1', 'an Excel workbook (.xls)', _TABLE),
+    (b'PAR1', 'a Parquet file', _TABLE),
+    (b'TDSm', 'a LabVIEW TDMS file', _TABLE),
+    (b'ARROW1', 'an Arrow file', _TABLE),
+    (b'\x93NUMPY', 'a NumPy array', _TABLE),
+    (b'\x89HDF\r\n\x1a\n', 'an HDF5 file', f"{_TABLE}, or in MATLAB with save(..., '-v7')"),
+    (b'SQLite format 3\0', 'an SQLite file', f'{_BAG}; `ros2 bag convert` makes one of a .db3'),
+    (b'\x89MCAP0\r\n', 'an MCAP file', 'give it a name ending in .mcap, or the folder of the bag'),
+    (b'#ROSBAG V', 'a ROS 1 bag', f'{_BAG}; `rosbags-convert` makes one'),
+    (b'\x1f\x8b', 'a gzip archive', _UNPACK),
+    (b'BZh', 'a bzip2 archive', _UNPACK),
+    (b'\xfd7zXZ\0', 'an xz archive', _UNPACK),
+    (b'(\xb5/\xfd', 'a zstd archive', _UNPACK),
+    (b"7z\xbc\xaf'\x1c", 'a 7z archive', _UNPACK),
+    (b'%PDF-', 'a PDF document', _TABLE),
+    (b'\x89PNG', 'a picture', _TABLE),
+    (b'\xff\xd8\xff', 'a picture', _TABLE),
+)
+_ZIP = b'PK\x03\x04'
+# What a zip archive of that kind has in its first entries.
+_ZIPPED: tuple[tuple[bytes, str], ...] = (
+    (b'[Content_Types].xml', 'an Excel workbook (.xlsx)'),
+    (b'xl/', 'an Excel workbook (.xlsx)'),
+    (b'opendocument', 'an OpenDocument table'),
+    (b'.npy', 'a NumPy archive'),
+)
+# No text has these; tab, line ends, form feed, end of file and escape it may have.
+_CONTROL = set(range(32)) - set(b'\t\n\v\f\r\x1a\x1b')
+_MARKS = (
+    (b'\xff\xfe\0\0', 'utf-32'),
+    (b'\0\0\xfe\xff', 'utf-32'),
+    (b'\xff\xfe', 'utf-16'),
+    (b'\xfe\xff', 'utf-16'),
+)
+
+
+def refuse_foreign(path: Path, wanted: str) -> bytes:
+    """Return the first bytes of a file that is not known to be something else.
+
+    Raises:
+        InputError: the file cannot be read, or is of a format that is not read; named by it.
+    """
+    try:
+        with path.open('rb') as file:
+            start = file.read(_LOOK)
+    except OSError as error:
+        raise InputError(f'{path}: cannot be read ({error.strerror or error})') from error
+    what, remedy = _known(start)
+    if what:
+        raise InputError(f'{path}: this is {what}, not {wanted}; {remedy}')
+    return start
+
+
+def text_encoding(path: Path) -> str:
+    """Return how the text of a file is coded: UTF-8, or UTF-16 and UTF-32 by their marks.
+
+    Raises:
+        InputError: the file cannot be read, or is no text; the message names what it is.
+    """
+    start = refuse_foreign(path, 'text')
+    if start.startswith(b'MATLAB '):
+        raise InputError(f'{path}: this is a MATLAB file; give it a name ending in .mat')
+    for mark, encoding in _MARKS:
+        if start.startswith(mark):
+            return encoding
+    # Western text in UTF-16 without a mark has a zero in every second byte.
+    for zeros, encoding in ((1, 'utf-16-le'), (0, 'utf-16-be')):
+        high, low = start[zeros::2], start[1 - zeros :: 2]
+        if high and high.count(0) > 0.9 * len(high) and 0 not in low:
+            return encoding
+    if not _CONTROL.isdisjoint(start):
+        raise InputError(
+            f'{path}: this is binary data of a format that is not known, not text; {_TABLE}'
+        )
+    return 'utf-8-sig'
+
+
+def _known(start: bytes) -> tuple[str, str]:
+    if start.startswith(_ZIP):
+        for inside, what in _ZIPPED:
+            if inside in start:
+                return what, _TABLE
+        return 'a zip archive', _UNPACK
+    for mark, what, remedy in _SIGNATURES:
+        if start.startswith(mark):
+            return what, remedy
+    return '', ''
