@@ -28,7 +28,7 @@ $(ROS_STAMP): $(VENV_STAMP) scripts/build_ros.sh setup.py setup.cfg package.xml 
 
 # make demo DATA=record.csv CHANNELS=map.yaml STIFFNESS=250e3 runs on a laboratory file instead of the simulator.
 demo: $(ROS_STAMP) ## about a minute of real nodes; results in out/demo
-	@$(ROS) $(BIN)/actuator-glue demo --out out/demo \
+	@$(ROS) $(BIN)/actuator-glue demo --force --out out/demo \
 		$(if $(DATA),--data '$(DATA)') $(if $(CHANNELS),--channels '$(CHANNELS)') \
 		$(if $(STIFFNESS),--stiffness '$(STIFFNESS)') $(DEMO_ARGS)
 
@@ -47,7 +47,7 @@ bench: $(ROS_STAMP) ## speed, side by side with peers; results in out/bench
 	@$(ROS) $(BIN)/python -m benchmarks --out out/bench $(BENCH_ARGS)
 
 reproduce: $(VENV_STAMP) ## the paper beside our numbers; report in out/reproduce
-	@$(BIN)/actuator-glue reproduce --out out/reproduce $(REPRODUCE_ARGS)
+	@$(BIN)/actuator-glue reproduce --force --out out/reproduce $(REPRODUCE_ARGS)
 
 docs: $(VENV_STAMP) ## renew docs/messages.md and the table of docs/effects.md
 	@$(BIN)/python scripts/write_message_reference.py

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from actuator_glue.cli._output import say
+from actuator_glue.cli._parser import claim
 from actuator_glue.errors import InputError
 from actuator_glue.records import Array, Record
 
@@ -72,7 +73,7 @@ class Draws:
         from actuator_glue.report import style
         from actuator_glue.report.posterior import posterior_figure
 
-        path = folder / f'{Path(self.source).stem}.{args.format}'
+        path = claim(folder / f'{Path(self.source).stem}.{args.format}', args)
         style.save(posterior_figure(self.values, self.names, self.units), path)
         say(f'{path}: {len(self.values)} draws of {self.source}', args)
 

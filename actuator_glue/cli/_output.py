@@ -11,24 +11,29 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from actuator_glue.errors import InputError
+from actuator_glue.cli._parser import Output, add_force
+from actuator_glue.errors import InputError, printable
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:
-    """Add `--json OUT`."""
+    """Add `--json OUT` and `--force`."""
     parser.add_argument(
-        '--json', metavar='OUT', help="also write the result as JSON; '-' is standard output"
+        '--json',
+        type=Output,
+        metavar='OUT',
+        help="also write the result as JSON; '-' is standard output",
     )
+    add_force(parser)
 
 
 def note(line: str) -> None:
     """Print one remark on standard error."""
-    print(f'note: {line}', file=sys.stderr)
+    print(f'note: {printable(line)}', file=sys.stderr)
 
 
 def say(line: str, args: argparse.Namespace) -> None:
     """Print one line for people; on standard error where JSON goes to standard output."""
-    print(line, file=sys.stderr if getattr(args, 'json', None) == '-' else sys.stdout)
+    print(printable(line), file=sys.stderr if getattr(args, 'json', None) == '-' else sys.stdout)
 
 
 def table(
@@ -87,6 +92,9 @@ def write_json(content: dict[str, Any], out: str | None) -> None:
     temporary = path.with_name(path.name + '.tmp')
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
+        if path.exists() and not path.is_file():  # a device or pipe stays what it is
+            path.write_text(text, 'utf-8')
+            return
         temporary.write_text(text, 'utf-8')
         temporary.replace(path)
     except OSError as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 
 from actuator_glue.cli._output import note
+from actuator_glue.cli._parser import number
 from actuator_glue.records import Record
 
 
@@ -23,10 +24,9 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
     """Add --stiffness, --channels, --hold and --split."""
     parser.add_argument(
         '--stiffness',
-        nargs='+',
-        action='extend',
+        action='append',
         type=number,
-        metavar='N/m',
+        metavar='N/m...',
         help='specimen stiffness: one for all records or one per record (250 kN/m is 250e3, 0 is '
         'a free actuator); wins over what a file says',
     )
@@ -45,19 +45,6 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
         help='where a bag lacks samples or its clock jumps, take the stretches between as '
         'records of their own',
     )
-
-
-def number(text: str) -> float:
-    """Return a finite number."""
-    import math
-
-    try:
-        value = float(text)
-    except ValueError:
-        raise argparse.ArgumentTypeError(f'{text!r} is not a number') from None
-    if not math.isfinite(value):
-        raise argparse.ArgumentTypeError(f'{text!r} is not finite')
-    return value
 
 
 def load(args: argparse.Namespace) -> list[Record]:

@@ -4,18 +4,27 @@ from __future__ import annotations
 
 import argparse
 import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from actuator_glue.cli._output import progress, say
+from actuator_glue.cli._parser import Output, add_force, claim
 from actuator_glue.errors import InputError
 from actuator_glue.records import Record
+
+FILES = ('.csv', '.mat')
 
 
 def add_out(parser: argparse.ArgumentParser) -> None:
     """Add OUT, --block and --unit."""
     parser.add_argument(
-        'out', metavar='OUT', help='.csv, .mat, or the folder of a new bag for any other name'
+        'out',
+        type=Output,
+        metavar='OUT',
+        help='.csv, .mat, or a name without a suffix: the folder of a new bag',
     )
+    add_force(parser)
     parser.add_argument(
         '--block', type=int, default=64, metavar='N', help='samples per message (default 64)'
     )
@@ -31,15 +40,27 @@ def check_out(args: argparse.Namespace) -> Path:
     """Return where to write, before any long work is done for it.
 
     Raises:
-        InputError: it exists, or is no name for a bag.
+        InputError: its suffix is none that can be written, or it is a folder but no bag.
     """
+    from actuator_glue.io.bag_reader import is_bag
+
     out = Path(args.out)
     if out.suffix == '.mcap':
         raise InputError(f'{out}: bags are folders; give a name without .mcap')
+    # A bag may be called test_2.5.
+    if out.suffix not in FILES and not out.suffix[1:].isdigit() and out.suffix:
+        raise InputError(
+            f'{out}: {out.suffix} cannot be written; use {", ".join(FILES)}, or a name without '
+            'a suffix for a bag'
+        )
     if args.block < 1:
         raise InputError(f'--block {args.block}: a message holds at least one sample')
-    if out.exists():
-        raise InputError(f'{out} exists already; choose another name or move it')
+    if out.exists() and out.is_dir() == (out.suffix in FILES):
+        raise InputError(
+            f'{out} is {"a folder" if out.is_dir() else "a file"}; choose another name'
+        )
+    if out.is_dir() and not is_bag(out):
+        raise InputError(f'{out} is a folder but no bag; choose another name or move it')
     return out
 
 
@@ -51,30 +72,48 @@ def save(records: list[Record], args: argparse.Namespace) -> None:
     """
     out = check_out(args)
     written = [out]
-    if out.suffix in ('.csv', '.mat'):
-        written = _files(records, out, args.unit)
+    if out.suffix in FILES:
+        written = _files(records, out, args)
     else:
-        _bag(records, out, args.block)
+        with _replacing(out):
+            _bag(records, out, args.block)
     samples = sum(len(r) for r in records)
     say(f'{", ".join(map(str, written))}: {len(records)} record(s), {samples} samples', args)
 
 
-def _files(records: list[Record], out: Path, unit: str) -> list[Path]:
+def _files(records: list[Record], out: Path, args: argparse.Namespace) -> list[Path]:
     from actuator_glue.io.export import write_csv, write_mat
 
     paths = [out]
     if len(records) > 1:
         paths = [out.with_name(f'{out.stem}_{i + 1}{out.suffix}') for i in range(len(records))]
     for path in paths:
-        if path.exists():
-            raise InputError(f'{path} exists already; choose another name or move it')
+        claim(path, args)
     with progress('writing', sum(len(r) for r in records)) as done:
         before = 0
         for path, record in zip(paths, records, strict=True):
-            (write_csv if out.suffix == '.csv' else write_mat)(path, record, unit=unit)
+            (write_csv if out.suffix == '.csv' else write_mat)(path, record, unit=args.unit)
             before += len(record)
             done(before)
     return paths
+
+
+@contextmanager
+def _replacing(bag: Path) -> Iterator[None]:
+    """Put a bag that is there aside; it comes back where the new one is not written."""
+    if not bag.exists():
+        yield
+        return
+    old = bag.with_name(f'{bag.name}.old')
+    if old.exists():
+        raise InputError(f'{old} is there already; move it')
+    bag.rename(old)
+    try:
+        yield
+    except BaseException:
+        old.rename(bag)
+        raise
+    shutil.rmtree(old, ignore_errors=True)
 
 
 def _bag(records: list[Record], out: Path, block: int) -> None:

@@ -15,7 +15,8 @@ from actuator_glue.cli._calibration import fit_error, initial_state, sample, sam
 from actuator_glue.cli._compilation import compilation
 from actuator_glue.cli._judgement import CONVERGED, bounds, problems, remarks
 from actuator_glue.cli._output import add_json, note, say, table, write_json
-from actuator_glue.cli._records import add_records, load, number
+from actuator_glue.cli._parser import Output, number
+from actuator_glue.cli._records import add_records, load
 from actuator_glue.errors import InputError
 from actuator_glue.records import Record
 
@@ -71,6 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--draws',
+        type=Output,
         metavar='OUT.npz',
         help='save the posterior draws (arrays draws, names, units, best, effects, initial) for '
         '`plot --draws` and for others',

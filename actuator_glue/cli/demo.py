@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from actuator_glue.cli._output import write_json
-from actuator_glue.cli._records import number
+from actuator_glue.cli._parser import Folder, add_force, number
 from actuator_glue.errors import InputError
 
 if TYPE_CHECKING:
@@ -17,8 +17,13 @@ if TYPE_CHECKING:
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument(
-        '--out', default='out/demo', metavar='DIR', help='where everything lands (out/demo)'
+        '--out',
+        type=Folder,
+        default='out/demo',
+        metavar='DIR',
+        help='where everything lands (out/demo)',
     )
+    add_force(parser)
     parser.add_argument('--data', metavar='FILE', help='stream this record, not the simulator')
     parser.add_argument('--channels', metavar='MAP.yaml', help='channel map of FILE')
     parser.add_argument(

@@ -13,6 +13,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from actuator_glue.cli._output import add_json, note, progress, say, table, write_json
+from actuator_glue.cli._parser import Output
 from actuator_glue.cli._records import add_records, load
 from actuator_glue.errors import InputError
 from actuator_glue.records import Record
@@ -50,7 +51,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='record that decides nothing and gives the error before and after; repeatable '
         '(default: every fourth block of each record)',
     )
-    parser.add_argument('--report', metavar='OUT.html', help='also write a report, one HTML file')
+    parser.add_argument(
+        '--report', type=Output, metavar='OUT.html', help='also write a report, one HTML file'
+    )
     parser.add_argument('--seed', type=int, default=1, metavar='S', help='seed (default 1)')
     parser.add_argument(
         '--jobs', type=int, default=2, metavar='N', help='threads for the refits (default 2)'

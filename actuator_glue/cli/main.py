@@ -6,7 +6,6 @@ docstring is its help. Only the command that runs is imported, and heavy librari
 
 from __future__ import annotations
 
-import argparse
 import ast
 import importlib
 import os
@@ -16,12 +15,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from actuator_glue import cli
+from actuator_glue.cli._parser import Parser, claim_outputs
 from actuator_glue.errors import InputError
-
-EPILOG = (
-    'Exit codes: 0 done; 1 the answer is no, where a command asks a question; 2 the input '
-    'cannot be used; 3 a fault of this program.'
-)
 
 
 def commands() -> dict[str, Path]:
@@ -37,12 +32,11 @@ def summary(file: Path) -> str:
     return text.split('\n', 1)[0]
 
 
-def build_parser(chosen: str | None) -> argparse.ArgumentParser:
+def build_parser(chosen: str | None) -> Parser:
     """Return the parser; only the chosen command knows its arguments."""
-    parser = argparse.ArgumentParser(
+    parser = Parser(
         prog='actuator-glue',
         description='Bayesian calibration and diagnosis of servo-hydraulic actuators.',
-        epilog=EPILOG,
     )
     parser.add_argument('--version', action='store_true', help='print the version and exit')
     parser.add_argument('--debug', action='store_true', help='show where a fault came from')
@@ -76,6 +70,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if args.command is None:
             parser.print_help()
             return 2
+        claim_outputs(args)
         return int(args.run(args))
     except InputError as error:
         return _fail(str(error), 2, debug)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from actuator_glue.cli._draws import Draws
 from actuator_glue.cli._output import note, say
+from actuator_glue.cli._parser import add_force, claim
 from actuator_glue.cli._records import add_records, load
 from actuator_glue.errors import InputError
 from actuator_glue.records import Record
@@ -20,8 +21,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_records(parser)
     parser.add_argument(
-        '--out', default='.', metavar='DIR', help='where the pictures go (default: here)'
+        '--out', default='out/plots', metavar='DIR', help='where pictures go (default out/plots)'
     )
+    add_force(parser)
     parser.add_argument(
         '--draws',
         metavar='DRAWS.npz',
@@ -52,9 +54,10 @@ def run(args: argparse.Namespace) -> int:
         draws.draw(folder, args)
     for i, record in enumerate(records, start=1):
         name = f'{_stem(record)}_{i}' if len(records) > 1 else _stem(record)
-        _draw(record, folder / f'{name}.{args.format}', args)
+        _draw(record, claim(folder / f'{name}.{args.format}', args), args)
         if draws is not None:
-            draws.draw_bands(record, folder / f'{name}_bands.{args.format}', args)
+            bands = claim(folder / f'{name}_bands.{args.format}', args)
+            draws.draw_bands(record, bands, args)
     for path in args.records:
         if is_bag(path):
             _draw_estimate(Path(path), folder, args)
@@ -84,7 +87,7 @@ def _draw_estimate(bag: Path, folder: Path, args: argparse.Namespace) -> None:
         note(f'{bag}: holds no posterior; `actuator-glue replay {bag}` makes them')
         return
     for draw, name in ((pictures.bands, 'bands'), (pictures.parameters, 'parameters')):
-        path = folder / f'{bag.stem}_{name}.{args.format}'
+        path = claim(folder / f'{bag.stem}_{name}.{args.format}', args)
         try:
             draw(content, path)
         except InputError as error:

@@ -8,7 +8,8 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
 from actuator_glue.cli._output import add_json, note, progress, say, table, write_json
-from actuator_glue.cli._records import add_reading, load, number
+from actuator_glue.cli._parser import number
+from actuator_glue.cli._records import add_reading, load
 from actuator_glue.errors import InputError
 
 if TYPE_CHECKING:

@@ -9,17 +9,19 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from actuator_glue.cli._output import note, say, write_json
+from actuator_glue.cli._parser import Folder, add_force
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     parser.add_argument(
         '--out',
-        type=Path,
-        default=Path('reproduction'),
+        type=Folder,
+        default='out/reproduce',
         metavar='DIR',
         help='folder for report.html, results.json and curves/*.csv (default: %(default)s)',
     )
+    add_force(parser)
     parser.add_argument(
         '--quick', action='store_true', help='under a minute: fewer evaluations, three G of eight'
     )
@@ -40,10 +42,11 @@ def run(args: argparse.Namespace) -> int:
 
     if args.seed < 0:
         raise InputError(f'--seed {args.seed} is negative; give 0 or more')
+    out = Path(args.out)
     try:
-        args.out.mkdir(parents=True, exist_ok=True)
+        out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(f'--out {args.out}: cannot be made ({error})') from error
+        raise InputError(f'--out {out}: cannot be made ({error.strerror or error})') from error
     started = time.monotonic()
     with _progress() as tell:
         # Figures and files are the last tenth.
@@ -52,17 +55,17 @@ def run(args: argparse.Namespace) -> int:
         )
         tell('figures and report', 0.9)
         made = f'actuator-glue reproduce{" --quick" if args.quick else ""} --seed {args.seed}'
-        page = report.write(results, args.out / 'report.html', made=made)
+        page = report.write(results, out / 'report.html', made=made)
         tell('files', 0.97)
-        numbers = args.out / 'results.json'
+        numbers = out / 'results.json'
         write_json(as_json.to_json(results), str(numbers))
-        curves = as_csv.write(results, args.out / 'curves')
+        curves = as_csv.write(results, out / 'curves')
         tell('done', 1.0)
     note(f'{time.monotonic() - started:.0f} s')
     spread = results.table_4
     say(f'report    {page}', args)
     say(f'numbers   {numbers}', args)
-    say(f'curves    {args.out / "curves"} ({len(curves)} files)', args)
+    say(f'curves    {out / "curves"} ({len(curves)} files)', args)
     say(
         f'Table 4   matched at a residual of {1e3 * spread.matched.best_rms:.2f} mm rms; COVs of '
         'beta_1, alpha_1_beta_0, alpha_2 off by '

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from actuator_glue.cli._output import note, progress, write_json
-from actuator_glue.cli._records import number
+from actuator_glue.cli._parser import claim, number
 from actuator_glue.cli._save import add_out, check_out, save
 from actuator_glue.errors import InputError
 from actuator_glue.records import Array, Record
@@ -42,10 +42,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     plant.add_argument(
         '--stiffness',
-        nargs='+',
-        action='extend',
+        action='append',
         type=number,
-        metavar='N/m',
+        metavar='N/m...',
         help='specimen stiffness; one test for each (default 0)',
     )
     plant.add_argument(
@@ -89,6 +88,9 @@ def run(args: argparse.Namespace) -> int:
     if args.seed < 0 or args.command_seed < 0:
         raise InputError('seeds are whole numbers of at least 0')
     out = check_out(args)
+    sealed = out.with_name(out.name + '.truth.json')
+    if args.effect:
+        claim(sealed, args)
     if args.plant == 'problem-r':
         save(_problem_r(args), args)
         return 0
@@ -107,7 +109,6 @@ def run(args: argparse.Namespace) -> int:
             records.append(replace(record, actuator=args.actuator))
     save(records, args)
     if args.effect:
-        sealed = out.with_name(out.name + '.truth.json')
         write_json({'schema': 'actuator_glue.truth/1', **truth}, str(sealed))
         note(f'what was switched on is in {sealed}')
     return 0

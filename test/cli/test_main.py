@@ -1,5 +1,6 @@
 """The entry point: light, lazy, and never a traceback."""
 
+import argparse
 import os
 import subprocess
 import sys
@@ -11,6 +12,7 @@ import pytest
 from actuator_glue.cli import main as entry
 from actuator_glue.errors import InputError
 
+EVERY = sorted(entry.commands())
 WANTED = {'simulate', 'convert', 'info', 'calibrate', 'replay', 'plot', 'recover'}
 HEAVY = ('numba', 'scipy', 'matplotlib', 'arviz', 'rosbags', 'control', 'rich', 'rclpy')
 
@@ -32,16 +34,17 @@ def test_help_names_every_command_with_one_line(run) -> None:
         assert len(entry.summary(file)) > 20, name
 
 
-@pytest.mark.parametrize('command', sorted(WANTED))
+@pytest.mark.parametrize('command', EVERY)
 def test_every_command_explains_itself(run, command: str) -> None:
-    """`COMMAND --help` works and every option has a help text."""
+    """`COMMAND --help` works, names the exit codes, and every option has a help text."""
     done = run(command, '--help')
     assert done.code == 0
-    import argparse
+    assert 'Exit codes: 0 done;' in ' '.join(done.out.split())
+    assert '--force' in done.out
     import importlib
 
     parser = argparse.ArgumentParser()
-    importlib.import_module(f'actuator_glue.cli.{command}').add_arguments(parser)
+    importlib.import_module(f'actuator_glue.cli.{command.replace("-", "_")}').add_arguments(parser)
     assert all(action.help for action in parser._actions)
 
 
@@ -74,6 +77,60 @@ def test_arguments_are_light(command: str) -> None:
         f'print([m for m in {HEAVY!r} if m in sys.modules])'
     )
     assert done.stdout.strip() == '[]', done.stderr
+
+
+def parse(*arguments: object) -> argparse.Namespace:
+    """Return what a command is given."""
+    return entry.build_parser(str(arguments[0])).parse_args([str(a) for a in arguments])
+
+
+@pytest.mark.parametrize('command', ['calibrate', 'diagnose', 'info', 'plot'])
+@pytest.mark.parametrize(
+    'arguments',
+    [
+        ('--stiffness', '0', '250e3', 'a.csv', 'b.csv'),
+        ('a.csv', 'b.csv', '--stiffness', '0', '250e3'),
+        ('a.csv', '--stiffness', '0', '--stiffness', '250e3', 'b.csv'),
+        ('a.csv', '--stiffness', '0', '250e3', 'b.csv'),
+        ('--stiffness=0', 'a.csv', 'b.csv', '--stiffness=250e3', '--hold', 'zoh'),
+    ],
+)
+def test_records_may_stand_after_stiffnesses(command: str, arguments: tuple[str, ...]) -> None:
+    """Numbers after --stiffness are stiffnesses; what is no number is a record."""
+    found = parse(command, *arguments)
+    assert found.records == ['a.csv', 'b.csv']
+    assert found.stiffness == [0.0, 250e3]
+
+
+def test_outputs_may_stand_after_stiffnesses() -> None:
+    """The last name is the output, wherever options stand."""
+    found = parse('convert', 'a.csv', '--stiffness', '-1', 'b.csv', '--unit', 'm', 'out.csv')
+    assert (found.records, found.out, found.stiffness) == (['a.csv', 'b.csv'], 'out.csv', [-1.0])
+    assert parse('simulate', '--stiffness', 0, 5, 'out').stiffness == [0.0, 5.0]
+    assert parse('replay', '--stiffness', 0, 'a.csv').bag == 'a.csv'
+
+
+@pytest.mark.parametrize(
+    ('arguments', 'words'),
+    [
+        (('calibrate',), 'required: RECORD'),
+        (('calibrate', 'a.csv', '--stiffness', 'soft'), "'soft' is not a number"),
+        (('calibrate', 'a.csv', '--seed', '\x1b[31m'), r'\x1b[31m'),
+        (('calibrate', 'a.csv', '--no-such'), 'unrecognized arguments: --no-such'),
+        (('replay',), 'required: BAG'),
+        (('calibrat',), "invalid choice: 'calibrat'"),
+    ],
+)
+def test_argument_errors_are_usage_and_error(run, arguments: tuple[str, ...], words: str) -> None:
+    """Two short lines, exit 2."""
+    done = run(*arguments)
+    assert done.code == 2
+    assert done.out == ''
+    usage, error = done.err.splitlines()
+    assert usage.startswith('usage: actuator-glue ')
+    assert error.startswith('actuator-glue: ')
+    assert words in error
+    assert len(usage) < 100
 
 
 def test_no_command_and_wrong_command_are_2(run) -> None:
