@@ -41,9 +41,12 @@ def _folder() -> Path:
     return folder
 
 
-# Who names a folder, or installs the package where it cannot be written, is left to numba.
-if 'NUMBA_CACHE_DIR' not in os.environ and os.access(Path(__file__).parent, os.W_OK):
-    numba.config.CACHE_DIR = str(_folder())
+# None where somebody names a folder (NUMBA_CACHE_DIR), or where the package cannot be written.
+_FOLDER = (
+    str(_folder())
+    if 'NUMBA_CACHE_DIR' not in os.environ and os.access(Path(__file__).parent, os.W_OK)
+    else None
+)
 
 # Reassociation and contraction let LLVM use vector and fused instructions; NaN and infinity keep
 # their meaning (a diverging simulation must stay visible as such).
@@ -74,4 +77,13 @@ def njit(function: Any = None, **options: Any) -> Any:
         function: what to compile; its signature is kept for type checkers.
         options: options of numba.njit that replace the house's.
     """
-    return _compile(**options) if function is None else _compile(function, **options)
+    if function is None:
+        return partial(njit, **options)
+    # numba asks for the folder when a function is decorated; other people's functions in this
+    # process keep theirs.
+    theirs = numba.config.CACHE_DIR
+    numba.config.CACHE_DIR = _FOLDER or theirs
+    try:
+        return _compile(function, **options)
+    finally:
+        numba.config.CACHE_DIR = theirs
