@@ -1,8 +1,7 @@
 """Diagnose records: is Eq. (2) enough; if not, which effect is missing, error before and after.
 
-Exit code 0: the model is enough, or the missing effect was named. 1: the residual cannot be
-explained by the catalogue, or the held-out part does not bear the answer out. 2: the input cannot
-be used.
+Exit code 0: the model is enough, or what it lacks was named. 1: something remains unexplained, or
+the held-out records do not bear out what the fitting records say. 2: the input cannot be used.
 """
 
 from __future__ import annotations
@@ -96,7 +95,7 @@ def run(args: argparse.Namespace) -> int:
     write_json(found.to_json(), args.json)
     if args.report is not None:
         _report(found, args.report)
-    return 0 if found.answered else 1
+    return 0 if found.complete else 1
 
 
 def _load(args: argparse.Namespace) -> tuple[list[Record], list[Record]]:

@@ -11,8 +11,8 @@ from actuator_glue.residual.data import Data
 from actuator_glue.residual.decide import Decision
 from actuator_glue.residual.diagnosis import HeldOutError
 from actuator_glue.residual.estimate import Estimate, Json
-from actuator_glue.residual.headline import misses
 from actuator_glue.residual.surrogate import Surrogate
+from actuator_glue.residual.verdict import misses
 from actuator_glue.residual.windows import Windows
 
 # The experiment that separates two groups of effects (issue: second amplitude, down-sweep, ...).
@@ -70,10 +70,14 @@ def of(
         )
     if decision.verdict == 'unexplained':
         best = found.singles[0].added if found.singles else ''
+        nearest = (
+            'the additions may stand for something that the catalogue does not hold'
+            if decision.names
+            else f'closest in the catalogue, not enough: {best}'
+        )
         out.append(
             f'{1e6 * decision.left:.1f} um of structure remain '
-            f'(limit {1e6 * decision.limit:.1f}); '
-            f'closest in the catalogue, not enough: {best}; look where `remaining` points, '
+            f'(limit {1e6 * decision.limit:.1f}); {nearest}; look where `remaining` points, '
             'and record the force channel and a second amplitude'
         )
         out += [_where(row) for row in decision.remaining['records']]
@@ -125,17 +129,14 @@ def unconverged(rhat: float) -> tuple[str, ...]:
     )
 
 
-def contradicted(verdict: str, error: HeldOutError, material: float) -> tuple[str, ...]:
-    """Say so where the held-out part shows far more than noise although nothing else is left.
-
-    The verdict stays: the held-out part decides nothing.
-    """
-    if verdict == 'unexplained' or not misses(error, material):
+def contradicted(error: HeldOutError, material: float) -> tuple[str, ...]:
+    """Say so where the held-out part shows far more than noise."""
+    if not misses(error, material):
         return ()
     return (
-        f'the held-out part does not bear this out: it leaves {1e6 * error.after:.1f} um where '
-        f'{1e6 * error.noise_floor:.1f} um are noise; it shows what the fitting records do not: '
-        'add a record like it to them',
+        f'the held-out part leaves {1e6 * error.after:.1f} um where '
+        f'{1e6 * error.noise_floor:.1f} um are noise: it may show what the fitting records do '
+        'not; add a record like it to them',
     )
 
 

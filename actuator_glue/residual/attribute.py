@@ -138,8 +138,7 @@ class Attributor:
             if self.left(current) < max(threshold, s.left_share * self.first):
                 # Most is explained: small change may only mend the form of what was found.
                 threshold = max(threshold, s.later_share * removed(base, current))
-            hopeless = stage > 1 and self.left(current) > s.hopeless * self.first
-            if self.left(current) < threshold or stage == s.most or hopeless:
+            if self.left(current) < threshold or stage == s.most:
                 break
             ranked = self.extend(self.rescored(ranked[: s.beam]), stage + 1)
             current = self.search.trial(current.effects, current.added)

@@ -1,4 +1,4 @@
-"""The verdict: none, missing-effect or unexplained, and where an unexplained rest sits."""
+"""The verdict on the fitting part, and where an unexplained rest sits."""
 
 from __future__ import annotations
 
@@ -24,13 +24,14 @@ class Decision:
 
     Attributes:
         verdict: see Diagnosis.
-        final: structure to go on with.
+        final: structure to go on with: all additions that are supported.
         names: its effects, named as findings.
         measured: measurement effects, named as findings.
         noise: rms of what no structure explains [m].
         left: rms structure that remains, without what measurement effects cause [m].
-        certainty: what the names' probabilities are multiplied with: the share of the structure
-            explained where much remains, else 1.
+        certainty: what the names' probabilities are multiplied with: 1 where next to nothing
+            remains, else the share of the structure that they explain and a generic regression
+            does not explain better.
         limit: rms structure above which a model counts as unexplained [m].
         remaining: where the rest sits, for the JSON.
     """
@@ -55,20 +56,17 @@ def decide(
 ) -> Decision:
     """Weigh what was found against what remains.
 
-    Names that a generic surrogate of as many parameters beats beyond chance stand only where
-    next to nothing remains: what a regression on the motion explains better than they do is not
-    their doing, even where they remove most of it. A machine that lacks three effects and more
-    lacks others too, and a regression finds some of them: its names are then held to the share
-    that one or two effects are held to, and fall where the regression leaves nothing material.
+    Which additions are supported was decided one by one, each on its own evidence and size; they
+    stay whatever remains beside them. Here it is decided whether they are the whole story. Where
+    a generic surrogate of as many parameters beats the names beyond chance, next to nothing may
+    remain: what a regression on the motion explains better than they do is not their doing.
     """
     variance = sum(m.rms**2 for m in seen if m.name != 'hum')
     left = float(np.sqrt(max(0.0, found.left**2 - variance)))
-    many = sum(gain >= found.material for gain in found.removed.values()) > 2
-    beaten = bool(found.final.effects) and surrogate.beats(found.material, settings.nats)
-    share = settings.left_share_many if many and not beaten else settings.left_share
-    limit = max(settings.left_noise * found.noise, found.material, share * found.structure)
-    rest = max(0.0, surrogate.error**2 - found.noise**2)
-    if beaten and (not many or rest < found.material**2):
+    limit = max(
+        settings.left_noise * found.noise, found.material, settings.left_share * found.structure
+    )
+    if found.final.effects and surrogate.beats(found.material, settings.nats):
         floor = max(settings.beaten_noise * found.noise, settings.beaten_share * found.structure)
         limit = min(limit, floor)
     verdict: Verdict = 'none'
@@ -76,22 +74,31 @@ def decide(
         verdict = 'unexplained'
     elif found.final.effects or seen:
         verdict = 'missing-effect'
-    # Several effects that explain most of it are worth going on with; what remains is said.
-    partly = verdict == 'unexplained' and many and not beaten
-    partly = partly and left < settings.left_share_partly * found.structure
-    named = verdict == 'missing-effect' or partly
-    final = found.final if named else found.base
+    final = found.final
     return Decision(
         verdict=verdict,
         final=final,
         names=final.effects,
-        measured=seen if named else (),
+        measured=seen,
         noise=found.noise,
         left=left,
-        certainty=1.0 - (left / found.structure) ** 2 if partly else 1.0,
+        certainty=_certainty(found, left, surrogate) if verdict == 'unexplained' else 1.0,
         limit=limit,
         remaining={'left': left, 'limit': limit, **remaining(data, final.fit.error)},
     )
+
+
+def _certainty(found: Attribution, left: float, surrogate: Surrogate) -> float:
+    """Return the share of the structure that is the names' own doing, in [0, 1].
+
+    What they explain of the structure, times what a regression of as many parameters leaves of
+    what they leave: a smooth function of the motion that does much better says that the names
+    stand for it.
+    """
+    explained = 1.0 - min(1.0, left / found.structure) ** 2 if found.structure > 0.0 else 0.0
+    theirs = surrogate.structure_error**2 - found.noise**2
+    generic = max(0.0, surrogate.error**2 - found.noise**2)
+    return explained * (min(1.0, generic / theirs) if theirs > 0.0 else 1.0)
 
 
 def _band(frequency: Array, excess: Array) -> list[float]:

@@ -13,7 +13,7 @@ from actuator_glue.inference.at_bound import Pressed, pressed
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array, Record
-from actuator_glue.residual import advice, apart, posterior, windows
+from actuator_glue.residual import advice, apart, posterior, verdict, windows
 from actuator_glue.residual.attribute import Attribution
 from actuator_glue.residual.conclude import Progress, conclude, with_the_right_hold
 from actuator_glue.residual.decide import Decision
@@ -89,10 +89,13 @@ def diagnose(
     )
     space = Space(after.model, max(r.duration for r in data.records))
     estimates, held_at = _estimates(space, after), _pressed(space, after)
+    effects = _findings(decision, found, estimates, stretches)
+    moved = any(e.noise is None for e in effects)
+    judged = verdict.conclude(decision.verdict, moved, error, found.material)
     tell('done', 1.0)
     return Diagnosis(
-        verdict=decision.verdict,
-        effects=_findings(decision, found, estimates, stretches),
+        verdict=judged,
+        effects=effects,
         error=error,
         candidates=_candidates(found, result.seen),
         coverage=coverage,
@@ -100,7 +103,7 @@ def diagnose(
         advice=(
             *advice.at_bound(held_at, estimates),
             *advice.of(decision, found, result.generic, stretches),
-            *advice.contradicted(decision.verdict, error, found.material),
+            *advice.contradicted(error, found.material),
             *advice.unidentified(data, estimates),
             *advice.unconverged(rhat),
             *prepared.notes,

@@ -8,11 +8,11 @@ from typing import Literal, TypeAlias
 from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.records import Array
 from actuator_glue.residual.estimate import Estimate, Json, number
-from actuator_glue.residual.headline import borne_out, headline
+from actuator_glue.residual.headline import headline
 
 SCHEMA = 'actuator_glue.diagnosis/1'
 
-Verdict: TypeAlias = Literal['none', 'missing-effect', 'unexplained']
+Verdict: TypeAlias = Literal['none', 'missing-effect', 'unexplained', 'undecided']
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +103,7 @@ class HeldOutError:
         after_ci: 95 % block-bootstrap interval of `after`.
         noise_floor: rms of what no function of the command can explain.
         removable_removed: share of (before^2 - floor^2) removed, 1 is all.
+        removed_ci: 95 % block-bootstrap interval of `removable_removed`.
         sham: rms error with a sham effect of equal parameter count, as control.
         records: rms error before and after of each held-out record.
         after_without_hum: `after` with the hum that was found regressed out of the held-out part
@@ -116,6 +117,7 @@ class HeldOutError:
     after_ci: tuple[float, float]
     noise_floor: float
     removable_removed: float
+    removed_ci: tuple[float, float]
     sham: float
     records: tuple[tuple[str, float, float], ...] = ()
     after_without_hum: float | None = None
@@ -131,6 +133,7 @@ class HeldOutError:
             **{k: number(getattr(self, k)) for k in numbers},
             'before_ci': [number(v) for v in self.before_ci],
             'after_ci': [number(v) for v in self.after_ci],
+            'removed_ci': [number(v) for v in self.removed_ci],
             'after_without_hum': None if hum is None else number(hum),
             'records': [
                 {'source': s, 'before': number(b), 'after': number(a)} for s, b, a in self.records
@@ -194,9 +197,11 @@ class Diagnosis:
     """Verdict, evidence and the augmented model.
 
     Attributes:
-        verdict: 'none' (the model is enough), 'missing-effect' or 'unexplained'.
-        effects: findings in the order of what they remove; with 'unexplained' only where three or
-            more together explain most of the structure, and then less probable.
+        verdict: 'none' (the model is enough), 'missing-effect' (what was added is all),
+            'unexplained' (material structure remains) or 'undecided' (the held-out part does not
+            bear out what the fitting part says).
+        effects: additions that are supported, in the order of what they remove; whatever remains
+            beside them they are part of the model, less probable the more of it does.
         error: held-out error before and after.
         candidates: all effects tried first, best first.
         coverage: share of held-out samples in the 95 % band, before and after.
@@ -240,7 +245,7 @@ class Diagnosis:
             'schema': SCHEMA,
             'verdict': self.verdict,
             'summary': self.summary(),
-            'borne_out': self.borne_out,
+            'complete': self.complete,
             'effects': [e.to_json() for e in self.effects],
             'error': self.error.to_json(),
             'candidates': [c.to_json() for c in self.candidates],
@@ -257,14 +262,9 @@ class Diagnosis:
         }
 
     @property
-    def borne_out(self) -> bool:
-        """Whether the held-out part shows what the verdict says."""
-        return borne_out(self)
-
-    @property
-    def answered(self) -> bool:
-        """Whether the verdict explains the records, held-out part included."""
-        return self.verdict != 'unexplained' and self.borne_out
+    def complete(self) -> bool:
+        """Whether nothing material remains, on the fitting and on the held-out part."""
+        return self.verdict in ('none', 'missing-effect')
 
     def summary(self) -> str:
         """Return the verdict in one line."""

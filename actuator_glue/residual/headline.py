@@ -1,38 +1,14 @@
-"""The one line of a diagnosis, and whether the held-out part bears it out."""
+"""The one line of a diagnosis, from the numbers that its notes, JSON and exit code have."""
 
 from __future__ import annotations
 
 import math
 from typing import TYPE_CHECKING
 
+from actuator_glue.residual.verdict import misses
+
 if TYPE_CHECKING:
-    from actuator_glue.residual.diagnosis import Diagnosis, Finding, HeldOutError
-
-# Held-out errors beyond this many times the noise say that the fitting records lack something.
-_BEYOND = 2.0
-# Share of the removable error that is printed as 0.0 %.
-_NOTHING = 5e-4
-
-
-def misses(error: HeldOutError, material: float) -> bool:
-    """Whether the held-out part shows more than noise, by what counts as material [m]."""
-    floor = error.noise_floor
-    return error.after > _BEYOND * floor and error.after**2 - floor**2 > material**2
-
-
-def of_motion(found: Diagnosis) -> list[Finding]:
-    """Return findings that change the simulated motion; the others only add to the noise."""
-    return [e for e in found.effects if e.noise is None]
-
-
-def removes_nothing(found: Diagnosis) -> bool:
-    """Whether effects were found for the motion that leave the held-out error as it was."""
-    return bool(of_motion(found)) and found.error.removable_removed < _NOTHING
-
-
-def borne_out(found: Diagnosis) -> bool:
-    """Whether the held-out part shows what the verdict says."""
-    return not misses(found.error, found.alarm.threshold) and not removes_nothing(found)
+    from actuator_glue.residual.diagnosis import Diagnosis, Finding
 
 
 def _named(effect: Finding) -> str:
@@ -54,24 +30,18 @@ def _noise(found: Diagnosis) -> str:
 
 def headline(found: Diagnosis) -> str:
     """Return the verdict in one line, never more than the held-out part bears out."""
-    moved = of_motion(found)
+    names = ', '.join(_named(e) for e in found.effects if e.noise is None)
     before, after = 1e6 * found.error.before, 1e6 * found.error.after
-    change = f'held-out error {before:.1f} -> {after:.1f} um, {_noise(found)}'
-    still = f'held-out error {after:.1f} um, {_noise(found)}'
-    missed = misses(found.error, found.alarm.threshold)
+    change = f'held-out error {before:.1f} -> {after:.1f} um' if names else (
+        f'held-out error {after:.1f} um'
+    )  # fmt: skip
+    change = f'{change}, {_noise(found)}'
+    if found.verdict == 'undecided':
+        asked = f'for {names}, the held-out part does not' if names else 'for nothing'
+        return f'undecided: the fitting records ask {asked}; {change}'
     if found.verdict == 'unexplained':
-        if not moved:
-            return f'the model is not enough and no catalogued effect explains why: {still}'
-        names = ', '.join(e.name for e in moved)
-        return (
-            f'the model is not enough and the catalogue explains it only in part ({names}): '
-            f'{change}'
-        )
-    if removes_nothing(found):
-        return f'what the fitting records show is not in the held-out part: {change}'
-    if moved:
-        names = ', '.join(map(_named, moved))
-        return f'missing: {names}{", and more" if missed else ""}; {change}'
-    if missed:
-        return f'the model explains the fitting records but not the held-out part: {still}'
-    return f'the model is enough: {still}'
+        rest = f'{1e6 * found.remaining["left"]:.1f} um of structure in the fitting records remain'
+        if not names:
+            return f'the model is not enough and no addition is supported: {change}; {rest}'
+        return f'added, but not the whole story: {names}; {change}; {rest}'
+    return f'missing: {names}; {change}' if names else f'the model is enough: {change}'

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy import ndimage
 
 from actuator_glue.errors import InputError
 from actuator_glue.model.exact import Initial
@@ -15,6 +16,9 @@ from actuator_glue.residual.data import Data, Mask
 
 SETTLE = 1.0  # s in which an unknown initial state is forgotten
 _SHORTEST = 5.0  # s
+_MOVED = 2e-3  # of its largest excursion: a command within it has not begun
+_HEAD = 0.5  # s that show where it rests and how noisy its channel is
+_SMOOTH = 0.03  # s
 _REST = 1.5  # s of constant command that define the zero of both channels
 # Share of its range that a channel may be away from zero, or move within a moment, at rest.
 _STILL = 0.05
@@ -40,10 +44,18 @@ class Prepared:
 
 
 def rest_samples(record: Record) -> int:
-    """Samples at the beginning in which the command does not move."""
-    off = np.abs(record.command - record.command[0])
-    moving = off > 2e-3 * float(off.max())
-    return int(np.argmax(moving))
+    """Samples at the beginning in which the command does not move.
+
+    The command is smoothed over a few hundredths of a second: one that was recorded by a noisy
+    channel does not move with every sample.
+    """
+    head = record.command[: max(2, round(_HEAD / record.period))]
+    width = max(1, round(_SMOOTH / record.period))
+    centre = float(np.median(head))
+    noise = 1.4826 * float(np.median(np.abs(head - centre))) / np.sqrt(width)
+    off = np.abs(ndimage.uniform_filter1d(record.command, width, mode='nearest') - centre)
+    moving = off > max(_MOVED * float(off.max()), 6.0 * noise)
+    return int(np.argmax(moving)) if noise < _MOVED * float(off.max()) else 0
 
 
 def zeroed(records: Sequence[Record]) -> tuple[list[Record], list[str]]:

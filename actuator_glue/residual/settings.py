@@ -18,12 +18,8 @@ class Settings:
         tie_share: or where they differ by less than this share of what the better one removes.
         left_noise: the model is unexplained where structure above this share of the noise
         left_share: and above this share of the structure found at first remains;
-        left_share_many: this share where three or more effects are material: such a machine
-            lacks more than any search finds, and each finding stands on evidence of its own.
-        left_share_partly: such findings are named beside `unexplained` below this share.
         beaten_noise, beaten_share: as left_noise and left_share, where a generic surrogate
             explains more than the names do (0.28 of the noise is found in noise alone).
-        hopeless: no third effect is sought where two leave this share of the structure.
         most: most effects added.
         beam: structures carried on from one size to the next.
         evaluations: likelihood evaluations of the posterior; 0 takes the Laplace approximation.
@@ -40,9 +36,6 @@ class Settings:
     left_share: float = 0.3
     beaten_noise: float = 0.3
     beaten_share: float = 0.15
-    left_share_partly: float = 0.5
-    left_share_many: float = 0.45
-    hopeless: float = 0.7
     most: int = 6
     beam: int = 3
     tried: int = 5

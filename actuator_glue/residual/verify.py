@@ -33,26 +33,36 @@ def rms(error: Array) -> float:
 
 
 def bootstrap(
-    squares: tuple[Array, ...], data: Data, rng: np.random.Generator
+    errors: tuple[Array, Array], floor: float, data: Data, rng: np.random.Generator
 ) -> list[tuple[float, float]]:
-    """95 % block-bootstrap intervals of rms errors, the same blocks for all of them.
+    """95 % block-bootstrap intervals, the same blocks for all of them.
 
     Args:
-        squares: squared errors over the counted samples, (N,) each [m^2].
+        errors: error before and after at the counted samples, (N,) each [m].
+        floor: noise of these samples [m].
         data: gives the block length; blocks are as long as a residual is correlated.
         rng: random numbers.
+
+    Returns:
+        Intervals of the rms before and after [m], and of the share removed of what exceeds the
+        noise.
     """
     length = max(1, round(BLOCK / min(data.periods)))
     edges = np.arange(0, data.target.size, length)
     sizes = np.diff(np.append(edges, data.target.size))
     pick = rng.integers(0, len(edges), (_RESAMPLES, len(edges)))
-    out = []
-    for square in squares:
-        sums = np.add.reduceat(square, edges)
-        means = np.sqrt(sums[pick].sum(axis=1) / sizes[pick].sum(axis=1))
-        low, high = np.quantile(means, [0.025, 0.975])
-        out.append((float(low), float(high)))
-    return out
+    counts = sizes[pick].sum(axis=1)
+    before, after = (
+        np.add.reduceat(error**2, edges)[pick].sum(axis=1) / counts for error in errors
+    )
+    removable = np.maximum(before - floor**2, 1e-6 * before)
+    return [
+        (float(low), float(high))
+        for low, high in (
+            np.quantile(values, [0.025, 0.975])
+            for values in (np.sqrt(before), np.sqrt(after), (before - after) / removable)
+        )
+    ]
 
 
 def _spread(data: Data, side: Side, rng: np.random.Generator) -> Array:
@@ -129,7 +139,7 @@ def verify(
         inner = fit.simulate(side.model, side.theta)[0]
         width = _NORMAL_95 * np.sqrt(_spread(fit, side, rng) ** 2 + noise**2)
         curves[key] = (inner, width, sims[key], halves[key])
-    intervals = bootstrap((errors['before'] ** 2, errors['after'] ** 2), held, rng)
+    intervals = bootstrap((errors['before'], errors['after']), floor, held, rng)
     first, last = rms(errors['before']), rms(errors['after'])
     removable = first**2 - floor**2
     count = len(after.theta) - len(before.theta)
@@ -152,6 +162,7 @@ def verify(
         after_ci=intervals[1],
         noise_floor=floor,
         removable_removed=(first**2 - last**2) / removable if removable > 0 else 0.0,
+        removed_ci=intervals[2],
         sham=sham,
         after_without_hum=rms(lines.regressed(held, errors['after'], line)) if line else None,
         records=per_record,

@@ -9,6 +9,7 @@ import pytest
 from actuator_glue.cli.main import main
 from actuator_glue.residual import diagnose as module
 from actuator_glue.residual.diagnosis import Alarm, Diagnosis, Finding, HeldOutError, Verdict
+from actuator_glue.residual.verdict import conclude
 
 NONE = np.empty((0, 4))
 
@@ -23,16 +24,18 @@ def diagnosis(
 ) -> Diagnosis:
     """A diagnosis with held-out errors before and after [m]."""
     removed = (before**2 - after**2) / max(before**2 - noise**2, 1e-12)
-    error = HeldOutError(before, (0, 1), after, (0, 1), noise, removed, before)
+    about = (removed - 0.1, removed + 0.1)
+    error = HeldOutError(before, (0, 1), after, (0, 1), noise, removed, about, before)
     alarm = Alarm(verdict != 'none', 1e-5, 5e-6, noise, 0.01)
+    judged = conclude(verdict, any(e.noise is None for e in effects), error, alarm.threshold)
     return Diagnosis(
-        verdict, effects, error, (), (0.9, 0.9), alarm, (), {}, (), (), NONE, 1.0, NONE, (),
-        {}, {}, 1.0,
+        judged, effects, error, (), (0.9, 0.9), alarm, (), {}, (), (), NONE, 1.0, NONE, (),
+        {}, {'left': 12e-6}, 1.0,
     )  # fmt: skip
 
 
 @pytest.mark.parametrize(
-    ('found', 'says', 'answered'),
+    ('found', 'says', 'complete'),
     [
         (
             diagnosis('none', 10.2e-6, 10.2e-6),
@@ -41,8 +44,8 @@ def diagnosis(
         ),
         (
             diagnosis('none', 198e-6, 198e-6),
-            'the model explains the fitting records but not the held-out part: held-out error '
-            '198.0 um, 19.8 times the noise of 10.0 um',
+            'undecided: the fitting records ask for nothing; held-out error 198.0 um, 19.8 times '
+            'the noise of 10.0 um',
             False,
         ),
         (
@@ -52,14 +55,20 @@ def diagnosis(
         ),
         (
             diagnosis('missing-effect', 80e-6, 40e-6, finding('backlash')),
-            'missing: backlash, and more; held-out error 80.0 -> 40.0 um, 4.0 times the noise of '
-            '10.0 um',
+            'added, but not the whole story: backlash; held-out error 80.0 -> 40.0 um, 4.0 times '
+            'the noise of 10.0 um; 12.0 um of structure in the fitting records remain',
             False,
         ),
         (
             diagnosis('missing-effect', 10.1e-6, 10.1e-6, finding('backlash')),
-            'what the fitting records show is not in the held-out part: held-out error '
-            '10.1 -> 10.1 um, noise 10.0 um',
+            'undecided: the fitting records ask for backlash, the held-out part does not; '
+            'held-out error 10.1 -> 10.1 um, noise 10.0 um',
+            False,
+        ),
+        (
+            diagnosis('missing-effect', 80e-6, 79e-6, finding('backlash')),
+            'undecided: the fitting records ask for backlash, the held-out part does not; '
+            'held-out error 80.0 -> 79.0 um, 7.9 times the noise of 10.0 um',
             False,
         ),
         (
@@ -68,9 +77,15 @@ def diagnosis(
             True,
         ),
         (
+            diagnosis('unexplained', 80e-6, 30e-6, finding('gain')),
+            'added, but not the whole story: gain; held-out error 80.0 -> 30.0 um, 3.0 times the '
+            'noise of 10.0 um; 12.0 um of structure in the fitting records remain',
+            False,
+        ),
+        (
             diagnosis('unexplained', 80e-6, 80e-6),
-            'the model is not enough and no catalogued effect explains why: held-out error '
-            '80.0 um, 8.0 times the noise of 10.0 um',
+            'the model is not enough and no addition is supported: held-out error 80.0 um, 8.0 '
+            'times the noise of 10.0 um; 12.0 um of structure in the fitting records remain',
             False,
         ),
     ],
@@ -78,7 +93,7 @@ def diagnosis(
 def test_the_headline_follows_the_held_out_part(
     found: Diagnosis,
     says: str,
-    answered: bool,
+    complete: bool,
     monkeypatch: pytest.MonkeyPatch,
     tmp_path: Path,
     capsys: pytest.CaptureFixture[str],
@@ -92,6 +107,6 @@ def test_the_headline_follows_the_held_out_part(
     code = main(['diagnose', str(record), '--stiffness', '0', '--json', str(out)])
     assert capsys.readouterr().out.splitlines()[0] == says
     content = json.loads(out.read_text())
-    assert content['summary'] == says
-    assert code == (0 if answered else 1)
-    assert content['borne_out'] is answered
+    assert (content['summary'], content['verdict']) == (says, found.verdict)
+    assert code == (0 if complete else 1)
+    assert content['complete'] is complete
