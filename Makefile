@@ -21,9 +21,11 @@ $(VENV_STAMP): pyproject.toml constraints.txt setup.py setup.cfg scripts/find_py
 	@scripts/make_venv.sh
 	@touch $@
 
-$(ROS_STAMP): $(VENV_STAMP) scripts/build_ros.sh setup.py setup.cfg package.xml \
+$(ROS_STAMP): $(VENV_STAMP) scripts/build_ros.sh scripts/warm_up.py setup.py setup.cfg package.xml \
 		$(wildcard msg_defs/*.* msg_defs/*/*.* launch/*.py config/*.yaml config/*/*.yaml)
-	@scripts/build_ros.sh
+	@echo 'set-up: compiling for the first calibration and diagnosis meanwhile (a minute or two)'
+	@$(BIN)/python scripts/warm_up.py & warm_up=$$!; \
+		scripts/build_ros.sh || { kill $$warm_up; exit 1; }; wait $$warm_up
 	@touch $@
 
 # make demo DATA=record.csv CHANNELS=map.yaml STIFFNESS=250e3 runs on a laboratory file instead of the simulator.

@@ -23,5 +23,6 @@ touch "$venv/COLCON_IGNORE"
 extras=dev
 [ "$flavour" = wheels ] && extras+=,ros
 echo 'set-up: installing actuator_glue, editable, and what it needs (a minute with a fast connection)'
-"$venv/bin/python" -m pip install --quiet --disable-pip-version-check -c constraints.txt --editable ".[$extras]"
+# --no-compile: Python compiles what it imports, a small part, when it imports it.
+"$venv/bin/python" -m pip install --quiet --no-compile --disable-pip-version-check -c constraints.txt --editable ".[$extras]"
 [ "$flavour" != wheels ] || "$venv/bin/python" scripts/mend_ros_wheels.py

@@ -10,6 +10,7 @@ import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
 import pytest
+import yaml
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 import actuator_glue
@@ -205,3 +206,22 @@ def test_test_modules_have_names_of_their_own() -> None:
     """Pytest imports two files of one name only once."""
     names = [p.name for p in (ROOT / 'test').rglob('test_*.py')]
     assert sorted(names) == sorted(set(names))
+
+
+def test_hooks_run_what_lint_runs() -> None:
+    """`git commit` with hooks and `make lint` find the same."""
+    makefile = (ROOT / 'Makefile').read_text(encoding='utf-8')
+    recipe = re.search(r'^lint:.*\n((?:\t.*\n)+)', makefile, re.MULTILINE)
+    commands = re.findall(r'^\t@\$\(BIN\)/(.*)$', recipe[1], re.MULTILINE)
+    hooks = yaml.safe_load((ROOT / '.pre-commit-config.yaml').read_text(encoding='utf-8'))
+    entries = [hook['entry'] for repo in hooks['repos'] for hook in repo['hooks']]
+    assert entries == [f'.venv/bin/{command}' for command in commands]
+
+
+def test_citation_is_of_this_version() -> None:
+    """CITATION.cff names the version and licence that the package has."""
+    citation = yaml.safe_load((ROOT / 'CITATION.cff').read_text(encoding='utf-8'))
+    assert citation['version'] == actuator_glue.__version__
+    assert citation['license'] == 'Apache-2.0'
+    changelog = (ROOT / 'CHANGELOG.rst').read_text(encoding='utf-8')
+    assert f'{citation["version"]} ({citation["date-released"]})' in changelog
