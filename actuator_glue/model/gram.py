@@ -111,14 +111,18 @@ def _add_products(x: Array, size: int, impulse: bool, e: Array, products: Array)
 
 
 @njit
-def _states(memory: Array, t: Array) -> Array:
-    """Return sections' states in coordinates in which they are lossless; memory is (..., 2)."""
-    states = np.empty(memory.shape[:-1])
+def _fill_states(memory: Array, t: Array, states: Array) -> None:
+    """Fill sections' states in coordinates in which they are lossless; memory is (..., 2).
+
+    Number by number: numba takes seconds to compile the message of an assignment between arrays
+    that do not fit.
+    """
     for kind, pole, delta in ((1, t[POLE], t[DELTA]), (0, t[POLE_2], t[DELTA_2])):
-        some = memory[:, kind::2]
         scale = np.sqrt(delta * (2.0 - delta))
-        states[:, kind::2] = (pole * some[..., 1] + delta * some[..., 0]) / scale
-    return states
+        for bank in range(len(memory)):
+            for k in range(kind, memory.shape[1], 2):
+                some = memory[bank, k]
+                states[bank, k] = (pole * some[1] + delta * some[0]) / scale
 
 
 @njit
@@ -146,8 +150,8 @@ def _fill_gram(products: Array, start: Array, end: Array, t: Array, gram: Array)
 
     Args:
         products: see `_add_products`.
-        start: `_states` at the first counted sample, shape (banks, K + 1).
-        end: `_states` after the last.
+        start: `_fill_states` at the first counted sample, shape (banks, K + 1).
+        end: the same after the last.
         t: the record's row.
         gram: shape (dims, dims); the banks' blocks of terms take turns.
     """
@@ -212,8 +216,9 @@ def prepare(t: Array, c: Array, measured: Array, command: Array, settle: int) ->
         last = min(first + _SAMPLES, n if first >= settle else settle)
         size = last - first
         if first == settle:
-            start[:filtered] = _states(memory[:filtered], t)
-        x[0, 0, :size] = command[first:last]
+            _fill_states(memory[:filtered], t, start)
+        for i in range(size):
+            x[0, 0, i] = command[first + i]
         if banks == 2:
             x[1, 0, 0] = 1.0 if first == 0 else 0.0
         for bank in range(filtered):
@@ -235,4 +240,6 @@ def prepare(t: Array, c: Array, measured: Array, command: Array, settle: int) ->
             i = at + (k // BLOCK * banks + bank) * BLOCK + k % BLOCK
             t[i], t[i + dims] = products[bank, k, 3], products[bank, k, 2]
     gram = t[at + 2 * dims : at + (2 + dims) * dims].reshape(dims, dims)
-    _fill_gram(products, start, _states(memory, t), t, gram)
+    end = np.empty((banks, K + 1))
+    _fill_states(memory, t, end)
+    _fill_gram(products, start, end, t, gram)

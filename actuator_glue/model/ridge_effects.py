@@ -201,7 +201,10 @@ def coordinates_all(
     theta: Array, k: float, low: Array, high: Array, at: NDArray[np.int64], middle: float, z: Array
 ) -> None:
     """Fill z (m, p) with the coordinates of physical parameters theta (m, p)."""
-    z[:] = theta
+    # Number by number: numba takes seconds to compile the message of arrays that do not fit.
+    for i in range(len(theta)):
+        for j in range(theta.shape[1]):
+            z[i, j] = theta[i, j]
     ridge.coordinates_all(theta, k, low, high, z)
     for i in range(len(theta)):
         oil = max(k + theta[i, 2], 1e-9)
