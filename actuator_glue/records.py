@@ -63,6 +63,12 @@ def check_stiffness(stiffness: float, source: str = '') -> float:
     return value
 
 
+def source_name(source: str) -> str:
+    """Return the last name of a source `folder/bag:/topic (record 1 of 2)`, folders left out."""
+    path, mark, rest = source.partition(':/')
+    return f'{path.rstrip("/").rpartition("/")[2]}{mark}{rest}'
+
+
 def check_period(period: float, source: str = '') -> float:
     """Return a sample period [s] that can be used.
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from actuator_glue.cli._output import say
 from actuator_glue.cli._parser import claim
 from actuator_glue.errors import InputError
-from actuator_glue.records import Array, Record
+from actuator_glue.records import Array, Record, source_name
 
 if TYPE_CHECKING:
     from actuator_glue.model.exact import Initial
@@ -104,7 +104,7 @@ class Draws:
         total = total_band(np.random.default_rng(0), simulated, residual, (LEVEL,))
         inside = (record.measured >= total.lower[0]) & (record.measured <= total.upper[0])
         limits = band(simulated, (LEVEL,))
-        title = Path(record.source).name
+        title = source_name(record.source)
         figure = band_at_zooms(
             record, limits, even_zooms(record), level=LEVEL, total=total, title=title
         )

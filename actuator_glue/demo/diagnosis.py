@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from actuator_glue.records import Record
 from actuator_glue.report import style
+from actuator_glue.report.diagnosis_figures import stretches
 from actuator_glue.residual.diagnose import diagnose
 from actuator_glue.residual.diagnosis import Diagnosis, Trace
 
@@ -89,11 +90,11 @@ def _draw(diagnosis: Diagnosis, trace: Trace) -> Figure:
 def _stretch(trace: Trace) -> slice:
     """Return a short stretch without a hole, of the longest one in the middle of the record."""
     period = float(np.median(np.diff(trace.time)))
-    edges = np.flatnonzero(np.diff(trace.time) > 1.5 * period) + 1
-    pieces = np.split(np.arange(len(trace.time)), edges)
+    pieces = stretches(trace)
     piece = pieces[len(pieces) // 2]
-    length = min(len(piece), max(2, round(SECONDS / period)))
-    start = int(piece[0]) + (len(piece) - length) // 2
+    size = piece.stop - piece.start
+    length = min(size, max(2, round(SECONDS / period)))
+    start = piece.start + (size - length) // 2
     return slice(start, start + length)
 
 

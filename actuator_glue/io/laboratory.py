@@ -182,7 +182,7 @@ def _rest_offset(column: Array, samples: int, where: str, role: str) -> float:
     span, whole = float(np.ptp(rest)), float(np.ptp(column))
     if span > _REST_SHARE * whole:
         if role == 'force':
-            # No zero of the force is used anywhere: its channel keeps its offset, and stops nobody.
+            # No zero of the force is used anywhere: its channel keeps its offset.
             return 0.0
         raise InputError(
             f'{where}: not at rest in the first {samples} samples (moves {span:.3g} of '

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from actuator_glue.model.effects import CATALOGUE
+from actuator_glue.records import source_name
 from actuator_glue.report import diagnosis_figures as figures
 from actuator_glue.report.html import Block, Note, Picture, Section, Table, Text, write
 from actuator_glue.residual.diagnosis import Diagnosis
@@ -18,7 +19,12 @@ def _error(found: Diagnosis) -> Section:
     e = found.error
     sides = (
         ('before: Eq. (2), refitted', e.before, e.before_ci, found.coverage[0]),
-        ('after', e.after, e.after_ci, found.coverage[1]),
+        (
+            'after' if figures.moved(found) else 'after (the same: nothing was added)',
+            e.after,
+            e.after_ci,
+            found.coverage[1],
+        ),
     )
     rows = [
         [text, _um(rms), f'{_um(low)} to {_um(high)}', f'{100 * inside:.1f}']
@@ -35,7 +41,7 @@ def _error(found: Diagnosis) -> Section:
         Text(f'Share of the removable error removed: {100 * e.removable_removed:.1f} %.'),
         Table(
             ['held-out record', 'before [um]', 'after [um]'],
-            [[Path(source).name, _um(b), _um(a)] for source, b, a in e.records],
+            [[source_name(source), _um(b), _um(a)] for source, b, a in e.records],
             'The same for each record.',
         ),
         Picture.of(figures.bands(found), '95 % predictive bands where both models differ most.'),
@@ -112,7 +118,7 @@ def _residual(found: Diagnosis) -> Section:
     tests = [[name, f'{value:.3g}'] for name, value in a.tests.items()]
     rows = [
         [
-            Path(r['source']).name, _um(r['structure']), _um(r['noise']),
+            source_name(r['source']), _um(r['structure']), _um(r['noise']),
             ' to '.join(f'{f:g}' for f in r['frequency_hz']),
             ' to '.join(f'{t:g}' for t in r['time_s']),
             ' to '.join(f'{1e3 * x:.2g}' for x in r['displacement']),
@@ -146,11 +152,26 @@ def _residual(found: Diagnosis) -> Section:
     )  # fmt: skip
 
 
+def _records(found: Diagnosis) -> Section:
+    rows = [
+        [
+            source_name(t.source),
+            'held out' if t.held_out else 'fitted',
+            f'{t.stiffness / 1e3:g}',
+            str(len(t.time)),
+            t.source,
+        ]
+        for t in found.traces
+    ]
+    header = ['record', 'part', 'stiffness [kN/m]', 'samples', 'source']
+    return Section('Records', [Table(header, rows, 'What was read, and from where.', prose=True)])
+
+
 def write_report(found: Diagnosis, path: Path) -> Path:
     """Write the report of a diagnosis and return its path.
 
     Raises:
         OSError: the file cannot be written.
     """
-    sections = [_error(found), _effects(found), _residual(found)]
+    sections = [_error(found), _effects(found), _residual(found), _records(found)]
     return write(path, 'Diagnosis', found.summary(), sections)

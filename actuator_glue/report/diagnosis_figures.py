@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from itertools import pairwise
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy import signal
 
-from actuator_glue.records import Array
+from actuator_glue.records import Array, source_name
+from actuator_glue.report import style
 from actuator_glue.report.style import (
     BAND,
     DETERMINISTIC,
@@ -17,7 +18,6 @@ from actuator_glue.report.style import (
     MEASURED,
     PUBLISHED,
     TOTAL,
-    label,
     new_figure,
     styled,
 )
@@ -25,96 +25,149 @@ from actuator_glue.residual.diagnosis import Diagnosis, Trace
 
 BEFORE, AFTER = DETERMINISTIC, TOTAL
 _POINTS = 4000  # per line: more cannot be seen
+_SECONDS = 4.0  # of each periodogram that is averaged
+_SMOOTH = 0.02  # s, so that loops are seen through the noise
 
 
-def _thin(trace: Trace, *columns: Array) -> tuple[Array, ...]:
+def stretches(trace: Trace) -> list[slice]:
+    """Return the stretches of a trace that have no gap: what is held out leaves gaps."""
+    step = np.diff(trace.time)
+    edges = np.flatnonzero(step > 1.5 * float(np.median(step))) + 1
+    bounds = [0, *edges.tolist(), len(trace.time)]
+    return [slice(a, b) for a, b in pairwise(bounds)]
+
+
+def moved(found: Diagnosis) -> bool:
+    """Whether an effect was added that changes the simulated motion; others add to the noise."""
+    return any(e.noise is None for e in found.effects)
+
+
+def _sides(found: Diagnosis) -> list[tuple[str, str]]:
+    """Return field of a `Trace` and colour of what is drawn: one where nothing was added."""
+    return [('before', BEFORE), ('after', AFTER)][: 2 if moved(found) else 1]
+
+
+def _text(found: Diagnosis, side: str) -> str:
+    return side if moved(found) else 'Eq. (2), refitted'
+
+
+def _title(trace: Trace, width: float) -> str:
+    tail = f': k = {trace.stiffness / 1e3:g} kN/m{", held out" if trace.held_out else ""}'
+    return style.fit(source_name(trace.source), width, tail=tail)
+
+
+def _legend(figure: Figure, axes: Axes, scale: float = 1.0) -> None:
+    """Put the legend below the panels, where it covers nothing."""
+    handles, names = axes.get_legend_handles_labels()
+    figure.legend(handles, names, loc='outside lower center', ncols=3, markerscale=scale)
+
+
+def _lines(trace: Trace, *columns: Array) -> Array:
+    """Return columns as lines to draw: not too many points, and broken at the gaps."""
     step = max(1, len(trace.time) // _POINTS)
-    return tuple(column[::step] for column in columns)
-
-
-def _name(trace: Trace) -> str:
-    held = ', held out' if trace.held_out else ''
-    return f'{Path(trace.source).name}: k = {trace.stiffness / 1e3:g} kN/m{held}'
+    table = np.column_stack(columns)
+    gap = np.full((1, len(columns)), np.nan)
+    parts = [piece for part in stretches(trace) for piece in (table[part][::step], gap)]
+    return np.vstack(parts).T
 
 
 @styled
 def residuals_in_time(found: Diagnosis) -> Figure:
     """Residual of every record against time, before and after."""
-    figure = new_figure(1.6 * len(found.traces) + 0.6)
+    figure = new_figure(1.6 * len(found.traces) + 0.8)
     grid = figure.subplots(len(found.traces), 1, squeeze=False)[:, 0]
     for axes, trace in zip(grid, found.traces, strict=True):
-        t, before, after = _thin(
-            trace, trace.time, trace.measured - trace.before, trace.measured - trace.after
-        )
-        axes.plot(t, 1e6 * before, color=BEFORE, lw=0.6, label='before')
-        axes.plot(t, 1e6 * after, color=AFTER, lw=0.6, label='after')
-        axes.set_title(_name(trace), loc='left')
+        for side, color in _sides(found):
+            t, residual = _lines(trace, trace.time, trace.measured - getattr(trace, side))
+            axes.plot(t, 1e6 * residual, color=color, lw=0.6, label=_text(found, side))
+        axes.set_title(_title(trace, style.WIDTH - 0.7))
         axes.set_ylabel('residual [um]')
-    grid[0].legend(loc='upper right', ncols=2)
     grid[-1].set_xlabel('time [s]')
+    _legend(figure, grid[0])
     return figure
+
+
+def _density(trace: Trace, residual: Array) -> tuple[Array, Array]:
+    """Return frequencies [Hz] and the amplitude density of a residual, its gaps left out."""
+    rate = 1.0 / float(np.median(np.diff(trace.time)))
+    parts = stretches(trace)
+    size = min(max(p.stop - p.start for p in parts), round(_SECONDS * rate))
+    used = [p for p in parts if p.stop - p.start >= size]
+    found = [signal.welch(residual[p], rate, nperseg=size) for p in used]
+    power = np.average([f[1] for f in found], axis=0, weights=[p.stop - p.start for p in used])
+    return found[0][0][1:], np.sqrt(power[1:])
 
 
 @styled
 def residuals_in_frequency(found: Diagnosis) -> Figure:
     """Density of the residual of every record, before and after."""
-    figure = new_figure(2.6)
-    grid = figure.subplots(1, len(found.traces), squeeze=False, sharey=True)[0]
-    for axes, trace in zip(grid, found.traces, strict=True):
-        rate = 1.0 / float(np.median(np.diff(trace.time)))
-        size = min(len(trace.time), int(4 * rate))
-        for column, color, text in (
-            (trace.before, BEFORE, 'before'),
-            (trace.after, AFTER, 'after'),
-        ):
-            f, density = signal.welch(trace.measured - column, rate, nperseg=size)
-            axes.loglog(f[1:], 1e6 * np.sqrt(density[1:]), color=color, lw=0.8, label=text)
-        axes.set_title(_name(trace), loc='left', fontsize=7)
+    columns = min(len(found.traces), 2)
+    rows = -(-len(found.traces) // columns)
+    figure = new_figure(2.1 * rows + 0.6)
+    panels = figure.subplots(rows, columns, squeeze=False, sharey=True).ravel()
+    for unused in panels[len(found.traces) :]:
+        unused.set_visible(False)
+    for axes, trace in zip(panels, found.traces, strict=False):
+        for side, color in _sides(found):
+            f, density = _density(trace, trace.measured - getattr(trace, side))
+            axes.loglog(f, 1e6 * density, color=color, lw=0.8, label=_text(found, side))
+        axes.set_title(_title(trace, style.WIDTH / columns - 0.5))
         axes.set_xlabel('frequency [Hz]')
-    grid[0].set_ylabel(r'residual [um/$\sqrt{\mathrm{Hz}}$]')
-    grid[0].legend()
+    for axes in panels[::columns]:
+        axes.set_ylabel(r'residual [um/$\sqrt{\mathrm{Hz}}$]')
+    _legend(figure, panels[0])
     return figure
 
 
 def _slow_part(trace: Trace) -> slice:
-    """The part of a record with slow, large motion: loops show best there."""
-    velocity = np.abs(np.gradient(trace.before, trace.time))
-    length = max(50, len(velocity) // 10)
-    means = np.convolve(velocity, np.ones(length) / length, mode='valid')
-    spread = np.array(
-        [np.ptp(trace.before[i : i + length]) for i in range(0, len(means), max(1, length // 4))]
-    )
-    starts = np.arange(0, len(means), max(1, length // 4))
-    merit = np.where(spread > 0.5 * spread.max(), means[starts], np.inf)
-    start = int(starts[int(np.argmin(merit))])
-    return slice(start, start + length)
+    """Return a part of a record with slow, large motion: loops show best there."""
+    parts = stretches(trace)
+    longest = max(p.stop - p.start for p in parts)
+    length = min(max(50, len(trace.time) // 10), longest)
+    windows = [
+        slice(start, start + length)
+        for part in parts
+        for start in range(part.start, part.stop - length + 1, max(1, length // 4))
+    ]
+    spread = np.array([np.ptp(trace.before[w]) for w in windows])
+    speed = np.array([np.abs(np.diff(trace.before[w])).mean() for w in windows])
+    return windows[int(np.argmin(np.where(spread >= 0.5 * spread.max(), speed, np.inf)))]
+
+
+def _smooth(trace: Trace, values: Array) -> Array:
+    """Return a moving mean of `_SMOOTH` seconds, within each stretch."""
+    size = max(1, round(_SMOOTH / float(np.median(np.diff(trace.time)))))
+    weights = np.ones(size)
+    means = []
+    for part in stretches(trace):
+        count = np.convolve(np.ones(part.stop - part.start), weights, mode='same')
+        means.append(np.convolve(values[part], weights, mode='same')[: len(count)] / count)
+    return np.concatenate(means)
 
 
 @styled
 def loops(found: Diagnosis) -> Figure:
     """Residual against displacement (slow part) and against velocity, before and after."""
-    figure = new_figure(2.3 * len(found.traces))
+    figure = new_figure(2.1 * len(found.traces) + 0.4)
     grid = figure.subplots(len(found.traces), 2, squeeze=False)
     for (left, right), trace in zip(grid, found.traces, strict=True):
-        part = _slow_part(trace)
-        smooth = max(1, round(0.02 / float(np.median(np.diff(trace.time)))))
-        weights = np.ones(smooth) / smooth
-        velocity: Array = np.asarray(np.gradient(trace.after, trace.time), dtype=np.float64)
-        for column, color, text in (
-            (trace.before, BEFORE, 'before'),
-            (trace.after, AFTER, 'after'),
-        ):
-            residual: Array = np.convolve(trace.measured - column, weights, mode='same').astype(
-                np.float64
-            )
-            left.plot(1e3 * column[part], 1e6 * residual[part], color=color, lw=0.6, label=text)
-            v, r = _thin(trace, velocity, residual)
-            right.plot(1e3 * v, 1e6 * r, '.', ms=0.8, color=color, label=text)
-        left.set_title(_name(trace), loc='left')
+        part, step = _slow_part(trace), max(1, len(trace.time) // _POINTS)
+        for side, color in _sides(found):
+            simulated: Array = getattr(trace, side)
+            residual = 1e6 * _smooth(trace, trace.measured - simulated)
+            velocity = np.gradient(simulated, trace.time)
+            left.plot(1e3 * simulated[part], residual[part], color=color, lw=0.6)
+            right.plot(
+                1e3 * velocity[::step], residual[::step], '.', ms=0.8, color=color,
+                label=_text(found, side),
+            )  # fmt: skip
+        left.set_title(_title(trace, style.WIDTH - 0.7))
         left.set_xlabel('displacement [mm] (slow part)')
         left.set_ylabel('residual [um]')
         right.set_xlabel('velocity [mm/s]')
-    grid[0, 1].legend(loc='upper left', markerscale=8)
+        # The title of a row is as long as both panels.
+        left.title.set_in_layout(False)
+    _legend(figure, grid[0, 1], scale=8)
     return figure
 
 
@@ -122,53 +175,77 @@ def loops(found: Diagnosis) -> Figure:
 def ranking(found: Diagnosis) -> Figure:
     """Error that each single candidate leaves on the fitting part."""
     shown = found.candidates[:14][::-1]
-    figure = new_figure(0.22 * len(shown) + 0.8)
+    figure = new_figure(0.22 * len(shown) + 1.0)
     axes: Axes = figure.subplots()
     named = {n for e in found.effects for n in (e.name, *e.alternatives)}
     colors = [AFTER if c.name in named else LIGHT_BAND for c in shown]
     axes.barh([c.name for c in shown], [1e6 * c.error for c in shown], color=colors)
     axes.axvline(1e6 * found.alarm.noise, color=MEASURED, ls='--', lw=0.8, label='noise')
     axes.set_xlabel('rms error of Eq. (2) + one effect, refitted [um]')
-    axes.legend(loc='lower right')
+    _legend(figure, axes)
     return figure
 
 
 @styled
 def posteriors(found: Diagnosis) -> Figure:
-    """Marginal posterior of every effect parameter, with its neutral value."""
-    columns = found.names[4:]
-    figure = new_figure(2.0)
-    grid = figure.subplots(1, len(columns), squeeze=False)[0]
+    """Marginal posterior of every effect parameter."""
     estimates = {n: p for e in found.effects for n, p in e.parameters.items()}
-    for axes, name, draws in zip(grid, columns, found.posterior.T[4:], strict=True):
-        axes.hist(draws, bins=40, color=BAND, density=True)
-        estimate = estimates.get(name)
-        axes.set_xlabel(label(name, estimate.unit if estimate else ''))
+    names = found.names[4:]
+    columns = min(len(names), 3)
+    rows = -(-len(names) // columns)
+    figure = new_figure(1.7 * rows + 0.3)
+    panels = figure.subplots(rows, columns, squeeze=False).ravel()
+    for unused in panels[len(names) :]:
+        unused.set_visible(False)
+    for axes, name, draws in zip(panels, names, found.posterior.T[4:], strict=False):
+        exponent = style.engineering(draws)
+        axes.hist(draws / 10.0**exponent, bins=40, color=BAND, density=True)
+        unit = estimates[name].unit if name in estimates else ''
+        axes.set_xlabel(style.label(name, unit, exponent))
         axes.set_yticks([])
+        axes.locator_params(axis='x', nbins=4)
     return figure
 
 
 @styled
 def bands(found: Diagnosis) -> Figure:
-    """95 % bands before and after on one second of the held-out part where they differ most."""
+    """95 % bands on one second of the held-out part where before and after differ most.
+
+    The lower panels show the same less the middle of the band.
+    """
     trace = next(t for t in found.traces if t.held_out)
-    period = float(np.median(np.diff(trace.time)))
-    length = max(10, round(1.0 / period))
-    change = (trace.before - trace.after) ** 2
-    start = int(np.argmax(np.convolve(change, np.ones(length), mode='valid')))
-    part = slice(start, start + length)
-    figure = new_figure(2.8)
-    grid = figure.subplots(1, 2, sharey=True)
-    sides = (
-        ('before', trace.lower_before, trace.upper_before, PUBLISHED),
-        ('after', trace.lower_after, trace.upper_after, LIGHT_BAND),
-    )
-    for axes, (text, lower, upper, color), share in zip(grid, sides, found.coverage, strict=True):
-        t = trace.time[part]
-        axes.fill_between(t, 1e3 * lower[part], 1e3 * upper[part], color=color, label='95 % band')
-        axes.plot(t, 1e3 * trace.measured[part], color=MEASURED, lw=0.7, label='measured')
-        axes.set_title(f'{text}: {100 * share:.1f} % inside', loc='left')
-        axes.set_xlabel('time [s]')
-    grid[0].set_ylabel('displacement [mm]')
-    grid[0].legend()
+    part = _second(trace)
+    t, measured = trace.time[part], trace.measured[part]
+    figure = new_figure(4.2)
+    looks = {'before': PUBLISHED, 'after': LIGHT_BAND}
+    sides = _sides(found)
+    grid = figure.subplots(2, len(sides), squeeze=False, sharex=True, sharey='row')
+    for (upper, lower), (side, _), share in zip(grid.T, sides, found.coverage, strict=False):
+        low, high = (getattr(trace, f'{edge}_{side}')[part] for edge in ('lower', 'upper'))
+        middle = getattr(trace, side)[part]
+        for axes, scale, less in ((upper, 1e3, 0.0 * middle), (lower, 1e6, middle)):
+            axes.fill_between(
+                t, scale * (low - less), scale * (high - less), color=looks[side],
+                label=f'95 % band, {_text(found, side)}',
+            )  # fmt: skip
+            axes.plot(t, scale * (measured - less), color=MEASURED, lw=0.7, label='measured')
+        upper.set_title(f'{_text(found, side)}: {100 * share:.1f} % inside')
+        lower.set_xlabel('time [s]')
+    grid[0, 0].set_ylabel('displacement [mm]')
+    grid[1, 0].set_ylabel('less the middle\nof the band [um]')
+    shown = [axes.get_legend_handles_labels() for axes in grid[0]]
+    named = {n: h for handles, names in shown for h, n in zip(handles, names, strict=True)}
+    figure.legend(list(named.values()), list(named), loc='outside lower center', ncols=3)
     return figure
+
+
+def _second(trace: Trace) -> slice:
+    """Return the second without a gap in which both models differ most."""
+    wanted = max(10, round(1.0 / float(np.median(np.diff(trace.time)))))
+    parts = stretches(trace)
+    length = min(wanted, max(p.stop - p.start for p in parts))
+    total = np.cumsum(np.append(0.0, (trace.before - trace.after) ** 2))
+    starts = [np.arange(p.start, p.stop - length + 1) for p in parts]
+    every = np.concatenate(starts)
+    start = int(every[np.argmax(total[every + length] - total[every])])
+    return slice(start, start + length)

@@ -34,6 +34,9 @@ def posterior_figure(
         raise InputError(f'draws of shape {draws.shape} for {count} parameters')
     if not np.isfinite(draws).all():
         raise InputError('the draws have NaN or infinite values')
+    exponents = [style.engineering(column) for column in draws.T]
+    draws = draws / 10.0 ** np.array(exponents)
+    texts = [style.label(*each) for each in zip(names, units, exponents, strict=True)]
     figure = style.new_figure(1.2 + 1.5 * count)
     grid = figure.subplots(count, count, sharex='col', squeeze=False)
     with np.errstate(invalid='ignore', divide='ignore'):
@@ -55,9 +58,9 @@ def posterior_figure(
                 axes.spines[:].set_visible(False)
                 axes.tick_params(axis='x', length=0)
             if i == count - 1:
-                axes.set_xlabel(style.label(names[j], units[j]))
+                axes.set_xlabel(texts[j])
             if j == 0 and i > 0:
-                axes.set_ylabel(style.label(names[i], units[i]))
+                axes.set_ylabel(texts[i])
     if title:
-        figure.suptitle(title)
+        figure.suptitle(style.fit(title, style.WIDTH, size=10))
     return figure

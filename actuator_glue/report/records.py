@@ -47,8 +47,6 @@ def record_figure(record: Record) -> Figure:
     figure.legend(*whole.get_legend_handles_labels(), loc='outside lower center', ncols=2)
     k = record.stiffness
     stiffness = 'not known' if k is None else f'{k / 1e3:.6g} kN/m'
-    figure.suptitle(
-        f'{record.actuator}: {len(record)} samples at {record.rate:.6g} Hz, '
-        f'specimen stiffness {stiffness}'
-    )
+    told = f': {len(record)} samples at {record.rate:.6g} Hz, specimen stiffness {stiffness}'
+    figure.suptitle(style.fit(record.actuator, style.WIDTH, tail=told, size=10))
     return figure

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import base64
 import io
+import math
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
 from typing import ParamSpec, TypeVar
 
 import matplotlib.style
+import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
 
 P = ParamSpec('P')
 R = TypeVar('R')
@@ -39,9 +42,37 @@ SYMBOL = {
 UNIT = {'N/(m s^2)': r'N/(m s$^2$)', '1': '-'}
 
 
-def label(name: str, unit: str) -> str:
-    """Return an axis label: symbol and unit."""
-    return f'{SYMBOL.get(name, name.replace("_", " "))} [{UNIT.get(unit, unit)}]'
+def label(name: str, unit: str, exponent: int = 0) -> str:
+    """Return an axis label: symbol and unit, values in units of 10^exponent."""
+    power = rf'$10^{{{exponent}}}$ ' if exponent else ''
+    return f'{SYMBOL.get(name, name.replace("_", " "))} [{power}{UNIT.get(unit, unit)}]'
+
+
+def engineering(*values: ArrayLike) -> int:
+    """Return the exponent, a multiple of 3, in whose units the largest value is 1 to 1000.
+
+    With it in the label no axis needs a power of ten beside it, where other texts are.
+    """
+    sizes = [np.abs(np.asarray(v, dtype=np.float64)) for v in values]
+    largest = max((float(np.nanmax(s)) for s in sizes if np.isfinite(s).any()), default=0.0)
+    if not 0.0 < largest < np.inf or 0.1 <= largest < 1e4:
+        return 0
+    return 3 * math.floor(math.log10(largest) / 3)
+
+
+def fit(text: str, width: float, *, tail: str = '', size: float = 9.0) -> str:
+    """Return text and tail, the middle of the text left out where both are wider than a width.
+
+    Args:
+        text: a name of any length.
+        width: room [in].
+        tail: put behind the text, always whole.
+        size: of the letters [pt].
+    """
+    room = max(int(72 * width / (0.56 * size)) - len(tail), 12)
+    if len(text) > room:
+        text = f'{text[: room - 3 - room // 3]}...{text[-(room // 3) :]}'
+    return text + tail
 
 
 def styled(draw: Callable[P, R]) -> Callable[P, R]:

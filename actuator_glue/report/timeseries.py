@@ -114,7 +114,7 @@ def band_over_measured(
     handles, names = panels[0].get_legend_handles_labels()
     figure.legend(handles, names, loc='outside lower center', ncols=3)
     if title:
-        figure.suptitle(title)
+        figure.suptitle(style.fit(title, style.WIDTH, size=10))
     return figure
 
 
@@ -164,7 +164,7 @@ def band_at_zooms(
     handles, names = rows[0, 0].get_legend_handles_labels()
     figure.legend(handles, names, loc='outside lower center', ncols=3)
     if title:
-        figure.suptitle(title)
+        figure.suptitle(style.fit(title, style.WIDTH, size=10))
     return figure
 
 
@@ -216,24 +216,26 @@ def parameters_against_time(
     for i, (axes, parameter) in enumerate(zip(panels, parameters, strict=False)):
         dominated = prior_dominated is not None and bool(prior_dominated[i])
         colour = style.COMMAND if dominated else style.BAND
-        axes.fill_between(
-            time_s, lower[:, i], upper[:, i], color=colour, alpha=0.3, lw=0, label=band_name
-        )
-        axes.plot(time_s, mean[:, i], '-o', color=colour, label='posterior mean')
+        exponent = style.engineering(mean[:, i], lower[:, i], upper[:, i])
+        scale = 10.0**-exponent
+        low, high = scale * lower[:, i], scale * upper[:, i]
+        axes.fill_between(time_s, low, high, color=colour, alpha=0.3, lw=0, label=band_name)
+        axes.plot(time_s, scale * mean[:, i], '-o', color=colour, label='posterior mean')
         if truth is not None:
-            column = np.broadcast_to(np.asarray(truth, float), mean.shape)[:, i]
+            column = scale * np.broadcast_to(np.asarray(truth, float), mean.shape)[:, i]
             axes.plot(time_s, column, '--', color=style.TRUTH, label='true value')
         if reference is not None:
-            axes.axhline(reference[i], ls=':', color=style.DETERMINISTIC, label='deterministic')
+            at = scale * float(reference[i])
+            axes.axhline(at, ls=':', color=style.DETERMINISTIC, label='deterministic')
         note = ', little more than the prior' if dominated else ''
-        axes.set_title(style.label(parameter.name, parameter.unit) + note)
+        axes.set_title(style.label(parameter.name, parameter.unit, exponent) + note)
         axes.tick_params(labelbottom=i >= count - columns)
     for axes in panels[max(0, count - columns) : count]:
         axes.set_xlabel('time [s]')
     handles, names = panels[0].get_legend_handles_labels()
     figure.legend(handles, names, loc='outside lower center', ncols=3)
     if title:
-        figure.suptitle(title)
+        figure.suptitle(style.fit(title, style.WIDTH, size=10))
     return figure
 
 

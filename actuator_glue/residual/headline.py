@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
+from actuator_glue.records import source_name
 from actuator_glue.residual.verdict import misses
 
 if TYPE_CHECKING:
@@ -12,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def _named(effect: Finding) -> str:
-    where = f' in {", ".join(effect.records)} only' if effect.records else ''
+    where = f' in {", ".join(map(source_name, effect.records))} only' if effect.records else ''
     others = f' (or {", ".join(effect.alternatives)})' if effect.alternatives else ''
     return effect.name + where + others
 

@@ -13,9 +13,9 @@ UNITS = ('1/s', 'N/(m s^2)', 'N/m', '1/s')
 def test_every_pair_is_there_and_nothing_overlaps(overlapping_texts) -> None:
     """One panel per pair, correlations above the diagonal, texts apart."""
     rng = np.random.default_rng(0)
-    draws = np.array([133.0, 1.1e9, 2.5e5, 0.01]) * (1 + 0.01 * rng.standard_normal((2000, 4)))
+    draws = np.array([133.0, 1.1e9, 2.5e5, 6e-5]) * (1 + 0.01 * rng.standard_normal((2000, 4)))
     draws[:, 1] = 8e6 * draws[:, 0]
-    figure = posterior_figure(draws, NAMES, UNITS, 'title')
+    figure = posterior_figure(draws, NAMES, UNITS, 'a_long_name_of_a_record' * 10)
     texts = [t.get_text() for axes in figure.axes for t in axes.texts]
     assert len(figure.axes) == 16
     assert len(texts) == 6

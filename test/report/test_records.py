@@ -9,12 +9,16 @@ from actuator_glue.records import Record
 from actuator_glue.report.records import record_figure
 
 
-@pytest.mark.parametrize('samples', [2, 50, 5000])
-@pytest.mark.parametrize('force', [False, True])
-def test_a_record_is_drawn_whole(samples: int, force: bool, overlapping_texts) -> None:
+@pytest.mark.parametrize(
+    ('samples', 'force', 'size'),
+    [(2, False, 2e-3), (50, True, 2e-3), (50, True, 2e-9), (5000, True, 5.0), (5000, False, 2e-3)],
+)
+def test_a_record_is_drawn_whole(
+    samples: int, force: bool, size: float, overlapping_texts
+) -> None:
     """Command, displacement, zooms, tracking error and force, with units, nothing overlapping."""
-    command = 2e-3 * np.sin(np.arange(samples) * 0.02)
-    record = Record(command, 0.9 * command, 1e-3, 250e3)
+    command = size * np.sin(np.arange(samples) * 0.02)
+    record = Record(command, 0.9 * command, 1e-3, 250e3, actuator='a_long_name' * 20)
     if force:
         record = replace(record, force=250e3 * record.measured)
     figure = record_figure(record)

@@ -1,0 +1,147 @@
+"""The report of a diagnosis: gaps, legends, titles and names, looked at as a reader does."""
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from actuator_glue.report import diagnosis_figures as figures
+from actuator_glue.report.diagnosis import write_report
+from actuator_glue.residual.diagnosis import (
+    Alarm,
+    Candidate,
+    Diagnosis,
+    Estimate,
+    Finding,
+    HeldOutError,
+    Trace,
+)
+
+RATE = 100.0
+FOLDER = '/laboratory/2026/campaign'
+LONG = 'structural_laboratory_actuator_B_specimen_17_sweep_0_to_10_Hz_repeat_3_free_of_load.csv'
+DRAWN = ('residuals_in_time', 'residuals_in_frequency', 'loops', 'ranking', 'posteriors', 'bands')
+
+
+def trace(name: str, held_out: bool, play: float) -> Trace:
+    """Return a sweep of 24 s; every fourth block of two seconds is held out."""
+    rng = np.random.default_rng(len(name))
+    time = np.arange(int(24 * RATE)) / RATE
+    time = time[(np.floor(time / 2.0) % 4 == 3) == held_out]
+    before = 2e-3 * np.sin(np.pi * 0.4 * time**2)
+    after = before - play * np.sign(np.gradient(before, time))
+    measured = after + 1e-5 * rng.standard_normal(len(time))
+    width = 2e-5
+    return Trace(
+        f'{FOLDER}/{name}', held_out, time, 250e3, before, measured, before, after,
+        before - width, before + width, after - width, after + width,
+    )  # fmt: skip
+
+
+def diagnosis(play: float, records: int = 2) -> Diagnosis:
+    """Return a diagnosis that found play, or nothing where there is none."""
+    names = (LONG, 'spring.csv')[:records]
+    size = Estimate(play, 1e-7, 0.9 * play, 1.1 * play, 'm', 0.0)
+    found = Finding(
+        'backlash', (), 1.0, 'sensor', {'backlash': size}, 3e-5, 1e-5, 500.0,
+        records=(f'{FOLDER}/{LONG}',),
+    )  # fmt: skip
+    effects = (found,) if play else ()
+    draws = np.random.default_rng(1).normal(1.0, 1e-3, (400, 4 + len(effects)))
+    draws[:, 4:] *= play
+    rest = {
+        'source': f'{FOLDER}/{LONG}', 'structure': 1e-6, 'noise': 1e-5, 'frequency_hz': [1, 2],
+        'time_s': [0, 20], 'displacement': [0.0, 2e-3], 'share_at_low_velocity': 0.5,
+        'share_at_large_displacement': 0.5,
+    }  # fmt: skip
+    after = 1e-5 if play else 3e-5
+    return Diagnosis(
+        verdict='missing-effect' if play else 'none',
+        effects=effects,
+        error=HeldOutError(3e-5, (3e-5, 3e-5), after, (after, after), 1e-5, 1.0, 3e-5,
+                           ((f'{FOLDER}/{LONG}', 3e-5, after),)),
+        candidates=tuple(Candidate(f'effect-{i}', 1.0, 1e-5 * (1 + i), 0.1) for i in range(14)),
+        coverage=(0.4, 0.95),
+        alarm=Alarm(bool(play), 3e-5, 1e-6, 1e-5, 0.001),
+        advice=(),
+        base={},
+        structure=tuple(e.name for e in effects),
+        names=('beta_1', 'alpha_1_beta_0', 'alpha_2', 'alpha_3', 'backlash')[: 4 + len(effects)],
+        posterior=draws,
+        rhat=1.0,
+        best=draws[0],
+        traces=tuple(trace(n, held, play) for held in (False, True) for n in names),
+        surrogate={'structure': ['Eq. (2)'], 'structure_error': 1e-5, 'features': ['u'],
+                   'error': 1e-5},
+        remaining={'records': [rest]},
+        seconds=1.0,
+    )  # fmt: skip
+
+
+def drawn(name: str, found: Diagnosis) -> Figure:
+    """Return one of the report's figures."""
+    draw: Callable[[Diagnosis], Figure] = getattr(figures, name)
+    return draw(found)
+
+
+@pytest.mark.parametrize('name', DRAWN)
+def test_no_text_or_legend_lies_on_another_thing(name: str, overlapping_texts) -> None:
+    """Long names, legends and powers of ten included; a legend covers no bar and no curve."""
+    figure = drawn(name, diagnosis(6e-5))
+    assert overlapping_texts(figure) == []
+    assert all(axes.get_legend() is None for axes in figure.axes)
+    for legend in figure.legends:
+        box = legend.get_window_extent()
+        assert not any(box.overlaps(axes.get_window_extent()) for axes in figure.axes)
+
+
+def test_lines_break_where_samples_were_held_out() -> None:
+    """No line runs across a gap, in time or in a loop."""
+    found = diagnosis(6e-5)
+    for axes in drawn('residuals_in_time', found).axes:
+        for line in axes.lines:
+            steps = np.diff(line.get_xdata())
+            assert not (steps > 1.0).any()
+            assert np.isnan(steps).sum() >= 4
+    for t in found.traces:
+        part = figures._slow_part(t)
+        assert np.diff(t.time[part]).max() < 1.5 / RATE
+        second = figures._second(t)
+        assert t.time[second][-1] - t.time[second][0] < 1.0
+
+
+def test_a_gap_is_no_frequency() -> None:
+    """White noise with gaps and a slow drift between its stretches has a flat density."""
+    t = trace('a', False, 0.0)
+    rng = np.random.default_rng(0)
+    white = rng.standard_normal(len(t.time)) + 100.0 * np.floor(t.time / 8.0)
+    f, density = figures._density(t, white)
+    assert density[f > 3.0].mean() == pytest.approx(np.sqrt(2.0 / RATE), rel=0.15)
+
+
+def test_what_was_not_added_is_not_drawn() -> None:
+    """One curve, called Eq. (2), where nothing was added."""
+    for name in ('residuals_in_time', 'residuals_in_frequency', 'bands'):
+        two, one = drawn(name, diagnosis(6e-5)), drawn(name, diagnosis(0.0))
+        names = [t.get_text() for t in one.legends[0].get_texts()]
+        assert any('Eq. (2)' in n for n in names)
+        assert not any('after' in n or 'before' in n for n in names)
+        assert any('after' in t.get_text() for t in two.legends[0].get_texts())
+
+
+def test_paths_stand_in_one_table(tmp_path: Path) -> None:
+    """The headline names files; where they lay is told once for each."""
+    found = diagnosis(6e-5)
+    assert f'backlash in {LONG} only' in found.summary()
+    assert FOLDER not in found.summary()
+    page = write_report(found, tmp_path / 'report.html').read_text()
+    text = re.sub(r'data:image/png;base64,[^"]*', '', page)
+    assert text.count(FOLDER) == len(found.traces)
+    assert text.index(FOLDER) > text.index('What was read')
+    same = replace(found, effects=(), structure=(), verdict='none')
+    page = write_report(same, tmp_path / 'none.html').read_text()
+    assert 'nothing was added' in page
