@@ -62,7 +62,7 @@ def diagnosis(play: float, records: int = 2) -> Diagnosis:
     return Diagnosis(
         verdict='missing-effect' if play else 'none',
         effects=effects,
-        error=HeldOutError(3e-5, (3e-5, 3e-5), after, (after, after), 1e-5, 1.0, 3e-5,
+        error=HeldOutError(3e-5, (3e-5, 3e-5), after, (after, after), 1e-5, 1.0, (0.9, 1.0), 3e-5,
                            ((f'{FOLDER}/{LONG}', 3e-5, after),)),
         candidates=tuple(Candidate(f'effect-{i}', 1.0, 1e-5 * (1 + i), 0.1) for i in range(14)),
         coverage=(0.4, 0.95),
