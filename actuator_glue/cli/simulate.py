@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from actuator_glue.cli._effects import NOISE, chosen, unseen
 from actuator_glue.cli._output import note, progress, write_json
 from actuator_glue.cli._parser import claim, number
 from actuator_glue.cli._save import add_out, check_out, save
@@ -15,7 +16,6 @@ from actuator_glue.records import Array, Record
 
 if TYPE_CHECKING:
     from actuator_glue.model.plant import Plant
-    from actuator_glue.model.structure import Structure
 
 COMMANDS = ('sweep', 'sine', 'noise', 'earthquake')
 BLOCK = 4096  # samples simulated at a time
@@ -111,6 +111,8 @@ def run(args: argparse.Namespace) -> int:
     if args.effect:
         write_json({'schema': 'actuator_glue.truth/1', **truth}, str(sealed))
         note(f'what was switched on is in {sealed}')
+        for line in unseen(args, stiffnesses, command, rate):
+            note(line)
     return 0
 
 
@@ -191,7 +193,7 @@ def _plant(
             period=1.0 / rate, hold=args.hold, seed=seed, displacement=spec
         )
         return made, {'specimen_stiffness': benchmark_plant.BenchmarkParameters().stiffness}
-    structure, theta = _effects(args, stiffness, command, rate)
+    structure, theta = chosen(args, stiffness, command, rate)
     stream = Stream(
         structure,
         theta,
@@ -204,7 +206,7 @@ def _plant(
     force = _given(args.force_noise_n, 2.0)
     made = MeasuredPlant(
         stream,
-        SensorSpec(1e-5 if noise is None else noise, args.bits, span),
+        SensorSpec(NOISE if noise is None else noise, args.bits, span),
         SensorSpec(force, args.bits, max(2.0 * stiffness * span, 1e3)),
         seed,
     )
@@ -215,49 +217,6 @@ def _plant(
         'seed': args.seed,
     }
     return made, truth
-
-
-def _effects(
-    args: argparse.Namespace, stiffness: float, command: Array, rate: float
-) -> tuple[Structure, Array]:
-    """Return the structure and its parameters, typical ones where no value is given."""
-    import numpy as np
-
-    from actuator_glue.model.effects import scale
-    from actuator_glue.model.parameters import TABLE_2
-    from actuator_glue.model.structure import Structure
-
-    asked = dict(_parse_effect(text) for text in args.effect)
-    structure = Structure(asked)
-    base = TABLE_2 if args.theta is None else np.array(args.theta)
-    theta = structure.neutral(base)
-    test = scale([Record(command, command, 1.0 / rate, stiffness)], base)
-    for entry in structure.entries:
-        columns = structure.columns(entry.name)
-        sizes = list(entry.starts(test))
-        theta[columns] = sizes[len(sizes) // 2]
-        names = [p.name for p in entry.parameters]
-        for name, value in asked[entry.name].items():
-            if name not in names:
-                raise InputError(
-                    f'effect {entry.name} has no parameter {name!r}; it has {", ".join(names)}'
-                )
-            theta[columns.start + names.index(name)] = value
-    return structure, theta
-
-
-def _parse_effect(text: str) -> tuple[str, dict[str, float]]:
-    name, _, rest = text.partition(':')
-    values = {}
-    for item in filter(None, rest.split(',')):
-        key, sign, value = item.partition('=')
-        try:
-            values[key.strip()] = float(value)
-        except ValueError:
-            sign = ''
-        if not sign:
-            raise InputError(f'--effect {text}: {item!r} is not PARAMETER=VALUE')
-    return name.strip(), values
 
 
 def _measure(plant: Plant, command: Array, rate: float, done: Any, before: int) -> Record:

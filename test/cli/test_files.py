@@ -71,6 +71,9 @@ def test_a_recorded_command_and_an_undeclared_effect(run, tmp_path: Path, short_
         (('--effect', 'gremlins'), 'not in the catalogue'),
         (('--effect', 'backlash:width=1'), 'no parameter'),
         (('--effect', 'backlash:width'), 'PARAMETER=VALUE'),
+        (('--effect', 'backlash:backlash=5'), 'bounds of the catalogue, [0, '),
+        (('--effect', 'backlash:backlash=-1e-5'), 'bounds of the catalogue, [0, '),
+        (('--effect', 'backlash:backlash=nan'), 'bounds of the catalogue, [0, '),
         (('--stiffness', '-1'), 'outside'),
         (('--rate', '5'), '10 Hz'),
         (('--duration', '0'), 'no full sample'),
@@ -91,6 +94,26 @@ def test_simulate_refuses(run, tmp_path: Path, options: tuple[str, ...], words: 
     assert done.code == 2
     assert words in (done.err if 'usage:' in done.err else done.message)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ('options', 'seen'),
+    [
+        (('--effect', 'backlash:backlash=1e-4'), True),
+        (('--effect', 'backlash:backlash=1e-7'), False),
+        (('--effect', 'backlash:backlash=1e-7', '--noise-mm', 0), True),
+        (('--effect', 'backlash:backlash=1e-5', '--noise-mm', 0, '--bits', 6), False),
+        (('--effect', 'specimen-gap', '--stiffness', 0), False),
+        (('--effect', 'specimen-gap', '--stiffness', 0, 250e3, '--noise-mm', 0), True),
+    ],
+)
+def test_an_effect_too_small_to_be_seen_is_told(
+    run, tmp_path: Path, options: tuple[object, ...], seen: bool
+) -> None:
+    """With and without it the displacement is the same but for noise and resolution."""
+    done = run('simulate', tmp_path / 'a.csv', '--rate', 200, '--duration', 8, '--f1', 4, *options)
+    assert done.code == 0, done.err
+    assert ('cannot be seen' not in done.err) == seen
 
 
 def test_outputs_are_overwritten_only_by_force(run, tmp_path: Path, short_bag: Path) -> None:
