@@ -127,8 +127,8 @@ def test_unusable_input_says_what_is_wrong() -> None:
         crps_ensemble(three, np.zeros((4, 2)))
     with pytest.raises(InputError, match='level'):
         interval_score(three, three, three, 95.0)
+    flat = Band(np.array([0.95]), three[None], three, three[None])
     with pytest.raises(InputError, match='frequency'):
-        flat = Band(np.array([0.95]), three[None], three, three[None])
         score(three, flat, edges_hz=(0, 1))
     with pytest.raises(InputError, match='crosses'):
         instantaneous_frequency(np.linspace(0, 1, 50), 0.01)
