@@ -6,6 +6,7 @@ import argparse
 
 from actuator_glue.cli._output import note
 from actuator_glue.cli._parser import number
+from actuator_glue.io.formats import formats
 from actuator_glue.records import Record
 
 
@@ -15,7 +16,7 @@ def add_records(parser: argparse.ArgumentParser) -> None:
         'records',
         nargs='+',
         metavar='RECORD',
-        help='bag folder, .mcap, .csv, .mat, or other text with --channels',
+        help=f'bag folder, .mcap, {", ".join(formats())}, or other text with --channels',
     )
     add_reading(parser)
 

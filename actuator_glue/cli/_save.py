@@ -11,9 +11,8 @@ from pathlib import Path
 from actuator_glue.cli._output import progress, say
 from actuator_glue.cli._parser import Output, add_force, claim
 from actuator_glue.errors import InputError
+from actuator_glue.io.formats import formats
 from actuator_glue.records import Record
-
-FILES = ('.csv', '.mat')
 
 
 def add_out(parser: argparse.ArgumentParser) -> None:
@@ -22,7 +21,7 @@ def add_out(parser: argparse.ArgumentParser) -> None:
         'out',
         type=Output,
         metavar='OUT',
-        help='.csv, .mat, or a name without a suffix: the folder of a new bag',
+        help=f'{", ".join(formats())}, or a name without a suffix: the folder of a new bag',
     )
     add_force(parser)
     parser.add_argument(
@@ -48,14 +47,14 @@ def check_out(args: argparse.Namespace) -> Path:
     if out.suffix == '.mcap':
         raise InputError(f'{out}: bags are folders; give a name without .mcap')
     # A bag may be called test_2.5.
-    if out.suffix not in FILES and not out.suffix[1:].isdigit() and out.suffix:
+    if out.suffix not in formats() and not out.suffix[1:].isdigit() and out.suffix:
         raise InputError(
-            f'{out}: {out.suffix} cannot be written; use {", ".join(FILES)}, or a name without '
-            'a suffix for a bag'
+            f'{out}: {out.suffix} cannot be written; use {", ".join(formats())}, or a name '
+            'without a suffix for a bag'
         )
     if args.block < 1:
         raise InputError(f'--block {args.block}: a message holds at least one sample')
-    if out.exists() and out.is_dir() == (out.suffix in FILES):
+    if out.exists() and out.is_dir() == (out.suffix in formats()):
         raise InputError(
             f'{out} is {"a folder" if out.is_dir() else "a file"}; choose another name'
         )
@@ -72,7 +71,7 @@ def save(records: list[Record], args: argparse.Namespace) -> None:
     """
     out = check_out(args)
     written = [out]
-    if out.suffix in FILES:
+    if out.suffix in formats():
         written = _files(records, out, args)
     else:
         with _replacing(out):
@@ -82,7 +81,7 @@ def save(records: list[Record], args: argparse.Namespace) -> None:
 
 
 def _files(records: list[Record], out: Path, args: argparse.Namespace) -> list[Path]:
-    from actuator_glue.io.export import write_csv, write_mat
+    from actuator_glue.io.export import write
 
     paths = [out]
     if len(records) > 1:
@@ -92,7 +91,7 @@ def _files(records: list[Record], out: Path, args: argparse.Namespace) -> list[P
     with progress('writing', sum(len(r) for r in records)) as done:
         before = 0
         for path, record in zip(paths, records, strict=True):
-            (write_csv if out.suffix == '.csv' else write_mat)(path, record, unit=args.unit)
+            write(path, record, unit=args.unit)
             before += len(record)
             done(before)
     return paths

@@ -9,10 +9,9 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import Channel, ChannelMap, read_channel_map
-from actuator_glue.io.delimited import position, read_columns, read_head
-from actuator_glue.io.matlab import read_variables
+from actuator_glue.io.formats import format_of
 from actuator_glue.io.time_base import uniform_period
-from actuator_glue.io.units import choose, factor, recognise
+from actuator_glue.io.units import choose, factor
 from actuator_glue.records import Array, Hold, Record
 
 # A channel "at rest" may move by this share of its range: noise does, a test does not.
@@ -53,7 +52,7 @@ def read(
         notes = {'hold': channels.hold or 'zoh', 'actuator': channels.actuator}
         stiffness = channels.stiffness if stiffness is None else stiffness
     else:
-        values, notes = _mat_by_name(path) if path.suffix == '.mat' else _text_by_name(path)
+        values, notes = _by_name(path)
         period = uniform_period(values['time'], str(path))
         if stiffness is None:
             stiffness = _noted_stiffness(notes, path)
@@ -81,38 +80,14 @@ def _noted_stiffness(notes: dict[str, str], path: Path) -> float | None:
         raise InputError(f'{path}: stiffness_N_per_m = {text!r} is not a number') from error
 
 
-def _text_by_name(path: Path) -> tuple[dict[str, Array], dict[str, str]]:
-    head = read_head(path)
-    if not any(recognise(name) for name in head.names) and _numeric(head.names):
-        raise InputError(
-            f'{path}: the first line must name the columns with their units, as in '
-            'time_s,command_mm,measured_mm,force_N; or describe the file with --channels MAP.yaml'
-        )
-    columns = choose(head.names, str(path))
-    data = read_columns(path, head, [at for at, _ in columns.values()])
-    values = {role: data[:, i] * scale for i, (role, (_, scale)) in enumerate(columns.items())}
-    return values, head.notes
-
-
-def _numeric(names: list[str]) -> bool:
-    try:
-        [float(name) for name in names]
-    except ValueError:
-        return False
-    return True
-
-
-def _mat_by_name(path: Path) -> tuple[dict[str, Array], dict[str, str]]:
-    vectors, texts = read_variables(path)
-    names = list(vectors)
-    # `test.command_mm` is command_mm of the struct `test`.
-    columns = choose([name.rpartition('.')[2] for name in names], str(path))
-    values = {role: vectors[names[at]] * scale for role, (at, scale) in columns.items()}
-    notes = {name.rpartition('.')[2]: text for name, text in texts.items()}
-    for name, vector in vectors.items():
-        if name.rpartition('.')[2] == 'stiffness_N_per_m' and len(vector) == 1:
-            notes['stiffness_N_per_m'] = repr(float(vector[0]))
-    return values, notes
+def _by_name(path: Path) -> tuple[dict[str, Array], dict[str, str]]:
+    """Return channels in SI units by the names of their columns, and what the file notes."""
+    table = format_of(path).read(path, None)
+    columns = choose(table.names, str(path))
+    raw = table.columns([at for at, _ in columns.values()])
+    scales = [scale for _, scale in columns.values()]
+    values = {role: c * s for role, c, s in zip(columns, raw, scales, strict=True)}
+    return values, table.notes
 
 
 def _mapped(path: Path, channels: ChannelMap) -> tuple[dict[str, Array], float]:
@@ -122,7 +97,7 @@ def _mapped(path: Path, channels: ChannelMap) -> tuple[dict[str, Array], float]:
         for role in ('time', 'command', 'measured', 'force')
         if (channel := getattr(channels, role)) is not None
     }
-    raw, counter = (_raw_mat if path.suffix == '.mat' else _raw_text)(path, channels, roles)
+    raw, counter = _raw(path, channels, roles)
     if counter is not None:
         _check_counter(counter, path)
     values = {}
@@ -137,31 +112,33 @@ def _mapped(path: Path, channels: ChannelMap) -> tuple[dict[str, Array], float]:
     return values, uniform_period(values['time'], str(path))
 
 
-def _raw_text(
+def _raw(
     path: Path, channels: ChannelMap, roles: dict[str, Channel]
 ) -> tuple[dict[str, Array], Array | None]:
-    head = read_head(path, channels.header_lines, channels.delimiter)
-    wanted = [position(c.column, head.names, f'{path}: {role}') for role, c in roles.items()]
+    """Return channels as the file has them, and its sample numbers."""
+    table = format_of(path).read(path, channels)
+    wanted: dict[str, str | int] = {role: channel.column for role, channel in roles.items()}
     if channels.sample_number is not None:
-        wanted.append(position(channels.sample_number, head.names, f'{path}: sample_number'))
-    data = read_columns(path, head, wanted, channels.decimal)
-    counter = data[:, -1] if channels.sample_number is not None else None
-    return {role: data[:, i] for i, role in enumerate(roles)}, counter
+        wanted['sample_number'] = channels.sample_number
+    at = [position(c, table.names, f'{path}: {role}') for role, c in wanted.items()]
+    raw = dict(zip(wanted, table.columns(at), strict=True))
+    return raw, raw.get('sample_number')
 
 
-def _raw_mat(
-    path: Path, channels: ChannelMap, roles: dict[str, Channel]
-) -> tuple[dict[str, Array], Array | None]:
-    vectors, _ = read_variables(path)
+def position(column: str | int, names: list[str], where: str) -> int:
+    """Return the position from 0 of a column given by name or by number from 1.
 
-    def vector(column: str | int, role: str) -> Array:
-        name = list(vectors)[position(column, list(vectors), f'{path}: {role}')]
-        return vectors[name]
-
-    counter = None
-    if channels.sample_number is not None:
-        counter = vector(channels.sample_number, 'sample_number')
-    return {role: vector(c.column, role) for role, c in roles.items()}, counter
+    Raises:
+        InputError: no column, or more than one, has that name.
+    """
+    if isinstance(column, int):
+        return column - 1
+    hits = [i for i, name in enumerate(names) if name == column]
+    if len(hits) != 1:
+        problem = 'no column is' if not hits else f'{len(hits)} columns are'
+        listed = ', '.join(repr(n) for n in names[:20]) or 'without names'
+        raise InputError(f'{where}: {problem} called {column!r}; the columns are {listed}')
+    return hits[0]
 
 
 def _check_counter(counter: Array, path: Path) -> None:

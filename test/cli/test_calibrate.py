@@ -72,7 +72,7 @@ def test_one_free_test_leaves_parameters_to_the_prior(run, problem_r: Path) -> N
 
 def test_a_record_that_does_not_start_at_rest(run, problem_r: Path, tmp_path: Path) -> None:
     """A piece cut out of a test starts from its first samples and finds the same parameters."""
-    from actuator_glue.io.export import write_csv
+    from actuator_glue.io.export import write
     from actuator_glue.io.load import load_records
 
     pieces = []
@@ -81,7 +81,7 @@ def test_a_record_that_does_not_start_at_rest(run, problem_r: Path, tmp_path: Pa
         # A zero crossing at speed, which only the slope tells from rest.
         start = 4000 + int(np.abs(record.measured[4000:4200]).argmin())
         pieces.append(tmp_path / f'p{i}.csv')
-        write_csv(pieces[-1], record.slice(start, len(record)), unit='m')
+        write(pieces[-1], record.slice(start, len(record)), unit='m')
     content = run('calibrate', *pieces, '--evaluations', 20_000, '--json', '-').json
     assert (content['initial'], content['settle_s']) == ('measured', 1.0)
     assert abs(content['parameters']['beta_1']['mean'] - MEAN[0]) < 4 * STDDEV[0]

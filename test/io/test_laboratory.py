@@ -1,5 +1,6 @@
 """Laboratory files: what is read, and one clear message for what is not."""
 
+import argparse
 import os
 import re
 from dataclasses import fields, replace
@@ -13,9 +14,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.io import savemat
 
+from actuator_glue.cli._save import add_out
 from actuator_glue.errors import InputError
+from actuator_glue.io import formats
 from actuator_glue.io.channel_map import Channel, ChannelMap, parse_channel_map, read_channel_map
-from actuator_glue.io.export import write_csv, write_mat
+from actuator_glue.io.export import write
 from actuator_glue.io.laboratory import read
 from actuator_glue.io.load import load_records
 from actuator_glue.io.time_base import uniform_period
@@ -157,7 +160,6 @@ def test_export_and_back(
 ) -> None:
     """In m nothing is lost; in mm one rounding; stiffness, hold and name come back."""
     record = replace(record, stiffness=stiffness, hold='linear')
-    write = write_csv if suffix == '.csv' else write_mat
     for unit in ('m', 'mm'):
         path = tmp_path / f'{unit}{suffix}'
         write(path, record, unit=unit)
@@ -171,6 +173,18 @@ def test_export_and_back(
             assert back.force is not None
             assert record.force is not None
             assert back.force.tobytes() == record.force.tobytes()
+
+
+def test_a_format_is_one_file(tmp_path: Path, record: Record) -> None:
+    """Every module of io/formats reads what it writes, and its suffix is in the help."""
+    folder, parser = Path(formats.__path__[0]), argparse.ArgumentParser()
+    add_out(parser)
+    names = {file.stem for file in folder.glob('[a-z]*.py')}
+    assert len(formats.formats()) == len(names)
+    for suffix in formats.formats():
+        write(tmp_path / f'a{suffix}', record, unit='m')
+        assert read(tmp_path / f'a{suffix}').measured.tobytes() == record.measured.tobytes()
+        assert suffix in parser.format_help()
 
 
 def test_matlab_structs_and_version_7_3(tmp_path: Path, record: Record) -> None:
@@ -318,7 +332,7 @@ def test_a_gap_in_the_sample_numbers_is_found(tmp_path: Path) -> None:
 
 def test_load_takes_anything(tmp_path: Path, bag: Path, record: Record) -> None:
     """Bag and file together, stiffnesses one for all, per path, per record."""
-    write_csv(tmp_path / 'a.csv', record, unit='m')
+    write(tmp_path / 'a.csv', record, unit='m')
     paths = [bag, tmp_path / 'a.csv']
     assert [r.stiffness for r in load_records(paths)] == [250e3, 250e3]
     assert [r.stiffness for r in load_records(paths, stiffness=0)] == [0.0, 0.0]

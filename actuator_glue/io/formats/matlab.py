@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from actuator_glue.errors import InputError
+from actuator_glue.io.channel_map import ChannelMap
+from actuator_glue.io.formats import Format, Table
 from actuator_glue.io.signature import refuse_foreign
 from actuator_glue.records import Array
 
@@ -56,3 +59,28 @@ def _collect(name: str, value: Any, vectors: dict[str, Array], texts: dict[str, 
     array = np.asarray(value)
     if array.dtype.kind in 'fiu' and array.ndim <= 1:
         vectors[name] = np.atleast_1d(array).astype(np.float64)
+
+
+def _read(path: Path, channels: ChannelMap | None) -> Table:
+    vectors, texts = read_variables(path)
+    names = list(vectors)
+    # `test.command_mm` is command_mm of the struct `test`; a map names it in full.
+    shown = names if channels is not None else [_last(name) for name in names]
+    notes = {_last(name): text for name, text in texts.items()}
+    for name, vector in vectors.items():
+        if _last(name) == 'stiffness_N_per_m' and len(vector) == 1:
+            notes['stiffness_N_per_m'] = repr(float(vector[0]))
+    return Table(shown, notes, lambda places: [vectors[names[at]] for at in places])
+
+
+def _last(name: str) -> str:
+    return name.rpartition('.')[2]
+
+
+def _write(path: Path, columns: Mapping[str, Array], notes: Mapping[str, str | float]) -> None:
+    from scipy.io import savemat
+
+    savemat(str(path), {**columns, **notes}, appendmat=False, do_compression=True)
+
+
+FORMAT = Format('.mat', _read, _write)

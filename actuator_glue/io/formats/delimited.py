@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import warnings
+from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -11,9 +12,13 @@ from pathlib import Path
 import numpy as np
 
 from actuator_glue.errors import InputError
+from actuator_glue.io.channel_map import ChannelMap
+from actuator_glue.io.formats import Format, Table
 from actuator_glue.io.signature import text_encoding
+from actuator_glue.io.units import EXAMPLE, recognise
 from actuator_glue.records import Array
 
+_ROWS = 10_000  # rows formatted at a time
 # A comma may be the decimal sign where there is another delimiter, so it comes last.
 _DELIMITERS = (';', '\t', ',')
 
@@ -92,22 +97,6 @@ def _fields(line: str, delimiter: str | None) -> list[str]:
     return [entry.strip() for entry in entries]
 
 
-def position(column: str | int, names: list[str], where: str) -> int:
-    """Return the position from 0 of a column given by name or by number from 1.
-
-    Raises:
-        InputError: no column, or more than one, has that name.
-    """
-    if isinstance(column, int):
-        return column - 1
-    hits = [i for i, name in enumerate(names) if name == column]
-    if len(hits) != 1:
-        problem = 'no column is' if not hits else f'{len(hits)} columns are'
-        listed = ', '.join(repr(n) for n in names[:20]) or 'without names'
-        raise InputError(f'{where}: {problem} called {column!r}; the columns are {listed}')
-    return hits[0]
-
-
 def read_columns(
     path: Path, head: Head, positions: list[int], decimal: str | None = None
 ) -> Array:
@@ -155,3 +144,39 @@ def read_columns(
     if not len(columns):
         raise InputError(f'{path}: no samples after the {head.lines} header lines')
     return columns
+
+
+def _read(path: Path, channels: ChannelMap | None) -> Table:
+    if channels is None:
+        head, decimal = read_head(path), None
+        if not any(recognise(name) for name in head.names) and _numeric(head.names):
+            raise InputError(
+                f'{path}: the first line must name the columns with their units, as in '
+                f'{EXAMPLE}; or describe the file with --channels MAP.yaml'
+            )
+    else:
+        head = read_head(path, channels.header_lines, channels.delimiter)
+        decimal = channels.decimal
+    return Table(head.names, head.notes, lambda at: list(read_columns(path, head, at, decimal).T))
+
+
+def _numeric(names: list[str]) -> bool:
+    try:
+        [float(name) for name in names]
+    except ValueError:
+        return False
+    return True
+
+
+def _write(path: Path, columns: Mapping[str, Array], notes: Mapping[str, str | float]) -> None:
+    table = np.column_stack(list(columns.values()))
+    with path.open('w', encoding='utf-8', newline='\n') as file:
+        for name, value in notes.items():
+            file.write(f'# {name} = {value}\n')
+        file.write(','.join(columns) + '\n')
+        for start in range(0, len(table), _ROWS):
+            rows = table[start : start + _ROWS].tolist()
+            file.writelines(','.join(map(repr, row)) + '\n' for row in rows)
+
+
+FORMAT = Format('.csv', _read, _write)
