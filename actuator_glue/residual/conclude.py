@@ -6,11 +6,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from actuator_glue.model.effects import CATALOGUE
-from actuator_glue.records import Record
-from actuator_glue.residual import apart, lines, measurement, surrogate
+from actuator_glue.residual import apart, lines, recorded, surrogate
 from actuator_glue.residual.attribute import Attribution, Attributor
 from actuator_glue.residual.data import Data
 from actuator_glue.residual.decide import Decision, decide
+from actuator_glue.residual.decimate import decimated
 from actuator_glue.residual.hygiene import Prepared
 from actuator_glue.residual.lines import Line
 from actuator_glue.residual.measurement import Measured
@@ -78,7 +78,7 @@ def _conclusion(
 ) -> Conclusion:
     assert search.scorer is not None
     data = search.data
-    seen = measurement.find(data, found.final.fit.error, found.material, line)
+    seen = recorded.find(data, found, settings, line)
     chosen = found.final if found.final.effects else found.singles[0]
     generic = surrogate.compare(data, search.scorer, found.base, chosen)
     decision = decide(found, seen, data, settings, generic)
@@ -96,7 +96,7 @@ def with_the_right_hold(
     commands taken for linear ones are a delay, which is in the catalogue.
     """
     prepared = first.prepared
-    if first.decision.verdict == 'none' or not any(r.hold == 'zoh' for r in prepared.fit.records):
+    if first.decision.verdict == 'none' or not any(r.hold == 'zoh' for r in prepared.fit.recorded):
         return first
     other = replace(prepared, fit=_linear(prepared.fit), held=_linear(prepared.held))
     base = Search(other.fit, ()).base()
@@ -118,7 +118,6 @@ def with_the_right_hold(
 
 
 def _linear(data: Data) -> Data:
-    def changed(record: Record) -> Record:
-        return replace(record, hold='linear')
-
-    return replace(data, records=tuple(changed(r) for r in data.records))
+    whole = tuple(replace(r, hold='linear') for r in data.recorded)
+    pairs = zip(whole, data.factors, strict=True)
+    return replace(data, records=tuple(decimated(r, n) for r, n in pairs), recorded=whole)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol
@@ -28,6 +28,18 @@ class Model(Protocol):
         """Free-run sensor output (m, n) [m] of theta (m, p)."""
 
 
+# Numbers of a block that is worked on at a time, and the least of rows: the kernels' lanes.
+_BLOCK = 1 << 21
+_ROWS = 8
+
+
+def chunks(rows: int, columns: int) -> Iterator[slice]:
+    """Yield slices of rows, of so few that their columns stay within a block."""
+    size = max(_ROWS, _BLOCK // max(columns, 1))
+    for begin in range(0, rows, size):
+        yield slice(begin, begin + size)
+
+
 @dataclass(frozen=True)
 class Data:
     """Records and the samples of each that count.
@@ -36,25 +48,40 @@ class Data:
         records: the records, simulated whole.
         masks: per record, which samples count, (n,) bool.
         initials: per record, the state it starts from: 'rest' or 'measured'.
-        strides: per record, how many samples lie between counted ones.
+        recorded: the records at the rate they were sampled with; the same where that was kept.
     """
 
     records: tuple[Record, ...]
     masks: tuple[Mask, ...]
     initials: tuple[Initial, ...]
-    strides: tuple[int, ...]
+    recorded: tuple[Record, ...]
 
     @classmethod
     def whole(cls, records: Sequence[Record]) -> Data:
         """Count all samples; every record starts from rest."""
         ones = tuple(np.ones(len(r), dtype=np.bool_) for r in records)
         initials: list[Initial] = ['rest' for _ in ones]
-        return cls(tuple(records), ones, tuple(initials), (1,) * len(ones))
+        return cls(tuple(records), ones, tuple(initials), tuple(records))
 
     @cached_property
     def periods(self) -> tuple[float, ...]:
-        """Time between counted samples of each record [s]."""
-        return tuple(r.period * s for r, s in zip(self.records, self.strides, strict=True))
+        """Time between samples of each record [s]."""
+        return tuple(r.period for r in self.records)
+
+    @cached_property
+    def factors(self) -> tuple[int, ...]:
+        """How many recorded samples became one of each record."""
+        pairs = zip(self.records, self.recorded, strict=True)
+        return tuple(round(r.period / whole.period) for r, whole in pairs)
+
+    @property
+    def as_recorded(self) -> Data:
+        """The same stretches at the rate they were sampled with."""
+        masks = [
+            np.repeat(mask, count)[: len(record)]
+            for record, mask, count in zip(self.recorded, self.masks, self.factors, strict=True)
+        ]
+        return Data(self.recorded, tuple(masks), self.initials, self.recorded)
 
     @cached_property
     def times(self) -> tuple[Array, ...]:
@@ -76,12 +103,17 @@ class Data:
         )
 
     def simulate(self, model: Model, theta: Array) -> Array:
-        """Simulate all records free-run and return the counted samples (m, N) [m]."""
+        """Simulate all records free-run and return the counted samples (m, N) [m].
+
+        Few parameter sets at a time: beyond some 20 MB the memory of a simulation goes back to
+        the system each time, and asking for it anew costs as much as the simulation.
+        """
         table = np.atleast_2d(theta)
         out = np.empty((len(table), self.target.size))
         rows = zip(self.records, self.initials, self.masks, self.parts, strict=True)
         for record, initial, mask, part in rows:
-            out[:, part] = model.simulate(table, record, initial=initial)[:, mask]
+            for some in chunks(len(table), len(record)):
+                out[some, part] = model.simulate(table[some], record, initial=initial)[:, mask]
         return out
 
     def split(self, errors: Array) -> list[Array]:

@@ -122,6 +122,10 @@ def diagnose(
         remaining=decision.remaining,
         seconds=clock() - start if clock else math.nan,
         at_bound=held_at,
+        sampling=tuple(
+            {'source': r.source, 'rate_hz': whole.rate, 'fitted_rate_hz': r.rate}
+            for r, whole in zip(prepared.fit.records, prepared.fit.recorded, strict=True)
+        ),
     )
 
 

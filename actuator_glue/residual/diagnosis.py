@@ -218,6 +218,7 @@ class Diagnosis:
         remaining: where in loop, frequency, amplitude and time the unexplained rest sits.
         seconds: wall time.
         at_bound: parameters that their bounds hold.
+        sampling: per record its source, its rate as recorded and as fitted [Hz].
     """
 
     verdict: Verdict
@@ -238,6 +239,7 @@ class Diagnosis:
     remaining: Json
     seconds: float
     at_bound: tuple[Pressed, ...] = ()
+    sampling: tuple[Json, ...] = ()
 
     def to_json(self) -> Json:
         """Return the object of schema `actuator_glue.diagnosis/1` (curves and draws left out)."""
@@ -253,6 +255,7 @@ class Diagnosis:
             'alarm': self.alarm.to_json(),
             'base': {name: p.to_json() for name, p in self.base.items()},
             'rhat': number(self.rhat),
+            'sampling': list(self.sampling),
             'at_bound': [p.to_json() for p in self.at_bound],
             'structure': list(self.structure),
             'surrogate': self.surrogate,

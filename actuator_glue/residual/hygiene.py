@@ -11,6 +11,7 @@ from scipy import ndimage
 from actuator_glue.errors import InputError
 from actuator_glue.model.exact import Initial
 from actuator_glue.records import Record
+from actuator_glue.residual import decimate
 from actuator_glue.residual.checks import check, refuse_repeats, where
 from actuator_glue.residual.data import Data, Mask
 
@@ -23,7 +24,6 @@ _REST = 1.5  # s of constant command that define the zero of both channels
 # Share of its range that a channel may be away from zero, or move within a moment, at rest.
 _STILL = 0.05
 _MOMENT = 0.02  # s
-_RATE = 300.0  # Hz: counted samples need not be denser, no effect acts above 100 Hz
 _FOLD = 4  # every fourth block is held out where no record is
 _FOLD_LENGTH = 3.0  # s
 
@@ -123,7 +123,7 @@ def _folds(record: Record) -> Mask:
 
 
 def prepare(records: Sequence[Record], holdout: Sequence[Record]) -> Prepared:
-    """Check, zero and split records into a fitting and a held-out part.
+    """Check, zero, decimate and split records into a fitting and a held-out part.
 
     Raises:
         InputError: see `clean`; no record, or one that is too short.
@@ -137,38 +137,33 @@ def prepare(records: Sequence[Record], holdout: Sequence[Record]) -> Prepared:
                 f'short for a diagnosis; give at least {_SHORTEST:g} s and 500 samples'
             )
     every, notes = clean(records, holdout)
-    fitted, held = every[: len(records)], every[len(records) :]
     initials = tuple(initial_state(r) for r in every)
-    masks, strides = [], []
+    recorded, every = tuple(every), []
+    for i, record in enumerate(recorded):
+        count = decimate.factor(record)
+        every.append(decimate.decimated(record, count))
+        if count > 1:
+            notes.append(
+                f'{where(record, i + 1)}: {record.rate:g} Hz are more than what moves in it needs '
+                f'(command up to {decimate.command_bandwidth(record):.3g} Hz): means over '
+                f'{count} samples are fitted, at {every[-1].rate:.4g} Hz; errors and noise are '
+                'theirs'
+            )
+    masks = []
     for record, initial in zip(every, initials, strict=True):
-        stride = max(1, int(record.rate / _RATE + 1e-9))
-        mask = np.zeros(len(record), dtype=np.bool_)
-        mask[::stride] = True
+        mask = np.ones(len(record), dtype=np.bool_)
         if initial == 'measured':
             mask[: round(SETTLE / record.period)] = False
         masks.append(mask)
-        strides.append(stride)
     n = len(records)
-    if held:
-        return Prepared(
-            Data(tuple(fitted), tuple(masks[:n]), initials[:n], tuple(strides[:n])),
-            Data(tuple(held), tuple(masks[n:]), initials[n:], tuple(strides[n:])),
-            tuple(notes),
-        )
-    folds = [_folds(r) for r in fitted]
+    if holdout:
+        fit = Data(tuple(every[:n]), tuple(masks[:n]), initials[:n], recorded[:n])
+        held = Data(tuple(every[n:]), tuple(masks[n:]), initials[n:], recorded[n:])
+        return Prepared(fit, held, tuple(notes))
     notes.append('every fourth block of each record held out')
-    return Prepared(
-        Data(
-            tuple(fitted),
-            tuple(m & ~f for m, f in zip(masks, folds, strict=True)),
-            initials,
-            tuple(strides),
-        ),
-        Data(
-            tuple(fitted),
-            tuple(m & f for m, f in zip(masks, folds, strict=True)),
-            initials,
-            tuple(strides),
-        ),
-        tuple(notes),
-    )
+    both = [
+        tuple(m & side(_folds(r)) for m, r in zip(masks, every, strict=True))
+        for side in (np.logical_not, np.asarray)
+    ]
+    fit, held = (Data(tuple(every), side, initials, recorded) for side in both)
+    return Prepared(fit, held, tuple(notes))

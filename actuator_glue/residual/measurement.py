@@ -12,7 +12,6 @@ import numpy as np
 from scipy import ndimage, signal
 
 from actuator_glue.records import Array, Record
-from actuator_glue.residual import lines
 from actuator_glue.residual.data import Data
 from actuator_glue.residual.lines import Line
 
@@ -152,9 +151,8 @@ def find(
         data: counted samples.
         errors: residual of the final structure (N,) [m].
         material: rms above which an effect matters [m].
-        line: hum that was taken out of the data before.
+        line: hum that was found in the data.
     """
-    line = line or lines.find(data, errors)
     hum = Measured('hum', line.rms, line.nats, line.values, line.stddev) if line else None
     found = (
         quantisation(data) or staircase(data, errors),

@@ -12,7 +12,7 @@ from actuator_glue.inference import dream
 from actuator_glue.inference.convergence import rhat
 from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array
-from actuator_glue.residual.data import Data, Model
+from actuator_glue.residual.data import Data, Model, chunks
 from actuator_glue.residual.fit import Fit, Space
 from actuator_glue.residual.score import Scorer
 from actuator_glue.residual.straight import coordinates
@@ -115,10 +115,11 @@ def sample(
     def log_density(w: Array) -> Array:
         theta, found = place(w)
         inside = np.isfinite(found)
-        if inside.any():
-            error = scorer.whiten(data.target - data.simulate(model, theta[inside]))
+        rows = np.flatnonzero(inside)
+        for some in chunks(len(rows), data.target.size):
+            error = scorer.whiten(data.target - data.simulate(model, theta[rows[some]]))
             sums = np.einsum('mn,mn->m', error, error)
-            found[inside] -= np.where(np.isfinite(sums), 0.5 * sums / inflation, np.inf)
+            found[rows[some]] -= np.where(np.isfinite(sums), 0.5 * sums / inflation, np.inf)
         return found
 
     box = np.full(len(phi), _REACH)

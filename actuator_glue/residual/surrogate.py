@@ -110,7 +110,7 @@ def library(data: Data, theta: Array) -> dict[str, Array]:
             for text, c in ((name, stroke * raw), (f'loop({name})', passed),
                             (f'd/dt loop({name})', rate)):  # fmt: skip
                 parts.setdefault(text, []).append(np.asarray(c)[mask])
-    return {name: np.concatenate(columns) for name, columns in parts.items()}
+    return {name: np.concatenate(parts.pop(name)) for name in list(parts)}
 
 
 def _passed(model: Structure, theta: Array, record: Record, command: Array) -> Array:
@@ -130,13 +130,13 @@ def compare(data: Data, scorer: Scorer, base: Trial, structure: Trial) -> Surrog
     count = len(structure.fit.theta) - len(base.fit.theta)
     features = library(data, base.fit.theta)
     names = list(features)
-    rows = np.stack([features[n] for n in names])
-    white = scorer.whiten(np.concatenate([base.fit.jacobian, rows]))
+    rows = np.stack([features.pop(n) for n in names])
     error = scorer.whiten(base.fit.error)
-    own, free = white[: len(base.fit.jacobian)], white[len(base.fit.jacobian) :].copy()
+    own, free = scorer.whiten(base.fit.jacobian), scorer.whiten(rows)
     start = np.einsum('pn,pn->p', free, free)
     q = np.linalg.qr(own.T)[0]
-    free -= (free @ q) @ q.T
+    for row in free:  # one by one: a table of a long record's features is large
+        row -= q @ (row @ q)
     chosen: list[int] = []
     for _ in range(count):
         power = np.einsum('pn,pn->p', free, free)
@@ -147,12 +147,13 @@ def compare(data: Data, scorer: Scorer, base: Trial, structure: Trial) -> Surrog
             break
         chosen.append(best)
         unit = free[best] / np.sqrt(power[best])
-        free -= np.outer(free @ unit, unit)
-    pick = [*range(len(own)), *(len(own) + i for i in chosen)]
-    raw = np.concatenate([base.fit.jacobian, rows])[pick]
-    scale = np.sqrt(np.einsum('pn,pn->p', white[pick], white[pick]))
+        for row in free:
+            row -= (row @ unit) * unit
+    raw = np.concatenate([base.fit.jacobian, rows[chosen]])
+    white = np.concatenate([own, scorer.whiten(rows[chosen])])
+    scale = np.sqrt(np.einsum('pn,pn->p', white, white))
     scale = np.where(scale > 0.0, scale, 1.0)
-    weights, *_ = np.linalg.lstsq((white[pick] / scale[:, None]).T, error, rcond=1e-10)
+    weights, *_ = np.linalg.lstsq((white / scale[:, None]).T, error, rcond=1e-10)
     fit = Fit(base.fit.theta, base.fit.error - (weights / scale) @ raw, raw, base.fit.z)
     left, whole = scorer.left_out_error(fit), scorer.left_out_error(base.fit)
     return Surrogate(

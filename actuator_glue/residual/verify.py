@@ -8,7 +8,7 @@ import numpy as np
 
 from actuator_glue.records import Array
 from actuator_glue.residual import lines
-from actuator_glue.residual.data import Data, Model
+from actuator_glue.residual.data import Data, Model, chunks
 from actuator_glue.residual.diagnosis import HeldOutError, Trace
 from actuator_glue.residual.lines import Line
 from actuator_glue.residual.score import BLOCK, pooled, splits_of
@@ -68,9 +68,17 @@ def bootstrap(
 def _spread(data: Data, side: Side, rng: np.random.Generator) -> Array:
     """Standard deviation of the simulation over posterior draws, (N,) [m]."""
     rows = rng.integers(0, len(side.draws), min(_DRAWS, len(side.draws)))
-    out = data.simulate(side.model, side.draws[rows])
-    out = out[np.isfinite(out).all(axis=1)]
-    return np.asarray(out.std(axis=0)) if len(out) > 1 else np.zeros(data.target.size)
+    centre = data.simulate(side.model, side.theta)[0]
+    count, total, squares = 0, np.zeros_like(centre), np.zeros_like(centre)
+    for some in chunks(len(rows), data.target.size):
+        off = data.simulate(side.model, side.draws[rows[some]]) - centre
+        off = off[np.isfinite(off).all(axis=1)]
+        count += len(off)
+        total += off.sum(axis=0)
+        squares += np.einsum('mn,mn->n', off, off)
+    if count < 2:
+        return np.zeros_like(centre)
+    return np.asarray(np.sqrt(np.maximum(squares / count - (total / count) ** 2, 0.0)))
 
 
 def _sham(

@@ -76,17 +76,6 @@ def test_without_a_held_out_record_blocks_are_set_aside() -> None:
     assert 0.2 < held.mean() < 0.3
 
 
-def test_fast_records_are_compared_at_every_nth_sample() -> None:
-    """1 kHz is simulated whole and counted at 333 Hz."""
-    t = np.arange(0, 10, 1e-3)
-    u = 2e-3 * np.sin(t)
-    fast = Record(u, 0.9 * u, 1e-3, stiffness=0.0)
-    data = prepare([fast], []).fit
-    assert data.strides == (3,)
-    assert data.periods == (pytest.approx(3e-3),)
-    assert 0.7 < data.target.size / len(range(0, 10000, 3)) < 0.8
-
-
 def test_a_record_that_begins_in_motion_starts_from_its_samples() -> None:
     """The first second then only lets the state be forgotten."""
     data = prepare([GOOD.slice(1000, 5000)], [GOOD]).fit

@@ -1,0 +1,131 @@
+"""Records sampled much faster than command and actuator move, brought to the rate they need.
+
+Both channels pass the same linear-phase filter, so that a linear actuator relates what is left of
+them exactly as it related them before; the command then runs linearly between its samples, with
+what a hold over one sample or the straight line over many takes off made up for to fourth order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy import signal
+
+from actuator_glue.model import linear
+from actuator_glue.records import Array, Record
+
+# Samples per period of the fastest that command or actuator show: the straight line between two
+# is then off by less than 1e-4 after its correction.
+_PER_PERIOD = 12.0
+# Hz that stay in sight whatever moves: hum with its first overtone, and the dynamics of valves and
+# conditioners in the catalogue.
+_SEEN = 150.0
+_TAIL = 1e-4  # share of the command's power that may lie above its bandwidth: 1 % of its amplitude
+_COARSE = 1e-3  # s: what moves is slower
+_STEPS = 24  # natural frequencies tried, a decade to either side of the command's bandwidth
+_DAMPINGS = (0.5, 0.9, 1.5)
+
+
+def _coarse(record: Record) -> Record:
+    """Return means over a millisecond."""
+    size = max(1, int(_COARSE / record.period))
+    count = len(record) // size
+    u, y = (
+        c[: count * size].reshape(count, size).mean(axis=1)
+        for c in (record.command, record.measured)
+    )
+    return Record(u, y, size * record.period)
+
+
+def command_bandwidth(record: Record) -> float:
+    """Return the frequency [Hz] above which 0.01 % of the command's power lies."""
+    coarse = _coarse(record)
+    u = signal.detrend(coarse.command) * np.hanning(len(coarse))
+    power = np.cumsum(np.abs(np.fft.rfft(u)) ** 2)
+    at = int(np.searchsorted(power, (1.0 - _TAIL) * power[-1]))
+    return max(at, 1) / (len(u) * coarse.period)
+
+
+def actuator_bandwidth(record: Record, near: float) -> float:
+    """Return the natural frequency [Hz] of the second-order lag nearest to a record.
+
+    Looked for within a decade of a frequency: a faster actuator follows what it is given, a
+    slower one hides it.
+    """
+    coarse = _coarse(record)
+    w, z = (
+        g.ravel()
+        for g in np.meshgrid(2.0 * np.pi * near * np.geomspace(0.1, 10.0, _STEPS), _DAMPINGS)
+    )
+    systems = np.stack([2.0 * z * w, w**2, w**2], axis=1)
+    y = coarse.measured - coarse.measured.mean()
+    miss = []
+    for some in np.array_split(systems, len(systems) // 8):
+        shapes = linear.respond(some, coarse.command, period=coarse.period)
+        shapes = shapes - shapes.mean(axis=1, keepdims=True)
+        power = np.einsum('mn,mn->m', shapes, shapes)
+        miss += list(-((shapes @ y) ** 2) / np.maximum(power, 1e-300))
+    return float(w[int(np.argmin(miss))] / (2.0 * np.pi))
+
+
+def needed_rate(record: Record) -> float:
+    """Return the sample rate [Hz] that what moves in a record needs."""
+    moved = command_bandwidth(record)
+    return max(2.0 * _SEEN, _PER_PERIOD * max(moved, actuator_bandwidth(record, moved)))
+
+
+def factor(record: Record) -> int:
+    """Return how many samples of a record may become one."""
+    if record.rate < 4.0 * _SEEN:  # whatever moves
+        return 1
+    return max(1, int(record.rate / needed_rate(record) + 1e-9))
+
+
+def window(count: int) -> Array:
+    """Return the filter of both channels, odd and of unit sum: means of means of `count`."""
+    box = np.full(count, 1.0 / count)
+    return np.convolve(box, box)
+
+
+def _filtered(values: Array, taps: Array, count: int) -> Array:
+    """Filter with odd, centred taps and take every `count`-th sample; the ends are held."""
+    half = len(taps) // 2
+    padded = np.concatenate([np.full(half, values[0]), values, np.full(half, values[-1])])
+    at = -(-2 * half // count) * count
+    # Zeros in front shift the first output to a multiple of the step.
+    lead = np.concatenate([np.zeros(at - 2 * half), taps])
+    out = signal.upfirdn(lead, padded, up=1, down=count)
+    first = at // count
+    return np.asarray(out[first : first + -(-len(values) // count)])
+
+
+def means(values: Array, count: int) -> Array:
+    """Return what `decimated` makes of a measured channel, one value for `count`."""
+    return _filtered(values, window(count), count)
+
+
+def decimated(record: Record, count: int) -> Record:
+    """Return a record with one sample for `count`, the first at the same time.
+
+    The force is left out: nothing that looks at it comes after.
+    """
+    if count == 1:
+        return record
+    taps = window(count)
+    # Over one sample: a hold is the mean of two neighbours but for its curvature; a line is not.
+    held = np.convolve([0.0, 0.5, 0.5], np.array([-1.0, 14.0, -1.0]) / 12.0)
+    inner = held if record.hold == 'zoh' else np.array([1.0, 10.0, 1.0]) / 12.0
+    command = _filtered(record.command, np.convolve(taps, inner), count)
+    bend = -np.convolve(command, [1.0, -2.0, 1.0])[1:-1]
+    bend[[0, -1]] = 0.0
+    twice = -np.convolve(bend, [1.0, -2.0, 1.0])[1:-1]
+    twice[[0, -1]] = 0.0
+    return replace(
+        record,
+        command=command + bend / 12.0 + twice / 90.0,
+        measured=means(record.measured, count),
+        period=count * record.period,
+        force=None,
+        hold='linear',
+    )
