@@ -49,7 +49,7 @@ bench: $(ROS_STAMP) ## speed, side by side with peers; results in out/bench
 	@$(ROS) $(BIN)/python -m benchmarks --out out/bench $(BENCH_ARGS)
 
 reproduce: $(VENV_STAMP) ## the paper beside our numbers; report in out/reproduce
-	@$(BIN)/actuator-glue reproduce --force --out out/reproduce $(REPRODUCE_ARGS)
+	@$(BIN)/python -m studies.chen --force --out out/reproduce $(REPRODUCE_ARGS)
 
 docs: $(VENV_STAMP) ## renew docs/messages.md and the table of docs/effects.md
 	@$(BIN)/python scripts/write_message_reference.py

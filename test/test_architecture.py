@@ -17,7 +17,7 @@ SOURCES = sorted(p for p in ROOT.rglob('*.py'))
 BOTTOM = {'errors', 'records', 'jit', 'normal'}
 CORE = BOTTOM | {'model', 'inference'}
 EVERYTHING = CORE | {
-    'online', 'residual', 'report', 'io', 'reproduction', 'interfaces', 'workers',
+    'online', 'residual', 'report', 'io', 'interfaces', 'workers',
 }  # fmt: skip
 # Each folder or top module, and what it may import besides itself.
 ARROWS = {
@@ -32,7 +32,6 @@ ARROWS = {
     'residual': CORE,
     'report': CORE | {'online', 'residual'},
     'io': {'records', 'errors', 'interfaces'},
-    'reproduction': CORE | {'residual', 'report', 'io'},
     'workers': CORE | {'online'},
     'nodes': EVERYTHING,
     'demo': EVERYTHING,

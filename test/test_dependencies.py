@@ -16,7 +16,7 @@ from colcon_python_setup_py.package_identification.python_setup_py import get_se
 
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / 'pyproject.toml').read_text(encoding='utf-8'))['project']
-OURS = {'actuator_glue', 'benchmarks', *(p.stem for p in (ROOT / 'test').rglob('*.py'))}
+OURS = {'actuator_glue', 'benchmarks', 'studies', *(p.stem for p in (ROOT / 'test').rglob('*.py'))}
 
 
 class Names(NamedTuple):
@@ -94,6 +94,11 @@ def test_pip_installs_what_the_package_imports() -> None:
     """[project] dependencies: every library, and none that nothing imports."""
     expected = {LIBRARIES[m].pip for m in RUN if m in LIBRARIES}
     assert pip_names(PROJECT['dependencies']) == expected
+
+
+def test_studies_need_nothing_more() -> None:
+    """They run where the package does."""
+    assert imported('studies') <= RUN
 
 
 def test_pip_installs_what_the_tests_import() -> None:

@@ -14,7 +14,7 @@ import actuator_glue
 
 ROOT = Path(actuator_glue.__file__).resolve().parent
 REPOSITORY = ROOT.parent
-SOURCES = sorted(ROOT.rglob('*.py'))
+SOURCES = sorted(p for f in (ROOT, REPOSITORY / 'studies') for p in f.rglob('*.py'))
 COMMANDS = sorted(p.stem for p in (ROOT / 'cli').glob('[!_]*.py') if p.stem != 'main')
 CONFIGS = sorted((REPOSITORY / 'config').rglob('*.yaml'))
 
@@ -45,7 +45,7 @@ def commands_of(command: str) -> argparse.ArgumentParser:
     return parser
 
 
-@pytest.mark.parametrize('path', SOURCES, ids=lambda p: str(p.relative_to(ROOT)))
+@pytest.mark.parametrize('path', SOURCES, ids=lambda p: str(p.relative_to(REPOSITORY)))
 def test_every_public_name_has_a_docstring(path: Path) -> None:
     """Modules, classes, functions and methods that others can call."""
     tree = ast.parse(path.read_text(encoding='utf-8'))

@@ -1,1 +1,0 @@
-"""Sections of the report: text, tables and figures from the study's numbers."""

@@ -1,0 +1,1 @@
+"""Studies made with actuator_glue, outside the package that is installed."""
