@@ -22,7 +22,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     # Links: setuptools reads through them; what it writes stays beside them.
     for name in (
         'pyproject.toml', 'setup.py', 'setup.cfg', 'README.md', 'LICENSE', 'package.xml',
-        'resource', 'launch', 'config', 'actuator_glue',
+        'resource', 'launch', 'config', 'actuator_glue', 'studies',
     ):  # fmt: skip
         (source / name).symlink_to(ROOT / name)
     command = ['-m', 'pip', 'wheel', '--quiet', '--no-deps', '--no-build-isolation', '-w', out]
@@ -46,6 +46,12 @@ def test_wheel_holds_every_file_of_the_package(wheel: Path) -> None:
     }
     held = {n for n in zipfile.ZipFile(wheel).namelist() if n.startswith('actuator_glue/')}
     assert held == files
+
+
+def test_wheel_holds_nothing_beside_the_package(wheel: Path) -> None:
+    """Studies stay in the checkout."""
+    tops = {name.partition('/')[0] for name in zipfile.ZipFile(wheel).namelist()}
+    assert {top.partition('-')[0] for top in tops} == {'actuator_glue'}
 
 
 def test_wheel_is_found_by_ros_and_by_pip(wheel: Path) -> None:
