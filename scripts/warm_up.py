@@ -20,6 +20,7 @@ COMMANDS = [
     'calibrate {0}/free.csv --stiffness 0 --evaluations 5000',
     'calibrate {0}/free.csv {0}/clamped.csv --stiffness 0 250e3 --evaluations 5000',
     'diagnose {0}/free.csv {0}/clamped.csv --stiffness 0 250e3',
+    'calibrate {0}/clamped.csv --stiffness 250e3 --effect backlash --evaluations 5000',
 ]
 
 
