@@ -159,7 +159,7 @@ class SuiteNode(LifecycleNode):
         return call
 
     def complain(self, kind: str, message: str, level: Any = health.WARN) -> None:
-        """Log a fault (not the same one more than once a second) and show it on /diagnostics."""
+        """Log a fault (one that lasts, once) and show it on /diagnostics."""
         if self.health.fault(kind, message, time.monotonic(), level):
             # rclpy ties a severity to the line that logs: one line each.
             if level == health.ERROR:

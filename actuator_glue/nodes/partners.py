@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
-from rclpy.qos import QoSCompatibility, QoSPolicyKind, qos_check_compatible
+from rclpy.qos import DurabilityPolicy, QoSPolicyKind, QoSProfile, ReliabilityPolicy
 from rclpy.qos_overriding_options import QoSOverridingOptions
 
 # Policies that parameters `qos_overrides.TOPIC.publisher|subscription.POLICY` override.
@@ -25,6 +25,24 @@ def type_name(cls: Any) -> str:
     return f'{package}/msg/{cls.__name__}'
 
 
+def refusal(asked: QoSProfile, offered: QoSProfile) -> str:
+    """Return why DDS does not match a subscription and a publisher, empty where it does.
+
+    rclpy's own comparison takes the endless deadlines that discovery tells of for finite ones.
+    """
+    if (
+        asked.reliability == ReliabilityPolicy.RELIABLE
+        and offered.reliability == ReliabilityPolicy.BEST_EFFORT
+    ):
+        return 'reliable is asked for, best effort offered'
+    if (
+        asked.durability == DurabilityPolicy.TRANSIENT_LOCAL
+        and offered.durability == DurabilityPolicy.VOLATILE
+    ):
+        return 'transient local is asked for, volatile offered'
+    return ''
+
+
 def unheard(node: Any, subscription: Any) -> Iterator[tuple[str, str]]:
     """Yield the kind and text of each reason why a publisher cannot be heard."""
     wanted, topic = type_name(subscription.msg_type), subscription.topic_name
@@ -33,16 +51,16 @@ def unheard(node: Any, subscription: Any) -> Iterator[tuple[str, str]]:
             text = f'{_name(info)} publishes {info.topic_type} on {topic}; {wanted} is expected'
             yield 'wrong message type', text
             continue
-        fits, reason = qos_check_compatible(info.qos_profile, subscription.qos_profile)
-        if fits == QoSCompatibility.ERROR:
+        reason = refusal(subscription.qos_profile, info.qos_profile)
+        if reason:
             yield 'incompatible QoS', f'nothing is heard of {_name(info)} on {topic}: {reason}'
 
 
 def unreached(node: Any, publisher: Any) -> Iterator[tuple[str, str]]:
     """Yield the kind and text of each reason why a subscription gets nothing."""
     for info in node.get_subscriptions_info_by_topic(publisher.topic_name):
-        fits, reason = qos_check_compatible(publisher.qos_profile, info.qos_profile)
-        if fits == QoSCompatibility.ERROR:
+        reason = refusal(info.qos_profile, publisher.qos_profile)
+        if reason:
             text = f'{_name(info)} gets nothing of {publisher.topic_name}: {reason}'
             yield 'incompatible QoS', text
 

@@ -12,13 +12,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rclpy.qos import (
-    DurabilityPolicy,
-    QoSCompatibility,
-    QoSProfile,
-    ReliabilityPolicy,
-    qos_check_compatible,
-)
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.bag_metadata import LATCHED, Qos
@@ -26,7 +20,7 @@ from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.nodes import base, folders, spin, topics
 from actuator_glue.nodes.health import ERROR, Rate
 from actuator_glue.nodes.parameters import Spec
-from actuator_glue.nodes.partners import type_name
+from actuator_glue.nodes.partners import refusal, type_name
 
 SPECS = (
     Spec(
@@ -156,7 +150,7 @@ class RecorderNode(base.SuiteNode):
                     self.complain('topic', f'{name}: type {types[0]} is not installed ({error})')
         for name, (topic, made) in list(self._heard.items()):
             offered = self._offered(name, type_name(topic.type))
-            if any(_unheard(made.qos_profile, one) for one in offered):
+            if any(refusal(made.qos_profile, one) for one in offered):
                 self._take_from(made)
                 self.unsubscribe(made)
                 qos = _suited(made.qos_profile, offered)
@@ -215,10 +209,6 @@ class RecorderNode(base.SuiteNode):
             self._waiting_bytes -= len(item.data)
             self._lag = time.monotonic() - item.arrived
             self._worst_lag = max(self._worst_lag, self._lag)
-
-
-def _unheard(asked: QoSProfile, offered: QoSProfile) -> bool:
-    return bool(qos_check_compatible(offered, asked)[0] == QoSCompatibility.ERROR)
 
 
 def _suited(asked: QoSProfile, offered: Sequence[QoSProfile]) -> QoSProfile:

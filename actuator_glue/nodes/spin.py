@@ -12,6 +12,7 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.signals import SignalHandlerOptions
 
 from actuator_glue.errors import InputError
+from actuator_glue.nodes import transport
 from actuator_glue.nodes.base import SUCCESS, SuiteNode
 from actuator_glue.nodes.executor import Executor
 from actuator_glue.nodes.signals import Stop
@@ -20,6 +21,7 @@ from actuator_glue.nodes.signals import Stop
 def main(make: Callable[[], SuiteNode], args: Sequence[str] | None = None) -> int:
     """Run a node until SIGINT, SIGTERM or its own end; return the exit code."""
     stop = Stop()
+    transport.choose()
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = make()

@@ -87,7 +87,7 @@ def test_no_sample_is_sent_before_subscribers_have_the_set_up(node, start, probe
 
 def test_a_recorder_writes_what_has_reached_it_when_it_is_stopped(probe, tmp_path, monkeypatch):
     """Messages that no callback has seen yet are in the bag."""
-    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv('ROS_HOME', str(tmp_path))
     recorder = RecorderNode()
     recorder.trigger_configure()
     recorder.trigger_activate()
@@ -100,7 +100,7 @@ def test_a_recorder_writes_what_has_reached_it_when_it_is_stopped(probe, tmp_pat
     # It is in nobody's executor: no callback has run.
     recorder.trigger_deactivate()
     recorder.destroy_node()
-    (bag,) = tmp_path.iterdir()
+    (bag,) = (tmp_path / 'actuator_glue').iterdir()
     assert np.array_equal(recorded(bag), np.arange(1000))
     found = list(messages(bag))
     assert sum(m.type == TEST_SETUP for m in found) == 1
