@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from actuator_glue_msgs.action import Diagnose
 from rclpy.action import ActionClient
+from rclpy.duration import Duration
 from ros_nodes import QUICK, RATE, stranger
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
@@ -137,6 +138,7 @@ def test_a_worker_that_is_killed_after_a_warning_is_replaced(start, probe):
     probe.until(lambda: 'the worker process ended' in probe.faults['estimator'], 15)
     probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 120, 'compiled again')
     probe.setup(index=probe.index)
+    assert probe.setup_out.wait_for_all_acked(Duration(seconds=20.0))
     probe.stream(good(5.0), pause=0.02)
     probe.until(lambda: probe.number('estimator', 'windows') >= 1, 30, 'windows')
     # So is the worker of a node that is inactive just then.

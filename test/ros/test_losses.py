@@ -118,6 +118,7 @@ def test_windows_that_are_complete_at_once_are_all_estimated(start, probe):
     probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 120, 'estimator compiled')
     probe.open_stream()
     probe.setup()
+    assert probe.setup_out.wait_for_all_acked(Duration(seconds=20.0))
     command = noise(RATE, 14.0, 0.2, 8.0, seed=1)
     for block in np.split(command[:400], 20):
         probe.block(block, 0.9 * block)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from ros_nodes import recorded
 
+from actuator_glue.io.bag_reader import decoded
 from actuator_glue.nodes import parameter_file, run
 
 
@@ -78,6 +79,31 @@ def test_an_early_signal_ends_a_node_without_a_traceback(after, tmp_path):
         os.killpg(process.pid, signal.SIGINT)
     told, _ = process.communicate(timeout=20)
     assert process.returncode == 0 and 'Traceback' not in told, told
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1500)
+def test_the_first_run_on_a_machine_is_whole(start, probe, tmp_path, monkeypatch):
+    """An empty compile cache, all nodes at once, signals as launch sends them."""
+    monkeypatch.setenv('NUMBA_CACHE_DIR', str(tmp_path / 'cache'))
+    bag, sealed = tmp_path / 'bag', tmp_path / 'truth.json'
+    nodes = [
+        start('recorder', bag=str(bag)),
+        start('estimator', window=4.0, hop=2.0, time_budget=1.8),
+        start('diagnoser', minimum=10.0),
+        start(
+            'actuator_sim', rate=200.0, duration=90.0, wait_for=3, preview=3.0,
+            undeclared_effect='backlash:backlash=1e-4', sealed_file=str(sealed),
+        ),
+    ]  # fmt: skip
+    probe.until(lambda: probe.number('estimator', 'windows') >= 5, 1200, 'windows')
+    diagnosed = lambda: probe.value('diagnoser', 'last diagnosis')  # noqa: E731
+    probe.until(diagnosed, 200, 'a diagnosis')
+    assert probe.number('estimator', 'windows dropped') <= 3
+    for node in reversed(nodes):
+        assert end_as_launch_does(node) == 0, node.text
+    assert (bag / 'metadata.yaml').exists()
+    assert list(decoded(bag, ('PosteriorMoments',))) and list(decoded(bag, ('Diagnosis',)))
 
 
 def test_every_node_has_an_executable():
