@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from actuator_glue.inference.choice import choose_model
 from actuator_glue.io.bag_reader import decoded
 from actuator_glue.io.bag_records import write_record
 from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.model import commands, linear
 from actuator_glue.online import job as window_job
 from actuator_glue.online.estimator import Estimator
-from actuator_glue.online.fitting import choose_model
 from actuator_glue.online.replay import at_once, items, replay, stream
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Preview, Setup

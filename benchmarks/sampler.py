@@ -17,7 +17,7 @@ for _name in ('OMP_NUM_THREADS', 'OPENBLAS_NUM_THREADS', 'MKL_NUM_THREADS'):
 import numpy as np  # noqa: E402 - after the threads are set
 
 from actuator_glue.inference.convergence import rhat  # noqa: E402 - after the threads are set
-from actuator_glue.inference.dream import Chains, Settings, sample  # noqa: E402 - after the threads are set
+from actuator_glue.inference.dream import Chains, SamplerSettings, sample  # noqa: E402 - after the threads are set
 from actuator_glue.inference.likelihood import GlueLikelihood  # noqa: E402 - after the threads are set
 from actuator_glue.model import problem_r  # noqa: E402 - after the threads are set
 from actuator_glue.model.fast import FastErrors  # noqa: E402 - after the threads are set
@@ -26,7 +26,7 @@ from actuator_glue.records import Array  # noqa: E402 - after the threads are se
 
 G = 256.0
 # More chains share the cost of a call; fewer make R-hat fall sooner. Sustained runs take these.
-MANY = Settings(chains=64)
+MANY = SamplerSettings(chains=64)
 
 
 def evaluations_to_rhat(chains: Chains, limit: float = 1.01) -> float:
@@ -39,7 +39,7 @@ def evaluations_to_rhat(chains: Chains, limit: float = 1.01) -> float:
     return float('inf')
 
 
-def evaluation(settings: Settings, evaluations: int = 300_000, repeats: int = 5) -> float:
+def evaluation(settings: SamplerSettings, evaluations: int = 300_000, repeats: int = 5) -> float:
     """Processor time of one evaluation of a run, the likelihood and all else included [us]."""
     density = GlueLikelihood(FastErrors(problem_r.records()), G)
     taken = []
@@ -66,7 +66,7 @@ def run(repeats: int = 5, seeds: int = 20) -> dict[str, Any]:
     first = sample(np.random.default_rng(0), density, *bounds(), evaluations=40_000)
     first_call = time.perf_counter() - began
 
-    def per_second(settings: Settings, seed: int) -> float:
+    def per_second(settings: SamplerSettings, seed: int) -> float:
         began = time.process_time()
         chains = sample(
             np.random.default_rng(seed), density, *bounds(), evaluations=1_000_000,
@@ -76,7 +76,7 @@ def run(repeats: int = 5, seeds: int = 20) -> dict[str, Any]:
         return float(chains.ess.min()) / seconds
 
     many = [per_second(MANY, seed) for seed in range(repeats)]
-    default = [per_second(Settings(), seed) for seed in range(repeats)]
+    default = [per_second(SamplerSettings(), seed) for seed in range(repeats)]
     warm = [
         sample(
             np.random.default_rng(seed), density, *bounds(), evaluations=60_000,
@@ -100,7 +100,7 @@ def run(repeats: int = 5, seeds: int = 20) -> dict[str, Any]:
         'ess_per_1000_evaluations': statistics.median(
             1000.0 * c.ess.min() / c.evaluations for c in warm
         ),
-        'evaluation_us': {str(n): evaluation(Settings(chains=n)) for n in (8, 20, 64)},
+        'evaluation_us': {str(n): evaluation(SamplerSettings(chains=n)) for n in (8, 20, 64)},
         'first_call_s': first_call,
         'setting': '64 chains sustained, 20 chains for the other figures; fast likelihood',
     }

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 from actuator_glue.cli._output import progress
@@ -13,9 +12,8 @@ from actuator_glue.records import Array, Record
 
 if TYPE_CHECKING:
     from actuator_glue.inference.chains import Chains
-    from actuator_glue.inference.evaluate import LogDensity
+    from actuator_glue.inference.choice import ModelChoice
     from actuator_glue.model.exact import Initial
-    from actuator_glue.online.settings import ModelChoice
 
 
 def initial_state(asked: str, records: list[Record]) -> Initial:
@@ -46,47 +44,21 @@ def sample(
     Raises:
         InputError: settings or records that cannot be used.
     """
-    import numpy as np
+    from actuator_glue.inference.posterior import Problem
+    from actuator_glue.inference.posterior import sample as sample_posterior
 
-    from actuator_glue.inference import dream
-    from actuator_glue.inference.likelihood import (
-        Ar1Likelihood,
-        GaussianLikelihood,
-        GlueLikelihood,
+    problem = Problem(
+        records=records,
+        model=model,
+        likelihood=args.likelihood,
+        shaping_factor=args.shaping_factor,
+        initial=initial,
+        settle=settle,
     )
-    from actuator_glue.model.fast import FastErrors
-    from actuator_glue.model.structure import Structure
-    from actuator_glue.online.coordinates import Coordinates
-
-    counts = [round(settle / r.period) for r in records]
-    errors = Structure(model.effects).errors(records, counts, initial)
-    sums = errors if model.effects else FastErrors(records, counts, initial)
-    density: LogDensity
-    if args.likelihood == 'glue':
-        density = GlueLikelihood(sums, args.shaping_factor)
-    elif args.likelihood == 'gaussian':
-        density = GaussianLikelihood(sums)
-    else:
-        density = Ar1Likelihood(errors)
-    lower, upper = model.bounds
-    stiffnesses = {r.known_stiffness() for r in records}
-    # One stiffness alone leaves a bent ridge, on which no sampler moves in physical parameters.
-    single = Coordinates(model, stiffnesses.pop()) if len(stiffnesses) == 1 else None
-    settings, archive = dream.Settings(), None
-    if single is not None:
-        settings, archive = single.cold(np.random.default_rng((args.seed, 1)), settings)
     with progress('calibrating', args.evaluations) as done:
-        chains = dream.sample(
-            np.random.default_rng(args.seed),
-            density if single is None else single.density(density),
-            lower if single is None else single.lower,
-            upper if single is None else single.upper,
-            evaluations=args.evaluations,
-            settings=settings,
-            archive=archive,
-            progress=lambda made, _: done(made),
+        return sample_posterior(
+            problem.target(), (args.seed,), args.evaluations, progress=lambda made, _: done(made)
         )
-    return chains if single is None else single.chains(chains)
 
 
 def sampled_model(
@@ -103,24 +75,15 @@ def sampled_model(
         InputError: unknown effect or parameter, or bounds that leave nothing between them or
             reach below zero where a parameter cannot.
     """
-    from actuator_glue.inference.likelihood import PHI
+    from actuator_glue.inference.choice import choose_model
     from actuator_glue.model.structure import Structure
-    from actuator_glue.online.fitting import choose_model
 
     for parameter in Structure(effects).parameters:
         least = bounds.get(parameter.name, (0.0, 0.0))[0]
         if parameter.lower == 0.0 and least < 0.0:
             raise InputError(f'{parameter.name} cannot be negative; --bounds starts at {least:g}')
     model = choose_model(effects, bounds)
-    if likelihood != 'ar1':
-        return model
-    return replace(
-        model,
-        names=(*model.names, PHI.name),
-        units=(*model.units, PHI.unit),
-        lower=(*model.lower, PHI.lower),
-        upper=(*model.upper, PHI.upper),
-    )
+    return model.with_autocorrelation() if likelihood == 'ar1' else model
 
 
 def fit_error(residuals: list[Array], records: list[Record], settle: float) -> dict[str, Any]:

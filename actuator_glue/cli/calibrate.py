@@ -22,7 +22,7 @@ from actuator_glue.records import Record
 
 if TYPE_CHECKING:
     from actuator_glue.inference.chains import Chains
-    from actuator_glue.online.settings import ModelChoice
+    from actuator_glue.inference.choice import ModelChoice
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

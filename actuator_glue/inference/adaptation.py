@@ -7,59 +7,59 @@ renewed whenever the archive has doubled, that is ever more rarely, from ever mo
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
+from actuator_glue.inference import student
 from actuator_glue.inference.archive import newest
-from actuator_glue.inference.moves import INDEPENDENCE, NAMES, PARALLEL, independence
-from actuator_glue.inference.settings import Settings
+from actuator_glue.inference.moves import UNTEMPERED, ProposalContext, Tuning
+from actuator_glue.inference.settings import SamplerSettings
+from actuator_glue.inference.transforms.log import Log
 from actuator_glue.jit import njit
 from actuator_glue.records import Array
 
-# Every crossover class keeps at least this weight, and the independence move this share, so that
-# what failed early can still prove itself.
+# Every crossover class keeps at least this weight, and moves without a fixed share this one, so
+# that what failed early can still prove itself.
 _FLOOR = 0.1
 _LEAST = 0.05
 
 
-class Tuning(NamedTuple):
-    """Proposal distributions of the moves.
-
-    Attributes:
-        move_cdf: cumulative probabilities of the moves, (3,).
-        crossover_cdf: cumulative probabilities of the crossover classes, (n_CR,).
-        scale: standard deviation of each coordinate over the archive, (p,).
-        centre: centre of the independence move, (p,).
-        factor: Cholesky factor of its covariance, (p, p).
-    """
-
-    move_cdf: Array
-    crossover_cdf: Array
-    scale: Array
-    centre: Array
-    factor: Array
-
-
-def empty_counts(settings: Settings) -> Array:
+def empty_counts(settings: SamplerSettings) -> Array:
     """Uses, acceptances and squared jumps of each move and crossover class, all zero."""
-    return np.zeros((len(NAMES) + settings.crossovers, 3))
+    return np.zeros((len(settings.moves) + settings.crossovers, 3))
 
 
-def tune(points: Array, counts: Array, settings: Settings) -> Tuning:
-    """Fit the proposals to points (m, p) and the shares to what the moves achieved.
+def tuned(points: Array, counts: Array, settings: SamplerSettings, box: Log) -> ProposalContext:
+    """Return what the moves depend on, fitted to points (m, p) and to what they achieved.
 
-    Crossover classes share by their mean squared jump (Vrugt 2016, section 3.2.1); the
-    independence and parallel moves share what the snooker move leaves by the square of the
-    effective draws that such jumps make: nearer to the better one alone than to equal parts.
+    Crossover classes share by their mean squared jump (Vrugt 2016, section 3.2.1); moves without
+    a fixed share divide what the others leave by the square of the effective draws that such
+    jumps make: nearer to the better one alone than to equal parts.
+
+    Args:
+        points: the archive, in sampling coordinates.
+        counts: uses, acceptances and squared jumps.
+        settings: settings of the sampler.
+        box: the prior.
     """
-    dimension = points.shape[1]
-    new = Tuning(
-        np.empty(len(NAMES)), np.empty(settings.crossovers), np.empty(dimension),
-        np.empty(dimension), np.empty((dimension, dimension)),
+    d, moves = points.shape[1], settings.moves
+    context = ProposalContext(
+        lower=box.low,
+        width=box.width,
+        tuning=Tuning(
+            np.empty(len(moves)), np.empty(settings.crossovers), np.empty(d), np.empty(d),
+            np.empty((d, d)),
+        ),
+        tempering=UNTEMPERED,
+        fixed=np.array([-1.0 if move.share is None else move.share for move in moves]),
+        most=np.array([move.most for move in moves]),
+        pairs=settings.pairs,
+        unit_jump=settings.unit_jump,
+        jitter=settings.jitter,
+        noise=settings.noise,
     )  # fmt: skip
-    _fit(points, counts, settings.independence, settings.snooker, True, new)
-    return new
+    _fit(points, counts, context, True)
+    return context
 
 
 @njit(fastmath=False)
@@ -70,27 +70,46 @@ def _drawn(jump: float, dimension: int) -> float:
 
 
 @njit(fastmath=False)
-def _fit(
-    points: Array, counts: Array, most: float, snooker: float, crossover: bool, tuning: Tuning
-) -> None:
-    """Do `tune` in place, for crossover classes where asked.
+def _share(reach: Array, context: ProposalContext, dimension: int, cumulative: Array) -> None:
+    """Write the cumulative probabilities of the moves, given their mean squared jumps (M,)."""
+    total, fixed, equal, base = 0.0, 0.0, 0, -1
+    for k in range(len(cumulative)):
+        cumulative[k] = 0.0
+        if context.fixed[k] >= 0.0:
+            fixed += context.fixed[k]
+        else:
+            cumulative[k] = _drawn(reach[k], dimension) ** 2
+            total += cumulative[k]
+            equal += 1
+            if base < 0:
+                base = k
+    given = 0.0
+    for k in range(len(cumulative)):
+        if context.fixed[k] < 0.0 and k != base:
+            part = cumulative[k] / total if total > 0.0 else 1.0 / equal
+            cumulative[k] = max(context.most[k] * part, min(_LEAST, context.most[k]))
+            given += cumulative[k]
+    before = 0.0
+    for k in range(len(cumulative)):
+        if context.fixed[k] >= 0.0:
+            before += context.fixed[k]
+        elif k == base:
+            before += (1.0 - fixed) * max(1.0 - given, 0.0)
+        else:
+            before += (1.0 - fixed) * cumulative[k]
+        cumulative[k] = before
 
-    `most` and `snooker` are the settings' shares of moves.
-    """
+
+@njit(fastmath=False)
+def _fit(points: Array, counts: Array, context: ProposalContext, crossover: bool) -> None:
+    """Fit the context's tuning in place, that of crossover classes where asked."""
+    tuning = context.tuning
     moves, crossovers, scale = tuning.move_cdf, tuning.crossover_cdf, tuning.scale
     reach = np.zeros(len(counts))
     for i in range(len(counts)):
         if counts[i, 0] > 0.0:
             reach[i] = counts[i, 2] / counts[i, 0]
-    alone = _drawn(reach[INDEPENDENCE], points.shape[1]) ** 2
-    along = _drawn(reach[PARALLEL], points.shape[1]) ** 2
-    share = most * (alone / (alone + along) if alone + along > 0.0 else 0.5)
-    if most > 0.0:
-        share = max(share, min(_LEAST, most))
-    free = 1.0 - snooker
-    moves[0] = free * (1.0 - share)
-    moves[1] = moves[0] + snooker
-    moves[2] = moves[1] + free * share
+    _share(reach, context, points.shape[1], moves)
     if crossover:
         first = len(moves)
         total = 0.0
@@ -103,7 +122,7 @@ def _fit(
             crossovers[i] = weights
         for i in range(len(crossovers)):
             crossovers[i] /= weights
-    independence.fit(points, tuning.centre, tuning.factor)
+    student.fit(points, tuning.centre, tuning.factor)
     for j in range(len(scale)):
         scale[j] = 0.0
         for k in range(j + 1):
@@ -117,7 +136,7 @@ def rescue(z: Array, x: Array, values: Array, target: Array, total: Array) -> No
 
     Outliers are chains whose mean log likelihood since they were last looked at, by which `total`
     (n,) orders them, lies below Q1 - 2 IQR of all chains (Vrugt 2016, Eq. 25). The other arguments
-    are a `Walk`'s parts, changed in place.
+    are a `ChainState`'s parts, changed in place.
     """
     ordered = np.sort(total)
     quartile = np.empty(2)
@@ -136,7 +155,7 @@ def rescue(z: Array, x: Array, values: Array, target: Array, total: Array) -> No
 @njit(fastmath=False)
 def learn(
     z: Array, x: Array, values: Array, target: Array, total: Array, rows: Array, size: int,
-    counts: Array, most: float, snooker: float, tuning: Tuning, burning: bool, fitted: int,
+    counts: Array, context: ProposalContext, burning: bool, fitted: int,
 ) -> int:  # fmt: skip
     """Have the moves follow an archive that has grown, in place; return its size at the last fit.
 
@@ -144,7 +163,7 @@ def learn(
     archive has doubled, from what the moves achieved since, which is then forgotten.
 
     Args:
-        z: the chains, as in a `Walk`, (n, p).
+        z: the chains, as in a `ChainState`, (n, p).
         x: likewise, (n, p).
         values: their log likelihoods, (n,).
         target: their log targets, (n,).
@@ -152,9 +171,7 @@ def learn(
         rows: the archive's buffer.
         size: how much of it is filled.
         counts: uses, acceptances and squared jumps of the moves.
-        most: the settings' largest share of independence moves.
-        snooker: the settings' share of snooker moves.
-        tuning: what is fitted.
+        context: of which the tuning is fitted.
         burning: whether this is burn-in.
         fitted: size of the archive at the last fit.
     """
@@ -162,7 +179,7 @@ def learn(
         return fitted
     if burning:
         rescue(z, x, values, target, total)
-    _fit(newest(rows, size), counts, most, snooker, burning, tuning)
+    _fit(newest(rows, size), counts, context, burning)
     if not burning:
         counts[:] = 0.0
     return size

@@ -15,16 +15,15 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.inference import generation
-from actuator_glue.inference.adaptation import empty_counts, tune
+from actuator_glue.inference import metropolis, student
+from actuator_glue.inference.adaptation import empty_counts, tuned
 from actuator_glue.inference.archive import Archive
 from actuator_glue.inference.compiled import compiled
-from actuator_glue.inference.coordinates import physical_all, sampling
 from actuator_glue.inference.evaluate import LogDensity, check_values, evaluate
-from actuator_glue.inference.generation import UNTEMPERED, Tempering
-from actuator_glue.inference.moves import independence, uniforms_per_chain
-from actuator_glue.inference.settings import Settings
-from actuator_glue.inference.sweep import Around, Walk, many
+from actuator_glue.inference.moves import UNTEMPERED, Tempering, uniforms_per_chain
+from actuator_glue.inference.settings import SamplerSettings
+from actuator_glue.inference.steps import ChainState, Course, many
+from actuator_glue.inference.transforms.log import Log
 from actuator_glue.jit import njit
 from actuator_glue.records import Array
 
@@ -51,26 +50,24 @@ class Population(NamedTuple):
     evaluations: int
 
 
-def prior_reference(rng: np.random.Generator, size: int, lower: Array, width: Array) -> Reference:
+def prior_reference(rng: np.random.Generator, size: int, box: Log) -> Reference:
     """Latin hypercube of the uniform prior: its density in z is the Jacobian itself."""
-    share = (np.arange(size)[:, None] + rng.random((size, len(lower)))) / size
-    x = lower + width * rng.permuted(share, axis=0)
-    return Reference(sampling(x, lower, width), UNTEMPERED.centre, UNTEMPERED.factor)
+    share = (np.arange(size)[:, None] + rng.random((size, len(box.low)))) / size
+    x = box.low + box.width * rng.permuted(share, axis=0)
+    return Reference(box.forward(x), UNTEMPERED.centre, UNTEMPERED.factor)
 
 
-def archive_reference(
-    rng: np.random.Generator, size: int, archive: Array, lower: Array, width: Array
-) -> Reference:
+def archive_reference(rng: np.random.Generator, size: int, archive: Array, box: Log) -> Reference:
     """Student t fitted to an earlier posterior z (m, p), half as wide again.
 
     Points beyond a bound are replaced by points of the archive: they only start the search.
     """
     dimension = archive.shape[1]
     centre, factor = np.empty(dimension), np.empty((dimension, dimension))
-    independence.fit(archive, centre, factor)
+    student.fit(archive, centre, factor)
     factor *= 1.5
-    points = independence.draw_all(rng.random((size, dimension + 4)), centre, factor)
-    outside = np.isneginf(physical_all(points, lower, width)[1])
+    points = student.draw_all(rng.random((size, dimension + 4)), centre, factor)
+    outside = np.isneginf(box.inverse(points)[1])
     if outside.any():
         points[outside] = archive[rng.integers(0, len(archive), int(outside.sum()))]
     return Reference(points, centre, factor)
@@ -79,10 +76,9 @@ def archive_reference(
 def anneal(
     rng: np.random.Generator,
     log_density: LogDensity,
-    lower: Array,
-    width: Array,
+    box: Log,
     reference: Reference,
-    settings: Settings,
+    settings: SamplerSettings,
     limit: int | None = None,
 ) -> Population:
     """Carry the reference's points to the posterior within `limit` evaluations.
@@ -92,36 +88,36 @@ def anneal(
     """
     z = reference.points
     size, dimension = z.shape
-    x, log_jacobian = physical_all(z, lower, width)
+    x, log_jacobian = box.inverse(z)
     values = evaluate(log_density, x)
     check_values(values, x)
     evaluations = size
     power = 0.0
     counts = empty_counts(settings)
     density = compiled(log_density)
-    chains = max(size // settings.sweeps, 2)
-    columns = uniforms_per_chain(dimension, settings.pairs)
+    chains = max(size // settings.steps, 2)
+    columns = uniforms_per_chain(settings.moves, dimension, settings.pairs)
     most = math.inf if limit is None else limit
     start, target = np.empty(chains, np.intp), np.empty(chains)
-    while power < 1.0 and evaluations + chains * settings.sweeps <= most:
+    while power < 1.0 and evaluations + chains * settings.steps <= most:
         chosen = np.empty(len(z), np.intp)
         power = _reweigh(
             z, values, log_jacobian, reference.centre, reference.factor, power, settings.survivors,
             rng.random(2), chosen, start, target,
         )  # fmt: skip
         archive = Archive.of(z[chosen])
-        tuning = tune(archive.rows, counts, settings)
         tempering = Tempering(power, reference.centre, reference.factor)
-        around = Around(lower, width, tuning, settings, tempering)
-        now = Walk(z[start], x[start], values[start], target)
+        context = tuned(archive.rows, counts, settings, box)._replace(tempering=tempering)
+        now = ChainState(z[start], x[start], values[start], target)
         counts = empty_counts(settings)
-        uniforms = rng.random((settings.sweeps, chains, columns))
-        _, _, _, path = many(uniforms, now, archive, 0, around, density, log_density, counts)
-        evaluations += chains * settings.sweeps
+        uniforms = rng.random((settings.steps, chains, columns))
+        course = Course(context, settings.moves, log_density, density)
+        _, _, _, path = many(uniforms, now, archive, course, counts)
+        evaluations += chains * settings.steps
         # Chain by chain: systematic resampling then treats every chain alike, so that modes which
         # no move connects keep their shares from temperature to temperature.
         z = path.z.swapaxes(0, 1).reshape(-1, dimension)
-        x, log_jacobian = physical_all(z, lower, width)
+        x, log_jacobian = box.inverse(z)
         values = path.log_density.swapaxes(0, 1).reshape(-1)
     return Population(z, x, values, counts, power, evaluations)
 
@@ -149,7 +145,7 @@ def _reweigh(
         target: receives their log targets at the next power, (n,).
     """
     reference, gain = np.empty(len(z)), np.empty(len(z))
-    generation.refer(z, log_jacobian, power, centre, factor, reference)
+    metropolis.refer(z, log_jacobian, Tempering(power, centre, factor), reference)
     finite, largest = 0, -np.inf
     for i in range(len(z)):
         gain[i] = values[i] + log_jacobian[i] - reference[i]
@@ -166,7 +162,7 @@ def _reweigh(
         gain[i] *= rise
     _systematic(gain, places[0], chosen)
     _systematic(gain, places[1], start)
-    generation.temper(values[start], log_jacobian[start], reference[start], after, target)
+    metropolis.temper(values[start], log_jacobian[start], reference[start], after, target)
     return after
 
 

@@ -19,11 +19,11 @@ class Chains:
     """Draws of all chains in the order they were made.
 
     Attributes:
-        draws: (generations, chains, p) [physical units], burn-in included.
-        log_density: log likelihood of each draw, (generations, chains).
+        draws: (steps, chains, p) [physical units], burn-in included.
+        log_density: log likelihood of each draw, (steps, chains).
         evaluations: likelihood evaluations of the whole run, the start included.
-        start_evaluations: evaluations before the first generation.
-        burn: first generations that adapted the proposals; not draws of the posterior.
+        start_evaluations: evaluations before the first step.
+        burn: first steps that adapted the proposals; not draws of the posterior.
         annealed: False if the budget ended before the start had reached the posterior.
     """
 
@@ -36,11 +36,11 @@ class Chains:
 
     @property
     def kept(self) -> Array:
-        """Draws after burn-in, (generations - burn, chains, p)."""
+        """Draws after burn-in, (steps - burn, chains, p)."""
         return self.draws[self.burn :]
 
     def posterior(self, burn: int | None = None) -> Array:
-        """Draws (m, p) of all chains after `burn` generations (default: the adaptation)."""
+        """Draws (m, p) of all chains after `burn` steps (default: the adaptation)."""
         kept = self.draws[self.burn if burn is None else burn :]
         return kept.reshape(-1, kept.shape[2])
 
@@ -48,9 +48,9 @@ class Chains:
         """Log likelihoods (m,) of `posterior(burn)`."""
         return self.log_density[self.burn if burn is None else burn :].reshape(-1)
 
-    def evaluations_at(self, generation: int) -> int:
-        """Likelihood evaluations made when the given generation (from 0) was complete."""
-        return self.start_evaluations + (generation + 1) * int(self.draws.shape[1])
+    def evaluations_at(self, step: int) -> int:
+        """Likelihood evaluations made when the given step (from 0) was complete."""
+        return self.start_evaluations + (step + 1) * int(self.draws.shape[1])
 
     @cached_property
     def _diagnostics(self) -> tuple[Array, Array]:

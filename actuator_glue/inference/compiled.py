@@ -1,4 +1,4 @@
-"""Log likelihoods as plain arrays, so that compiled loops need no Python between generations."""
+"""Log likelihoods as plain arrays, so that compiled loops need no Python between steps."""
 
 from __future__ import annotations
 

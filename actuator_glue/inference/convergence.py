@@ -24,7 +24,7 @@ def gelman_rubin(draws: Array) -> Array:
     The paper's R-hat (Gelman and Rubin 1992; Vrugt 2016, Eq. 27), threshold 1.2.
 
     Args:
-        draws: (generations, chains, p).
+        draws: (steps, chains, p).
 
     Returns:
         (p,); nan where fewer than two draws or chains remain or nothing moves.
@@ -39,10 +39,10 @@ def rhat(draws: Array) -> Array:
     The larger of the bulk value and the value of the folded draws.
 
     Args:
-        draws: (generations, chains, p).
+        draws: (steps, chains, p).
 
     Returns:
-        (p,); nan for fewer than 4 generations, draws that are not finite, or constant ones.
+        (p,); nan for fewer than 4 steps, draws that are not finite, or constant ones.
     """
     return rhat_and_ess(draws)[0]
 
@@ -83,7 +83,7 @@ def rhat_and_ess(draws: Array) -> tuple[Array, Array]:
 
 
 def _split(draws: Array) -> Array | None:
-    """(p, 2 chains, generations // 2): each chain's first and last half, the middle dropped.
+    """(p, 2 chains, steps // 2): each chain's first and last half, the middle dropped.
 
     None for too few draws, or some that are not finite.
     """

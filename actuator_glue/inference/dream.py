@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from actuator_glue.errors import InputError
-from actuator_glue.inference.adaptation import Tuning, empty_counts, tune
+from actuator_glue.inference.adaptation import empty_counts, tuned
 from actuator_glue.inference.anneal import (
     Population,
     anneal,
@@ -21,22 +21,22 @@ from actuator_glue.inference.anneal import (
 )
 from actuator_glue.inference.archive import Archive
 from actuator_glue.inference.chains import Chains
-from actuator_glue.inference.compiled import Compiled, compiled
-from actuator_glue.inference.coordinates import check_bounds, physical_all, sampling
+from actuator_glue.inference.compiled import compiled
 from actuator_glue.inference.evaluate import LogDensity, check_values, evaluate
-from actuator_glue.inference.moves import uniforms_per_chain
-from actuator_glue.inference.settings import Settings
-from actuator_glue.inference.state import Info, State, moved
-from actuator_glue.inference.sweep import Path, enter, many, one
+from actuator_glue.inference.moves import Tuning, uniforms_per_chain
+from actuator_glue.inference.settings import SamplerSettings
+from actuator_glue.inference.state import Info, State
+from actuator_glue.inference.steps import ChainState, Path, enter, many, one
+from actuator_glue.inference.transforms.log import Log
 from actuator_glue.records import Array
 
 # Evaluations of a compiled likelihood between two questions whether to stop: 0.2 ms; and in one go
 # where nobody asks: the uniforms of more would leave the cache.
 _PATIENCE, _MOST = 200, 2000
-# Shares of the generations after which a run may have drawn enough.
+# Shares of the steps after which a run may have drawn enough.
 _LOOKS = tuple(k / 16.0 for k in range(5, 16))
 
-__all__ = ['Chains', 'Info', 'Settings', 'State', 'init', 'sample', 'step']
+__all__ = ['Chains', 'Info', 'SamplerSettings', 'State', 'init', 'sample', 'step']
 
 
 def init(
@@ -44,7 +44,7 @@ def init(
     log_density: LogDensity,
     lower: ArrayLike,
     upper: ArrayLike,
-    settings: Settings | None = None,
+    settings: SamplerSettings | None = None,
     archive: ArrayLike | None = None,
     limit: int | None = None,
 ) -> State:
@@ -55,131 +55,139 @@ def init(
         log_density: log likelihood (m,) of points (m, p) in physical units.
         lower: lower bounds of the uniform prior, (p,).
         upper: upper bounds, (p,).
-        settings: see `Settings`.
+        settings: see `SamplerSettings`.
         archive: points (m, p) of an earlier run (`Chains.archive`) for a warm start.
         limit: likelihood evaluations that may be spent on the start.
 
     Raises:
         InputError: bounds, archive or log density cannot be used.
     """
-    settings = settings or Settings()
-    low, width = check_bounds(np.asarray(lower, np.float64), np.asarray(upper, np.float64))
-    start = _points(rng, log_density, low, width, settings, archive, limit)
+    settings = settings or SamplerSettings()
+    box = Log(lower, upper)
+    start = _points(rng, log_density, box, settings, archive, limit)
     # Chains start at points spread over the population; impossible points are no start.
     possible = np.where(np.isfinite(start.log_density), 0.0, -np.inf)
     chosen = resample(rng, possible, settings.chains)
-    _, log_jacobian = physical_all(start.z[chosen], low, width)
+    _, log_jacobian = box.inverse(start.z[chosen])
     return State(
-        x=start.x[chosen],
-        z=start.z[chosen],
-        log_density=start.log_density[chosen],
-        log_target=start.log_density[chosen] + log_jacobian,
+        now=ChainState(
+            z=start.z[chosen],
+            x=start.x[chosen],
+            log_density=start.log_density[chosen],
+            log_target=start.log_density[chosen] + log_jacobian,
+        ),
         archive=Archive.of(start.z),
-        tuning=tune(start.z, start.counts, settings),
+        context=tuned(start.z, start.counts, settings, box),
         fitted=len(start.z),
         counts=empty_counts(settings),
         sum_log_density=np.zeros(settings.chains),
-        generation=0,
+        made=0,
         evaluations=start.evaluations,
         power=start.power,
-        lower=low,
-        width=width,
         settings=settings,
+        log_density=log_density,
     )
 
 
 def _points(
     rng: np.random.Generator,
     log_density: LogDensity,
-    lower: Array,
-    width: Array,
-    settings: Settings,
+    box: Log,
+    settings: SamplerSettings,
     archive: ArrayLike | None,
     limit: int | None,
 ) -> Population:
     """The points that become the first archive and the chains' starts."""
-    d = len(lower)
+    d = len(box.low)
     if archive is not None:
-        old = sampling(_check_archive(np.asarray(archive, np.float64), lower, width), lower, width)
-        reference = archive_reference(rng, settings.points(d) // 4, old, lower, width)
+        old = box.forward(_check_archive(np.asarray(archive, np.float64), box))
+        reference = archive_reference(rng, settings.points(d) // 4, old, box)
     else:
-        reference = prior_reference(rng, settings.points(d), lower, width)
+        reference = prior_reference(rng, settings.points(d), box)
         if settings.start == 'prior':
             # As Vrugt (2016): only the chains' own points are evaluated.
-            x, _ = physical_all(reference.points, lower, width)
+            x, _ = box.inverse(reference.points)
             values = np.full(len(x), np.nan)
             values[: settings.chains] = evaluate(log_density, x[: settings.chains])
             check_values(values, x)
             counts = empty_counts(settings)
             return Population(reference.points, x, values, counts, 1.0, settings.chains)
-    return anneal(rng, log_density, lower, width, reference, settings, limit)
+    return anneal(rng, log_density, box, reference, settings, limit)
 
 
-def _check_archive(archive: Array, lower: Array, width: Array) -> Array:
-    if archive.ndim != 2 or archive.shape[1] != len(lower) or len(archive) < 2:
+def _check_archive(archive: Array, box: Log) -> Array:
+    if archive.ndim != 2 or archive.shape[1] != len(box.low) or len(archive) < 2:
         raise InputError(
             f'the archive for a warm start has shape {archive.shape}; '
-            f'it must hold at least two points of {len(lower)} parameters'
+            f'it must hold at least two points of {len(box.low)} parameters'
         )
-    inside = ((archive >= lower) & (archive <= lower + width)).all(axis=1)
+    inside = ((archive >= box.low) & (archive <= box.low + box.width)).all(axis=1)
     if inside.sum() < 2:
         raise InputError('the archive for a warm start lies outside the prior bounds')
     return archive if inside.all() else archive[inside]
 
 
-def step(rng: np.random.Generator, state: State, log_density: LogDensity) -> tuple[State, Info]:
-    """Advance every chain by one generation; the state given is left as it is."""
+def step(rng: np.random.Generator, state: State) -> tuple[State, Info]:
+    """Advance every chain by one step; the state given is left as it is."""
     state = _own(state)
-    uniforms = rng.random(
-        (len(state.z), uniforms_per_chain(state.z.shape[1], state.settings.pairs))
-    )
-    walk, accepted, label = one(
-        uniforms, state.walk, state.archive, state.around, log_density, state.counts
-    )
-    archive, fitted = state.archive, state.fitted
-    if state.burn_in:
-        state.sum_log_density[:] += walk.log_density
+    course, archive, fitted = state.course, state.archive, state.fitted
+    now, accepted, label = one(
+        _uniforms(rng, state, 1)[0], state.now, archive, state.context, course.moves,
+        state.log_density, state.counts,
+    )  # fmt: skip
+    if state.adapting:
+        state.sum_log_density[:] += now.log_density
     if state.until_append == 1:
-        archive, fitted = enter(walk, archive, state.around, state.counts, state.learning)
-    new = moved(state, walk, archive, fitted, state.counts, 1)
-    return new, Info(accepted, label[:, 0], label[:, 1])
+        archive, fitted = enter(now, archive, state.context, state.counts, state.learning)
+    return _later(state, now, archive, fitted, 1), Info(accepted, label[:, 0], label[:, 1])
 
 
-def stretch(
-    rng: np.random.Generator,
-    state: State,
-    log_density: LogDensity,
-    density: Compiled | None,
-    count: int,
-) -> tuple[State, Path]:
-    """Advance every chain by `count` generations.
+def stretch(rng: np.random.Generator, state: State, count: int) -> tuple[State, Path]:
+    """Advance every chain by `count` steps.
 
     The state is that of as many `step`s, bit by bit; with a compiled likelihood it is there
     sooner.
     """
     state = _own(state)
-    columns = uniforms_per_chain(state.z.shape[1], state.settings.pairs)
-    walk, archive, fitted, path = many(
-        rng.random((count, len(state.z), columns)), state.walk, state.archive, state.until_append,
-        state.around, density, log_density, state.counts, state.learning,
+    now, archive, fitted, path = many(
+        _uniforms(rng, state, count), state.now, state.archive, state.course, state.counts,
+        state.until_append, state.learning,
     )  # fmt: skip
-    return moved(state, walk, archive, fitted, state.counts, count), path
+    return _later(state, now, archive, fitted, count), path
+
+
+def _uniforms(rng: np.random.Generator, state: State, count: int) -> Array:
+    n, d = state.now.z.shape
+    columns = uniforms_per_chain(state.settings.moves, d, state.settings.pairs)
+    return rng.random((count, n, columns))
 
 
 def _own(state: State) -> State:
-    """Return the state with arrays of its own for what generations change in place."""
+    """Return the state with arrays of its own for what steps change in place."""
+    tuning = Tuning(*(part.copy() for part in state.context.tuning))
     return state._replace(
         counts=state.counts.copy(),
         sum_log_density=state.sum_log_density.copy(),
-        tuning=Tuning(*(part.copy() for part in state.tuning)),
+        context=state.context._replace(tuning=tuning),
     )
 
 
-def _burn_in(settings: Settings, generations: int, warm: bool) -> int:
-    """Generations to discard: the adaptation; half of them where nothing led the chains in."""
-    half = generations // 2
+def _later(state: State, now: ChainState, archive: Archive, fitted: int, steps: int) -> State:
+    """Return the state some steps later, `fitted` the archive's size at the last fit."""
+    return state._replace(
+        now=now,
+        archive=archive,
+        fitted=fitted,
+        made=state.made + steps,
+        evaluations=state.evaluations + steps * len(now.z),
+    )
+
+
+def _burn_in(settings: SamplerSettings, steps: int, warm: bool) -> int:
+    """Steps to discard: the adaptation; half of them where nothing led the chains in."""
+    half = steps // 2
     if settings.start == 'prior' and not warm:
-        return max(min(settings.adaptation, generations - 1), half)
+        return max(min(settings.adaptation, steps - 1), half)
     return min(settings.adaptation, half)
 
 
@@ -190,7 +198,7 @@ def sample(
     upper: ArrayLike,
     *,
     evaluations: int,
-    settings: Settings | None = None,
+    settings: SamplerSettings | None = None,
     archive: ArrayLike | None = None,
     stop: Callable[[State], bool] | None = None,
     enough: Callable[[Chains], bool] | None = None,
@@ -209,9 +217,9 @@ def sample(
         lower: lower bounds of the uniform prior, (p,) [physical units].
         upper: upper bounds, (p,) [physical units].
         evaluations: likelihood evaluations at most, the search for the start included.
-        settings: see `Settings`.
+        settings: see `SamplerSettings`.
         archive: points (m, p) of an earlier run (`Chains.archive`) for a warm start.
-        stop: asked after every generation, or about every 200 evaluations where the likelihood
+        stop: asked after every step, or about every 200 evaluations where the likelihood
             has a compiled form, always at the same ones; True ends the run.
         enough: asked at every sixteenth of the run from the fifth on whether its draws will do;
             True ends it.
@@ -221,26 +229,25 @@ def sample(
         InputError: bounds, archive, settings or log density cannot be used, or `evaluations` does
             not even suffice for the start.
     """
-    settings = settings or Settings()
-    # Whatever the start costs, some generations remain to be seen.
+    settings = settings or SamplerSettings()
+    # Whatever the start costs, some steps remain to be seen.
     limit = evaluations - 4 * settings.chains
     state = init(rng, log_density, lower, upper, settings, archive, limit)
-    n, d = state.x.shape
-    generations = (evaluations - state.evaluations) // n
-    if generations < 2:
+    n, d = state.now.x.shape
+    steps = (evaluations - state.evaluations) // n
+    if steps < 2:
         raise InputError(
             f'{evaluations} evaluations are used up by the start ({state.evaluations}); '
             f'give at least {state.evaluations + n * (settings.adaptation + 100)}'
         )
     spent = state.evaluations
-    draws = np.empty((generations, n, d))
-    log_densities = np.empty((generations, n))
-    density = compiled(log_density)
+    draws = np.empty((steps, n, d))
+    log_densities = np.empty((steps, n))
     most = -(-_MOST // n)
     if stop is not None:
-        most = 1 if density is None else -(-_PATIENCE // n)
-    every = max(generations // 100, 1)
-    looks = [int(share * generations) for share in _LOOKS] if enough is not None else []
+        most = 1 if compiled(log_density) is None else -(-_PATIENCE // n)
+    every = max(steps // 100, 1)
+    looks = [int(share * steps) for share in _LOOKS] if enough is not None else []
 
     def so_far(done: int) -> Chains:
         return Chains(
@@ -253,9 +260,9 @@ def sample(
         )
 
     done = 0
-    while done < generations:
-        ahead = min((look for look in looks if look > done), default=generations) - done
-        state, path = stretch(rng, state, log_density, density, min(most, ahead))
+    while done < steps:
+        ahead = min((look for look in looks if look > done), default=steps) - done
+        state, path = stretch(rng, state, min(most, ahead))
         new = done + len(path.x)
         draws[done:new], log_densities[done:new] = path.x, path.log_density
         if progress is not None and new // every > done // every:

@@ -7,47 +7,45 @@ from dataclasses import dataclass
 from typing import Literal
 
 from actuator_glue.errors import InputError
+from actuator_glue.inference.moves import MOVES, Move
 
 
 @dataclass(frozen=True, slots=True)
-class Settings:
+class SamplerSettings:
     """What the sampler does; see docs/dream.md for the equations behind each number.
 
     Attributes:
         chains: number of chains N, at least 3.
+        moves: the moves, each with its share; `moves.PUBLISHED` are those of Vrugt (2016).
         pairs: largest number delta of archive pairs in a parallel-direction move.
         crossovers: number n_CR of crossover classes; class m moves a share m/n_CR of coordinates.
-        snooker: probability of a snooker move.
         unit_jump: probability that a parallel-direction move uses gamma = 1.
-        independence: largest share of independence moves among the others; 0 switches them off
-            and leaves the DREAM(ZS) of Vrugt (2016).
         jitter: half width c of the uniform lambda that stretches a jump.
         noise: half width of epsilon, in units of each coordinate's standard deviation.
-        thinning: the chains enter the archive every `thinning` generations (K).
-        adaptation: generations in which shares, scales and outliers are adapted; all of them are
+        thinning: the chains enter the archive every `thinning` steps (K).
+        adaptation: steps in which shares, scales and outliers are adapted; all of them are
             burn-in and discarded.
         start: 'annealed' finds the posterior by tempering the likelihood from the prior (or from
             the archive of an earlier run) before the chains start; 'prior' starts the chains at a
             Latin hypercube of the prior as Vrugt (2016) does.
         population: points per temperature while annealing, and of the initial archive (m_0); a
             warm start takes a quarter. None: 50 p^1.5 for p parameters, 200 to 2000.
-        sweeps: moves of each point's chain per temperature.
+        steps: steps of each point's chain per temperature.
         survivors: share of the population that the weights of the next temperature may leave.
     """
 
     chains: int = 20
+    moves: tuple[Move, ...] = MOVES
     pairs: int = 3
     crossovers: int = 3
-    snooker: float = 0.1
     unit_jump: float = 0.2
-    independence: float = 0.9
     jitter: float = 0.05
     noise: float = 1e-6
     thinning: int = 2
     adaptation: int = 60
     start: Literal['annealed', 'prior'] = 'annealed'
     population: int | None = None
-    sweeps: int = 10
+    steps: int = 10
     survivors: float = 0.6
 
     def __post_init__(self) -> None:
@@ -57,21 +55,26 @@ class Settings:
             ('crossovers', 1),
             ('thinning', 1),
             ('adaptation', 0),
-            ('sweeps', 1),
+            ('steps', 1),
         ):
             if getattr(self, name) < lowest:
                 raise InputError(f'sampler setting {name}={getattr(self, name)} is below {lowest}')
-        for name in ('snooker', 'unit_jump', 'independence', 'jitter'):
+        for name in ('unit_jump', 'jitter'):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise InputError(f'sampler setting {name}={getattr(self, name)} is outside [0, 1]')
         if not 0.0 < self.survivors < 1.0:
             raise InputError(f'sampler setting survivors={self.survivors} is outside (0, 1)')
+        fixed = [move.share for move in self.moves if move.share is not None]
+        if not all(0.0 < share <= 1.0 for share in fixed) or sum(fixed) > 1.0:
+            raise InputError(f'fixed shares {fixed} of the moves are no probabilities')
+        if not self.moves or (len(fixed) == len(self.moves) and sum(fixed) < 1.0):
+            raise InputError('the moves share less than 1; leave one of them without a share')
         if not self.noise > 0.0:
             raise InputError('sampler setting noise must be positive')
-        if self.population is not None and self.population < 2 * self.sweeps:
+        if self.population is not None and self.population < 2 * self.steps:
             raise InputError(
                 f'sampler setting population={self.population} leaves fewer than two chains of '
-                f'{self.sweeps} sweeps'
+                f'{self.steps} steps'
             )
         if self.start not in ('annealed', 'prior'):
             raise InputError(f"sampler setting start={self.start!r}; use 'annealed' or 'prior'")

@@ -7,43 +7,69 @@ import sys
 import time
 from collections import deque
 from collections.abc import Mapping
+from dataclasses import fields
 from typing import Any
 
 from actuator_glue_msgs.srv import SetModel
 
 from actuator_glue.errors import InputError
-from actuator_glue.nodes import configuration, spin, topics
+from actuator_glue.inference.choice import ModelChoice, choose_model
+from actuator_glue.nodes import base, spin, topics
 from actuator_glue.nodes.estimating import compute, warm_up
 from actuator_glue.nodes.health import ERROR, Rate
-from actuator_glue.nodes.latched import Newest
 from actuator_glue.nodes.messages import publish
-from actuator_glue.nodes.working import WorkingNode
+from actuator_glue.nodes.parameters import Spec
 from actuator_glue.online import wire
 from actuator_glue.online.estimator import Estimator
-from actuator_glue.online.fitting import choose_model, identifiable
+from actuator_glue.online.fitting import identifiable
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.sampling import Job
-from actuator_glue.online.settings import ModelChoice
+from actuator_glue.online.settings import LIMITS, EstimatorSettings
 from actuator_glue.online.stream import Dropped, Event, Failed, Rejected, Restarted, Window
-from actuator_glue.workers.worker import DIED, FAILED, Answer
+from actuator_glue.workers.worker import DIED, FAILED, Answer, Worker
 
 
-class EstimatorNode(WorkingNode):
+def _specs() -> list[Spec]:
+    """Parameters from the settings' own table, so that neither can drift from the other."""
+    defaults = EstimatorSettings()
+    specs = []
+    for field in fields(EstimatorSettings):
+        limit = LIMITS.get(field.name)
+        if limit is None:
+            continue
+        value = getattr(defaults, field.name)
+        specs.append(
+            Spec(field.name, value, limit.meaning, limit.unit, limit.lower, limit.upper, True)
+        )
+    return specs
+
+
+SPECS = (
+    *_specs(),
+    Spec('likelihood', 'glue', 'likelihood', read_only=True, choices=('glue', 'gaussian')),
+    Spec('levels', list(EstimatorSettings().levels), 'probability of each band', read_only=True),
+    Spec('effects', [''], 'effects of the catalogue beyond Eq. (2)', read_only=True),
+)
+
+
+class EstimatorNode(base.SuiteNode):
     """Feeds the estimator's state machine and publishes what it finds."""
 
     def __init__(self) -> None:
-        super().__init__('estimator', configuration.SPECS)
+        super().__init__('estimator', SPECS)
 
     def check(self, values: Mapping[str, Any]) -> None:
         """Refuse settings that contradict each other."""
-        configuration.settings(values)
-        choose_model(configuration.effects(values))
+        _settings(values)
+        choose_model(_effects(values))
 
     def do_configure(self) -> None:
         """Start the worker process, which compiles while nothing depends on it yet."""
         values = self.parameters.values()
-        self.settings = configuration.settings(values)
-        self.employ(warm_up)
+        self.settings = _settings(values)
+        self._answers: deque[Answer] = deque()
+        self._guard = self.create_guard_condition(self.guarded(self._take_answers))
+        self.worker = Worker(self._answered, warm_up)
         self._out = {
             topic: self.publisher(topic)
             for topic in (topics.POSTERIOR, topics.BAND, topics.RESPONSE, topics.ESTIMATOR_SETUP)
@@ -52,7 +78,7 @@ class EstimatorNode(WorkingNode):
 
     def do_activate(self) -> None:
         """Begin with an empty window."""
-        model = choose_model(configuration.effects(self.parameters.values()))
+        model = choose_model(_effects(self.parameters.values()))
         self.estimator = Estimator(self.settings, model, live=True)
         self._announced: ModelChoice | None = None
         self._arrival: dict[int, float] = {}
@@ -63,23 +89,21 @@ class EstimatorNode(WorkingNode):
         self.last: WindowResult | None = None
         # Before the first samples: what they will be estimated with is known from the start.
         self._announce(None)
-        self.listen_when_ready()
-
-    def listen(self) -> None:
-        """Subscribe: set-ups first, then the samples that they are for."""
-        self._setups = Newest(self, topics.TEST_SETUP, self._setup)
+        self.subscribe(topics.TEST_SETUP, self._setup)
         self.subscribe(topics.PREVIEW, self._preview)
         self.subscribe(topics.SAMPLES, self._block)
 
     def do_deactivate(self) -> None:
         """Give up the running window."""
+        self._answers.clear()
         if self.estimator.running is not None and not self.finished:
-            self.give_up()
+            self.worker.restart()
 
     def do_cleanup(self) -> None:
         """End the worker."""
-        self.dismiss()
+        self.worker.close()
         self.destroy_service(self._service)
+        self.destroy_guard_condition(self._guard)
 
     def clock_jumped(self) -> None:
         """Nothing depends on the node's clock: windows follow the stamps of the samples."""
@@ -99,7 +123,6 @@ class EstimatorNode(WorkingNode):
         self._tell(self.estimator.preview(wire.preview(message)))
 
     def _block(self, message: Any) -> None:
-        self._setups.settle()
         block = wire.block(message)
         self.samples.add(len(block))
         self._tell(self.estimator.push(block))
@@ -115,10 +138,7 @@ class EstimatorNode(WorkingNode):
                 self.complain('bad input', event.message)
             elif isinstance(event, Dropped):
                 self.dropped += 1
-                why = (
-                    'the worker is still compiling' if self.compiling else 'computing took longer'
-                )
-                self.complain('deadline', f'window {event.number} dropped: {why}')
+                self.complain('deadline', f'window {event.number} dropped: computing took longer')
             elif isinstance(event, Failed):
                 self.failed += 1
                 self.complain('window', f'window {event.number}: {event.message}')
@@ -141,7 +161,7 @@ class EstimatorNode(WorkingNode):
         for window in self.estimator.waiting:
             self._arrival.setdefault(window.number, now)
         self._tell(self.estimator.drop(lambda window: self._too_late(window, now)))
-        job = None if self.compiling else self.estimator.next_job()
+        job = self.estimator.next_job() if self.worker.ready.is_set() else None
         if job is None:
             return
         self._announce(job)
@@ -155,16 +175,25 @@ class EstimatorNode(WorkingNode):
         takes = statistics.median(self.compute) if self.compute else 0.0
         return now + 2.0 * takes > self._arrival[window.number] + self.settings.time_budget
 
-    def answered(self, answer: Answer) -> None:
-        """Take the result of a window, or that there is none."""
-        if not self.active:
-            return
-        if answer.kind in (DIED, FAILED):
-            self._tell(self.estimator.abandon(answer.payload))
-        if answer.kind == FAILED:
-            self.complain('internal error', str(answer.payload), ERROR)
-        elif answer.kind != DIED and self.estimator.running is not None:
-            self._finish(answer.payload, answer.seconds)
+    def _answered(self, answer: Answer) -> None:
+        """Called from the listening thread: hand over to the executor."""
+        self._answers.append(answer)
+        self._guard.trigger()
+
+    def _take_answers(self) -> None:
+        while self._answers:
+            answer = self._answers.popleft()
+            if not self.active:
+                continue
+            if answer.kind == DIED:
+                self._tell(self.estimator.abandon(answer.payload))
+                self.complain('worker', f'{answer.payload}; starting another', ERROR)
+                self.worker.restart()
+            elif answer.kind == FAILED:
+                self._tell(self.estimator.abandon(answer.payload))
+                self.complain('internal error', str(answer.payload), ERROR)
+            elif self.estimator.running is not None:
+                self._finish(answer.payload, answer.seconds)
         self._next(time.monotonic())
 
     def _finish(self, result: WindowResult, seconds: float) -> None:
@@ -207,7 +236,7 @@ class EstimatorNode(WorkingNode):
         try:
             if not self.active:
                 raise InputError('the estimator is not active')
-            model = configuration.requested(request)
+            model = _requested(request)
             self.estimator.set_model(model)
         except InputError as error:
             response.success, response.message = False, str(error)
@@ -221,7 +250,6 @@ class EstimatorNode(WorkingNode):
 
     def do_report(self) -> None:
         """Rate, gaps, dropped windows, R-hat, compute time."""
-        super().do_report()
         if not hasattr(self, 'estimator'):
             return
         now, tally = time.monotonic(), self.estimator.tally
@@ -238,6 +266,7 @@ class EstimatorNode(WorkingNode):
             'windows failed': self.failed,
             'deadlines missed': self.late + self.dropped,
             'model': ', '.join(self.estimator.model.effects) or 'Eq. (2)',
+            'worker': 'ready' if self.worker.ready.is_set() else 'compiling',
         }
         if self.last is not None and self.last.rhat is not None:
             latency = sorted(self.latency)
@@ -260,6 +289,29 @@ class EstimatorNode(WorkingNode):
                 or 'none',
             }
         self.health.values.update(values)
+
+
+def _effects(values: Mapping[str, Any]) -> tuple[str, ...]:
+    # ROS cannot declare an empty list of strings with its type, so an empty word stands for it.
+    return tuple(name for name in values['effects'] if name)
+
+
+def _settings(values: Mapping[str, Any]) -> EstimatorSettings:
+    known = {f.name for f in fields(EstimatorSettings)}
+    return EstimatorSettings.from_mapping({n: v for n, v in values.items() if n in known})
+
+
+def _requested(request: Any) -> ModelChoice:
+    names = list(request.parameter_names)
+    lower, upper, start = list(request.lower), list(request.upper), list(request.start)
+    if not len(names) == len(lower) == len(upper) or len(start) not in (0, len(names)):
+        raise InputError(
+            f'{len(names)} parameter names, {len(lower)} lower, {len(upper)} upper bounds and '
+            f'{len(start)} starting values do not belong together'
+        )
+    bounds = {n: (lo, up) for n, lo, up in zip(names, lower, upper, strict=True)}
+    places = dict(zip(names, start, strict=True)) if start else None
+    return choose_model(tuple(request.effects), bounds, places)
 
 
 def main(args: list[str] | None = None) -> int:

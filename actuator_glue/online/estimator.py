@@ -8,11 +8,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from actuator_glue.errors import InputError
+from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.online.fitting import starting_points
 from actuator_glue.online.forecast import Frozen
 from actuator_glue.online.job import WindowResult
-from actuator_glue.online.sampling import Fit, Job
-from actuator_glue.online.settings import EstimatorSettings, ModelChoice
+from actuator_glue.online.sampling import Job, WindowFit
+from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import (
     Block,
     Dropped,
@@ -171,7 +172,7 @@ class Estimator:
         self.running = replace(job, ahead=ahead)
         return self.running
 
-    def finish(self, result: WindowResult | Fit) -> list[Event]:
+    def finish(self, result: WindowResult | WindowFit) -> list[Event]:
         """Take the result of the running job, or its first part, all that the next one needs."""
         self.running = None
         window, memory = result.window, self._memory

@@ -8,10 +8,10 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from actuator_glue.inference.bands import Band, band
+from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.inference.predictive import ResidualModel
 from actuator_glue.jit import njit
 from actuator_glue.online.mixture import mixture_band
-from actuator_glue.online.settings import ModelChoice
 from actuator_glue.records import Array
 
 # PARAMETER holds the spread of the parameters, TOTAL adds what the model left over in its window

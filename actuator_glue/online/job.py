@@ -8,13 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from actuator_glue.errors import InputError
+from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.inference.convergence import rhat_and_ess
 from actuator_glue.inference.moments import Moments, moments
 from actuator_glue.online import fitting, sampling
 from actuator_glue.online.forecast import Frozen, Prediction, predictions
 from actuator_glue.online.response import ResponseBand, response_band
-from actuator_glue.online.sampling import Fit, Job
-from actuator_glue.online.settings import EstimatorSettings, ModelChoice
+from actuator_glue.online.sampling import Job, WindowFit
+from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Window
 from actuator_glue.records import Array, Record
 
@@ -84,15 +85,15 @@ def run(job: Job, expired: Callable[[], bool] | None = None) -> WindowResult:
     return report(job, fit(job, expired))
 
 
-def fit(job: Job, expired: Callable[[], bool] | None = None) -> Fit:
+def fit(job: Job, expired: Callable[[], bool] | None = None) -> WindowFit:
     """Do the first part of `run`, all that the next job needs; a window may fail."""
     try:
         return sampling.fit(job, expired)
     except InputError as error:
-        return Fit(job.window, job.model, failure=str(error))
+        return WindowFit(job.window, job.model, failure=str(error))
 
 
-def report(job: Job, fitted: Fit, limits: bool = True) -> WindowResult:
+def report(job: Job, fitted: WindowFit, limits: bool = True) -> WindowResult:
     """Do the second part of `run`: what is published of a posterior.
 
     Args:
@@ -107,7 +108,7 @@ def report(job: Job, fitted: Fit, limits: bool = True) -> WindowResult:
         return _failed(job, fitted, str(error))
 
 
-def _failed(job: Job, fitted: Fit, reason: str) -> WindowResult:
+def _failed(job: Job, fitted: WindowFit, reason: str) -> WindowResult:
     """Return what is left of a window, for later ones."""
     return WindowResult(
         job.window,
@@ -119,7 +120,7 @@ def _failed(job: Job, fitted: Fit, reason: str) -> WindowResult:
     )
 
 
-def _report(job: Job, fitted: Fit, limits: bool) -> WindowResult:
+def _report(job: Job, fitted: WindowFit, limits: bool) -> WindowResult:
     settings, model, record = job.settings, job.model, job.window.record
     chains, frozen = fitted.chains, fitted.frozen
     if chains is None or frozen is None:

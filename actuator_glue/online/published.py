@@ -10,10 +10,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.online import wire
 from actuator_glue.online.estimator import Schedule
 from actuator_glue.online.job import WindowResult
-from actuator_glue.online.settings import EstimatorSettings, ModelChoice
+from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.records import check_period
 
 

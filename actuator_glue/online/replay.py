@@ -6,19 +6,19 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TypeAlias
 
 from actuator_glue.errors import InputError
+from actuator_glue.inference.choice import ModelChoice, choose_model
 from actuator_glue.online import wire
 from actuator_glue.online.estimator import Estimator, Schedule
-from actuator_glue.online.fitting import choose_model
 from actuator_glue.online.job import WindowResult, fit, report
-from actuator_glue.online.sampling import Fit, Job
-from actuator_glue.online.settings import EstimatorSettings, ModelChoice
+from actuator_glue.online.sampling import Job, WindowFit
+from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Block, Event, Failed, Preview, Rejected, Setup
 from actuator_glue.records import Record
 
 Item: TypeAlias = Setup | Block | Preview
 Named: TypeAlias = tuple[str, Any]
 # A window that has been sampled and is to be reported.
-Sampled: TypeAlias = tuple[Job, Fit]
+Sampled: TypeAlias = tuple[Job, WindowFit]
 
 
 def at_once(found: Iterable[Event | Sampled]) -> Iterator[WindowResult | Event]:

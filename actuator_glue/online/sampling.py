@@ -10,22 +10,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.errors import InputError
-from actuator_glue.inference import dream
 from actuator_glue.inference.chains import Chains
+from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.inference.convergence import quick_rhat_and_ess
-from actuator_glue.inference.evaluate import LogDensity
-from actuator_glue.inference.likelihood import GaussianLikelihood, GlueLikelihood
+from actuator_glue.inference.posterior import Problem, sample
 from actuator_glue.inference.predictive import fit_residual
+from actuator_glue.inference.settings import SamplerSettings
+from actuator_glue.inference.state import State
 from actuator_glue.online import fitting
-from actuator_glue.online.coordinates import Coordinates
 from actuator_glue.online.forecast import Frozen, sensor_noise
-from actuator_glue.online.settings import EstimatorSettings, ModelChoice
+from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Window
 from actuator_glue.records import Array, Record
 
 # A command that moves less than this many noise standard deviations calibrates nothing.
 EXCITATION = 3.0
-# Generations in which a sampler that starts from the last posterior adapts.
+# Steps in which a sampler that starts from the last posterior adapts.
 ADAPT = 20
 # Share of the last posterior's points, spread, that must be alive in the next: so few that mostly
 # one temperature leads there.
@@ -61,8 +61,8 @@ class Job:
     @property
     def evaluations(self) -> int:
         """Likelihood evaluations the window is allowed; of chains that fill a batch up, too."""
-        generations = self.settings.evaluations // self.settings.chains
-        usual = max(self.settings.evaluations, generations * self.chains)
+        steps = self.settings.evaluations // self.settings.chains
+        usual = max(self.settings.evaluations, steps * self.chains)
         return max(self.settings.start_evaluations, usual) if self.afresh else usual
 
     @property
@@ -82,7 +82,7 @@ class Job:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Fit:
+class WindowFit:
     """One window's posterior: all that the next window needs of it, and what is to be told.
 
     Attributes:
@@ -108,7 +108,7 @@ class Fit:
     failure: str = ''
 
 
-def fit(job: Job, expired: Callable[[], bool] | None = None) -> Fit:
+def fit(job: Job, expired: Callable[[], bool] | None = None) -> WindowFit:
     """Sample one window.
 
     Args:
@@ -122,13 +122,13 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> Fit:
     settle = round(job.settings.settle / record.period)
     noise = sensor_noise(record.measured)
     moved = _check_excited(record, settle, noise)
-    chains, complete = _sample(job, settle, expired)
+    chains, complete = _sample(job, expired)
     posterior = chains.posterior()
     best = fitting.simulate(job.model, chains.best[np.newaxis], record)[0]
     residual = (record.measured - best)[settle:]
     rms_error = float(residual.std())
     start, stop = job.forecast
-    return Fit(
+    return WindowFit(
         window=job.window,
         model=job.model,
         chains=chains,
@@ -149,28 +149,27 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> Fit:
     )
 
 
-def _sample(job: Job, settle: int, expired: Callable[[], bool] | None) -> tuple[Chains, bool]:
+def _sample(job: Job, expired: Callable[[], bool] | None) -> tuple[Chains, bool]:
     """Return chains of physical parameters, and whether they are all that was wanted."""
     settings, model, record = job.settings, job.model, job.window.record
     near = None
     if job.archive is not None:
         near = np.sort(job.archive, axis=0)[len(job.archive) // 2]
-    errors = fitting.errors(model, record, settle, near)
-    likelihood: LogDensity = (
-        GlueLikelihood(errors, settings.shaping_factor)
-        if settings.likelihood == 'glue'
-        else GaussianLikelihood(errors)
-    )
-    # What another model has shown says nothing about this one's bends.
-    shown = None if job.afresh else job.archive
-    middle = (record.first_index + 0.5 * len(record)) * record.period
-    coordinates = Coordinates(model, record.known_stiffness(), shown, middle)
-    seed = (settings.seed, record.first_index)
-    sampler = _sampler(job)
-    if job.archive is not None:
-        archive = coordinates.coordinates(job.archive)
-    else:
-        sampler, archive = coordinates.cold(np.random.default_rng((*seed, 3)), sampler)
+    target = Problem(
+        records=(record,),
+        model=model,
+        likelihood=settings.likelihood,
+        shaping_factor=settings.shaping_factor,
+        initial='measured',
+        settle=settings.settle,
+        first_index=record.first_index,
+        near=near,
+        # What another model has shown says nothing about this one's bends.
+        shown=None if job.afresh else job.archive,
+    ).target()
+    archive = job.archive
+    if archive is not None and target.transform is not None:
+        archive = target.transform.forward(archive)
     complete = False
 
     def enough(sampled: Chains) -> bool:
@@ -180,22 +179,20 @@ def _sample(job: Job, settle: int, expired: Callable[[], bool] | None) -> tuple[
         complete = bool(sampled.annealed and ess.min() >= settings.ess and rhat.max() <= limit)
         return complete
 
-    sampled = dream.sample(
-        np.random.default_rng((*seed, 0)),
-        coordinates.density(likelihood),
-        coordinates.lower,
-        coordinates.upper,
-        evaluations=job.evaluations,
-        settings=sampler,
+    chains = sample(
+        target,
+        (settings.seed, record.first_index),
+        job.evaluations,
+        settings=_sampler(job),
         archive=archive,
         stop=_stop(job, expired),
         enough=enough,
     )
-    complete = complete or sampled.evaluations + job.chains > job.evaluations
-    return coordinates.chains(sampled), complete
+    complete = complete or chains.evaluations + job.chains > job.evaluations
+    return chains, complete
 
 
-def _stop(job: Job, expired: Callable[[], bool] | None) -> Callable[[dream.State], bool] | None:
+def _stop(job: Job, expired: Callable[[], bool] | None) -> Callable[[State], bool] | None:
     """What ends the sampling early: the evaluations of the run that is repeated, or the clock."""
     if job.stop_at is not None:
         at = job.stop_at
@@ -203,16 +200,16 @@ def _stop(job: Job, expired: Callable[[], bool] | None) -> Callable[[dream.State
     return None if expired is None else lambda _: expired()
 
 
-def _sampler(job: Job) -> dream.Settings:
+def _sampler(job: Job) -> SamplerSettings:
     """Settings of the sampler."""
     if job.archive is None:
-        return dream.Settings(chains=job.chains, adaptation=50)
+        return SamplerSettings(chains=job.chains, adaptation=50)
     if not job.model.effects:
-        return dream.Settings(chains=job.chains, adaptation=ADAPT, survivors=SURVIVORS)
-    sampler = dream.Settings(chains=job.chains, adaptation=ADAPT)
-    # A warm start takes a quarter of the population, and moves a chain of so many sweeps each:
+        return SamplerSettings(chains=job.chains, adaptation=ADAPT, survivors=SURVIVORS)
+    sampler = SamplerSettings(chains=job.chains, adaptation=ADAPT)
+    # A warm start takes a quarter of the population, and moves a chain of so many steps each:
     # batches are full.
-    return replace(sampler, population=4 * sampler.sweeps * job.chains)
+    return replace(sampler, population=4 * sampler.steps * job.chains)
 
 
 def _archive(new: Array, old: Array | None) -> Array:

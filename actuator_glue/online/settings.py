@@ -1,16 +1,15 @@
-"""What the online estimator is told: window, sampler, bands; and the model it fits."""
+"""What the online estimator is told: window, sampler, bands."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
 from actuator_glue.errors import InputError
-from actuator_glue.records import Array
 
 Likelihood: TypeAlias = Literal['glue', 'gaussian']
 
@@ -159,31 +158,3 @@ class EstimatorSettings:
             raise InputError(f'{source}: estimator settings are no JSON object')
         values.pop('start', None)  # belongs to the model
         return EstimatorSettings.from_mapping(values, source)
-
-
-@dataclass(frozen=True, slots=True)
-class ModelChoice:
-    """The model that is fitted: Eq. (2) with effects, and the uniform prior's box.
-
-    Attributes:
-        effects: names of the catalogue; empty for Eq. (2) itself.
-        names: the model's parameters.
-        units: their units.
-        lower: lower bounds of the prior.
-        upper: upper bounds of the prior.
-        start: where to start sampling; NaN or empty for anywhere in the prior.
-    """
-
-    effects: tuple[str, ...]
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    lower: tuple[float, ...]
-    upper: tuple[float, ...]
-    # Not compared: NaN differs from itself once it has been through a pipe, and where sampling
-    # once began makes no other model.
-    start: tuple[float, ...] = field(default=(), compare=False)
-
-    @property
-    def bounds(self) -> tuple[Array, Array]:
-        """Lower and upper bounds, each of shape (p,)."""
-        return np.array(self.lower), np.array(self.upper)

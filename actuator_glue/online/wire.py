@@ -13,10 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from actuator_glue.errors import InputError
-from actuator_glue.online.fitting import choose_model
+from actuator_glue.inference.choice import ModelChoice, choose_model
 from actuator_glue.online.forecast import Prediction
 from actuator_glue.online.job import WindowResult
-from actuator_glue.online.settings import EstimatorSettings, ModelChoice
+from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Block, Preview, Setup
 from actuator_glue.records import Array
 

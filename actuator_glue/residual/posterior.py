@@ -8,8 +8,10 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.inference import dream
-from actuator_glue.inference.convergence import rhat
+from actuator_glue.inference import posterior
+from actuator_glue.inference.settings import SamplerSettings
+from actuator_glue.inference.transforms import Composed
+from actuator_glue.inference.transforms.laplace import Laplace
 from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array
 from actuator_glue.residual.data import Data, Model, chunks
@@ -18,7 +20,6 @@ from actuator_glue.residual.score import Scorer
 from actuator_glue.residual.straight import coordinates
 
 _P = len(BASE)
-_REACH = 100.0  # of the sampled box, in standard deviations of the Laplace approximation
 _HALVINGS = 40  # bring any point of it inside the bounds of the prior
 
 
@@ -37,20 +38,6 @@ def laplace(scorer: Scorer, fit: Fit, slopes: Array) -> tuple[Array, float]:
     normal = (jac / scale[:, None]) @ (jac / scale[:, None]).T
     covariance = np.linalg.pinv(normal, rcond=1e-10, hermitian=True) / np.outer(scale, scale)
     return np.asarray(inflation * covariance), inflation
-
-
-def _scaled(covariance: Array, widest: Array) -> tuple[Array, Array]:
-    """Standard deviations (p,) and correlations (p, p); `widest` (p,) where data say nothing.
-
-    What the data say nothing about has a variance of 0 or of many decades: left in the covariance,
-    it takes all digits from the directions that they do fix.
-    """
-    sd = np.sqrt(np.diag(covariance))
-    told = sd > 0.0
-    safe = np.where(told, sd, 1.0)
-    correlation = covariance / np.outer(safe, safe)
-    correlation[np.diag_indices(len(sd))] = 1.0
-    return np.where(told, sd, widest), correlation
 
 
 def identified(space: Space, draws: Array) -> NDArray[np.bool_]:
@@ -89,50 +76,37 @@ def sample(
     """
     space = Space(model, max(r.duration for r in data.records))
     around = coordinates(space, model, data, fit.z)
-    phi = around.phi(fit.z)
+    phi = around.forward(fit.theta[None])[0]
     covariance, inflation = laplace(scorer, fit, around.slopes(phi))
-    spread, correlation = _scaled(covariance, around.widest)
-    spread = np.minimum(spread, around.widest)
-    values, vectors = np.linalg.eigh(correlation)
-    root = spread[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
-
-    def place(w: Array) -> tuple[Array, Array]:
-        """Parameters and log prior (m,) where the Laplace approximation is standard normal."""
-        return around.theta(phi + w @ root.T)
+    transform = Composed(around, Laplace(phi, covariance, around.widest))
 
     def gaussian(count: int) -> Array:
         w = rng.standard_normal((count, len(phi)))
         for _ in range(_HALVINGS):
-            outside = ~np.isfinite(place(w)[1])
+            outside = ~np.isfinite(transform.inverse(w)[1])
             if not outside.any():
                 break
             w[outside] *= 0.5
         return w
 
     if evaluations <= 0:
-        return place(gaussian(500))[0], math.nan
+        return transform.inverse(gaussian(500))[0], math.nan
 
-    def log_density(w: Array) -> Array:
-        theta, found = place(w)
-        inside = np.isfinite(found)
-        rows = np.flatnonzero(inside)
-        for some in chunks(len(rows), data.target.size):
-            error = scorer.whiten(data.target - data.simulate(model, theta[rows[some]]))
+    def log_likelihood(theta: Array) -> Array:
+        found = np.empty(len(theta))
+        for some in chunks(len(theta), data.target.size):
+            error = scorer.whiten(data.target - data.simulate(model, theta[some]))
             sums = np.einsum('mn,mn->m', error, error)
-            found[rows[some]] -= np.where(np.isfinite(sums), 0.5 * sums / inflation, np.inf)
+            found[some] = np.where(np.isfinite(sums), -0.5 * sums / inflation, -np.inf)
         return found
 
-    box = np.full(len(phi), _REACH)
-    settings = dream.Settings(chains=32, population=128, sweeps=2, adaptation=20)
-    chains = dream.sample(
-        rng,
-        log_density,
-        -box,
-        box,
-        evaluations=evaluations,
-        settings=settings,
+    bounds = space.theta(space.lower), space.theta(space.upper)
+    chains = posterior.sample(
+        posterior.Target(log_likelihood, bounds, transform),
+        [int(word) for word in rng.integers(0, 2**32, 3)],
+        evaluations,
+        settings=SamplerSettings(chains=32, population=128, steps=2, adaptation=20),
         archive=gaussian(320),
         progress=lambda done, all_: progress(done / all_),
     )
-    kept = chains.draws[chains.burn :]
-    return place(kept.reshape(-1, len(phi)))[0], float(rhat(kept).max())
+    return chains.posterior(), float(chains.rhat.max())

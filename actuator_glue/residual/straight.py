@@ -2,7 +2,7 @@
 
 In the logarithms of Eq. (2)'s parameters the ridge that one stiffness leaves is bent, and a
 thousand times longer than wide: points around the fit lie off it, and chains creep. In those of
-`model.ridge_effects` it is straight. Records under several stiffnesses leave no such ridge: for
+`Ridge` it is straight. Records under several stiffnesses leave no such ridge: for
 them the working coordinates serve.
 """
 
@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from actuator_glue.model import ridge_effects
+from actuator_glue.inference.transforms.ridge import Ridge
 from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array
 from actuator_glue.residual.data import Data, Model
@@ -28,7 +28,7 @@ def coordinates(space: Space, model: Model, data: Data, fit: Array) -> Working |
     """Return what to sample in around the working coordinates (p,) of a fit."""
     if len({record.known_stiffness() for record in data.records}) == 1:
         straight = Straight(space, model, data, fit)
-        back, log_prior = straight.theta(straight.phi(fit)[None])
+        back, log_prior = straight.inverse(straight.forward(space.theta(fit)[None]))
         # A fit in a corner of its bounds may have no place there.
         if np.isfinite(log_prior[0]) and np.allclose(back[0], space.theta(fit), rtol=1e-3):
             return straight
@@ -36,7 +36,7 @@ def coordinates(space: Space, model: Model, data: Data, fit: Array) -> Working |
 
 
 class Working:
-    """The working coordinates themselves.
+    """The working coordinates themselves, as a `Transform` of the physical parameters.
 
     Attributes:
         widest: spreads (p,) beyond which nothing is known.
@@ -44,17 +44,18 @@ class Working:
 
     def __init__(self, space: Space) -> None:
         self._space = space
+        self.lower, self.upper = space.lower, space.upper
         self.widest = space.upper - space.lower
         self.widest[:_P] = 1.0
 
-    def phi(self, z: Array) -> Array:
-        """As `Straight.phi`."""
-        return z
+    def forward(self, theta: Array) -> Array:
+        """Return the working coordinates (m, p) of physical parameters (m, p)."""
+        return self._space.z(theta)
 
-    def theta(self, phi: Array) -> tuple[Array, Array]:
-        """As `Straight.theta`."""
-        inside = ((phi >= self._space.lower) & (phi <= self._space.upper)).all(axis=1)
-        return self._space.theta(phi), np.where(inside, 0.0, -np.inf)
+    def inverse(self, z: Array) -> tuple[Array, Array]:
+        """As `Straight.inverse`."""
+        inside = ((z >= self.lower) & (z <= self.upper)).all(axis=1)
+        return self._space.theta(z), np.where(inside, 0.0, -np.inf)
 
     def slopes(self, phi: Array) -> Array:
         """As `Straight.slopes`."""
@@ -62,7 +63,7 @@ class Working:
 
 
 class Straight:
-    """Maps working coordinates z of `Space` to straight ones phi and back.
+    """Straight coordinates, as a `Transform` of the physical parameters.
 
     Args:
         space: the working coordinates; the prior is uniform within their bounds.
@@ -76,42 +77,38 @@ class Straight:
 
     def __init__(self, space: Space, model: Model, data: Data, fit: Array) -> None:
         self._space = space
-        self._stiffness = data.records[0].known_stiffness()
-        self._middle = 0.5 * max(record.duration for record in data.records)
-        self._at = ridge_effects.columns([p.name for p in model.parameters])
+        stiffness = data.records[0].known_stiffness()
+        middle = 0.5 * max(record.duration for record in data.records)
         reach = np.full(len(fit), np.inf)
         reach[2] = _HELD_REACH
-        if self._stiffness == 0.0:
+        if stiffness == 0.0:
             reach[2:4] = _FREE_REACH
         low = space.theta(np.maximum(space.lower, fit - reach))
         high = space.theta(np.minimum(space.upper, fit + reach))
         margin = _ROUNDING * np.where(np.arange(len(fit)) < _P, low, high - low)
-        self._low, self._high = low - margin, high + margin
-        lower, upper = ridge_effects.bounds(self._at, self._stiffness, self._low, self._high)
+        low, high = low - margin, high + margin
+        names = [p.name for p in model.parameters]
+        self._ridge = Ridge(names, low, high, stiffness, middle)
         # Logarithms and normal scores; what is known less well than this is not known.
-        self.widest = np.where(np.arange(len(fit)) < _P, 1.0, upper - lower)
-        if self._stiffness > 0.0:
-            self.widest[3] = self._high[3] * self._stiffness / (self._stiffness + self._low[2])
-
-    def phi(self, z: Array) -> Array:
-        """Straight coordinates (p,) of working ones (p,)."""
-        theta = self._space.theta(z)[None]
-        found = np.empty_like(theta)
-        ridge_effects.coordinates_all(
-            theta, self._stiffness, self._low, self._high, self._at, self._middle, found
+        self.widest = np.where(
+            np.arange(len(fit)) < _P, 1.0, self._ridge.upper - self._ridge.lower
         )
-        return np.asarray(found[0])
+        if stiffness > 0.0:
+            self.widest[3] = self._ridge.upper[3]
+        # The bounds of the parameters are all there are.
+        self.lower, self.upper = np.full(len(fit), -np.inf), np.full(len(fit), np.inf)
+        self._ridge.lower, self._ridge.upper = self.lower, self.upper
 
-    def theta(self, phi: Array) -> tuple[Array, Array]:
+    def forward(self, theta: Array) -> Array:
+        """Return the straight coordinates (m, p) of physical parameters (m, p)."""
+        return self._ridge.forward(theta)
+
+    def inverse(self, phi: Array) -> tuple[Array, Array]:
         """Physical parameters (m, p) and log prior density (m,) at straight coordinates (m, p).
 
         The density is minus infinity outside the bounds, where the parameters mean nothing.
         """
-        phi = np.ascontiguousarray(phi)
-        theta, log_prior = np.ones_like(phi), np.empty(len(phi))
-        ridge_effects.physical_all(
-            phi, self._stiffness, self._low, self._high, self._at, self._middle, theta, log_prior
-        )
+        theta, log_prior = self._ridge.inverse(phi)
         # The Jacobian is that of a prior uniform in theta; ours is in its logarithm.
         inside = np.isfinite(log_prior)
         log_prior[inside] -= np.log(theta[inside, :_P]).sum(axis=1)
@@ -123,9 +120,9 @@ class Straight:
             np.arange(len(phi)) < _P, 1.0, np.maximum(np.abs(phi), 1e-3 * self.widest)
         )
         steps = np.diag(1e-6 * sizes)
-        moved, log_prior = self.theta(np.concatenate([phi + steps, phi - steps]))
+        moved, log_prior = self.inverse(np.concatenate([phi + steps, phi - steps]))
         z = self._space.z(moved)
-        z[~np.isfinite(log_prior)] = self._space.z(self.theta(phi[None])[0])
+        z[~np.isfinite(log_prior)] = self._space.z(self.inverse(phi[None])[0])
         inside = np.isfinite(log_prior).reshape(2, -1).sum(axis=0)
         found = z[: len(phi)] - z[len(phi) :]
         return np.asarray(found / (np.diag(steps) * np.maximum(inside, 1))[:, None])

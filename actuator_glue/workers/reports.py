@@ -12,7 +12,7 @@ from typing import Any
 
 from actuator_glue.online.job import WindowResult, report
 from actuator_glue.online.replay import Sampled, told
-from actuator_glue.online.sampling import Fit, Job
+from actuator_glue.online.sampling import Job, WindowFit
 from actuator_glue.online.stream import Event
 from actuator_glue.workers.warm import warm_windows
 from actuator_glue.workers.worker import DIED, DONE, Answer, Tell, Worker
@@ -130,7 +130,7 @@ def _warm() -> None:
     warm_windows(swap=False)
 
 
-def _known(job: Job, fitted: Fit) -> dict[str, Any]:
+def _known(job: Job, fitted: WindowFit) -> dict[str, Any]:
     """Return the fields of a result that whoever asks for it has."""
     return {
         'window': job.window,

@@ -7,8 +7,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from actuator_glue.inference.choice import choose_model
 from actuator_glue.online.estimator import Estimator
-from actuator_glue.online.fitting import choose_model
 from actuator_glue.online.job import WindowResult, run
 from actuator_glue.online.replay import stream
 from actuator_glue.online.sampling import Job

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference.bands import Band, band
+from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.convergence import gelman_rubin
-from actuator_glue.inference.dream import Chains, Settings, sample
 from actuator_glue.inference.likelihood import Errors, GlueLikelihood
 from actuator_glue.inference.moments import Moments, moments
+from actuator_glue.inference.moves import PUBLISHED
+from actuator_glue.inference.posterior import Target, sample
 from actuator_glue.inference.predictive import fit_residual, predictive_draws, total_band
 from actuator_glue.inference.scores import Scores, coverage, crps_ensemble, score
+from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.model import commands, linear
 from actuator_glue.model.exact import ExactErrors
 from actuator_glue.model.parameters import BASE, NAMES, TABLE_2, bounds
@@ -21,9 +24,41 @@ from actuator_glue.residual.diagnose import diagnose
 from actuator_glue.residual.diagnosis import Diagnosis
 
 __all__ = [
-    'BASE', 'EQUATION_3', 'NAMES', 'NOISE', 'RATE', 'STIFFNESS', 'TABLE_2', 'Array', 'Band',
-    'Chains', 'Diagnosis', 'Errors', 'ExactErrors', 'GlueLikelihood', 'InputError', 'Moments',
-    'Record', 'Scores', 'Settings', 'Structure', 'band', 'bounds', 'commands', 'coverage',
-    'crps_ensemble', 'diagnose', 'fit_residual', 'gelman_rubin', 'linear', 'moments',
-    'predictive_draws', 'reconstructed_tests', 'sample', 'score', 'total_band',
+    'BASE',
+    'EQUATION_3',
+    'NAMES',
+    'NOISE',
+    'PUBLISHED',
+    'RATE',
+    'STIFFNESS',
+    'TABLE_2',
+    'Array',
+    'Band',
+    'Chains',
+    'Diagnosis',
+    'Errors',
+    'ExactErrors',
+    'GlueLikelihood',
+    'InputError',
+    'Moments',
+    'Record',
+    'SamplerSettings',
+    'Scores',
+    'Structure',
+    'Target',
+    'band',
+    'bounds',
+    'commands',
+    'coverage',
+    'crps_ensemble',
+    'diagnose',
+    'fit_residual',
+    'gelman_rubin',
+    'linear',
+    'moments',
+    'predictive_draws',
+    'reconstructed_tests',
+    'sample',
+    'score',
+    'total_band',
 ]  # fmt: skip

@@ -9,19 +9,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.chen.library import (
+    PUBLISHED,
     Array,
     Chains,
     Errors,
     GlueLikelihood,
     Moments,
-    Settings,
+    SamplerSettings,
+    Target,
     bounds,
     moments,
     sample,
 )
 
 # The sampler the paper cites, as Vrugt (2016) runs it: three chains, from the prior.
-AS_PUBLISHED = Settings(chains=3, start='prior', independence=0.0)
+AS_PUBLISHED = SamplerSettings(chains=3, start='prior', moves=PUBLISHED)
 
 # Called with the stage and the share of the whole study that is done.
 Progress = Callable[[str, float], None]
@@ -119,7 +121,7 @@ class Laboratory:
         evaluations: int,
         *,
         added_rms: float = 0.0,
-        settings: Settings | None = None,
+        settings: SamplerSettings | None = None,
     ) -> Posterior:
         """Sample the posterior of Eq. (4) within Table 3's bounds.
 
@@ -138,8 +140,8 @@ class Laboratory:
 
         likelihood = GlueLikelihood(AddedResidual(errors, added_rms), shaping_factor)
         chains = sample(
-            np.random.default_rng([self.seed, *words]), likelihood, *bounds(),
-            evaluations=evaluations, settings=settings, progress=tell,
+            Target(likelihood, bounds()), (self.seed, *words), evaluations, settings=settings,
+            progress=tell,
         )  # fmt: skip
         self.add(evaluations)
         best = float(np.exp(-0.5 * chains.log_density.max() / shaping_factor))

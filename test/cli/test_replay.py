@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from actuator_glue.inference.choice import choose_model
 from actuator_glue.io import messages
 from actuator_glue.io.bag_records import read_records, write_record
 from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.online import wire
-from actuator_glue.online.fitting import choose_model
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.replay import replay, stream
 from actuator_glue.online.settings import EstimatorSettings

@@ -10,7 +10,8 @@ import targets
 from scipy import integrate, stats
 
 from actuator_glue.inference.convergence import ess_bulk
-from actuator_glue.inference.dream import Chains, Settings, sample
+from actuator_glue.inference.dream import Chains, SamplerSettings, sample
+from actuator_glue.inference.moves import MOVES, PUBLISHED, Move
 from actuator_glue.records import Array
 
 # Every moment test below fails by chance once in a million runs.
@@ -18,7 +19,7 @@ FALSE_FAILURE = 1e-6
 
 
 def _replicates(
-    target: targets.Target, rng_seed: int, seeds: int, evaluations: int, settings: Settings
+    target: targets.Target, rng_seed: int, seeds: int, evaluations: int, settings: SamplerSettings
 ) -> list[Chains]:
     return [
         sample(
@@ -57,22 +58,20 @@ def _check_estimates(estimates: Array, truth: Array) -> None:
 
 def test_gaussian_whose_parameters_differ_by_nine_orders_of_magnitude(rng_seed: int) -> None:
     target = targets.scales()
-    runs = _replicates(target, rng_seed, 12, 20_000, Settings())
+    runs = _replicates(target, rng_seed, 12, 20_000, SamplerSettings())
     _check_moments(target, runs)
     assert max(run.rhat.max() for run in runs) < 1.02
 
 
-@pytest.mark.parametrize('independence', [0.0, 0.9], ids=['dream', 'default'])
-def test_mass_in_the_corner_of_the_prior(rng_seed: int, independence: float) -> None:
+@pytest.mark.parametrize('moves', [PUBLISHED, MOVES], ids=['dream', 'default'])
+def test_mass_in_the_corner_of_the_prior(rng_seed: int, moves: tuple[Move, ...]) -> None:
     target = targets.corner()
-    _check_moments(
-        target, _replicates(target, rng_seed, 12, 30_000, Settings(independence=independence))
-    )
+    _check_moments(target, _replicates(target, rng_seed, 12, 30_000, SamplerSettings(moves=moves)))
 
 
 def test_gaussian_with_the_moves_of_vrugt_alone_from_the_prior(rng_seed: int) -> None:
     target = targets.equicorrelated(4)
-    plain = Settings(start='prior', independence=0.0, chains=5, adaptation=400)
+    plain = SamplerSettings(start='prior', moves=PUBLISHED, chains=5, adaptation=400)
     _check_moments(target, _replicates(target, rng_seed, 12, 40_000, plain))
 
 
@@ -82,7 +81,7 @@ def test_two_modes_ten_sigma_apart(rng_seed: int) -> None:
     Four of 16 would happen once in 5 000 runs of this test even if one start in fifty did.
     """
     target = targets.two_modes()
-    runs = _replicates(target, rng_seed, 16, 60_000, Settings())
+    runs = _replicates(target, rng_seed, 16, 60_000, SamplerSettings())
     share = np.array([(run.posterior()[:, 0] < 0.0).mean() for run in runs])
     both = [run for run, part in zip(runs, share, strict=True) if abs(part - 1 / 3) < 0.25]
     assert len(both) >= 13
@@ -98,7 +97,7 @@ def test_banana(rng_seed: int) -> None:
     scatter too widely for Student's t.
     """
     target, twist, tip = targets.banana(), 0.1, -10.0
-    runs = _replicates(target, rng_seed, 16, 800_000, Settings())
+    runs = _replicates(target, rng_seed, 16, 800_000, SamplerSettings())
     beyond, _ = integrate.quad(
         lambda z: stats.norm.pdf(z) * stats.norm.cdf(tip - 100.0 * twist * (1.0 - z * z)), -8, 8
     )

@@ -14,7 +14,8 @@ import targets
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference.adaptation import rescue
-from actuator_glue.inference.dream import Chains, Settings, init, sample, step
+from actuator_glue.inference.dream import Chains, SamplerSettings, init, sample, step
+from actuator_glue.inference.moves import SNOOKER
 from actuator_glue.records import Array
 
 
@@ -26,7 +27,7 @@ def _short(seed: int, evaluations: int = 6000, **settings: object) -> Chains:
         target.lower,
         target.upper,
         evaluations=evaluations,
-        settings=Settings(population=100, **settings),
+        settings=SamplerSettings(population=100, **settings),
     )
 
 
@@ -49,26 +50,28 @@ def test_same_seed_same_bits_in_another_process() -> None:
 def test_a_shorter_run_is_the_beginning_of_a_longer_one() -> None:
     long, short = _short(3, 6000), _short(3, 4000)
     assert np.array_equal(long.draws[: len(short.draws)], short.draws)
-    assert short.burn == long.burn == Settings().adaptation
+    assert short.burn == long.burn == SamplerSettings().adaptation
 
 
 def test_step_leaves_the_given_state_as_it_is_and_branches_do_not_meet() -> None:
     target = targets.scales()
     rng = np.random.default_rng(5)
-    state = init(rng, target.log_density, target.lower, target.upper, Settings(thinning=1))
-    before = [np.array(part) for part in (state.x, state.z, state.archive.rows, state.counts)]
+    state = init(rng, target.log_density, target.lower, target.upper, SamplerSettings(thinning=1))
+    before = [
+        np.array(part) for part in (state.now.x, state.now.z, state.archive.rows, state.counts)
+    ]
 
     def walk(seed: int) -> Array:
         rng, now = np.random.default_rng(seed), state
         for _ in range(5):
-            now, _info = step(rng, now, target.log_density)
+            now, _info = step(rng, now)
         return np.array(now.archive.rows)
 
     first, other, again = walk(1), walk(2), walk(1)
     assert np.array_equal(first, again)
     assert not np.array_equal(first, other)
     for old, part in zip(
-        before, (state.x, state.z, state.archive.rows, state.counts), strict=True
+        before, (state.now.x, state.now.z, state.archive.rows, state.counts), strict=True
     ):
         assert np.array_equal(old, part)
 
@@ -76,14 +79,16 @@ def test_step_leaves_the_given_state_as_it_is_and_branches_do_not_meet() -> None
 def test_burn_in_ends_what_must_end() -> None:
     target = targets.scales()
     rng = np.random.default_rng(1)
-    settings = Settings(adaptation=30, thinning=3)
+    settings = SamplerSettings(adaptation=30, thinning=3)
     state = init(rng, target.log_density, target.lower, target.upper, settings)
     fits = []
     for _ in range(2000):
         old = state
-        state, _ = step(rng, state, target.log_density)
-        if not old.burn_in:
-            assert np.array_equal(state.tuning.crossover_cdf, old.tuning.crossover_cdf)
+        state, _ = step(rng, state)
+        if not old.adapting:
+            assert np.array_equal(
+                state.context.tuning.crossover_cdf, old.context.tuning.crossover_cdf
+            )
             if state.fitted != old.fitted:
                 fits.append(state.fitted)
     assert fits and all(b >= 2 * a for a, b in pairwise(fits))
@@ -99,13 +104,13 @@ def test_outlier_chains_are_found_and_rescued_in_burn_in_only() -> None:
         assert all(part.ravel().tolist() == where for part in walk)
 
     target = targets.scales()
-    settings = Settings(chains=8, adaptation=20, thinning=5)
+    settings = SamplerSettings(chains=8, adaptation=20, thinning=5)
 
-    def stranded(generation: int) -> bool:
+    def stranded(made: int) -> bool:
         """Put one chain where no move leads away from, see whether it is brought back."""
         rng = np.random.default_rng(2)
         state = init(rng, target.log_density, target.lower, target.upper, settings)
-        values = state.log_density.copy()
+        values = state.now.log_density.copy()
         values[3] = -1e6
 
         def nowhere_but_there(x: Array) -> Array:
@@ -113,12 +118,13 @@ def test_outlier_chains_are_found_and_rescued_in_burn_in_only() -> None:
             found[3] = -np.inf
             return found
 
-        x, z = state.x.copy(), state.z.copy()
+        x, z = state.now.x.copy(), state.now.z.copy()
         z[3] = 5.0
-        state = state._replace(x=x, z=z, log_density=values, generation=generation)
+        now = state.now._replace(x=x, z=z, log_density=values)
+        state = state._replace(now=now, made=made, log_density=nowhere_but_there)
         for _ in range(10):
-            state, _ = step(rng, state, nowhere_but_there)
-        return bool((state.z[3] == 5.0).all())
+            state, _ = step(rng, state)
+        return bool((state.now.z[3] == 5.0).all())
 
     assert not stranded(0)
     assert stranded(20)
@@ -136,7 +142,7 @@ def test_stop_and_progress() -> None:
         )  # fmt: skip
 
     stopped = run(20_000, 12_000)
-    assert 12_000 <= stopped.evaluations < 12_000 + Settings().chains
+    assert 12_000 <= stopped.evaluations < 12_000 + SamplerSettings().chains
     assert stopped.evaluations == stopped.evaluations_at(len(stopped.draws) - 1)
     assert seen and all(most == 20_000 for _, most in seen)
     assert [done for done, _ in seen] == sorted(done for done, _ in seen)
@@ -175,7 +181,7 @@ def test_impossible_regions_and_not_a_number_are_never_entered() -> None:
     for start in ('annealed', 'prior'):
         chains = sample(
             np.random.default_rng(0), log_density, [-5.0, -5.0], [5.0, 5.0],
-            evaluations=20_000, settings=Settings(start=start),
+            evaluations=20_000, settings=SamplerSettings(start=start),
         )  # fmt: skip
         draws = chains.posterior()
         assert draws[:, 0].min() >= 0.0
@@ -215,9 +221,15 @@ def test_too_few_evaluations_and_bad_settings_and_archives_are_said() -> None:
         sample(np.random.default_rng(0), *arguments, evaluations=9000, archive=np.zeros((5, 4)))
     with pytest.raises(InputError, match='at least two points of 4'):
         sample(np.random.default_rng(0), *arguments, evaluations=9000, archive=np.zeros((5, 3)))
-    for wrong in ({'chains': 2}, {'snooker': 1.5}, {'survivors': 0.0}, {'start': 'there'}):
+    for wrong in (
+        {'chains': 2},
+        {'moves': ()},
+        {'moves': (SNOOKER,)},
+        {'survivors': 0.0},
+        {'start': 'there'},
+    ):
         with pytest.raises(InputError):
-            Settings(**wrong)
+            SamplerSettings(**wrong)
 
 
 def test_a_budget_that_ends_while_annealing_is_admitted() -> None:

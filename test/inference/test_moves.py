@@ -7,15 +7,23 @@ import pytest
 import targets
 from scipy import stats
 
-from actuator_glue.inference import generation, moves
-from actuator_glue.inference.adaptation import Tuning, empty_counts, tune
-from actuator_glue.inference.coordinates import physical_all, sampling
-from actuator_glue.inference.moves import independence
+from actuator_glue.inference import dream, metropolis, moves, student
+from actuator_glue.inference.adaptation import empty_counts, tuned
+from actuator_glue.inference.moves import (
+    MOVES,
+    NO_CLASS,
+    U_FREE,
+    Move,
+    ProposalContext,
+    workspace,
+)
 from actuator_glue.inference.moves.draw import distinct
-from actuator_glue.inference.settings import Settings
+from actuator_glue.inference.settings import SamplerSettings
+from actuator_glue.inference.transforms.log import Log
+from actuator_glue.jit import njit
 from actuator_glue.records import Array
 
-SETTINGS = Settings()
+SETTINGS = SamplerSettings()
 # Each check below compares at most 64 statistics with this two-sided normal limit: one false
 # failure in 1e5 runs of this whole file.
 LIMIT = float(stats.norm.isf(0.5e-5 / 64 / 20))
@@ -27,48 +35,57 @@ TARGETS = {
 }
 
 
-def _tuning(points: Array, move: int, settings: Settings = SETTINGS) -> Tuning:
-    cdf = np.cumsum(np.eye(3)[move])
-    fitted = tune(points, empty_counts(settings), settings)
-    return fitted._replace(move_cdf=cdf)
+def _context(
+    points: Array, move: Move, settings: SamplerSettings = SETTINGS, box: Log | None = None
+) -> ProposalContext:
+    """Context fitted to points, in which nothing but one move is made."""
+    d = points.shape[1]
+    box = box or Log(np.full(d, -1.0), np.full(d, 1.0))
+    fitted = tuned(points, empty_counts(settings), settings, box)
+    cdf = np.cumsum([float(other is move) for other in settings.moves])
+    return fitted._replace(tuning=fitted.tuning._replace(move_cdf=cdf))
 
 
-def _propose(rng, z, rows, lower, width, tuning, settings=SETTINGS):
-    uniforms = rng.random((len(z), moves.uniforms_per_chain(z.shape[1], settings.pairs)))
+def _tuned(context: ProposalContext, **parts: Array) -> ProposalContext:
+    return context._replace(tuning=context.tuning._replace(**parts))
+
+
+def _propose(rng, z, rows, context):
+    uniforms = rng.random((len(z), moves.uniforms_per_chain(MOVES, z.shape[1], context.pairs)))
     candidate, x = np.empty_like(z), np.empty_like(z)
-    room = generation.room(*z.shape, settings.pairs)
-    generation.propose(
-        z, uniforms, rows, len(rows), lower, width, tuning, settings.pairs, settings.unit_jump,
-        settings.jitter, settings.noise, candidate, x, room,
-    )  # fmt: skip
-    return candidate, x, room
+    space = workspace(*z.shape, context.pairs)
+    metropolis.propose(z, uniforms, rows, len(rows), context, candidate, x, space)
+    return candidate, space
 
 
-def _worst(target: targets.Target, move: int, correct: bool, rng_seed: int) -> tuple[float, float]:
-    """Largest |z| of first and second moments after 12 generations from exact draws.
+def _worst(
+    target: targets.Target, move: Move, correct: bool, rng_seed: int
+) -> tuple[float, float]:
+    """Largest |z| of first and second moments after 12 steps from exact draws.
 
     The chains start as independent exact draws and share an archive independent of them, so they
     remain independent exact draws if, and only if, the move leaves the target invariant.
     """
     rng = np.random.default_rng(rng_seed)
-    width = target.upper - target.lower
+    box = Log(target.lower, target.upper)
     chains = 30_000
-    rows = sampling(target.draw(rng, 500), target.lower, width)
-    z = sampling(target.draw(rng, chains), target.lower, width)
-    tuning = _tuning(rows, move)
-    x, jacobian = physical_all(z, target.lower, width)
+    rows = box.forward(target.draw(rng, 500))
+    z = box.forward(target.draw(rng, chains))
+    context = _context(rows, move, box=box)
+    x, jacobian = box.inverse(z)
     values = target.log_density(x)
     where = values + jacobian
     moved = 0.0
     for _ in range(12):
-        new, new_x, room = _propose(rng, z, rows, target.lower, width, tuning)
+        new, space = _propose(rng, z, rows, context)
+        new_x, _ = box.inverse(new)
         new_values = target.log_density(new_x)
-        goal = new_values + room.log_jacobian
+        goal = new_values + space.log_jacobian
         if not correct:
-            room.correction[:] = 0.0
-        generation.accept(z, x, values, where, new, new_x, new_values, goal, room)
+            space.correction[:] = 0.0
+        metropolis.accept(z, x, values, where, new, new_x, new_values, goal, space)
         z, x, values, where = new, new_x, new_values, goal
-        moved += room.accepted.mean() / 12
+        moved += space.accepted.mean() / 12
     scaled = (x - target.mean) / target.sd
     exact = (target.draw(rng, chains) - target.mean) / target.sd
     worst = 0.0
@@ -85,15 +102,15 @@ def _worst(target: targets.Target, move: int, correct: bool, rng_seed: int) -> t
 
 
 @pytest.mark.parametrize('name', TARGETS)
-@pytest.mark.parametrize('move', range(3), ids=moves.NAMES)
-def test_move_leaves_its_target_invariant(move: int, name: str, rng_seed: int) -> None:
+@pytest.mark.parametrize('move', MOVES, ids=lambda move: move.name)
+def test_move_leaves_its_target_invariant(move: Move, name: str, rng_seed: int) -> None:
     worst, moved = _worst(TARGETS[name], move, True, rng_seed)
     assert worst < LIMIT
     assert moved > 0.05
 
 
-@pytest.mark.parametrize('move', [moves.SNOOKER, moves.INDEPENDENCE], ids=moves.NAMES[1:])
-def test_a_missing_hastings_correction_is_noticed(move: int, rng_seed: int) -> None:
+@pytest.mark.parametrize('move', MOVES[1:], ids=lambda move: move.name)
+def test_a_missing_hastings_correction_is_noticed(move: Move, rng_seed: int) -> None:
     worst, _ = _worst(TARGETS['scales'], move, False, rng_seed)
     assert worst > 2.0 * LIMIT
 
@@ -137,16 +154,14 @@ def test_archive_indices_are_all_ordered_samples_alike(rng_seed: int) -> None:
 def test_crossover_classes_and_unit_jumps_occur_as_often_as_they_should(rng_seed: int) -> None:
     rng = np.random.default_rng(rng_seed)
     d, chains = 6, 100_000
-    settings = Settings(unit_jump=0.2, crossovers=3)
+    settings = SamplerSettings(unit_jump=0.2, crossovers=3)
     rows = rng.standard_normal((40, d))
     crossover = np.array([0.2, 0.3, 0.5])
-    tuning = _tuning(rows, moves.PARALLEL, settings)._replace(crossover_cdf=crossover.cumsum())
-    z = np.zeros((chains, d))
-    candidate, _x, room = _propose(
-        rng, z, rows, np.full(d, -1.0), np.full(d, 2.0), tuning, settings
-    )
-    assert not room.correction.any()
-    used = room.label[:, 1]
+    context = _context(rows, moves.PARALLEL, settings)
+    context = _tuned(context, crossover_cdf=crossover.cumsum())
+    candidate, space = _propose(rng, np.zeros((chains, d)), rows, context)
+    assert not space.correction.any()
+    used = space.label[:, 1]
     probability = np.concatenate([[0.2], 0.8 * crossover])
     assert _chi_square(np.bincount(used + 1, minlength=4), probability) > 1e-6
     moved = (candidate != 0.0).sum(axis=1)
@@ -165,16 +180,14 @@ def test_archive_pairs_occur_as_often_as_they_should_with_their_jump_rate(rng_se
     """Rows of the archive are unit vectors: a candidate shows which ones made it."""
     rng = np.random.default_rng(rng_seed)
     d, chains = 12, 100_000
-    settings = Settings(jitter=0.0, noise=1e-12, unit_jump=0.2, crossovers=1, pairs=3)
+    settings = SamplerSettings(jitter=0.0, noise=1e-12, unit_jump=0.2, crossovers=1, pairs=3)
     rows = np.eye(d)
-    tuning = _tuning(rows, moves.PARALLEL, settings)
-    candidate, _x, room = _propose(
-        rng, np.zeros((chains, d)), rows, np.full(d, -1.0), np.full(d, 2.0), tuning, settings
-    )
+    context = _context(rows, moves.PARALLEL, settings)
+    candidate, space = _propose(rng, np.zeros((chains, d)), rows, context)
     plus, minus = (candidate > 0.01), (candidate < -0.01)
     pairs = plus.sum(axis=1)
     assert (pairs == minus.sum(axis=1)).all()
-    unit = room.label[:, 1] == -1
+    unit = space.label[:, 1] == -1
     assert (pairs[unit] == 1).all()
     assert _chi_square(np.bincount(pairs[~unit], minlength=4)[1:], np.full(3, 1 / 3)) > 1e-6
     gamma = np.where(unit, 1.0, 2.38 / np.sqrt(2.0 * pairs * d))
@@ -189,9 +202,9 @@ def test_snooker_stays_on_its_line_and_carries_its_jacobian(rng_seed: int) -> No
     d = 5
     rows = rng.standard_normal((3, d))
     z = rng.standard_normal((200, d))
-    tuning = _tuning(rows, moves.SNOOKER)._replace(scale=np.array([1.0, 10.0, 0.1, 3.0, 1.0]))
-    candidate, _x, room = _propose(rng, z, rows, np.full(d, -1.0), np.full(d, 2.0), tuning)
-    step, scale = (candidate - z) / tuning.scale, tuning.scale
+    scale = np.array([1.0, 10.0, 0.1, 3.0, 1.0])
+    candidate, space = _propose(rng, z, rows, _tuned(_context(rows, moves.SNOOKER), scale=scale))
+    step = (candidate - z) / scale
     found = np.zeros(len(z), bool)
     for anchor, one, two in ((0, 1, 2), (1, 0, 2), (2, 0, 1)):
         line = (z - rows[anchor]) / scale
@@ -204,7 +217,7 @@ def test_snooker_stays_on_its_line_and_carries_its_jacobian(rng_seed: int) -> No
         lengths = np.linalg.norm((candidate - rows[anchor]) / scale, axis=1) / np.linalg.norm(
             line, axis=1
         )
-        assert np.allclose(room.correction[fits], (d - 1) * np.log(lengths[fits]), atol=1e-9)
+        assert np.allclose(space.correction[fits], (d - 1) * np.log(lengths[fits]), atol=1e-9)
         found |= fits
     assert found.all()
 
@@ -214,15 +227,14 @@ def test_independence_draws_have_the_density_it_claims(rng_seed: int) -> None:
     rng = np.random.default_rng(rng_seed)
     d, count = 5, 200_000
     points = targets.equicorrelated(d).draw(rng, 2000)
-    tuning = _tuning(points, moves.INDEPENDENCE)
+    context = _context(points, moves.INDEPENDENCE)
+    tuning = context.tuning
     z = np.tile(tuning.centre, (count, 1))
-    drawn, _x, room = _propose(rng, z, points, np.full(d, -1.0), np.full(d, 2.0), tuning)
-    t = stats.multivariate_t(
-        tuning.centre, tuning.factor @ tuning.factor.T, df=moves.independence.DEGREES
-    )
+    drawn, space = _propose(rng, z, points, context)
+    t = stats.multivariate_t(tuning.centre, tuning.factor @ tuning.factor.T, df=student.DEGREES)
     log_q = t.logpdf(drawn)
     # The correction is ln q(centre) - ln q(candidate).
-    assert np.allclose(room.correction, t.logpdf(tuning.centre) - log_q, atol=1e-9)
+    assert np.allclose(space.correction, t.logpdf(tuning.centre) - log_q, atol=1e-9)
     normal = stats.multivariate_normal(tuning.centre, tuning.factor @ tuning.factor.T)
     weights = np.exp(normal.logpdf(drawn) - log_q)
     error = weights.std() / np.sqrt(count)
@@ -240,6 +252,48 @@ def test_an_independent_draw_knows_how_far_from_the_centre_it_is(dimension, rng_
     factor = np.linalg.cholesky(spread @ spread.T + np.eye(dimension))
     point = np.empty(dimension)
     for uniforms in rng.random((20, dimension + 4)):
-        distance2 = independence.draw(uniforms, 0, centre, factor, point)
+        distance2 = student.draw(uniforms, 0, centre, factor, point)
         away = np.linalg.solve(factor, point - centre)
         np.testing.assert_allclose(distance2, away @ away, rtol=1e-9)
+
+
+@njit(cache=False)
+def _uniform_step(z, uniforms, rows, size, context, workspace, candidate):
+    """A walk of one coordinate, a standard deviation either way; no archive, no correction."""
+    at = min(int(uniforms[U_FREE] * z.size), z.size - 1)
+    candidate[:] = z
+    candidate[at] += context.tuning.scale[at] * 2.0 * (2.0 * uniforms[U_FREE + 1] - 1.0)
+    return 0.0, NO_CLASS
+
+
+@pytest.mark.parametrize('share', [0.5, None], ids=['fixed', 'by what it achieves'])
+def test_a_fourth_move_is_registered_from_outside(share: float | None, rng_seed: int) -> None:
+    """It is made as often as it says, samples right, and crossover statistics stay in place."""
+    walk = Move('walk', _uniform_step, lambda dimension, pairs: 2, share=share, most=0.5)
+    settings = SamplerSettings(moves=(*MOVES, walk), adaptation=50)
+    target = targets.scales()
+    runs = []
+    for rng in np.random.default_rng(rng_seed).spawn(8):
+        run = dream.sample(
+            rng, target.log_density, target.lower, target.upper, evaluations=15_000,
+            settings=settings,
+        )  # fmt: skip
+        scores = (run.posterior() - target.mean) / target.sd
+        runs.append(np.append(scores.mean(axis=0), (scores**2).mean(axis=0)))
+    truth = np.repeat((0.0, 1.0), 4)
+    assert (np.abs(targets.t_values(np.array(runs), truth)) < targets.t_limit(8, 8, 1e-6)).all()
+
+    rng = np.random.default_rng(rng_seed)
+    state = dream.init(rng, target.log_density, target.lower, target.upper, settings)
+    state = state._replace(counts=np.zeros_like(state.counts), settings=settings)
+    made: list[int] = []
+    classes = np.zeros(settings.crossovers)
+    for _ in range(40):
+        state, info = dream.step(rng, state)
+        made += info.move.tolist()
+        classes += np.bincount(info.crossover[info.crossover >= 0], minlength=len(classes))
+    uses = state.counts[:, 0]
+    assert np.array_equal(uses[:4], np.bincount(made, minlength=4)) and uses[3] > 0
+    assert np.array_equal(uses[4:], classes)
+    if share is not None:
+        assert abs(np.mean(np.array(made) == 3) - share) < 0.1

@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 from online_streams import THETA, stream
 
+from actuator_glue.inference.choice import choose_model
 from actuator_glue.model import commands
 from actuator_glue.model.structure import Structure
 from actuator_glue.online.estimator import Estimator
-from actuator_glue.online.fitting import batch, choose_model
+from actuator_glue.online.fitting import batch
 from actuator_glue.online.job import run
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Block, Setup

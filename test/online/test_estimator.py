@@ -8,9 +8,9 @@ import pytest
 from online_streams import RATE, SETTINGS, THETA, record
 
 from actuator_glue.errors import InputError
+from actuator_glue.inference.choice import choose_model
 from actuator_glue.online import wire
 from actuator_glue.online.estimator import Ahead, Estimator, Schedule
-from actuator_glue.online.fitting import choose_model
 from actuator_glue.online.job import WindowResult, run
 from actuator_glue.online.published import differences
 from actuator_glue.online.replay import replay, stream

@@ -10,30 +10,15 @@ from scipy.stats import norm
 
 from actuator_glue.inference.predictive import ResidualModel, total_band
 from actuator_glue.model import linear, ridge
-from actuator_glue.model.parameters import bounds
 from actuator_glue.normal import below
 from actuator_glue.online.alarm import CoverageAlarm
 from actuator_glue.online.collect import PIECE, Collector
-from actuator_glue.online.coordinates import Coordinates
-from actuator_glue.online.fitting import choose_model
 from actuator_glue.online.forecast import sensor_noise
 from actuator_glue.online.mixture import mixture_band
 from actuator_glue.online.replay import stream
 from actuator_glue.online.response import response_band
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Setup
-
-LOWER, UPPER = bounds()
-
-
-@given(st.integers(0, 2**32), st.sampled_from([0.0, 1e3, 250e3, 1e9]))
-def test_coordinates_are_a_bijection_inside_the_box(seed, stiffness):
-    theta = np.random.default_rng(seed).uniform(LOWER, UPPER, (50, 4))
-    there = Coordinates(choose_model(), stiffness)
-    phi = there.coordinates(theta)
-    inside = (phi > there.lower).all(axis=1) & (phi < there.upper).all(axis=1)
-    # beta_1 s is up to 10^6 times r, which is what is left of d0/d2 without it.
-    assert np.allclose(there.physical(phi)[inside], theta[inside], rtol=1e-6)
 
 
 @pytest.mark.parametrize('stiffness', [0.0, 250e3])
@@ -54,41 +39,6 @@ def test_what_is_uniform_between_bounds_is_a_normal_score():
     assert np.allclose([below(z) for z in scores], share, rtol=1e-12)
     assert ridge.score(0.0) == -ridge.EDGE and ridge.score(1.0) == ridge.EDGE
     assert ridge.score(np.nan) == -ridge.EDGE
-
-
-@pytest.mark.parametrize('stiffness', [0.0, 250e3])
-def test_the_jacobian_is_the_derivative(stiffness):
-    there = Coordinates(choose_model(), stiffness)
-    for theta in np.random.default_rng(0).uniform(LOWER + 0.1 * UPPER, 0.9 * UPPER, (20, 4)):
-        phi = there.coordinates(theta[None])[0]
-        step = 1e-6 * np.maximum(np.abs(phi), 1e-3)
-        columns = [
-            (there.physical(phi + h) - there.physical(phi - h)) / (2 * step[j])
-            for j, h in enumerate(np.diag(step))
-        ]
-        determinant = np.linalg.slogdet(np.array(columns) / theta)[1] + np.log(theta).sum()
-        density = there.density(lambda t: np.zeros(len(t)))
-        reference = there.density(lambda t: np.zeros(len(t)))(there.coordinates(THETA[None]))
-        # Up to a constant, the same at every point.
-        got = density(phi[None])[0] - reference[0]
-        at = there.coordinates(THETA[None])[0]
-        step = 1e-6 * np.maximum(np.abs(at), 1e-3)
-        columns = [
-            (there.physical(at + h) - there.physical(at - h)) / (2 * step[j])
-            for j, h in enumerate(np.diag(step))
-        ]
-        zero = np.linalg.slogdet(np.array(columns) / THETA)[1] + np.log(THETA).sum()
-        assert got == pytest.approx(determinant - zero, abs=1e-4)
-
-
-def test_outside_the_prior_the_density_is_zero():
-    there = Coordinates(choose_model(), 250e3)
-    density = there.density(lambda t: np.zeros(len(t)))
-    outside = there.coordinates(THETA[None])
-    outside[0, 2] = UPPER[2]
-    outside[0, 1] = np.log(1e5)  # alpha_1 beta_0 = 1e12
-    assert np.isneginf(density(outside)).all()
-    assert np.isfinite(density(there.coordinates(THETA[None]))).all()
 
 
 def test_a_mixture_of_one_is_a_normal():

@@ -1,27 +1,37 @@
 """Moves of the sampler: one file each, all in sampling coordinates, all reversible.
 
-A move is a compiled function that writes a candidate for one chain and returns the log of its
-Hastings correction q(candidate -> z) / q(z -> candidate). Random numbers come in as a row of
-uniforms, so that a generation uses the same number of them whatever happens. What every move must
-pass is in test/inference/test_moves.py.
+A new move is a file with a `Move` and its place in `MOVES` here, or in `SamplerSettings.moves`
+for one run. Random numbers come in as a row of uniforms, so that a step uses the same number of
+them whatever happens. What every move must pass is in test/inference/test_moves.py.
 """
 
 from typing import Final
 
-PARALLEL: Final = 0
-SNOOKER: Final = 1
-INDEPENDENCE: Final = 2
-NAMES: Final = ('parallel', 'snooker', 'independence')
+from actuator_glue.inference.moves.independence import INDEPENDENCE
+from actuator_glue.inference.moves.move import (
+    NO_CLASS,
+    U_ACCEPT,
+    U_FREE,
+    U_MOVE,
+    UNTEMPERED,
+    Move,
+    ProposalContext,
+    Tempering,
+    Tuning,
+    Workspace,
+    dispatch,
+    uniforms_per_chain,
+    workspace,
+)
+from actuator_glue.inference.moves.parallel import PARALLEL
+from actuator_glue.inference.moves.snooker import SNOOKER
 
-# Columns of the uniforms of one chain and generation; from U_FREE on they belong to its move.
-U_MOVE: Final = 0
-U_ACCEPT: Final = 1
-U_FREE: Final = 2
+# Those of DREAM(ZS) as Vrugt (2016) has it, and with what this package adds.
+PUBLISHED: Final[tuple[Move, ...]] = (PARALLEL, SNOOKER)
+MOVES: Final[tuple[Move, ...]] = (*PUBLISHED, INDEPENDENCE)
 
-
-def uniforms_per_chain(dimension: int, pairs: int) -> int:
-    """How many uniforms one chain may use in one generation."""
-    parallel = 4 + 2 * pairs + 3 * dimension
-    snooker = 4
-    independence = dimension + 4
-    return U_FREE + max(parallel, snooker, independence)
+__all__ = [
+    'INDEPENDENCE', 'MOVES', 'NO_CLASS', 'PARALLEL', 'PUBLISHED', 'SNOOKER', 'UNTEMPERED',
+    'U_ACCEPT', 'U_FREE', 'U_MOVE', 'Move', 'ProposalContext', 'Tempering', 'Tuning', 'Workspace',
+    'dispatch', 'uniforms_per_chain', 'workspace',
+]  # fmt: skip

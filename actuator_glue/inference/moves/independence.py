@@ -1,123 +1,38 @@
-"""Independence move: a Student-t distribution fitted to the archive, and its density.
+"""Independence move: candidates from a Student t fitted to the archive.
 
 An addition to Vrugt (2016): where the posterior is near a single hill the fitted density proposes
-almost independent draws; elsewhere its share falls by itself (see adaptation.py). Heavy tails (8
-degrees of freedom) keep the density ratio bounded for any posterior with Gaussian tails.
+almost independent draws; elsewhere its share falls by itself (see adaptation.py).
 """
 
 from __future__ import annotations
 
 import math
+from typing import Final
 
-import numpy as np
-
-from actuator_glue.inference.moves import U_FREE
+from actuator_glue.inference import student
+from actuator_glue.inference.moves.move import (
+    NO_CLASS,
+    U_FREE,
+    Move,
+    ProposalContext,
+    Workspace,
+)
 from actuator_glue.jit import njit
-from actuator_glue.normal import quantile
 from actuator_glue.records import Array
-
-DEGREES = 8.0
-
-
-@njit(fastmath=False)
-def fit(points: Array, centre: Array, factor: Array) -> None:
-    """Write centre (p,) and lower Cholesky factor (p, p) of the covariance of points (m, p).
-
-    The covariance is shrunk towards its diagonal as far as few points need it.
-    """
-    m, d = points.shape
-    centre[:] = 0.0
-    factor[:] = 0.0
-    for i in range(m):
-        for j in range(d):
-            centre[j] += points[i, j]
-    centre /= m
-    residual = np.empty(d)
-    for i in range(m):
-        for j in range(d):
-            residual[j] = points[i, j] - centre[j]
-            for k in range(j + 1):
-                factor[j, k] += residual[j] * residual[k]
-    share = (d + 1.0) / (m + d + 1.0)
-    for j in range(d):
-        for k in range(j):
-            factor[j, k] *= (1.0 - share) / max(m - 1, 1)
-        # Never singular: points all equal in a coordinate get the spread of rounding.
-        least = 1e-16 * (1.0 + centre[j] * centre[j])
-        factor[j, j] = max(factor[j, j] / max(m - 1, 1), least) * (1.0 + 1e-9)
-    for j in range(d):
-        for k in range(j + 1):
-            for i in range(k):
-                factor[j, k] -= factor[j, i] * factor[k, i]
-            if k < j:
-                factor[j, k] /= factor[k, k]
-        factor[j, j] = math.sqrt(factor[j, j])
-
-
-@njit
-def _distance2(z: Array, centre: Array, factor: Array, residual: Array) -> float:
-    """Squared Mahalanobis distance of z from the centre; residual is scratch (p,)."""
-    distance2 = 0.0
-    for j in range(z.size):
-        value = z[j] - centre[j]
-        for k in range(j):
-            value -= factor[j, k] * residual[k]
-        residual[j] = value / factor[j, j]
-        distance2 += residual[j] * residual[j]
-    return distance2
-
-
-@njit
-def log_density(z: Array, centre: Array, factor: Array) -> Array:
-    """Log density (m,) of the fitted Student t at points z (m, p), less a constant."""
-    values = np.empty(z.shape[0])
-    residual = np.empty(z.shape[1])
-    for i in range(z.shape[0]):
-        distance2 = _distance2(z[i], centre, factor, residual)
-        values[i] = -0.5 * (DEGREES + z.shape[1]) * math.log1p(distance2 / DEGREES)
-    return values
-
-
-@njit
-def draw(uniforms: Array, first: int, centre: Array, factor: Array, candidate: Array) -> float:
-    """Write one draw of the fitted Student t into candidate, from uniforms[first:].
-
-    Returns its squared Mahalanobis distance from the centre.
-    """
-    d = centre.size
-    # Chi-squared with eight degrees of freedom: four exponentials.
-    product = 1.0
-    for i in range(4):
-        product *= 1.0 - uniforms[first + i]
-    stretch = math.sqrt(-0.5 * DEGREES / math.log(product))
-    distance2 = 0.0
-    for j in range(d):
-        candidate[j] = centre[j]
-    for k in range(d):
-        step = stretch * quantile(uniforms[first + 4 + k])
-        distance2 += step * step
-        for j in range(k, d):
-            candidate[j] += factor[j, k] * step
-    return distance2
-
-
-@njit
-def draw_all(uniforms: Array, centre: Array, factor: Array) -> Array:
-    """Return draws (m, p) of the fitted Student t from uniforms (m, p + 4)."""
-    points = np.empty((len(uniforms), len(centre)))
-    for i in range(len(uniforms)):
-        draw(uniforms[i], 0, centre, factor, points[i])
-    return points
 
 
 @njit
 def propose(
-    z: Array, uniforms: Array, centre: Array, factor: Array, residual: Array, candidate: Array
-) -> float:
-    """Write a candidate that does not depend on z, return the log Hastings correction.
+    z: Array, uniforms: Array, rows: Array, size: int, context: ProposalContext,
+    workspace: Workspace, candidate: Array,
+) -> tuple[float, int]:  # fmt: skip
+    """Write a candidate that does not depend on z: a `Move.propose`."""
+    centre, factor = context.tuning.centre, context.tuning.factor
+    there = student.DEGREES + student.draw(uniforms, U_FREE, centre, factor, candidate)
+    here = student.DEGREES + student.distance2(z, centre, factor, workspace.residual)
+    return 0.5 * (student.DEGREES + z.size) * math.log(there / here), NO_CLASS
 
-    residual is scratch (p,).
-    """
-    there = DEGREES + draw(uniforms, U_FREE, centre, factor, candidate)
-    here = DEGREES + _distance2(z, centre, factor, residual)
-    return 0.5 * (DEGREES + z.size) * math.log(there / here)
+
+INDEPENDENCE: Final = Move(
+    'independence', propose, lambda dimension, pairs: dimension + 4, most=0.9
+)

@@ -3,44 +3,40 @@
 from __future__ import annotations
 
 import math
+from typing import Final
 
-import numpy as np
-from numpy.typing import NDArray
-
-from actuator_glue.inference.moves import U_FREE
 from actuator_glue.inference.moves.draw import choose, distinct
+from actuator_glue.inference.moves.move import (
+    NO_CLASS,
+    U_FREE,
+    Move,
+    ProposalContext,
+    Workspace,
+)
 from actuator_glue.jit import njit
 from actuator_glue.records import Array
 
 
 @njit
 def propose(
-    z: Array,
-    uniforms: Array,
-    rows: Array,
-    size: int,
-    scale: Array,
-    crossover_cdf: Array,
-    pairs: int,
-    unit_jump: float,
-    jitter: float,
-    noise: float,
-    indices: NDArray[np.int64],
-    candidate: Array,
-) -> int:
-    """Write a candidate, return the crossover class used (-1: unit jump, all coordinates).
+    z: Array, uniforms: Array, rows: Array, size: int, context: ProposalContext,
+    workspace: Workspace, candidate: Array,
+) -> tuple[float, int]:  # fmt: skip
+    """Write a candidate: a `Move.propose`, of no crossover class for unit jumps.
 
     candidate = z + (1 + lambda) gamma sum_k (a_k - b_k) + epsilon over the d* coordinates that
     cross over, gamma = 2.38 / sqrt(2 delta d*), lambda ~ U(-jitter, jitter), epsilon uniform and
     small. Symmetric: (a, b) and (b, a) are equally likely, and so are epsilon and -epsilon; the
     log Hastings correction is 0.
     """
+    scale, crossover_cdf = context.tuning.scale, context.tuning.crossover_cdf
+    pairs, indices = context.pairs, workspace.indices
     d = z.size
     at = U_FREE
-    crossover = -1
+    crossover = NO_CLASS
     delta = 1
     # A unit jump (gamma = 1) carries a chain from mode to mode: one pair, every coordinate.
-    if uniforms[at] >= unit_jump:
+    if uniforms[at] >= context.unit_jump:
         crossover = choose(uniforms[at + 1], crossover_cdf)
         delta = min(1 + int(uniforms[at + 2] * pairs), size // 2)
     lone = int(uniforms[at + 3] * d)
@@ -60,7 +56,10 @@ def propose(
             direction = 0.0
             for k in range(delta):
                 direction += rows[indices[0, 2 * k], j] - rows[indices[0, 2 * k + 1], j]
-            stretch = 1.0 + jitter * (2.0 * uniforms[at + d + j] - 1.0)
-            small = noise * scale[j] * (2.0 * uniforms[at + 2 * d + j] - 1.0)
+            stretch = 1.0 + context.jitter * (2.0 * uniforms[at + d + j] - 1.0)
+            small = context.noise * scale[j] * (2.0 * uniforms[at + 2 * d + j] - 1.0)
             candidate[j] += stretch * gamma * direction + small
-    return crossover
+    return 0.0, crossover
+
+
+PARALLEL: Final = Move('parallel', propose, lambda dimension, pairs: 4 + 2 * pairs + 3 * dimension)

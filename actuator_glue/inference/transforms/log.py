@@ -1,4 +1,4 @@
-"""Sampling coordinates: logarithms of what is positive by its prior, the rest on a unit scale.
+"""Logarithms of what is positive by its prior, the rest on a unit scale: the sampler's own.
 
 A parameter with lower bound 0 is carried as z = ln(x / upper), any other as z = (x - lower) /
 (upper - lower). Parameters that differ by nine orders of magnitude then live on one scale, a ratio
@@ -12,6 +12,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from actuator_glue.errors import InputError
 from actuator_glue.jit import njit
@@ -50,29 +51,47 @@ def physical_all(z: Array, lower: Array, width: Array) -> tuple[Array, Array]:
     return x, log_jacobian
 
 
-def sampling(x: Array, lower: Array, width: Array) -> Array:
-    """Return the sampling coordinates of physical points x (m, p) inside the prior."""
-    share = np.clip((x - lower) / width, _EDGE, 1.0 - _EDGE)
-    positive = lower == 0.0
-    share[:, positive] = np.log(share[:, positive])
-    return np.ascontiguousarray(share)
+class Log:
+    """Transform of a box: logarithms of what is positive by its prior, the rest on a unit scale.
 
-
-def check_bounds(lower: Array, upper: Array) -> tuple[Array, Array]:
-    """Return lower bounds and widths (p,) of a uniform prior.
+    Args:
+        low: lower bounds of the parameters, (p,).
+        high: upper bounds, (p,).
 
     Raises:
-        InputError: bounds are not finite, of unequal length, or lower is not below upper.
+        InputError: bounds are not finite, of unequal length, or low is not below high.
     """
-    low = np.array(lower, dtype=np.float64).reshape(-1)
-    high = np.array(upper, dtype=np.float64).reshape(-1)
-    if low.shape != high.shape or low.size == 0:
-        raise InputError(f'prior bounds have lengths {low.size} and {high.size}')
-    wrong = ~(np.isfinite(low) & np.isfinite(high) & (low < high))
+
+    def __init__(self, low: ArrayLike, high: ArrayLike) -> None:
+        self.low, self.width = _checked(low, high)
+        positive = self.low == 0.0
+        self.lower = np.where(positive, -np.inf, 0.0)
+        self.upper = np.where(positive, 0.0, 1.0)
+
+    def forward(self, x: Array) -> Array:
+        """Return the coordinates (m, p) of parameters (m, p) inside the box."""
+        share = np.clip((x - self.low) / self.width, _EDGE, 1.0 - _EDGE)
+        positive = self.low == 0.0
+        share[:, positive] = np.log(share[:, positive])
+        return np.ascontiguousarray(share)
+
+    def inverse(self, z: Array) -> tuple[Array, Array]:
+        """Return the parameters (m, p) of coordinates (m, p), and ln |dx/dz| (m,)."""
+        x, log_jacobian = physical_all(z, self.low, self.width)
+        return x, log_jacobian
+
+
+def _checked(low: ArrayLike, high: ArrayLike) -> tuple[Array, Array]:
+    """Return lower bounds and widths (p,) of a box."""
+    lower = np.array(low, dtype=np.float64).reshape(-1)
+    upper = np.array(high, dtype=np.float64).reshape(-1)
+    if lower.shape != upper.shape or lower.size == 0:
+        raise InputError(f'prior bounds have lengths {lower.size} and {upper.size}')
+    wrong = ~(np.isfinite(lower) & np.isfinite(upper) & (lower < upper))
     if wrong.any():
         at = int(wrong.argmax())
         raise InputError(
-            f'prior bounds of parameter {at} are ({low[at]:g}, {high[at]:g}); '
+            f'prior bounds of parameter {at} are ({lower[at]:g}, {upper[at]:g}); '
             'a uniform prior needs two finite bounds, the lower one first'
         )
-    return low, high - low
+    return lower, upper - lower

@@ -1,8 +1,8 @@
-"""What is still bent in an earlier posterior is straightened, coordinate by coordinate.
+"""Triangular transport (Knothe-Rosenblatt): what an earlier posterior bends, straightened.
 
 Points of the earlier posterior tell each coordinate's mean given those before it, as a quadratic
-function; the straight coordinates are what is left, in standard deviations (a Knothe-Rosenblatt
-map of second degree). Its Jacobian is constant. The map is fixed before the window is sampled and
+function; the straight coordinates are what is left, in standard deviations (a map of second
+degree). Its Jacobian is constant. The map is fixed before the window is sampled and
 one-to-one whatever the points were, so it makes the sampler faster, never wrong.
 """
 
@@ -23,7 +23,7 @@ _KNOWN = 4.0
 # Prior weight of 'no bend', as a share of the points.
 _SHRINK = 0.01
 # Limits of the straight coordinates in standard deviations: nothing of a posterior is so far out.
-LIMIT = 1e5
+_LIMIT = 1e5
 
 
 @_njit
@@ -55,17 +55,18 @@ def _straight(y: Array, width: Array, coefficients: Array, v: Array) -> None:
             v[i, j] = (y[i, j] - _mean(y[i], j, coefficients)) / width[j]
 
 
-class Shear:
-    """Maps straight coordinates v (m, p) to coordinates z and back.
+class Triangular:
+    """Transform of coordinates y (m, p) to straight ones z.
 
     Effects come first, then what one record leaves free, then what it fixes best.
 
     Args:
-        points: an earlier posterior in coordinates z, shape (m, p), m > 2 p.
+        points: an earlier posterior in coordinates y, shape (m, p), m > 2 p.
     """
 
     def __init__(self, points: Array) -> None:
         m, p = points.shape
+        self.lower, self.upper = np.full(p, -_LIMIT), np.full(p, _LIMIT)
         self._order = np.array([*range(p - 1, 3, -1), 2, 3, 1, 0][-p:])
         points = points[:, self._order]
         self._centre = points.mean(axis=0)
@@ -84,15 +85,15 @@ class Shear:
             self._mean[axis, : len(found)] = found
             self._width[axis] = max(float((y[:, axis] - table @ found).std()), 1e-9)
 
-    def bent(self, v: Array) -> Array:
-        """Return coordinates z (m, p) of straight coordinates v (m, p)."""
-        y, z = np.empty_like(v), np.empty_like(v)
-        _bent(v, self._width, self._mean, y)
-        z[:, self._order] = self._centre + self._scale * y
-        return z
+    def forward(self, x: Array) -> Array:
+        """Return straight coordinates (m, p) of coordinates (m, p)."""
+        z = np.empty_like(x)
+        _straight((x[:, self._order] - self._centre) / self._scale, self._width, self._mean, z)
+        return np.clip(z, self.lower, self.upper)
 
-    def straight(self, z: Array) -> Array:
-        """Return straight coordinates v (m, p) of coordinates z (m, p)."""
-        v = np.empty_like(z)
-        _straight((z[:, self._order] - self._centre) / self._scale, self._width, self._mean, v)
-        return v
+    def inverse(self, z: Array) -> tuple[Array, Array]:
+        """Return coordinates (m, p) of straight ones (m, p), and a constant's logarithm (m,)."""
+        y, x = np.empty_like(z), np.empty_like(z)
+        _bent(z, self._width, self._mean, y)
+        x[:, self._order] = self._centre + self._scale * y
+        return x, np.zeros(len(z))

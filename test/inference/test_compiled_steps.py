@@ -1,4 +1,4 @@
-"""Compiled generations have the bits of single steps, with the exact kernel where it is needed."""
+"""Compiled steps have the bits of single steps, with the exact kernel where it is needed."""
 
 from __future__ import annotations
 
@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 
 from actuator_glue.errors import InputError
+from actuator_glue.inference.choice import choose_model
 from actuator_glue.inference.compiled import compiled, log_densities, scratch
-from actuator_glue.inference.dream import Settings, State, init, sample, step, stretch
-from actuator_glue.inference.evaluate import LogDensity
+from actuator_glue.inference.dream import State, init, sample, step, stretch
 from actuator_glue.inference.likelihood import GaussianLikelihood, GlueLikelihood
+from actuator_glue.inference.moves import PUBLISHED
+from actuator_glue.inference.posterior import Problem, _Density
+from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.model import problem_r
 from actuator_glue.model.fast import FastErrors
 from actuator_glue.model.parameters import bounds
-from actuator_glue.online.coordinates import Coordinates
-from actuator_glue.online.fitting import choose_model
 from actuator_glue.records import Array
 
 RECORDS = [record.slice(0, 4000) for record in problem_r.records()]
@@ -25,32 +26,43 @@ def glue() -> GlueLikelihood:
     return GlueLikelihood(FastErrors(RECORDS), 256.0)
 
 
-def window() -> tuple[LogDensity, Array, Array]:
+def window() -> tuple[_Density, Array, Array]:
     """One record in the coordinates of the online estimator."""
-    record = RECORDS[1].slice(500, 4000)
-    there = Coordinates(choose_model(), record.known_stiffness())
-    errors = FastErrors([record], 200, 'measured')
-    return there.density(GlueLikelihood(errors, 256.0)), there.lower, there.upper
+    problem = Problem(
+        (RECORDS[1].slice(500, 4000),), choose_model(), initial='measured', settle=0.2
+    )
+    target = problem.target()
+    transform = target.transform
+    return _Density(target.log_likelihood, transform), transform.lower, transform.upper
 
 
 def same(one: State, other: State) -> bool:
     """Whether two states are equal to the last bit."""
     parts = [
-        (a.rows, b.rows) if hasattr(a, 'rows') else (a, b)
-        for a, b in zip(one[:-1], other[:-1], strict=True)
-        if not isinstance(a, tuple)
+        (one.archive.rows, other.archive.rows),
+        (one.counts, other.counts),
+        (one.sum_log_density, other.sum_log_density),
+        *zip(one.now, other.now, strict=True),
+        *zip(one.context.tuning, other.context.tuning, strict=True),
     ]
-    parts += list(zip(one.tuning, other.tuning, strict=True))
-    return all(np.array_equal(a, b) for a, b in parts)
+    numbers = [(s.fitted, s.made, s.evaluations, s.power) for s in (one, other)]
+    return numbers[0] == numbers[1] and all(np.array_equal(a, b) for a, b in parts)
 
 
 CASES = {
-    'glue': (glue, Settings()),
-    'gaussian': (lambda: GaussianLikelihood(FastErrors(RECORDS)), Settings(chains=7, thinning=3)),
-    'sigma': (lambda: GaussianLikelihood(FastErrors(RECORDS), 1e-4), Settings(adaptation=17)),
+    'glue': (glue, SamplerSettings()),
+    'gaussian': (
+        lambda: GaussianLikelihood(FastErrors(RECORDS)),
+        SamplerSettings(chains=7, thinning=3),
+    ),
+    'sigma': (
+        lambda: GaussianLikelihood(FastErrors(RECORDS), 1e-4),
+        SamplerSettings(adaptation=17),
+    ),
     # Half of the prior needs the exact kernel.
-    'fallback': (glue, Settings(start='prior', adaptation=100)),
-    'window': (window, Settings(chains=5)),
+    'fallback': (glue, SamplerSettings(start='prior', adaptation=100)),
+    'window': (window, SamplerSettings(chains=5)),
+    'published': (glue, SamplerSettings(chains=3, moves=PUBLISHED)),
 }
 
 
@@ -73,12 +85,12 @@ def test_the_bits_are_those_of_steps(case: str, most: int, rng_seed: int) -> Non
     assert same(one, other)
     rngs = np.random.default_rng(rng_seed), np.random.default_rng(rng_seed)
     before = 0 if case == 'window' else density.errors.fallbacks
-    while one.generation < 250:
-        one, path = stretch(rngs[0], one, density, fast, most)
-        while other.generation < one.generation:
-            other, _ = step(rngs[1], other, plain)
+    while one.made < 250:
+        one, path = stretch(rngs[0], one, most)
+        while other.made < one.made:
+            other, _ = step(rngs[1], other)
         assert same(one, other)
-        assert np.array_equal(path.x[-1], one.x) or one.generation <= settings.adaptation
+        assert np.array_equal(path.x[-1], one.now.x) or one.made <= settings.adaptation
     assert rngs[0].random() == rngs[1].random()
     if case == 'fallback':
         assert density.errors.fallbacks > before
@@ -86,13 +98,14 @@ def test_the_bits_are_those_of_steps(case: str, most: int, rng_seed: int) -> Non
 
 def test_stretches_from_one_state_do_not_meet(rng_seed: int) -> None:
     density = glue()
-    fast = compiled(density)
-    state = init(np.random.default_rng(rng_seed), density, LOWER, UPPER, Settings(thinning=1))
+    state = init(
+        np.random.default_rng(rng_seed), density, LOWER, UPPER, SamplerSettings(thinning=1)
+    )
 
     def walk(seed: int) -> State:
         rng, now = np.random.default_rng(seed), state
-        while now.generation < 100:
-            now, _ = stretch(rng, now, density, fast, 10)
+        while now.made < 100:
+            now, _ = stretch(rng, now, 10)
         return now
 
     first, other = walk(1), walk(2)
@@ -114,19 +127,20 @@ def test_a_stopped_run_is_repeated_by_stopping_there(rng_seed: int) -> None:
     assert np.array_equal(stopped.draws, again.draws)
 
 
-def test_plus_infinity_is_refused_from_compiled_code_too() -> None:
+class Infinite:
     """A record whose sums of squares are made to vanish."""
-    density = glue()
-    fast = compiled(density)
-    assert fast is not None
-    state = init(np.random.default_rng(0), density, LOWER, UPPER, Settings())
 
-    def infinite(x: Array) -> Array:
+    def __call__(self, x: Array) -> Array:
         return np.full(len(x), np.inf)
 
-    nothing = fast._replace(size=np.inf)
+    def compiled(self) -> object:
+        return compiled(glue())._replace(size=np.inf)
+
+
+def test_plus_infinity_is_refused_from_compiled_code_too() -> None:
+    state = init(np.random.default_rng(0), glue(), LOWER, UPPER)
     with pytest.raises(InputError, match='plus infinity'):
-        stretch(np.random.default_rng(0), state, infinite, nothing, 10)
+        stretch(np.random.default_rng(0), state._replace(log_density=Infinite()), 10)
 
 
 @pytest.mark.parametrize('case', ['glue', 'gaussian', 'sigma'])
