@@ -20,8 +20,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from actuator_glue.demo.processes import end_in_order
 from benchmarks.environment import ROOT, python
+from examples.demonstration.processes import end_in_order
 
 PEERS = ('emcee_samplers', 'pydream_sampler', 'spotpy_sampler', 'pints_samplers')
 

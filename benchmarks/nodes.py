@@ -18,12 +18,12 @@ from typing import Any
 
 import numpy as np
 
-from actuator_glue.demo.processes import Node, Nodes
-from actuator_glue.demo.watch import BAND, HEALTH, POSTERIOR, SAMPLES, Watch
 from actuator_glue.io.bag_reader import messages
 from actuator_glue.io.messages import deserialize
 from actuator_glue.online import wire
 from benchmarks.stalls import awake, watched, withheld
+from examples.demonstration.processes import Node, Nodes
+from examples.demonstration.watch import BAND, HEALTH, POSTERIOR, SAMPLES, Watch
 
 # Nodes of a benchmark see each other and nobody else.
 _DOMAIN = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'ROS_DOMAIN_ID': '97'}

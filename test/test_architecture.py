@@ -30,12 +30,11 @@ ARROWS = {
     'inference': BOTTOM | {'model'},
     'online': CORE,
     'residual': CORE,
-    'report': CORE | {'online', 'residual'},
+    'report': CORE | {'online', 'residual', 'io'},
     'io': {'records', 'errors', 'interfaces'},
     'workers': CORE | {'online'},
     'nodes': EVERYTHING,
-    'demo': EVERYTHING,
-    'cli': EVERYTHING | {'demo'},
+    'cli': EVERYTHING,
 }
 # All below io but jit, which keeps compiled code in files.
 PURE = ('errors', 'records', 'normal', 'model', 'inference', 'online', 'residual')

@@ -16,7 +16,13 @@ from colcon_python_setup_py.package_identification.python_setup_py import get_se
 
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / 'pyproject.toml').read_text(encoding='utf-8'))['project']
-OURS = {'actuator_glue', 'benchmarks', 'studies', *(p.stem for p in (ROOT / 'test').rglob('*.py'))}
+OURS = {
+    'actuator_glue',
+    'benchmarks',
+    'studies',
+    'examples',
+    *(p.stem for p in (ROOT / 'test').rglob('*.py')),
+}
 
 
 class Names(NamedTuple):
@@ -96,9 +102,9 @@ def test_pip_installs_what_the_package_imports() -> None:
     assert pip_names(PROJECT['dependencies']) == expected
 
 
-def test_studies_need_nothing_more() -> None:
+def test_studies_and_examples_need_nothing_more() -> None:
     """They run where the package does."""
-    assert imported('studies') <= RUN
+    assert imported('studies', 'examples') <= RUN
 
 
 def test_pip_installs_what_the_tests_import() -> None:

@@ -14,7 +14,9 @@ import actuator_glue
 
 ROOT = Path(actuator_glue.__file__).resolve().parent
 REPOSITORY = ROOT.parent
-SOURCES = sorted(p for f in (ROOT, REPOSITORY / 'studies') for p in f.rglob('*.py'))
+SOURCES = sorted(
+    p for f in (ROOT, REPOSITORY / 'studies', REPOSITORY / 'examples') for p in f.rglob('*.py')
+)
 COMMANDS = sorted(p.stem for p in (ROOT / 'cli').glob('[!_]*.py') if p.stem != 'main')
 CONFIGS = sorted((REPOSITORY / 'config').rglob('*.yaml'))
 

@@ -22,7 +22,7 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     # Links: setuptools reads through them; what it writes stays beside them.
     for name in (
         'pyproject.toml', 'setup.py', 'setup.cfg', 'README.md', 'LICENSE', 'package.xml',
-        'resource', 'launch', 'config', 'actuator_glue', 'studies',
+        'resource', 'launch', 'config', 'actuator_glue', 'studies', 'examples',
     ):  # fmt: skip
         (source / name).symlink_to(ROOT / name)
     command = ['-m', 'pip', 'wheel', '--quiet', '--no-deps', '--no-build-isolation', '-w', out]
@@ -49,7 +49,7 @@ def test_wheel_holds_every_file_of_the_package(wheel: Path) -> None:
 
 
 def test_wheel_holds_nothing_beside_the_package(wheel: Path) -> None:
-    """Studies stay in the checkout."""
+    """Studies and examples stay in the checkout."""
     tops = {name.partition('/')[0] for name in zipfile.ZipFile(wheel).namelist()}
     assert {top.partition('-')[0] for top in tops} == {'actuator_glue'}
 

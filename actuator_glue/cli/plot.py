@@ -14,7 +14,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.records import Record
 
 if TYPE_CHECKING:
-    from actuator_glue.demo.bag import Content
+    from actuator_glue.report.bag_content import Content
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -79,14 +79,14 @@ def _draw(record: Record, path: Path, args: argparse.Namespace) -> None:
 
 def _draw_estimate(bag: Path, folder: Path, args: argparse.Namespace) -> None:
     """Draw the forecast bands and the posteriors that a live estimator left in a bag."""
-    from actuator_glue.demo import pictures
-    from actuator_glue.demo.bag import read
+    from actuator_glue.report import estimate_figures as figures
+    from actuator_glue.report.bag_content import read
 
     content: Content = read(bag)
     if not content.posteriors:
         note(f'{bag}: holds no posterior; `actuator-glue replay {bag}` makes them')
         return
-    for draw, name in ((pictures.bands, 'bands'), (pictures.parameters, 'parameters')):
+    for draw, name in ((figures.bands, 'bands'), (figures.parameters, 'parameters')):
         path = claim(folder / f'{bag.stem}_{name}.{args.format}', args)
         try:
             draw(content, path)

@@ -15,6 +15,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, Ti
 
 from actuator_glue import __version__
 from actuator_glue.cli._output import note, write_json
+from actuator_glue.cli._parser import Folder, claim_outputs
 from actuator_glue.errors import InputError
 from studies.chen import published, report
 from studies.chen.curves import curves
@@ -32,7 +33,7 @@ def parser() -> argparse.ArgumentParser:
     """Return the command line."""
     found = argparse.ArgumentParser(prog='python -m studies.chen', description=__doc__)
     found.add_argument(
-        '--out', type=Path, default=Path('out/reproduce'), metavar='DIR',
+        '--out', type=Folder, default='out/reproduce', metavar='DIR',
         help='folder for report.html, results.json, tables/*.csv and curves/*.csv '
         '(default: %(default)s)',
     )  # fmt: skip
@@ -46,23 +47,6 @@ def parser() -> argparse.ArgumentParser:
         '--seed', type=int, default=1, help='of sensor noise and samplers (default: %(default)s)'
     )
     return found
-
-
-def check(out: Path, *, force: bool) -> None:
-    """Make the output folder.
-
-    Raises:
-        InputError: it holds results and may not be overwritten, or cannot be made.
-    """
-    taken = [name for name in MADE if (out / name).exists()]
-    if taken and not force:
-        raise InputError(
-            f'{out} exists already with {", ".join(taken)}; choose another name, or add --force'
-        )
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f'--out {out}: cannot be made ({error.strerror or error})') from error
 
 
 def write(results: Results, out: Path, made: str) -> int:
@@ -102,7 +86,9 @@ def run(args: argparse.Namespace) -> None:
     """
     if args.seed < 0:
         raise InputError(f'--seed {args.seed} is negative; give 0 or more')
-    check(args.out, force=args.force)
+    claim_outputs(args)
+    out = Path(args.out)
+    out.mkdir(parents=True, exist_ok=True)
     started = time.monotonic()
     made = f'python -m studies.chen{" --quick" if args.quick else ""} --seed {args.seed}'
     with progress() as tell:
@@ -111,12 +97,12 @@ def run(args: argparse.Namespace) -> None:
             args.seed, quick=args.quick, progress=lambda stage, share: tell(stage, 0.9 * share)
         )
         tell('figures and files', 0.9)
-        files = write(results, args.out, made)
+        files = write(results, out, made)
         tell('done', 1.0)
     note(f'{time.monotonic() - started:.0f} s')
-    print(f'report    {args.out / "report.html"}')
-    print(f'numbers   {args.out / "results.json"}')
-    print(f'CSV       {args.out / "tables"}, {args.out / "curves"} ({files} files)')
+    print(f'report    {out / "report.html"}')
+    print(f'numbers   {out / "results.json"}')
+    print(f'CSV       {out / "tables"}, {out / "curves"} ({files} files)')
     spread = results.table_4
     print(
         f'Table 4   matched at a residual of {1e3 * spread.matched.best_rms:.2f} mm rms; COVs of '

@@ -10,16 +10,15 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
-from actuator_glue.demo.bag import Content
-from actuator_glue.demo.diagnosis import verdict
 from actuator_glue.io.bag_reader import decoded
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.published import Comparison, compare, published
 from actuator_glue.online.replay import items, replay
+from actuator_glue.report.bag_content import Content
 from actuator_glue.residual.diagnosis import Diagnosis
 from actuator_glue.workers.reports import Reports
 
-SCHEMA = 'actuator_glue.demo/1'
+SCHEMA = 'examples.demonstration/1'
 BANDS = {
     'total': 'total (parameters and residual)',
     'parameter': 'parameters only (GLUE)',
@@ -186,3 +185,28 @@ class Outcome:
                     title, f'{float(level):.0%}', f'{share:.1%}', f'{1e3 * width:.4f} mm'
                 )
         return table
+
+
+def verdict(diagnosis: Diagnosis) -> list[str]:
+    """Return what people want to know, line by line."""
+    error = diagnosis.error
+    lines = [f'diagnosis {diagnosis.summary()}']
+    for effect in diagnosis.effects:
+        sizes = ', '.join(
+            f'{name} {p.mean:.4g} +- {p.stddev:.2g} {p.unit}'
+            for name, p in effect.parameters.items()
+        )
+        lines.append(f'          {effect.name} ({effect.place}): {sizes}')
+    if diagnosis.effects:
+        base = [
+            f'{name} {p.mean:.4g} +- {p.stddev:.2g} {p.unit}' for name, p in diagnosis.base.items()
+        ]
+        lines.append(f'          with it {", ".join(base)}')
+    before, after, low, high, noise = (
+        f'{1e6 * v:.2f}' for v in (error.before, error.after, *error.after_ci, error.noise_floor)
+    )
+    lines.append(
+        f'error     {before} um before, {after} um after [{low}, {high}], noise {noise} um, '
+        'held-out data'
+    )
+    return lines

@@ -6,70 +6,17 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from actuator_glue.demo.bag import Content
-from actuator_glue.demo.processes import Nodes, executable
-from actuator_glue.demo.run import prepare
-from actuator_glue.demo.watch import Watch
 from actuator_glue.errors import InputError
 from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.io.messages import header, message
-from actuator_glue.records import Record
-
-
-def band(index: int, values: np.ndarray, kind: str = 'total') -> SimpleNamespace:
-    """Return a scored band around values, one level."""
-    return SimpleNamespace(
-        kind=kind,
-        index=index,
-        levels=np.array([0.9]),
-        lower=values - 1.0,
-        median=values,
-        upper=values + 1.0,
-        coverage=np.array([0.5]),
-        width=np.array([2.0]),
-    )
-
-
-def content(*bands: SimpleNamespace) -> Content:
-    """Return a bag's content: 100 samples from running index 1000 on."""
-    samples = np.linspace(0.0, 1e-3, 100)
-    record = Record(samples, samples, 1e-3, 0.0, first_index=1000)
-    return Content(record, 100, [], bands=list(bands))
-
-
-def test_bands_are_joined_where_they_lie() -> None:
-    """Two hops in a row give one band; what no band covers is NaN."""
-    joined = content(
-        band(1010, np.arange(20.0)),
-        band(1030, np.arange(20.0, 50.0)),
-        band(1010, np.zeros(5), 'x'),
-    ).stitched('total')
-    assert joined is not None and len(joined) == 100
-    np.testing.assert_array_equal(joined.median[10:60], np.arange(50.0))
-    np.testing.assert_array_equal(joined.lower[0, 10:60], np.arange(50.0) - 1.0)
-    assert np.isnan(joined.median[:10]).all() and np.isnan(joined.median[60:]).all()
-
-
-def test_bands_beyond_the_record_are_cut() -> None:
-    """A band that reaches out of the record counts as far as the record goes."""
-    joined = content(band(1090, np.arange(20.0)), band(995, np.arange(10.0))).stitched('total')
-    assert joined is not None
-    np.testing.assert_array_equal(joined.median[90:], np.arange(10.0))
-    np.testing.assert_array_equal(joined.median[:5], np.arange(5.0, 10.0))
-    assert content().stitched('total') is None
-
-
-def test_coverage_weighs_bands_by_their_samples() -> None:
-    """Ten samples count for less than thirty."""
-    short, long = band(1000, np.zeros(10)), band(1010, np.zeros(30))
-    short.coverage = np.array([1.0])
-    assert content(short, long).coverage('total') == {'0.9': pytest.approx(0.625)}
-    assert content(short, long).mean_width('total', 0.9) == 2.0
+from examples.demonstration import __main__ as command
+from examples.demonstration.processes import Nodes, executable
+from examples.demonstration.run import prepare
+from examples.demonstration.watch import Watch
 
 
 def test_watch_counts_what_is_flushed(tmp_path: Path) -> None:
@@ -115,6 +62,33 @@ def test_missing_workspace_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
         executable('estimator')
 
 
+@pytest.mark.parametrize(
+    ('arguments', 'said'),
+    [
+        (['--channels', 'map.yaml'], 'belongs to --data'),
+        (['--seconds', '1'], 'shorter than the window'),
+        (['--data', 'missing.csv'], 'missing.csv'),
+    ],
+)
+def test_unusable_arguments_say_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], said: str
+) -> None:
+    """Before any node is started."""
+    assert command.main(['--out', str(tmp_path / 'out'), *arguments]) == 2
+    assert said in capsys.readouterr().err
+    assert not (tmp_path / 'out' / 'nodes').exists()
+
+
+def test_results_are_not_overwritten_unasked(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As with every command."""
+    (tmp_path / 'summary.json').write_text('precious')
+    assert command.main(['--out', str(tmp_path)]) == 2
+    assert 'exists already; choose another name, or add --force' in capsys.readouterr().err
+    assert (tmp_path / 'summary.json').read_text() == 'precious'
+
+
 @pytest.mark.ros
 def test_a_dying_node_is_reported(tmp_path: Path) -> None:
     """The end of its log is in the message, and the others are stopped."""
@@ -129,7 +103,7 @@ def test_a_dying_node_is_reported(tmp_path: Path) -> None:
 _HOLDER = """
 import sys, time
 from pathlib import Path
-from actuator_glue.demo.processes import Nodes, end_in_order
+from examples.demonstration.processes import Nodes, end_in_order
 end_in_order()
 with Nodes() as nodes:
     node = nodes.start('recorder', {'bag': str(Path(sys.argv[1], 'bag'))}, Path(sys.argv[1]))
@@ -161,11 +135,11 @@ def test_demo_from_end_to_end(tmp_path: Path) -> None:
     _need_nodes()
     out = tmp_path / 'out'
     arguments = ['--seconds', '12', '--rate', '200', '--window', '3', '--no-diagnosis']
-    command = [sys.executable, '-m', 'actuator_glue.cli.main', 'demo', '--out', str(out)]
+    command = [sys.executable, '-m', 'examples.demonstration', '--out', str(out)]
     done = subprocess.run([*command, *arguments], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
     summary = json.loads((out / 'summary.json').read_text())
-    assert summary['schema'] == 'actuator_glue.demo/1'
+    assert summary['schema'] == 'examples.demonstration/1'
     assert set(summary['samples'].values()) == {13 * 200 + 1}
     assert summary['replay_identical'] is True
     assert summary['windows'] >= 5

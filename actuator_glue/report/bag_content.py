@@ -1,4 +1,4 @@
-"""What a finished bag holds, as the demonstration reports it."""
+"""What a live estimator left in a bag: records, posteriors, bands, diagnoses, health."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures of a run: forecast bands over what was measured, parameters against time."""
+"""Pictures of a live estimate: forecast bands over what was measured, parameters against time."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from actuator_glue.demo.bag import Content
 from actuator_glue.errors import InputError
 from actuator_glue.inference.scores import instantaneous_frequency
 from actuator_glue.model.parameters import NAMES, Parameter
 from actuator_glue.records import Array, Record
 from actuator_glue.report import style
+from actuator_glue.report.bag_content import Content
 from actuator_glue.report.timeseries import (
     band_at_zooms,
     even_zooms,
@@ -98,48 +98,6 @@ def _by_name(posterior: Any, values: Sequence[float], wanted: Any) -> list[float
     """Return values in the order of another posterior's parameters, NaN for those it lacks."""
     known = dict(zip(posterior.parameter_names, values, strict=True))
     return [float(known.get(name, np.nan)) for name in wanted.parameter_names]
-
-
-@style.styled
-def live(content: Content, path: Path) -> Path:
-    """Draw how far the forecasts were off, hop by hop, and where the model was changed.
-
-    Raises:
-        InputError: the bag holds no scored bands.
-    """
-    hops = [b for b in content.bands if b.kind == 'noise']
-    if not hops:
-        raise InputError('the estimator published no scored bands')
-    first, period = content.record.first_index, content.record.period
-    time = [(int(b.index) - first + len(b.median) / 2) * period for b in hops]
-    figure = style.new_figure(3.8)
-    upper, lower = figure.subplots(2, 1, sharex=True)
-    upper.plot(time, [1e6 * b.rms_error for b in hops], '-o', color=style.BAND)
-    upper.set(ylabel='rms error of the\nforecast [um]', ylim=(0, None))
-    lower.plot(time, [100 * b.widest_coverage for b in hops], '-o', color=style.BAND)
-    lower.axhline(100 * float(hops[-1].widest_level), ls=':', color=style.COMMAND)
-    lower.set(ylabel='samples in the band of\nparameters and noise [%]', ylim=(0, 103))
-    lower.set_xlabel('time [s]')
-    for start, name in _changes(content):
-        for axes in (upper, lower):
-            axes.axvline((start - first) * period, ls='--', color=style.TRUTH)
-        upper.annotate(
-            f' {name}', ((start - first) * period, 0.97), xycoords=('data', 'axes fraction'),
-            color=style.TRUTH, va='top',
-        )  # fmt: skip
-    figure.suptitle('Forecasts before and after the model was augmented, live')
-    return style.save(figure, path)
-
-
-def _changes(content: Content) -> list[tuple[int, str]]:
-    """Return first forecast sample and effects of each model after the first."""
-    found = []
-    pairs = zip(content.posteriors, content.posteriors[1:], strict=False)
-    for before, after in pairs:
-        if list(before.effects) != list(after.effects):
-            name = ' + '.join(['Eq. (2)', *after.effects])
-            found.append((int(after.index) + int(after.samples), name))
-    return found
 
 
 def _zooms(record: Record, start: int, stop: int) -> tuple[list[tuple[float, float]], list[str]]:

@@ -11,14 +11,15 @@ from typing import Any
 
 from rich.console import Console
 
-from actuator_glue.demo import bag as demo_bag
-from actuator_glue.demo import diagnosis, pictures
-from actuator_glue.demo.outcome import Outcome, replay_bag
-from actuator_glue.demo.processes import Node, Nodes
-from actuator_glue.demo.progress import Display
-from actuator_glue.demo.sources import Source
-from actuator_glue.demo.watch import Watch
 from actuator_glue.errors import InputError
+from actuator_glue.report import bag_content, estimate_figures
+from actuator_glue.residual.diagnose import diagnose as diagnose_records
+from examples.demonstration import pictures
+from examples.demonstration.outcome import Outcome, replay_bag
+from examples.demonstration.processes import Node, Nodes
+from examples.demonstration.progress import Display
+from examples.demonstration.sources import Source
+from examples.demonstration.watch import Watch
 
 READY_SECONDS = 180.0  # the first start on a machine compiles the kernels
 DRAIN_SECONDS = 15.0  # for the last window to be computed after the last sample
@@ -138,13 +139,13 @@ def finish(
         InputError: the bag is damaged or holds no window.
     """
     stage = display.stage('replaying the bag', total=1)
-    content = demo_bag.read(folder / 'bag')
+    content = bag_content.read(folder / 'bag')
     comparison = replay_bag(folder / 'bag')
     display.advance(stage, 1)
     stage = display.stage('drawing', total=3)
-    pictures.bands(content, folder / 'bands.png')
+    estimate_figures.bands(content, folder / 'bands.png')
     display.advance(stage, 1)
-    pictures.parameters(content, folder / 'parameters.png', source.truth)
+    estimate_figures.parameters(content, folder / 'parameters.png', source.truth)
     display.advance(stage, 2)
     pictures.live(content, folder / 'live.png')
     display.advance(stage, 3)
@@ -164,8 +165,10 @@ def _diagnose(outcome: Outcome, folder: Path, display: Display, seed: int) -> No
         # The number of stages depends on what is found; the bar never runs full before the end.
         display.advance(stage, min(len(seen) - 1 + share, STAGES - 0.1))
 
-    outcome.diagnosis = diagnosis.find(outcome.content.record, seed, tell)
-    diagnosis.picture(outcome.diagnosis, folder / 'diagnosis.png')
+    outcome.diagnosis = diagnose_records(
+        [outcome.content.record], seed=seed, jobs=2, progress=tell, clock=time.perf_counter
+    )
+    pictures.residual(outcome.diagnosis, folder / 'diagnosis.png')
     display.advance(stage, STAGES)
 
 

@@ -1,19 +1,16 @@
-"""The end of the demonstration: what the model lacked, and the error before and after."""
+"""Pictures of a run: forecasts while the model changed, the residual before and after."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
-from time import perf_counter
 
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from actuator_glue.records import Record
+from actuator_glue.errors import InputError
 from actuator_glue.report import style
+from actuator_glue.report.bag_content import Content
 from actuator_glue.report.diagnosis_figures import stretches
-from actuator_glue.residual.diagnose import diagnose
 from actuator_glue.residual.diagnosis import Diagnosis, Trace
 
 UM = 1e6
@@ -22,39 +19,49 @@ POINTS = 4000  # in a scatter plot; more only blacken it
 SECONDS = 0.6  # of residual drawn against time
 
 
-def find(record: Record, seed: int, progress: Callable[[str, float], None]) -> Diagnosis:
-    """Diagnose one record, part of which is set aside for the error before and after.
+@style.styled
+def live(content: Content, path: Path) -> Path:
+    """Draw how far the forecasts were off, hop by hop, and where the model was changed.
 
     Raises:
-        InputError: the record cannot be diagnosed.
+        InputError: the bag holds no scored bands.
     """
-    return diagnose([record], seed=seed, jobs=2, progress=progress, clock=perf_counter)
+    hops = [b for b in content.bands if b.kind == 'noise']
+    if not hops:
+        raise InputError('the estimator published no scored bands')
+    first, period = content.record.first_index, content.record.period
+    time = [(int(b.index) - first + len(b.median) / 2) * period for b in hops]
+    figure = style.new_figure(3.8)
+    upper, lower = figure.subplots(2, 1, sharex=True)
+    upper.plot(time, [1e6 * b.rms_error for b in hops], '-o', color=style.BAND)
+    upper.set(ylabel='rms error of the\nforecast [um]', ylim=(0, None))
+    lower.plot(time, [100 * b.widest_coverage for b in hops], '-o', color=style.BAND)
+    lower.axhline(100 * float(hops[-1].widest_level), ls=':', color=style.COMMAND)
+    lower.set(ylabel='samples in the band of\nparameters and noise [%]', ylim=(0, 103))
+    lower.set_xlabel('time [s]')
+    for start, name in _changes(content):
+        for axes in (upper, lower):
+            axes.axvline((start - first) * period, ls='--', color=style.TRUTH)
+        upper.annotate(
+            f' {name}', ((start - first) * period, 0.97), xycoords=('data', 'axes fraction'),
+            color=style.TRUTH, va='top',
+        )  # fmt: skip
+    figure.suptitle('Forecasts before and after the model was augmented, live')
+    return style.save(figure, path)
 
 
-def verdict(diagnosis: Diagnosis) -> list[str]:
-    """Return what people want to know, line by line."""
-    error = diagnosis.error
-    lines = [f'diagnosis {diagnosis.summary()}']
-    for effect in diagnosis.effects:
-        sizes = ', '.join(
-            f'{name} {p.mean:.4g} +- {p.stddev:.2g} {p.unit}'
-            for name, p in effect.parameters.items()
-        )
-        lines.append(f'          {effect.name} ({effect.place}): {sizes}')
-    if diagnosis.effects:
-        base = [
-            f'{name} {p.mean:.4g} +- {p.stddev:.2g} {p.unit}' for name, p in diagnosis.base.items()
-        ]
-        lines.append(f'          with it {", ".join(base)}')
-    low, high = error.after_ci
-    lines.append(
-        f'error     {UM * error.before:.2f} um before, {UM * error.after:.2f} um after '
-        f'[{UM * low:.2f}, {UM * high:.2f}], noise {UM * error.noise_floor:.2f} um, held-out data'
-    )
-    return lines
+def _changes(content: Content) -> list[tuple[int, str]]:
+    """Return first forecast sample and effects of each model after the first."""
+    found = []
+    pairs = zip(content.posteriors, content.posteriors[1:], strict=False)
+    for before, after in pairs:
+        if list(before.effects) != list(after.effects):
+            name = ' + '.join(['Eq. (2)', *after.effects])
+            found.append((int(after.index) + int(after.samples), name))
+    return found
 
 
-def picture(diagnosis: Diagnosis, path: Path) -> Path:
+def residual(diagnosis: Diagnosis, path: Path) -> Path:
     """Draw the held-out residual before and after, against time and against displacement."""
     held = [t for t in diagnosis.traces if t.held_out]
     trace = max(held or diagnosis.traces, key=lambda t: len(t.measured))
@@ -70,7 +77,7 @@ def _draw(diagnosis: Diagnosis, trace: Trace) -> Figure:
         ('Eq. (2) alone', trace.before, diagnosis.error.before, style.DETERMINISTIC),
         (with_effects, trace.after, diagnosis.error.after, style.BAND),
     )
-    part, pick = _stretch(trace), _thin(len(trace.time))
+    part, pick = _stretch(trace), slice(None, None, 1 + len(trace.time) // POINTS)
     limit = 1.15 * UM * float(np.quantile(np.abs(trace.measured - trace.before), 0.999))
     for (name, simulated, rms, colour), (left, right) in zip(rows, panels, strict=True):
         residual = UM * (trace.measured - simulated)
@@ -96,7 +103,3 @@ def _stretch(trace: Trace) -> slice:
     length = min(size, max(2, round(SECONDS / period)))
     start = piece.start + (size - length) // 2
     return slice(start, start + length)
-
-
-def _thin(count: int) -> NDArray[np.intp]:
-    return np.unique(np.linspace(0, count - 1, min(count, POINTS)).astype(np.intp))

@@ -17,7 +17,7 @@ from rich.progress import (
 )
 from rich.table import Table
 
-from actuator_glue.demo.watch import Watch
+from examples.demonstration.watch import Watch
 
 LINE_SECONDS = 10.0  # between two lines where there is no terminal
 
