@@ -16,13 +16,8 @@ from colcon_python_setup_py.package_identification.python_setup_py import get_se
 
 ROOT = Path(__file__).resolve().parent.parent
 PROJECT = tomllib.loads((ROOT / 'pyproject.toml').read_text(encoding='utf-8'))['project']
-OURS = {
-    'actuator_glue',
-    'benchmarks',
-    'studies',
-    'examples',
-    *(p.stem for p in (ROOT / 'test').rglob('*.py')),
-}
+OURS = {'actuator_glue', 'benchmarks', 'examples', 'studies'}
+OURS |= {p.stem for p in (ROOT / 'test').rglob('*.py')}
 
 
 class Names(NamedTuple):

@@ -72,6 +72,7 @@ def write(results: Results, out: Path, made: str) -> int:
         'schema': SCHEMA, 'version': __version__, 'source': published.SOURCE,
         'seed': results.seed, 'quick': results.quick, 'sensor_noise': NOISE, 'level': LEVEL,
         'tables': {name: table.records() for name, table in tables.items()},
+        'diagnosis': {name: found.to_json() for name, found in results.diagnoses.items()},
     }  # fmt: skip
     write_json(numbers, str(out / 'results.json'))
     report.write(results, out / 'report.html', made=made)
