@@ -7,9 +7,10 @@ import time
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any
 
-from actuator_glue.cli._output import add_json, note, progress, say, table, write_json
+from actuator_glue.cli._output import add_json, note, progress, say, write_json
 from actuator_glue.cli._parser import number
 from actuator_glue.cli._records import add_reading, load
+from actuator_glue.cli._windows import numbers, show
 from actuator_glue.errors import InputError
 
 if TYPE_CHECKING:
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
 
 INPUTS = ('SampleBlock', 'TestSetup')
 RESULTS = ('EstimatorSetup', 'PosteriorMoments', 'PredictionBand')
-ROWS = 20  # windows shown to people; JSON has all
 OVERRIDES = ('window', 'hop', 'settle', 'shaping_factor', 'evaluations', 'seed')
 
 
@@ -73,7 +73,7 @@ def run(args: argparse.Namespace) -> int:
     settings = _settings(live, asked)
     windows, events, comparison, seconds_of_data = _replay(items, live, settings, total)
     seconds = time.perf_counter() - started
-    _show(windows, args)
+    show(windows, args)
     for line in list(dict.fromkeys(events))[:20]:
         note(line)
     if not windows:
@@ -181,7 +181,7 @@ def _replay(
             for told in replay(counted(), settings, model, schedule, reports):
                 if isinstance(told, WindowResult):
                     # Not the result itself: its samples and bands are many.
-                    windows.append(_window(told))
+                    windows.append(numbers(told))
                     yield told
                 else:
                     events.append(getattr(told, 'message', str(told)))
@@ -200,36 +200,6 @@ def _usable_seconds(block: Block) -> float:
         return len(block) * check_block(block).period
     except InputError:
         return 0.0  # told by the estimator
-
-
-def _show(windows: list[dict[str, Any]], args: argparse.Namespace) -> None:
-    if not windows:
-        return
-    names = list(windows[-1]['parameters'])
-    shown = [w for w in windows if list(w['parameters']) == names]
-    if len(shown) > ROWS:
-        shown = [shown[i * (len(shown) - 1) // (ROWS - 1)] for i in range(ROWS)]
-    rows = []
-    for w in shown:
-        parameters = list(w['parameters'].values())
-        coverage = [b['coverage'][-1] for b in w['bands'] if b['kind'] == 'total']
-        rows.append(
-            (
-                str(w['window']),
-                f'{w["end_s"]:.2f}',
-                *(f'{p["mean"]:.4g} {_percent(p["stddev"], p["mean"])}' for p in parameters),
-                f'{max(p["rhat"] for p in parameters):.2f}',
-                f'{1e6 * w["error"]["rms_m"]:.1f}',
-                f'{100 * coverage[-1]:.0f} %' if coverage else '-',
-            )
-        )
-    columns = ('window', 'end [s]', *names, 'R-hat', 'rms [um]', 'cover')
-    title = 'Posterior mean (SI units) and standard deviation (% of it) of each window'
-    table(title, columns, rows, args)
-
-
-def _percent(stddev: float, mean: float) -> str:
-    return f'{100 * stddev / abs(mean):3.0f}%' if mean else '  -%'
 
 
 def _verdict(comparison: Comparison | None, args: argparse.Namespace) -> None:
@@ -271,34 +241,4 @@ def _content(
         'events': events,
         'seconds': seconds,
         'times_real_time': rate,
-    }
-
-
-def _window(r: WindowResult) -> dict[str, Any]:
-    assert r.moments is not None and r.rhat is not None and r.ess is not None
-    record, m = r.window.record, r.moments
-    columns = {'mean': m.mean, 'stddev': m.stddev, 'skewness': m.skewness, 'cov': m.cov}
-    columns |= {'rhat': r.rhat, 'ess': r.ess}
-    return {
-        'window': r.window.number,
-        'index': record.first_index,
-        'samples': len(record),
-        'end_s': (record.first_index + len(record)) * record.period,
-        'parameters': {
-            name: {key: values[i] for key, values in columns.items()}
-            for i, name in enumerate(r.model.names)
-        },
-        'evaluations': r.evaluations,
-        'converged': r.converged,
-        'error': {'rms_m': r.rms_error, 'nrmse': r.nrmse},
-        'bands': [
-            {
-                'kind': p.kind,
-                'index': p.index,
-                'levels': p.band.levels,
-                'coverage': p.coverage,
-                'width_m': p.width,
-            }
-            for p in r.scored
-        ],
     }

@@ -18,7 +18,7 @@ from actuator_glue.model.plant import MeasuredPlant, Plant
 from actuator_glue.model.sensor import SensorSpec
 from actuator_glue.model.stream import Stream
 from actuator_glue.model.structure import Structure
-from actuator_glue.nodes import spin, streamer, undeclared
+from actuator_glue.nodes import folders, spin, streamer, undeclared
 from actuator_glue.nodes.blocks import BlockPublisher
 from actuator_glue.nodes.pacer import Step
 from actuator_glue.nodes.parameters import Parameters, Spec
@@ -58,7 +58,10 @@ SPECS = (
         'undeclared_effect', '', f'effects of the plant, told to nobody; {undeclared.FORM}',
         secret=True,
     ),
-    Spec('sealed_file', '', 'file that gets the truth about undeclared_effect', read_only=True),
+    Spec(
+        'sealed_file', '', 'file that gets the truth about undeclared_effect, empty for '
+        '~/.ros/actuator_glue/truth_DATE-TIME.json', read_only=True,
+    ),
 )  # fmt: skip
 
 
@@ -67,6 +70,7 @@ class SimulatorNode(streamer.Streamer):
 
     def __init__(self) -> None:
         self._renewed = self._clock_changed = False
+        self._sealed: Path | None = None
         super().__init__('actuator_sim', SPECS)
 
     def check(self, values: Mapping[str, Any]) -> None:
@@ -75,8 +79,6 @@ class SimulatorNode(streamer.Streamer):
             given = undeclared.parse(values['undeclared_effect'])
             if given and values['plant'] != 'paper':
                 raise InputError("undeclared effects need plant 'paper'")
-            if given and not values['sealed_file']:
-                raise InputError('undeclared_effect needs sealed_file, where the truth is kept')
         if values['command'] == 'file' and not values['command_file']:
             raise InputError("command 'file' needs command_file")
         if values['command'] != 'file':
@@ -118,8 +120,8 @@ class SimulatorNode(streamer.Streamer):
                 stiffness=values['specimen_stiffness'],
             )
             truth = undeclared.sizes(undeclared.parse(values['undeclared_effect']), theta, record)
-        if values['sealed_file']:
-            undeclared.seal(Path(values['sealed_file']), truth, theta)
+        if truth or values['sealed_file']:
+            self._seal(truth, theta)
         structure = Structure(truth)
         full = structure.neutral(theta)
         full[len(BASE) :] = [v for effect in truth.values() for v in effect.values()]
@@ -137,6 +139,13 @@ class SimulatorNode(streamer.Streamer):
             SensorSpec(values['force_noise']),
             seed=values['seed'],
         )
+
+    def _seal(self, truth: dict[str, dict[str, float]], theta: Array) -> None:
+        if self._sealed is None:
+            given = self._values['sealed_file']
+            self._sealed = Path(given) if given else folders.unnamed('truth', '.json')
+            self.get_logger().info(f'the truth is sealed in {self._sealed}')
+        undeclared.seal(self._sealed, truth, theta)
 
     # Below runs in the pacer's thread.
 

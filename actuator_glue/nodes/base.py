@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+import copy
 import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
-from rclpy.qos_overriding_options import QoSOverridingOptions
 
 from actuator_glue.errors import InputError
-from actuator_glue.nodes import health
+from actuator_glue.nodes import health, partners
 from actuator_glue.nodes.parameters import Parameters, Spec
 from actuator_glue.nodes.topics import DIAGNOSTICS, Topic
+from actuator_glue.nodes.transitions import REACHED, answered
 
 COMMON = (
     Spec('autostart', True, 'configure and activate at the start', read_only=True),
@@ -44,9 +46,14 @@ class SuiteNode(LifecycleNode):
         # Work for nobody, so that an executor that waits returns to its loop.
         self.wake: Callable[[], None] = self.create_guard_condition(lambda: None).trigger
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
-        self._topics: list[tuple[Topic, Any]] = []
+        self._subscriptions_made: list[Any] = []
         self._made: list[Any] = []
         self._timers_made: list[Any] = []
+        change = self._service_change_state
+        change.callback = answered(
+            change.callback,
+            lambda asked: self.complain('transition', f'{asked} is impossible: {self.state}'),
+        )
         self.parameters = Parameters(self, (*COMMON, *specs), self.check, self.changed)
         self._diagnostics = self.create_publisher(
             DIAGNOSTICS.type, DIAGNOSTICS.name, DIAGNOSTICS.qos
@@ -91,36 +98,52 @@ class SuiteNode(LifecycleNode):
         made = self.create_publisher(
             topic.type,
             topic.name,
-            topic.qos,
-            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+            copy.copy(topic.qos),  # overriding writes into it
+            qos_overriding_options=partners.OVERRIDES,
         )
         self._made.append(made)
         return made
 
-    def subscribe(self, topic: Topic, callback: Callable[..., None], *, raw: bool = False) -> None:
+    def subscribe(
+        self,
+        topic: Topic,
+        callback: Callable[..., None],
+        *,
+        info: bool = False,
+        raw: bool = False,
+        overrides: bool = True,
+    ) -> Any:
         """Subscribe until deactivation; what the callback raises is reported.
 
         Args:
             topic: what to subscribe to.
-            callback: gets the message; if raw, its bytes and what the middleware knows of it.
+            callback: gets the message; with `info` also what the middleware knows of it.
+            info: whether the callback takes two arguments.
             raw: do not decode.
+            overrides: parameters override the QoS.
         """
         call = self.guarded(callback)
         made = self.create_subscription(
             topic.type,
             topic.name,
-            (lambda data, info: call(data, info)) if raw else call,
-            topic.qos,
+            (lambda data, known: call(data, known)) if info else call,
+            copy.copy(topic.qos),  # overriding writes into it
             raw=raw,
-            qos_overriding_options=QoSOverridingOptions.with_default_policies(),
+            qos_overriding_options=partners.OVERRIDES if overrides else None,
         )
-        self._topics.append((topic, made))
+        self._subscriptions_made.append(made)
+        return made
 
-    def every(self, period: float, callback: Callable[[], None]) -> None:
-        """Call back every `period` seconds of steady time until deactivation."""
-        self._timers_made.append(
-            self.create_timer(period, self.guarded(callback), clock=self._steady)
-        )
+    def unsubscribe(self, made: Any) -> None:
+        """End a subscription before deactivation does."""
+        self._subscriptions_made.remove(made)
+        self.destroy_subscription(made)
+
+    def every(self, period: float, callback: Callable[[], None]) -> Any:
+        """Call back every `period` seconds of steady time until deactivation; return the timer."""
+        made = self.create_timer(period, self.guarded(callback), clock=self._steady)
+        self._timers_made.append(made)
+        return made
 
     def guarded(self, callback: Callable[..., Any]) -> Callable[..., None]:
         """Return the callback with everything it raises reported instead."""
@@ -136,10 +159,13 @@ class SuiteNode(LifecycleNode):
         return call
 
     def complain(self, kind: str, message: str, level: Any = health.WARN) -> None:
-        """Log a fault (not the same one more than once a second) and show it on /diagnostics."""
+        """Log a fault (one that lasts, once) and show it on /diagnostics."""
         if self.health.fault(kind, message, time.monotonic(), level):
-            log = self.get_logger()
-            (log.error if level == health.ERROR else log.warning)(f'{kind}: {message}')
+            # rclpy ties a severity to the line that logs: one line each.
+            if level == health.ERROR:
+                self.get_logger().error(f'{kind}: {message}')
+            else:
+                self.get_logger().warning(f'{kind}: {message}')
 
     def complain_of_bug(self, error: BaseException) -> None:
         """Report an exception nobody foresaw; the node goes on."""
@@ -216,7 +242,9 @@ class SuiteNode(LifecycleNode):
                 f'cannot {name}: ' + ''.join(traceback.format_exception(error))
             )
             return TransitionCallbackReturn.ERROR
-        self._report({'configure': 'inactive', 'activate': 'active'}.get(name, name))
+        reached = REACHED.get(name, name)
+        self.get_logger().info(reached)
+        self._report(reached)
         return base(state)
 
     def _stop(self) -> None:
@@ -228,10 +256,10 @@ class SuiteNode(LifecycleNode):
         finally:
             for timer in self._timers_made:
                 self.destroy_timer(timer)
-            for _, subscription in self._topics:
+            for subscription in self._subscriptions_made:
                 self.destroy_subscription(subscription)
             self._timers_made.clear()
-            self._topics.clear()
+            self._subscriptions_made.clear()
 
     def _clean(self) -> None:
         try:
@@ -244,32 +272,21 @@ class SuiteNode(LifecycleNode):
     # Diagnostics.
 
     def _report(self, state: str | None = None) -> None:
-        self._check_types()
+        self._check_partners()
         self.do_report()
         stamp = self.get_clock().now().to_msg()
         message = self.health.message(time.monotonic(), stamp, state or self.state)
         self._diagnostics.publish(message)
 
-    def _check_types(self) -> None:
-        """Tell of publishers whose messages DDS will never hand over."""
-        for topic, subscription in self._topics:
-            wanted = type_name(topic.type)
-            for info in self.get_publishers_info_by_topic(subscription.topic_name):
-                if info.topic_type != wanted:
-                    self.complain(
-                        'wrong message type',
-                        f'{info.node_namespace.rstrip("/")}/{info.node_name} publishes '
-                        f'{info.topic_type} on {subscription.topic_name}; {wanted} is expected',
-                    )
+    def _check_partners(self) -> None:
+        """Tell of partners to whom DDS will never hand a message, or from whom."""
+        listening = (partners.unheard(self, made) for made in self._subscriptions_made)
+        sending = (partners.unreached(self, made) for made in self._made)
+        for kind, text in chain(*listening, *sending):
+            self.complain(kind, text)
 
     def _jumped(self, jump: TimeJump) -> None:
         if jump.delta is not None and jump.delta.nanoseconds < 0:
             seconds = jump.delta.nanoseconds * 1e-9
             self.complain('clock', f'the clock jumped by {seconds:.3f} s')
         self.guarded(self.clock_jumped)()
-
-
-def type_name(cls: Any) -> str:
-    """Return the full name of a message class, `package/msg/Name`."""
-    package = cls.__module__.partition('.')[0]
-    return f'{package}/msg/{cls.__name__}'

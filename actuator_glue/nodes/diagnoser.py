@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import sys
 import time
-from collections import deque
 from typing import Any
 
 from actuator_glue_msgs.action import Diagnose
@@ -12,15 +11,17 @@ from actuator_glue_msgs.srv import SetModel
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 
 from actuator_glue.errors import InputError
-from actuator_glue.nodes import base, diagnosing, spin, topics
+from actuator_glue.nodes import diagnosing, spin, topics
 from actuator_glue.nodes.health import ERROR
+from actuator_glue.nodes.latched import Newest
 from actuator_glue.nodes.messages import publish
 from actuator_glue.nodes.parameters import Spec
+from actuator_glue.nodes.working import WorkingNode
 from actuator_glue.online import wire
 from actuator_glue.online.alarm import CoverageAlarm
 from actuator_glue.online.collect import Collector
 from actuator_glue.online.stream import Event, Rejected, Restarted
-from actuator_glue.workers.worker import DIED, FAILED, PROGRESS, Answer, Worker
+from actuator_glue.workers.worker import DIED, FAILED, PROGRESS, Answer
 
 SPECS = (
     Spec('automatic', True, 'diagnose when the coverage breaks'),
@@ -37,7 +38,7 @@ SPECS = (
 ANSWER_SECONDS = 10.0
 
 
-class DiagnoserNode(base.SuiteNode):
+class DiagnoserNode(WorkingNode):
     """Collects samples, watches the coverage, and has a worker process diagnose."""
 
     def __init__(self) -> None:
@@ -48,9 +49,7 @@ class DiagnoserNode(base.SuiteNode):
 
     def do_configure(self) -> None:
         """Start the worker; offer the action."""
-        self._answers: deque[Answer] = deque()
-        self._arrived = self.create_guard_condition(self.guarded(self._take_answers))
-        self.worker = Worker(self._answered, None, nice=5)
+        self.employ(diagnosing.warm_up, nice=5)
         self._diagnosis = self.publisher(topics.DIAGNOSIS)
         self._model_client = self.create_client(
             SetModel, f'{self.parameters["estimator"]}/set_model'
@@ -72,35 +71,40 @@ class DiagnoserNode(base.SuiteNode):
         self.alarm = CoverageAlarm(values['coverage_limit'], values['coverage_windows'])
         self._last = float('-inf')
         self._pending = False
-        self.subscribe(
-            topics.TEST_SETUP, lambda m: self._tell(self.collector.setup(wire.setup(m)))
-        )
-        self.subscribe(topics.SAMPLES, lambda m: self._tell(self.collector.push(wire.block(m))))
-        self.subscribe(topics.BAND, self._band)
         self.every(0.2, self._check)
+        self.listen_when_ready()
+
+    def listen(self) -> None:
+        """Subscribe: set-ups first, then the samples that they are for."""
+        self._setups = Newest(
+            self,
+            topics.TEST_SETUP,
+            lambda message: self._tell(self.collector.setup(wire.setup(message))),
+        )
+        self.subscribe(topics.BAND, self._band)
+        self.subscribe(topics.SAMPLES, self._block)
 
     def do_deactivate(self) -> None:
         """Give up a running diagnosis."""
         if self._request is not None:
             if not self.finished:
-                self.worker.restart()
+                self.give_up()
             self._finish(diagnosing.Outcome(message='the node was deactivated'))
 
     def do_cleanup(self) -> None:
         """End the worker, withdraw the action."""
-        self.worker.close()
+        self.dismiss()
         self._action.destroy()
         self.destroy_client(self._model_client)
-        self.destroy_guard_condition(self._arrived)
 
     def do_report(self) -> None:
         """Coverage and what is being done."""
+        super().do_report()
         if hasattr(self, 'alarm'):
             self.health.values.update(
                 {
                     'coverage of the noise band': self.alarm.coverage,
                     'diagnosing': self._request is not None,
-                    'worker': 'ready' if self.worker.ready.is_set() else 'compiling',
                 }
             )
 
@@ -110,6 +114,10 @@ class DiagnoserNode(base.SuiteNode):
             self.alarm.limit = self.parameters['coverage_limit']
 
     # Watching.
+
+    def _block(self, message: Any) -> None:
+        self._setups.settle()
+        self._tell(self.collector.push(wire.block(message)))
 
     def _tell(self, events: list[Event]) -> None:
         for event in events:
@@ -163,34 +171,28 @@ class DiagnoserNode(base.SuiteNode):
 
     def _start(self, request: diagnosing.Request) -> None:
         self._request = request
+        self._overall = diagnosing.Overall()
         self._last = time.monotonic()
         self.worker.submit(diagnosing.work, request)
 
-    def _answered(self, answer: Answer) -> None:
-        self._answers.append(answer)
-        self._arrived.trigger()
-
-    def _take_answers(self) -> None:
-        while self._answers:
-            answer = self._answers.popleft()
-            if self._request is None and answer.kind != DIED:
-                continue
-            if answer.kind == PROGRESS:
-                self._progress(*answer.payload)
-            elif answer.kind == DIED:
-                self.complain('worker', f'{answer.payload}; starting another', ERROR)
-                self.worker.restart()
-                self._finish(diagnosing.Outcome(message=str(answer.payload)))
-            elif answer.kind == FAILED:
+    def answered(self, answer: Answer) -> None:
+        """Take progress, the diagnosis, or that there is none."""
+        if self._request is None:
+            return
+        if answer.kind == PROGRESS:
+            self._progress(*answer.payload)
+        elif answer.kind in (DIED, FAILED):
+            if answer.kind == FAILED:
                 self.complain('diagnosis', str(answer.payload), ERROR)
-                self._finish(diagnosing.Outcome(message=str(answer.payload)))
-            else:
-                self._diagnosed(answer.payload)
+            self._finish(diagnosing.Outcome(message=str(answer.payload)))
+        else:
+            self._diagnosed(answer.payload)
 
-    def _progress(self, stage: str, fraction: float) -> None:
-        self.health.values['stage'] = f'{stage} ({100 * fraction:.0f} %)'
+    def _progress(self, stage: str, share: float) -> None:
+        self.health.values['stage'] = f'{stage} ({100 * share:.0f} %)'
         if self._goal is not None:
-            self._goal.publish_feedback(Diagnose.Feedback(stage=stage, fraction=float(fraction)))
+            fraction = self._overall(stage, share)
+            self._goal.publish_feedback(Diagnose.Feedback(stage=stage, fraction=fraction))
 
     def _diagnosed(self, outcome: diagnosing.Outcome) -> None:
         request = self._request
@@ -236,7 +238,7 @@ class DiagnoserNode(base.SuiteNode):
     def _check(self) -> None:
         """Give up what is cancelled, and waiting for an answer that was lost."""
         if self._goal is not None and self._request is not None and self._goal.is_cancel_requested:
-            self.worker.restart()
+            self.give_up()
             self._finish(diagnosing.Outcome(message='cancelled'))
         if self._swap is not None and time.monotonic() > self._swap_end:
             self._swap.cancel()

@@ -7,69 +7,43 @@ import sys
 import time
 from collections import deque
 from collections.abc import Mapping
-from dataclasses import fields
 from typing import Any
 
 from actuator_glue_msgs.srv import SetModel
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference.choice import ModelChoice, choose_model
-from actuator_glue.nodes import base, spin, topics
+from actuator_glue.nodes import configuration, spin, topics
 from actuator_glue.nodes.estimating import compute, warm_up
 from actuator_glue.nodes.health import ERROR, Rate
+from actuator_glue.nodes.latched import Newest
 from actuator_glue.nodes.messages import publish
-from actuator_glue.nodes.parameters import Spec
+from actuator_glue.nodes.working import WorkingNode
 from actuator_glue.online import wire
 from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.fitting import identifiable
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.sampling import Job
-from actuator_glue.online.settings import LIMITS, EstimatorSettings
 from actuator_glue.online.stream import Dropped, Event, Failed, Rejected, Restarted, Window
-from actuator_glue.workers.worker import DIED, FAILED, Answer, Worker
+from actuator_glue.workers.worker import DIED, FAILED, Answer
 
 
-def _specs() -> list[Spec]:
-    """Parameters from the settings' own table, so that neither can drift from the other."""
-    defaults = EstimatorSettings()
-    specs = []
-    for field in fields(EstimatorSettings):
-        limit = LIMITS.get(field.name)
-        if limit is None:
-            continue
-        value = getattr(defaults, field.name)
-        specs.append(
-            Spec(field.name, value, limit.meaning, limit.unit, limit.lower, limit.upper, True)
-        )
-    return specs
-
-
-SPECS = (
-    *_specs(),
-    Spec('likelihood', 'glue', 'likelihood', read_only=True, choices=('glue', 'gaussian')),
-    Spec('levels', list(EstimatorSettings().levels), 'probability of each band', read_only=True),
-    Spec('effects', [''], 'effects of the catalogue beyond Eq. (2)', read_only=True),
-)
-
-
-class EstimatorNode(base.SuiteNode):
+class EstimatorNode(WorkingNode):
     """Feeds the estimator's state machine and publishes what it finds."""
 
     def __init__(self) -> None:
-        super().__init__('estimator', SPECS)
+        super().__init__('estimator', configuration.SPECS)
 
     def check(self, values: Mapping[str, Any]) -> None:
         """Refuse settings that contradict each other."""
-        _settings(values)
-        choose_model(_effects(values))
+        configuration.settings(values)
+        choose_model(configuration.effects(values))
 
     def do_configure(self) -> None:
         """Start the worker process, which compiles while nothing depends on it yet."""
         values = self.parameters.values()
-        self.settings = _settings(values)
-        self._answers: deque[Answer] = deque()
-        self._guard = self.create_guard_condition(self.guarded(self._take_answers))
-        self.worker = Worker(self._answered, warm_up)
+        self.settings = configuration.settings(values)
+        self.employ(warm_up)
         self._out = {
             topic: self.publisher(topic)
             for topic in (topics.POSTERIOR, topics.BAND, topics.RESPONSE, topics.ESTIMATOR_SETUP)
@@ -78,7 +52,7 @@ class EstimatorNode(base.SuiteNode):
 
     def do_activate(self) -> None:
         """Begin with an empty window."""
-        model = choose_model(_effects(self.parameters.values()))
+        model = choose_model(configuration.effects(self.parameters.values()))
         self.estimator = Estimator(self.settings, model, live=True)
         self._announced: ModelChoice | None = None
         self._arrival: dict[int, float] = {}
@@ -89,21 +63,23 @@ class EstimatorNode(base.SuiteNode):
         self.last: WindowResult | None = None
         # Before the first samples: what they will be estimated with is known from the start.
         self._announce(None)
-        self.subscribe(topics.TEST_SETUP, self._setup)
+        self.listen_when_ready()
+
+    def listen(self) -> None:
+        """Subscribe: set-ups first, then the samples that they are for."""
+        self._setups = Newest(self, topics.TEST_SETUP, self._setup)
         self.subscribe(topics.PREVIEW, self._preview)
         self.subscribe(topics.SAMPLES, self._block)
 
     def do_deactivate(self) -> None:
         """Give up the running window."""
-        self._answers.clear()
         if self.estimator.running is not None and not self.finished:
-            self.worker.restart()
+            self.give_up()
 
     def do_cleanup(self) -> None:
         """End the worker."""
-        self.worker.close()
+        self.dismiss()
         self.destroy_service(self._service)
-        self.destroy_guard_condition(self._guard)
 
     def clock_jumped(self) -> None:
         """Nothing depends on the node's clock: windows follow the stamps of the samples."""
@@ -123,6 +99,7 @@ class EstimatorNode(base.SuiteNode):
         self._tell(self.estimator.preview(wire.preview(message)))
 
     def _block(self, message: Any) -> None:
+        self._setups.settle()
         block = wire.block(message)
         self.samples.add(len(block))
         self._tell(self.estimator.push(block))
@@ -138,7 +115,10 @@ class EstimatorNode(base.SuiteNode):
                 self.complain('bad input', event.message)
             elif isinstance(event, Dropped):
                 self.dropped += 1
-                self.complain('deadline', f'window {event.number} dropped: computing took longer')
+                why = (
+                    'the worker is still compiling' if self.compiling else 'computing took longer'
+                )
+                self.complain('deadline', f'window {event.number} dropped: {why}')
             elif isinstance(event, Failed):
                 self.failed += 1
                 self.complain('window', f'window {event.number}: {event.message}')
@@ -161,7 +141,7 @@ class EstimatorNode(base.SuiteNode):
         for window in self.estimator.waiting:
             self._arrival.setdefault(window.number, now)
         self._tell(self.estimator.drop(lambda window: self._too_late(window, now)))
-        job = self.estimator.next_job() if self.worker.ready.is_set() else None
+        job = None if self.compiling else self.estimator.next_job()
         if job is None:
             return
         self._announce(job)
@@ -175,25 +155,16 @@ class EstimatorNode(base.SuiteNode):
         takes = statistics.median(self.compute) if self.compute else 0.0
         return now + 2.0 * takes > self._arrival[window.number] + self.settings.time_budget
 
-    def _answered(self, answer: Answer) -> None:
-        """Called from the listening thread: hand over to the executor."""
-        self._answers.append(answer)
-        self._guard.trigger()
-
-    def _take_answers(self) -> None:
-        while self._answers:
-            answer = self._answers.popleft()
-            if not self.active:
-                continue
-            if answer.kind == DIED:
-                self._tell(self.estimator.abandon(answer.payload))
-                self.complain('worker', f'{answer.payload}; starting another', ERROR)
-                self.worker.restart()
-            elif answer.kind == FAILED:
-                self._tell(self.estimator.abandon(answer.payload))
-                self.complain('internal error', str(answer.payload), ERROR)
-            elif self.estimator.running is not None:
-                self._finish(answer.payload, answer.seconds)
+    def answered(self, answer: Answer) -> None:
+        """Take the result of a window, or that there is none."""
+        if not self.active:
+            return
+        if answer.kind in (DIED, FAILED):
+            self._tell(self.estimator.abandon(answer.payload))
+        if answer.kind == FAILED:
+            self.complain('internal error', str(answer.payload), ERROR)
+        elif answer.kind != DIED and self.estimator.running is not None:
+            self._finish(answer.payload, answer.seconds)
         self._next(time.monotonic())
 
     def _finish(self, result: WindowResult, seconds: float) -> None:
@@ -236,7 +207,7 @@ class EstimatorNode(base.SuiteNode):
         try:
             if not self.active:
                 raise InputError('the estimator is not active')
-            model = _requested(request)
+            model = configuration.requested(request)
             self.estimator.set_model(model)
         except InputError as error:
             response.success, response.message = False, str(error)
@@ -250,6 +221,7 @@ class EstimatorNode(base.SuiteNode):
 
     def do_report(self) -> None:
         """Rate, gaps, dropped windows, R-hat, compute time."""
+        super().do_report()
         if not hasattr(self, 'estimator'):
             return
         now, tally = time.monotonic(), self.estimator.tally
@@ -266,7 +238,6 @@ class EstimatorNode(base.SuiteNode):
             'windows failed': self.failed,
             'deadlines missed': self.late + self.dropped,
             'model': ', '.join(self.estimator.model.effects) or 'Eq. (2)',
-            'worker': 'ready' if self.worker.ready.is_set() else 'compiling',
         }
         if self.last is not None and self.last.rhat is not None:
             latency = sorted(self.latency)
@@ -289,29 +260,6 @@ class EstimatorNode(base.SuiteNode):
                 or 'none',
             }
         self.health.values.update(values)
-
-
-def _effects(values: Mapping[str, Any]) -> tuple[str, ...]:
-    # ROS cannot declare an empty list of strings with its type, so an empty word stands for it.
-    return tuple(name for name in values['effects'] if name)
-
-
-def _settings(values: Mapping[str, Any]) -> EstimatorSettings:
-    known = {f.name for f in fields(EstimatorSettings)}
-    return EstimatorSettings.from_mapping({n: v for n, v in values.items() if n in known})
-
-
-def _requested(request: Any) -> ModelChoice:
-    names = list(request.parameter_names)
-    lower, upper, start = list(request.lower), list(request.upper), list(request.start)
-    if not len(names) == len(lower) == len(upper) or len(start) not in (0, len(names)):
-        raise InputError(
-            f'{len(names)} parameter names, {len(lower)} lower, {len(upper)} upper bounds and '
-            f'{len(start)} starting values do not belong together'
-        )
-    bounds = {n: (lo, up) for n, lo, up in zip(names, lower, upper, strict=True)}
-    places = dict(zip(names, start, strict=True)) if start else None
-    return choose_model(tuple(request.effects), bounds, places)
 
 
 def main(args: list[str] | None = None) -> int:

@@ -12,6 +12,8 @@ OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.E
 
 # A fault stays visible this long after its last occurrence, so that people see it.
 REMEMBER = 10.0  # s
+# What comes again within this time has lasted [s]; reports are up to a second apart.
+LASTING = 1.5
 # A stream of a thousand bad blocks a second must not fill the log; /diagnostics counts them all.
 LOGGED_PER_SECOND = 5
 
@@ -48,10 +50,10 @@ class Health:
         self.values: dict[str, Any] = {}
 
     def fault(self, kind: str, message: str, now: float, level: Any = WARN) -> bool:
-        """Note a fault; return whether to log it: the same one once a second, few in all."""
+        """Note a fault; return whether to log it: one that lasts only once, few in all."""
         before = self._faults.get(kind)
         self._faults[kind] = (level, message, now, 1 + (before[3] if before else 0))
-        if before is not None and before[1] == message and now - before[2] <= 1.0:
+        if before is not None and before[1] == message and now - before[2] <= LASTING:
             return False
         recent = self._logged.setdefault(kind, deque(maxlen=LOGGED_PER_SECOND))
         if len(recent) == LOGGED_PER_SECOND and now - recent[0] < 1.0:

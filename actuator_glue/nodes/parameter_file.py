@@ -9,8 +9,8 @@ import yaml
 from actuator_glue.nodes import (
     actuator_sim,
     base,
+    configuration,
     diagnoser,
-    estimator,
     lab_bridge,
     recorder,
     replay,
@@ -19,7 +19,7 @@ from actuator_glue.nodes.parameters import Spec
 
 NODES = {
     'actuator_sim': actuator_sim.SPECS,
-    'estimator': estimator.SPECS,
+    'estimator': configuration.SPECS,
     'recorder': recorder.SPECS,
     'replay': replay.SPECS,
     'lab_bridge': lab_bridge.SPECS,

@@ -7,19 +7,28 @@ import queue
 import sys
 import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
+
+from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.bag_metadata import LATCHED, Qos
 from actuator_glue.io.bag_writer import BagWriter
-from actuator_glue.nodes import base, spin, topics
+from actuator_glue.nodes import base, folders, spin, topics
 from actuator_glue.nodes.health import ERROR, Rate
 from actuator_glue.nodes.parameters import Spec
+from actuator_glue.nodes.partners import refusal, type_name
 
 SPECS = (
-    Spec('bag', '', 'folder of the bag, empty for bag_DATE_TIME here', read_only=True),
+    Spec(
+        'bag',
+        '',
+        'folder of the bag, empty for ~/.ros/actuator_glue/bag_DATE-TIME',
+        read_only=True,
+    ),
     Spec('suite', True, 'record the topics of the suite', read_only=True),
     Spec('topics', [''], 'further topics, recorded as soon as they appear', read_only=True),
     Spec('flush_period', 0.2, 'longest time a message stays in memory', 's', 0.01, 10.0, True),
@@ -64,11 +73,11 @@ class RecorderNode(base.SuiteNode):
         self._wanted = {name for name in values['topics'] if name}
         self._thread = threading.Thread(target=self._write, name='writer', daemon=True)
         self._thread.start()
+        self._heard: dict[str, tuple[topics.Topic, Any]] = {}
         for topic in topics.RECORDED if values['suite'] else ():
             self._record(topic)
-        if self._wanted:
-            self._look()
-            self.every(0.5, self._look)
+        self._look()
+        self.every(0.5, self._look)
 
     def do_deactivate(self) -> None:
         """Write what has arrived and finish the bag."""
@@ -104,41 +113,69 @@ class RecorderNode(base.SuiteNode):
             self.complain('bag', self._failed, ERROR)
 
     def _path(self, values: Mapping[str, Any]) -> Path:
-        path = Path(values['bag'] or time.strftime('bag_%Y_%m_%d-%H_%M_%S'))
+        path = Path(values['bag']) if values['bag'] else folders.unnamed('bag')
         return path if self._bags == 0 else path.with_name(f'{path.name}_{self._bags + 1}')
 
     def _record(self, topic: topics.Topic) -> None:
         """Declare and subscribe to a topic; one that cannot be recorded is reported."""
         assert self.writer is not None
         name = self.resolve_topic_name(topic.name)
-        kind = base.type_name(topic.type)
+        kind = type_name(topic.type)
         try:
             self.writer.add_topic(name, kind, qos=(LATCHED if topic.latched else Qos(),))
         except InputError as error:
             self.complain('topic', str(error))
             return
-        self.subscribe(topic, lambda *found: self._take(name, *found), raw=True)
+        self._listen(name, topic)
+
+    def _listen(self, name: str, topic: topics.Topic, *, overrides: bool = True) -> None:
+        made = self.subscribe(
+            topic,
+            lambda *found: self._take(name, *found),
+            info=True,
+            raw=True,
+            overrides=overrides,
+        )
+        self._heard[name] = topic, made
 
     def _look(self) -> None:
-        """Subscribe to further topics that have appeared."""
-        if not self._wanted:
-            return
-        for name, types in self.get_topic_names_and_types():
+        """Subscribe to further topics that have appeared; adapt to what publishers offer."""
+        for name, types in self.get_topic_names_and_types() if self._wanted else ():
             for wanted in [w for w in self._wanted if self.resolve_topic_name(w) == name]:
                 self._wanted.discard(wanted)
+                qos = _suited(topics.SAMPLES.qos, self._offered(name, types[0]))
                 try:
-                    self._record(topics.Topic(wanted, _message(types[0]), topics.SAMPLES.qos))
+                    self._record(topics.Topic(wanted, _message(types[0]), qos))
                 except (ImportError, AttributeError) as error:
                     self.complain('topic', f'{name}: type {types[0]} is not installed ({error})')
+        for name, (topic, made) in list(self._heard.items()):
+            offered = self._offered(name, type_name(topic.type))
+            if any(refusal(made.qos_profile, one) for one in offered):
+                self._take_from(made)
+                self.unsubscribe(made)
+                qos = _suited(made.qos_profile, offered)
+                self._listen(name, replace(topic, qos=qos), overrides=False)
+                self.get_logger().info(
+                    f'{name}: a publisher offers less than was asked for; recorded '
+                    f'{qos.reliability.name.lower()}, {qos.durability.name.lower()} from here on'
+                )
+
+    def _offered(self, name: str, kind: str) -> list[QoSProfile]:
+        """Return the QoS of each publisher of a topic that has the type."""
+        found = self.get_publishers_info_by_topic(name)
+        return [info.qos_profile for info in found if info.topic_type == kind]
 
     def _take_what_waits(self) -> None:
-        """Take what has reached this process but not yet its callbacks."""
-        for topic, subscription in self._topics:
-            for _ in range(topic.qos.depth):
-                found = subscription.handle.take_message(subscription.msg_type, True)
-                if found is None:
-                    break
-                self._take(subscription.topic_name, *found)
+        """Take what has reached this process but not yet its callbacks, in the suite's order."""
+        for _, made in self._heard.values():
+            self._take_from(made)
+
+    def _take_from(self, made: Any) -> None:
+        for _ in range(made.qos_profile.depth):
+            found = made.handle.take_message(made.msg_type, True)
+            if found is None:
+                return
+            self._take(made.topic_name, *found)
 
     def _take(self, name: str, data: bytes, info: Mapping[str, Any]) -> None:
         self.received.add()
@@ -174,8 +211,20 @@ class RecorderNode(base.SuiteNode):
             self._worst_lag = max(self._worst_lag, self._lag)
 
 
-def _message(type_name: str) -> Any:
-    package, _, name = type_name.split('/')
+def _suited(asked: QoSProfile, offered: Sequence[QoSProfile]) -> QoSProfile:
+    """Return a profile that hears every publisher, and asks for the most that all offer."""
+    reliable = all(o.reliability == ReliabilityPolicy.RELIABLE for o in offered)
+    latched = offered and all(o.durability == DurabilityPolicy.TRANSIENT_LOCAL for o in offered)
+    return QoSProfile(
+        history=asked.history,
+        depth=asked.depth,
+        reliability=ReliabilityPolicy.RELIABLE if reliable else ReliabilityPolicy.BEST_EFFORT,
+        durability=DurabilityPolicy.TRANSIENT_LOCAL if latched else DurabilityPolicy.VOLATILE,
+    )
+
+
+def _message(kind: str) -> Any:
+    package, _, name = kind.split('/')
     return getattr(importlib.import_module(f'{package}.msg'), name)
 
 

@@ -12,9 +12,10 @@ from rosgraph_msgs.msg import Clock
 from actuator_glue.errors import InputError
 from actuator_glue.io.bag_reader import as_published, is_bag, messages
 from actuator_glue.io.messages import deserialize
-from actuator_glue.nodes import base, spin, streamer, topics
+from actuator_glue.nodes import spin, streamer, topics
 from actuator_glue.nodes.pacer import Step
 from actuator_glue.nodes.parameters import Spec
+from actuator_glue.nodes.partners import type_name
 
 SPECS = (
     Spec('bag', '', 'bag folder or .mcap file', read_only=True),
@@ -40,7 +41,7 @@ class ReplayNode(streamer.Streamer):
         if not is_bag(self.path):
             raise InputError(f'parameter bag = {self.path!r} is neither a bag nor an .mcap file')
         chosen = INPUTS + (RESULTS if self.parameters['results'] else ())
-        self._outputs = {base.type_name(t.type): self.publisher(t) for t in chosen}
+        self._outputs = {type_name(t.type): self.publisher(t) for t in chosen}
         clock = topics.Topic('/clock', Clock, topics.PREVIEW.qos)
         self._time: Any = self.publisher(clock) if self.parameters['clock'] else None
 
@@ -48,7 +49,7 @@ class ReplayNode(streamer.Streamer):
         """Yield the messages of the bag, set-ups before their samples, as they were recorded."""
         first: int | None = None
         note = partial(self.complain, 'bag')
-        setup = base.type_name(topics.TEST_SETUP.type)
+        setup = type_name(topics.TEST_SETUP.type)
         for found in as_published(messages(self.path, types=tuple(self._outputs), note=note)):
             if first is None and found.type == setup:
                 self._publish(found.type, found.data, found.log_time)
@@ -64,7 +65,7 @@ class ReplayNode(streamer.Streamer):
             message.clock.sec, message.clock.nanosec = divmod(log_time, 1_000_000_000)
             self._time.publish(message)
         self._outputs[kind].publish(data)
-        if kind == base.type_name(topics.SAMPLES.type):
+        if kind == type_name(topics.SAMPLES.type):
             self.samples.add(len(deserialize(kind, data).command))
 
 

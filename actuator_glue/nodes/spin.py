@@ -3,11 +3,7 @@
 from __future__ import annotations
 
 import gc
-import os
-import signal
-import socket
 import sys
-import threading
 import time
 from collections.abc import Callable, Sequence
 
@@ -16,15 +12,16 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.signals import SignalHandlerOptions
 
 from actuator_glue.errors import InputError
+from actuator_glue.nodes import transport
 from actuator_glue.nodes.base import SUCCESS, SuiteNode
 from actuator_glue.nodes.executor import Executor
+from actuator_glue.nodes.signals import Stop
 
 
 def main(make: Callable[[], SuiteNode], args: Sequence[str] | None = None) -> int:
-    """Run a node until SIGINT, SIGTERM or its own end; return the exit code.
-
-    A second signal ends the process at once.
-    """
+    """Run a node until SIGINT, SIGTERM or its own end; return the exit code."""
+    stop = Stop()
+    transport.choose()
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
     try:
         node = make()
@@ -34,10 +31,9 @@ def main(make: Callable[[], SuiteNode], args: Sequence[str] | None = None) -> in
         return 2
     executor = Executor()
     executor.add_node(node)
-    stop = threading.Event()
-    _on_signal(stop, node.wake)
+    stop.wake = node.wake
     code = 0
-    if node.parameters['autostart']:
+    if node.parameters['autostart'] and not stop.is_set():
         started = node.trigger_configure() == SUCCESS and node.trigger_activate() == SUCCESS
         if not started:
             code = 2
@@ -62,26 +58,3 @@ def main(make: Callable[[], SuiteNode], args: Sequence[str] | None = None) -> in
     node.destroy_node()
     rclpy.try_shutdown()
     return code
-
-
-def _on_signal(stop: threading.Event, wake: Callable[[], None]) -> None:
-    """Set `stop` on SIGINT or SIGTERM without interrupting whatever callback is running.
-
-    Python's own handlers run in the main thread only, which waits inside the middleware; the
-    wake-up descriptor is written at once, whatever thread the signal reaches.
-    """
-    reader, writer = socket.socketpair()
-    writer.setblocking(False)
-    for number in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(number, lambda *_: None)
-    signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
-
-    def wait() -> None:
-        reader.recv(1)
-        stop.set()
-        wake()
-        number = reader.recv(1)[0]
-        writer.close()
-        os._exit(128 + number)
-
-    threading.Thread(target=wait, name='signals', daemon=True).start()

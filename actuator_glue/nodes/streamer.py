@@ -14,7 +14,8 @@ from actuator_glue.nodes.pacer import Pacer, Step
 from actuator_glue.nodes.parameters import Spec
 
 # How long a stream waits for subscribers that lag, at its beginning and its end [s]. DDS lets go
-# of a dead one after its lease of 20 s, so that more is never needed.
+# of a dead one after its lease of 20 s, so that more is never needed. Workers compile before their
+# nodes subscribe: that takes minutes, and is waited for without limit.
 PATIENCE_SECONDS = 30.0
 
 
@@ -23,7 +24,15 @@ def specs(*, exit_at_end: bool) -> tuple[Spec, ...]:
     return (
         Spec('speed', 1.0, 'stream seconds per second, 0 for no waiting', '1', 0.0, 1e4, True),
         Spec('exit_at_end', exit_at_end, 'end the node when the stream has ended', read_only=True),
-        Spec('wait_for', 0, 'subscribers of the samples to wait for', '1', 0, 100, True),
+        Spec(
+            'wait_for',
+            0,
+            'subscribers of the samples, ready for them, to wait for',
+            '1',
+            0,
+            100,
+            True,
+        ),
     )
 
 
@@ -41,6 +50,7 @@ class Streamer(base.SuiteNode):
         super().__init__(name, specs)
         self.samples = Rate()
         self.pacer: Pacer | None = None
+        self._waited_for: str | None = None
 
     def stream(self) -> Iterator[Step]:
         """Yield what is published, and when; runs in the pacer's thread."""
@@ -62,9 +72,19 @@ class Streamer(base.SuiteNode):
 
     def ready(self) -> bool:
         """Whether everybody who was waited for listens and the clock has begun."""
-        # Simulated time is 0 until the first /clock: such stamps would jump with it.
-        clock_runs = not self.stamps_now or self.get_clock().now().nanoseconds > 0
-        return bool(self.subscribers >= self.parameters['wait_for'] and clock_runs)
+        wanted, there = self.parameters['wait_for'], self.subscribers
+        missing = ''
+        if there < wanted:
+            missing = (
+                f'{wanted} subscribers of samples, {there} {"is" if there == 1 else "are"} there'
+            )
+        elif self.stamps_now and self.get_clock().now().nanoseconds == 0:
+            # Simulated time is 0 until the first /clock: such stamps would jump with it.
+            missing = 'the first /clock'
+        if missing != self._waited_for:
+            self._waited_for = missing
+            self.get_logger().info(f'waiting for {missing}' if missing else 'the stream begins')
+        return not missing
 
     def introduce(self) -> None:
         """Wait until whoever was waited for has the first test set-up; call it in the stream.
@@ -79,6 +99,7 @@ class Streamer(base.SuiteNode):
     def do_activate(self) -> None:
         """Begin the stream."""
         self.samples = Rate()
+        self._waited_for = None
         self.pacer = Pacer(self.stream(), self.ready, self.parameters['speed'], self._ended)
         self.pacer.start()
 

@@ -74,7 +74,12 @@ class Worker:
         self._process: Any = context.Process(
             target=_serve, args=(theirs, self._warm, self._nice), daemon=True, name='worker'
         )
-        self._process.start()
+        # It begins with Ctrl-C blocked: its imports shall not be cut, with a traceback each.
+        masked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            self._process.start()
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, masked)
         theirs.close()
         # The tasks of an ended process are not the next one's.
         self._tasks = queue.SimpleQueue()
@@ -107,6 +112,8 @@ class Worker:
                 answer = pipe.recv()
             except (EOFError, OSError):
                 break
+            if process is not self._process:
+                break  # what an ended process still said is nobody's answer
             if answer is None:
                 self.ready.set()
             else:
@@ -120,7 +127,7 @@ def _serve(pipe: Connection, warm: Callable[[], None] | None, nice: int) -> None
     # Ctrl-C reaches the whole group: the node decides when its worker ends.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
     if nice:
         os.nice(nice)
 

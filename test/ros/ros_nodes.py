@@ -148,6 +148,7 @@ class Probe(Node):
         try:
             return self.call(ChangeState, f'{node}/change_state', request, attempts=1).success
         except AssertionError:
+            # The answer was lost: what it was shows in the state.
             return self.state(node) != before
 
     def parameters(self, node):

@@ -6,6 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from actuator_glue_msgs.action import Diagnose
+from rclpy.action import ActionClient
+from rclpy.duration import Duration
 from ros_nodes import QUICK, RATE, stranger
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import String
@@ -14,6 +17,8 @@ from actuator_glue.io.bag_reader import decoded
 from actuator_glue.model import linear
 from actuator_glue.model.commands import noise
 from actuator_glue.records import Record
+
+BAG = Path(__file__).resolve().parents[2] / 'bags' / 'undeclared_clamped'
 
 
 def good(seconds, seed=0):
@@ -115,20 +120,53 @@ def test_a_recorder_that_is_ended_keeps_what_it_recorded(how, start, probe, tmp_
         assert len(indices) >= 600
 
 
-def test_a_killed_worker_is_replaced(start, probe, tmp_path):
+def worker_of(process):
+    """Process id of a node's worker."""
+    pids = children_of(process.process.pid)
+    (worker,) = [p for p in pids if b'spawn_main' in Path(f'/proc/{p}/cmdline').read_bytes()]
+    return int(worker)
+
+
+def test_a_worker_that_is_killed_after_a_warning_is_replaced(start, probe):
+    """An error after a warning is logged, and what follows it is done."""
     estimator = start('estimator', **QUICK)
     probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 120, 'estimator compiled')
-    pids = children_of(estimator.process.pid)
-    workers = [p for p in pids if b'spawn_main' in Path(f'/proc/{p}/cmdline').read_bytes()]
-    assert len(workers) == 1
-    os.kill(int(workers[0]), signal.SIGKILL)
+    probe.open_stream()
+    probe.block(np.zeros(3), np.zeros(3))
+    probe.until(lambda: 'nothing on test_setup' in probe.faults['estimator'], 15, 'a warning')
+    os.kill(worker_of(estimator), signal.SIGKILL)
     probe.until(lambda: 'the worker process ended' in probe.faults['estimator'], 15)
     probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 120, 'compiled again')
-    probe.open_stream()
-    probe.setup()
+    probe.setup(index=probe.index)
+    assert probe.setup_out.wait_for_all_acked(Duration(seconds=20.0))
     probe.stream(good(5.0), pause=0.02)
     probe.until(lambda: probe.number('estimator', 'windows') >= 1, 30, 'windows')
-    assert estimator.end() == 0
+    # So is the worker of a node that is inactive just then.
+    assert probe.transition('estimator', 'deactivate')
+    os.kill(worker_of(estimator), signal.SIGKILL)
+    probe.for_a_while(1.0)
+    assert probe.transition('estimator', 'activate')
+    probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 120, 'compiled again')
+    assert estimator.end() == 0 and 'Traceback' not in estimator.text
+
+
+def test_a_goal_ends_with_the_worker_that_diagnosed(start, probe):
+    diagnoser = start('diagnoser')
+    probe.until(lambda: probe.value('diagnoser', 'worker') == 'ready', 200, 'diagnoser compiled')
+    probe.open_stream()
+    probe.setup(hold='cubic')
+    probe.until(lambda: 'cubic' in probe.faults['diagnoser'], 15, 'a warning')
+    client = ActionClient(probe, Diagnose, 'diagnoser/diagnose')
+    probe.until(client.server_is_ready, 30)
+    sent = client.send_goal_async(Diagnose.Goal(records=[str(BAG)]))
+    probe.until(sent.done, 20)
+    os.kill(worker_of(diagnoser), signal.SIGKILL)
+    answer = sent.result().get_result_async()
+    probe.until(answer.done, 30, 'result')
+    assert not answer.result().result.success
+    assert 'the worker process ended' in answer.result().result.message
+    probe.until(lambda: probe.value('diagnoser', 'worker') == 'ready', 60, 'another worker')
+    assert diagnoser.end() == 0
 
 
 def test_a_simulated_clock_that_jumps_back_is_said_and_survived(start, probe):

@@ -94,6 +94,8 @@ def test_a_diagnosis_on_request_reports_its_progress_and_can_be_cancelled(start,
     answer = result(ask(**goal))
     assert answer.success, answer.message
     assert told and all(0.0 <= f.fraction <= 1.0 and f.stage for f in told)
+    fractions = [f.fraction for f in told]
+    assert fractions == sorted(fractions) and fractions[-1] == 1.0
     probe.until(lambda: diagnoses, 10)
     assert diagnoses[0].verdict == answer.diagnosis.verdict
     assert diagnoser.end() == 0

@@ -87,7 +87,7 @@ def test_no_sample_is_sent_before_subscribers_have_the_set_up(node, start, probe
 
 def test_a_recorder_writes_what_has_reached_it_when_it_is_stopped(probe, tmp_path, monkeypatch):
     """Messages that no callback has seen yet are in the bag."""
-    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv('ROS_HOME', str(tmp_path))
     recorder = RecorderNode()
     recorder.trigger_configure()
     recorder.trigger_activate()
@@ -100,7 +100,7 @@ def test_a_recorder_writes_what_has_reached_it_when_it_is_stopped(probe, tmp_pat
     # It is in nobody's executor: no callback has run.
     recorder.trigger_deactivate()
     recorder.destroy_node()
-    (bag,) = tmp_path.iterdir()
+    (bag,) = (tmp_path / 'actuator_glue').iterdir()
     assert np.array_equal(recorded(bag), np.arange(1000))
     found = list(messages(bag))
     assert sum(m.type == TEST_SETUP for m in found) == 1
@@ -118,6 +118,7 @@ def test_windows_that_are_complete_at_once_are_all_estimated(start, probe):
     probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 120, 'estimator compiled')
     probe.open_stream()
     probe.setup()
+    assert probe.setup_out.wait_for_all_acked(Duration(seconds=20.0))
     command = noise(RATE, 14.0, 0.2, 8.0, seed=1)
     for block in np.split(command[:400], 20):
         probe.block(block, 0.9 * block)

@@ -1,0 +1,69 @@
+"""Parameters and requests of the estimator node as settings and models."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+from actuator_glue.errors import InputError
+from actuator_glue.inference.choice import ModelChoice, choose_model
+from actuator_glue.nodes.parameters import Spec
+from actuator_glue.online.settings import LIMITS, EstimatorSettings
+
+
+def _specs() -> list[Spec]:
+    """Parameters from the settings' own table, so that neither can drift from the other."""
+    defaults = EstimatorSettings()
+    specs = []
+    for field in fields(EstimatorSettings):
+        limit = LIMITS.get(field.name)
+        if limit is None:
+            continue
+        value = getattr(defaults, field.name)
+        specs.append(
+            Spec(field.name, value, limit.meaning, limit.unit, limit.lower, limit.upper, True)
+        )
+    return specs
+
+
+SPECS = (
+    *_specs(),
+    Spec('likelihood', 'glue', 'likelihood', read_only=True, choices=('glue', 'gaussian')),
+    Spec('levels', list(EstimatorSettings().levels), 'probability of each band', read_only=True),
+    Spec('effects', [''], 'effects of the catalogue beyond Eq. (2)', read_only=True),
+)
+
+
+def effects(values: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return the effects that are asked for."""
+    # ROS cannot declare an empty list of strings with its type, so an empty word stands for it.
+    return tuple(name for name in values['effects'] if name)
+
+
+def settings(values: Mapping[str, Any]) -> EstimatorSettings:
+    """Return the settings among a node's parameters.
+
+    Raises:
+        InputError: they contradict each other.
+    """
+    known = {f.name for f in fields(EstimatorSettings)}
+    return EstimatorSettings.from_mapping({n: v for n, v in values.items() if n in known})
+
+
+def requested(request: Any) -> ModelChoice:
+    """Return the model that a SetModel request names.
+
+    Raises:
+        InputError: unknown effects or parameters, lists that do not belong together.
+    """
+    names = list(request.parameter_names)
+    lower, upper, start = list(request.lower), list(request.upper), list(request.start)
+    if not len(names) == len(lower) == len(upper) or len(start) not in (0, len(names)):
+        raise InputError(
+            f'{len(names)} parameter names, {len(lower)} lower, {len(upper)} upper bounds and '
+            f'{len(start)} starting values do not belong together'
+        )
+    bounds = {n: (lo, up) for n, lo, up in zip(names, lower, upper, strict=True)}
+    places = dict(zip(names, start, strict=True)) if start else None
+    return choose_model(tuple(request.effects), bounds, places)

@@ -1,0 +1,65 @@
+"""SIGINT and SIGTERM: the first one ends a node in order, whatever thread it reaches."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import sys
+import threading
+import time
+from collections.abc import Callable
+
+# Within this time repeats are one and the same [s]: `timeout -s INT`, a launch without a
+# terminal and Ctrl-C in a shell's group reach a node twice.
+REPEATS_SECONDS = 1.0
+
+
+def end_at_once() -> None:
+    """Have SIGINT end the process, in order: a start has nothing to lose yet."""
+    signal.signal(signal.SIGINT, lambda *_: os._exit(0))
+
+
+class Stop:
+    """Set by the first SIGINT or SIGTERM, without interrupting whatever callback is running.
+
+    A SIGINT a second later or more ends the process at once, for whoever does not want to wait
+    for a node that hangs. A SIGTERM after another signal does nothing: launch sends one to nodes
+    that are still finishing their work.
+
+    Python's own handlers run in the main thread only, which waits inside the middleware; the
+    wake-up descriptor is written at once, whatever thread the signal reaches.
+    """
+
+    def __init__(self) -> None:
+        self._event = threading.Event()
+        # Makes the executor return to its loop; the node gives it when it is there.
+        self.wake: Callable[[], None] = lambda: None
+        self._reader, writer = socket.socketpair()
+        writer.setblocking(False)
+        self._writer = writer
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, lambda *_: None)
+        signal.set_wakeup_fd(writer.fileno(), warn_on_full_buffer=False)
+        threading.Thread(target=self._listen, name='signals', daemon=True).start()
+
+    def is_set(self) -> bool:
+        """Whether the node is to end."""
+        return self._event.is_set()
+
+    def set(self) -> None:
+        """End the node, without a signal."""
+        self._event.set()
+
+    def _listen(self) -> None:
+        first: float | None = None
+        while True:
+            number = self._reader.recv(1)[0]
+            now = time.monotonic()
+            if first is None:
+                first = now
+                self._event.set()
+                self.wake()
+            elif number == signal.SIGINT and now - first > REPEATS_SECONDS:
+                print('interrupted again: ending at once', file=sys.stderr, flush=True)
+                os._exit(128 + number)

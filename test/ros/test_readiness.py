@@ -1,0 +1,45 @@
+"""Nodes listen when their workers can compute, and say what they wait for."""
+
+import pytest
+from ros_nodes import QUICK
+
+from actuator_glue.nodes import diagnoser, estimator, topics
+from actuator_glue.nodes.executor import Executor
+from actuator_glue.online.stream import Dropped
+
+
+@pytest.mark.parametrize('make', [estimator.EstimatorNode, diagnoser.DiagnoserNode])
+def test_samples_are_listened_to_once_the_worker_is_ready(make, probe):
+    node = make()
+    executor = Executor()
+    executor.add_node(node)
+    node.trigger_configure()
+    # Not ready, however quick this computer is.
+    begun, node.worker.ready = node.worker.ready, type(node.worker.ready)()
+    node.trigger_activate()
+    topic = node.resolve_topic_name(topics.SAMPLES.name)
+    for _ in range(30):
+        executor.spin_once(0.02)
+    assert node.count_subscribers(topic) == 0 and node.compiling
+    node.worker.ready.set()
+    probe.until(lambda: executor.spin_once(0.02) or node.count_subscribers(topic), 5)
+    if make is estimator.EstimatorNode:
+        for ready, why in ((False, 'the worker is still compiling'), (True, 'took longer')):
+            node.worker.ready = type(begun)()
+            if ready:
+                node.worker.ready.set()
+            node._tell([Dropped(3, 0)])
+            assert why in node.health._faults['deadline'][1]
+    node.worker.ready = begun
+    node.trigger_shutdown()
+    executor.remove_node(node)
+    node.destroy_node()
+
+
+def test_a_stream_says_for_whom_it_waits(start, probe):
+    simulator = start('actuator_sim', wait_for=2)
+    probe.until(lambda: 'waiting for 2 subscribers of samples, 0 are there' in simulator.text)
+    start('estimator', **QUICK)
+    probe.until(lambda: '2 subscribers of samples, 1 is there' in simulator.text, 120)
+    assert probe.number('estimator', 'samples') != 0
+    assert simulator.end() == 0

@@ -1,0 +1,110 @@
+"""Signals as launch, `timeout` and a shell's process group send them: twice, early, mixed."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+from ros_nodes import recorded
+
+from actuator_glue.io.bag_reader import decoded
+from actuator_glue.nodes import parameter_file, run
+
+
+def end_as_launch_does(process):
+    """A SIGINT to the process and one to its group, then SIGTERM; return the exit status."""
+    os.kill(process.process.pid, signal.SIGINT)
+    time.sleep(0.02)
+    os.killpg(process.process.pid, signal.SIGINT)
+    time.sleep(0.02)
+    os.kill(process.process.pid, signal.SIGTERM)
+    return process.wait(5.0)
+
+
+def test_a_doubled_signal_leaves_the_bag_whole(start, probe, tmp_path):
+    bag = tmp_path / 'bag'
+    recorder = start('recorder', bag=str(bag))
+    probe.open_stream()
+    probe.setup()
+    for _ in range(200):
+        probe.block(np.zeros(500), np.zeros(500))
+    assert end_as_launch_does(recorder) == 0, recorder.text
+    assert (bag / 'metadata.yaml').exists(), recorder.text
+    assert len(recorded(bag)) % 500 == 0
+
+
+def test_a_second_signal_ends_a_node_that_hangs(tmp_path):
+    text = (
+        'import sys, time\n'
+        'from actuator_glue.nodes.signals import Stop\n'
+        'stop = Stop()\n'
+        'print("ready", flush=True)\n'
+        'time.sleep(60)\n'
+    )
+    process = subprocess.Popen([sys.executable, '-c', text], stdout=subprocess.PIPE)
+    assert process.stdout.readline() == b'ready\n'
+    for pause in (0.1, 1.2):
+        process.send_signal(signal.SIGINT)
+        time.sleep(pause)
+        assert process.poll() is None
+    process.send_signal(signal.SIGINT)
+    assert process.wait(5.0) == 130
+
+
+@pytest.mark.parametrize('after', [0.3, 0.6, 1.2])
+def test_an_early_signal_ends_a_node_without_a_traceback(after, tmp_path):
+    """While its libraries are imported, or its worker begins."""
+    text = (
+        'import sys\n'
+        'from actuator_glue.nodes import run\n'
+        'print("ready", flush=True)\n'
+        'if __name__ == "__main__":\n'
+        '    sys.exit(run.estimator())\n'
+    )
+    script = tmp_path / 'estimator'
+    script.write_text(text)
+    process = subprocess.Popen(
+        [sys.executable, str(script)],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        start_new_session=True,
+        text=True,
+    )
+    assert process.stdout.readline() == 'ready\n'
+    time.sleep(after)
+    for _ in range(2):
+        os.killpg(process.pid, signal.SIGINT)
+    told, _ = process.communicate(timeout=20)
+    assert process.returncode == 0 and 'Traceback' not in told, told
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1500)
+def test_the_first_run_on_a_machine_is_whole(start, probe, tmp_path, monkeypatch):
+    """An empty compile cache, all nodes at once, signals as launch sends them."""
+    monkeypatch.setenv('NUMBA_CACHE_DIR', str(tmp_path / 'cache'))
+    bag, sealed = tmp_path / 'bag', tmp_path / 'truth.json'
+    nodes = [
+        start('recorder', bag=str(bag)),
+        start('estimator', window=4.0, hop=2.0, time_budget=1.8),
+        start('diagnoser', minimum=10.0),
+        start(
+            'actuator_sim', rate=200.0, duration=90.0, wait_for=3, preview=3.0,
+            undeclared_effect='backlash:backlash=1e-4', sealed_file=str(sealed),
+        ),
+    ]  # fmt: skip
+    probe.until(lambda: probe.number('estimator', 'windows') >= 5, 1200, 'windows')
+    diagnosed = lambda: probe.value('diagnoser', 'last diagnosis')  # noqa: E731
+    probe.until(diagnosed, 200, 'a diagnosis')
+    assert probe.number('estimator', 'windows dropped') <= 3
+    for node in reversed(nodes):
+        assert end_as_launch_does(node) == 0, node.text
+    assert (bag / 'metadata.yaml').exists()
+    assert list(decoded(bag, ('PosteriorMoments',))) and list(decoded(bag, ('Diagnosis',)))
+
+
+def test_every_node_has_an_executable():
+    assert all(callable(getattr(run, node)) for node in parameter_file.NODES)
