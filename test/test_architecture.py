@@ -17,7 +17,7 @@ SOURCES = sorted(p for p in ROOT.rglob('*.py'))
 BOTTOM = {'errors', 'records', 'jit', 'normal'}
 CORE = BOTTOM | {'model', 'inference'}
 EVERYTHING = CORE | {
-    'online', 'residual', 'report', 'io', 'interfaces', 'workers',
+    'online', 'residual', 'report', 'io', 'interfaces', 'workers', 'effects',
 }  # fmt: skip
 # Each folder or top module, and what it may import besides itself.
 ARROWS = {
@@ -27,6 +27,7 @@ ARROWS = {
     'jit': set(),
     'normal': {'jit'},
     'model': BOTTOM,
+    'effects': BOTTOM | {'model'},
     'inference': BOTTOM | {'model'},
     'online': CORE,
     'residual': CORE,

@@ -43,17 +43,24 @@ class Draws:
 
     @staticmethod
     def read(path: Path) -> Draws:
-        """Return the draws of a file.
+        """Return the draws of a file; registers the effects that it defines.
 
         Raises:
             InputError: it cannot be read, or is no file of draws.
         """
+        import json
         import zipfile
 
         import numpy as np
 
+        from actuator_glue.model.effects import CATALOGUE
+        from actuator_glue.model.effects.terms.definition import entries
+
         try:
             with np.load(path, allow_pickle=False) as file:
+                if 'definitions' in file and (own := json.loads(str(file['definitions']))):
+                    for effect in entries(own, str(path)):
+                        CATALOGUE.register(effect, replace=True)
                 return Draws(
                     np.asarray(file['draws'], dtype=np.float64),
                     np.asarray(file['best'], dtype=np.float64),

@@ -7,12 +7,14 @@ the first line says so. 2: the input cannot be used.
 from __future__ import annotations
 
 import argparse
+import json
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from actuator_glue.cli._calibration import fit_error, initial_state, sample, sampled_model
 from actuator_glue.cli._compilation import compilation
+from actuator_glue.cli._effects_file import add_effects_file, definitions, load_effects
 from actuator_glue.cli._judgement import CONVERGED, bounds, problems, remarks
 from actuator_glue.cli._output import add_json, note, say, table, write_json
 from actuator_glue.cli._parser import Output, number
@@ -56,6 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='NAME',
         help='calibrate Eq. (2) with this effect of the catalogue as well; repeatable',
     )
+    add_effects_file(parser)
     parser.add_argument(
         '--initial',
         choices=('auto', 'rest', 'measured'),
@@ -96,6 +99,7 @@ def run(args: argparse.Namespace) -> int:
     """
     if args.seed < 0:
         raise InputError(f'--seed {args.seed} is negative')
+    load_effects(args)
     model = sampled_model(args.effect, args.likelihood, bounds(args.bounds))
 
     from actuator_glue.inference.at_bound import pressed
@@ -140,6 +144,7 @@ def run(args: argparse.Namespace) -> int:
         'notes': notes,
         'converged': converged,
         'effects': list(structure.effects),
+        **definitions(structure.effects),
         'likelihood': args.likelihood,
         'shaping_factor': args.shaping_factor if args.likelihood == 'glue' else None,
         'seed': args.seed,
@@ -239,6 +244,7 @@ def _save_draws(
                 names=np.array(list(parameters)),
                 units=np.array([p['unit'] for p in parameters.values()]),
                 effects=np.array(effects, dtype=np.str_),
+                definitions=np.array(json.dumps(definitions(effects).get('definitions', {}))),
                 initial=np.array(how),
             )
     except OSError as error:

@@ -11,6 +11,7 @@ import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from actuator_glue.cli._effects_file import add_effects_file, definitions, load_effects
 from actuator_glue.cli._output import add_json, note, progress, say, table, write_json
 from actuator_glue.cli._parser import Output
 from actuator_glue.cli._records import add_records, load
@@ -50,6 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='record that decides nothing and gives the error before and after; repeatable '
         '(default: every fourth block of each record)',
     )
+    add_effects_file(parser)
     parser.add_argument(
         '--report', type=Output, metavar='OUT.html', help='also write a report, one HTML file'
     )
@@ -70,6 +72,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f'--seed {args.seed} is negative')
     if args.jobs < 1:
         raise InputError(f'--jobs {args.jobs} is below 1')
+    load_effects(args)
     records, held = _load(args)
 
     from actuator_glue.residual.diagnose import diagnose
@@ -92,7 +95,7 @@ def run(args: argparse.Namespace) -> int:
             clock=time.perf_counter,
         )
     _show(found, args)
-    write_json(found.to_json(), args.json)
+    write_json({**found.to_json(), **definitions(found.structure)}, args.json)
     if args.report is not None:
         _report(found, args.report)
     return 0 if found.complete else 1

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from actuator_glue.cli._effects import NOISE, chosen, unseen
+from actuator_glue.cli._effects_file import add_effects_file, definitions, load_effects
 from actuator_glue.cli._output import note, progress, write_json
 from actuator_glue.cli._parser import claim, number
 from actuator_glue.cli._save import add_out, check_out, save
@@ -55,6 +56,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='switch an effect of the catalogue on; repeatable. Values not given are typical '
         'ones. The output does not tell: OUT.truth.json does',
     )
+    add_effects_file(plant)
     plant.add_argument('--noise-mm', type=number, help='displacement noise, sd (default 0.01)')
     plant.add_argument('--force-noise-n', type=number, help='force noise, sd [N] (default 2)')
     plant.add_argument('--bits', type=int, help='resolution of both converters (default none)')
@@ -87,6 +89,7 @@ def run(args: argparse.Namespace) -> int:
     """
     if args.seed < 0 or args.command_seed < 0:
         raise InputError('seeds are whole numbers of at least 0')
+    load_effects(args)
     out = check_out(args)
     sealed = out.with_name(out.name + '.truth.json')
     if args.effect:
@@ -214,6 +217,7 @@ def _plant(
         'plant': args.plant,
         'theta': dict(zip(structure.names, theta.tolist(), strict=True)),
         'effects': list(structure.effects),
+        **definitions(structure.effects),
         'seed': args.seed,
     }
     return made, truth

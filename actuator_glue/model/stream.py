@@ -77,11 +77,14 @@ class Stream:
     def reset(self) -> None:
         """Return to rest at zero displacement, sample 0 (the random generator runs on)."""
         start = (0.0, 0.0)
-        args = self._values, self.stiffness
         if self.structure.linear:
-            self._table = lti.tables(*args, self.period, self.hold == 'linear', start)[0]
+            linear = self.hold == 'linear'
+            self._table = lti.tables(self._values, self.stiffness, self.period, linear, start)[0]
         else:
-            self._table = run.tables(*args, self._substeps, self.period, start)[0]
+            self._table = run.tables(
+                self._values, self.structure.program, self.stiffness, self._substeps, self.period,
+                start,
+            )[0]  # fmt: skip
         self._history = np.zeros(1)
         self._offset = -1
         self._begin = 0
@@ -117,12 +120,13 @@ class Stream:
         """Run the compiled step through the samples after `_begin`."""
         at = u, self._offset, self._begin
         if self.structure.linear:
-            effects = self.structure.effects
-            lti.advance(self._table, lti.third(effects), 'delay' in effects, *at, out, force)
+            third, delayed = self.structure.exact
+            lti.advance(self._table, third, delayed, *at, out, force)
         else:
             kernel.advance(
                 self._table,
                 self.structure.switches,
+                self.structure.program.code,
                 *at,
                 self._substeps,
                 self.period,

@@ -10,15 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 from actuator_glue.errors import InputError
 from actuator_glue.model import linear
 from actuator_glue.model.effects import CATALOGUE, Effect, Scale, lti, rows, run
+from actuator_glue.model.effects.terms import machine
+from actuator_glue.model.effects.terms.program import Written, compiled
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.parameters import BASE, Parameter
 from actuator_glue.model.structure_errors import StructureErrors
 from actuator_glue.records import Array, Record
-
-# Effects that leave the mean of the record, and those that leave the loop Eq. (2).
-_MEANLESS = frozenset(n for n, e in CATALOGUE.items() if e.variance is not None)
-_OUTSIDE = _MEANLESS | {'gain'} | {n for n, e in CATALOGUE.items() if e.output is not None}
-_DEFAULTS = {p.name: p.neutral for e in CATALOGUE.values() for p in e.parameters}
 
 
 class Structure:
@@ -58,8 +55,14 @@ class Structure:
             first += len(effect.parameters)
         self._on = np.zeros(rows.SWITCHES, dtype=np.bool_)
         self._on[[s for effect in self.entries for s in effect.switches]] = True
-        self._plain = _MEANLESS.issuperset(self.effects)
-        self.linear = _OUTSIDE.union(lti.EFFECTS).issuperset(self.effects)
+        self.program = compiled(
+            Written(e.expression, e.parameters) for e in self.entries if e.expression is not None
+        )
+        if self.program.acts(machine.COMMAND, machine.FORCE):
+            self._on[[rows.ON_TERMS, rows.ON_FLOW]] = True
+            self._on[rows.ON_FORCE] = self.program.acts(machine.FORCE, machine.FORCE)
+        self._plain = all(e.variance is not None for e in self.entries)
+        self.linear = all(e.linear for e in self.entries)
 
     def __repr__(self) -> str:
         return f'Structure({self.effects!r})'
@@ -227,10 +230,16 @@ class Structure:
 
     def values(self, table: Array) -> dict[str, Array]:
         """Return every catalogue parameter by name, each (m,), neutral if not in theta."""
-        off = np.repeat([[*_DEFAULTS.values()]], len(table), axis=0).T
-        known = dict(zip(_DEFAULTS, np.ascontiguousarray(off), strict=True))
+        defaults = {p.name: p.neutral for e in CATALOGUE.values() for p in e.parameters}
+        off = np.repeat([[*defaults.values()]], len(table), axis=0).T
+        known = dict(zip(defaults, np.ascontiguousarray(off), strict=True))
         known.update(zip(self.names, table.T, strict=True))
         return known
+
+    @property
+    def exact(self) -> tuple[int, bool]:
+        """States beside x and q, and whether there is a delay, for a linear structure's steps."""
+        return lti.third(e.exact for e in self.entries), 'delay' in self._columns
 
     @property
     def switches(self) -> NDArray[np.bool_]:
@@ -274,7 +283,7 @@ class Structure:
         time = record.time + origin
         if self.linear and not self._plain:
             for which, begin, x in run.exact_blocks(
-                self.values(table), self.effects, record, start
+                self.values(table), *self.exact, record, start
             ):
                 now = time[begin : begin + len(x)]
                 yield which, begin, self.sensed(table[which], now, x)
@@ -285,7 +294,8 @@ class Structure:
                 values['delay'] = values['delay'] + values['clock_skew'] * origin
             if before is not None:
                 values['envelope'] = before(values['droop_time'])
-            for which, begin, x in run.blocks(values, self._on, record, start, rate):
+            values['origin'] = np.full(len(table), origin)
+            for which, begin, x in run.blocks(values, self._on, self.program, record, start, rate):
                 now = time[begin : begin + len(x)]
                 yield which, begin, self.sensed(table[which], now, x)
             return

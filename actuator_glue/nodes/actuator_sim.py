@@ -18,7 +18,7 @@ from actuator_glue.model.plant import MeasuredPlant, Plant
 from actuator_glue.model.sensor import SensorSpec
 from actuator_glue.model.stream import Stream
 from actuator_glue.model.structure import Structure
-from actuator_glue.nodes import folders, spin, streamer, undeclared
+from actuator_glue.nodes import folders, own_effects, spin, streamer, undeclared
 from actuator_glue.nodes.blocks import BlockPublisher
 from actuator_glue.nodes.pacer import Step
 from actuator_glue.nodes.parameters import Parameters, Spec
@@ -58,6 +58,7 @@ SPECS = (
         'undeclared_effect', '', f'effects of the plant, told to nobody; {undeclared.FORM}',
         secret=True,
     ),
+    own_effects.SPEC,
     Spec(
         'sealed_file', '', 'file that gets the truth about undeclared_effect, empty for '
         '~/.ros/actuator_glue/truth_DATE-TIME.json', read_only=True,
@@ -75,6 +76,7 @@ class SimulatorNode(streamer.Streamer):
 
     def check(self, values: Mapping[str, Any]) -> None:
         """Refuse combinations that cannot be simulated."""
+        own_effects.load(values)
         if values['undeclared_effect'] != Parameters.HIDDEN:
             given = undeclared.parse(values['undeclared_effect'])
             if given and values['plant'] != 'paper':

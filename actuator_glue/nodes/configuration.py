@@ -8,6 +8,7 @@ from typing import Any
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference.choice import ModelChoice, choose_model
+from actuator_glue.nodes import own_effects
 from actuator_glue.nodes.parameters import Spec
 from actuator_glue.online.settings import LIMITS, EstimatorSettings
 
@@ -32,6 +33,7 @@ SPECS = (
     Spec('likelihood', 'glue', 'likelihood', read_only=True, choices=('glue', 'gaussian')),
     Spec('levels', list(EstimatorSettings().levels), 'probability of each band', read_only=True),
     Spec('effects', [''], 'effects of the catalogue beyond Eq. (2)', read_only=True),
+    own_effects.SPEC,
 )
 
 

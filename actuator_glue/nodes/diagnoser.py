@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Mapping
 from typing import Any
 
 from actuator_glue_msgs.action import Diagnose
@@ -11,7 +12,7 @@ from actuator_glue_msgs.srv import SetModel
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 
 from actuator_glue.errors import InputError
-from actuator_glue.nodes import diagnosing, spin, topics
+from actuator_glue.nodes import diagnosing, own_effects, spin, topics
 from actuator_glue.nodes.health import ERROR
 from actuator_glue.nodes.latched import Newest
 from actuator_glue.nodes.messages import publish
@@ -32,6 +33,7 @@ SPECS = (
     Spec('pause', 60.0, 'shortest time between diagnoses by itself', 's', 0.0, 86_400.0),
     Spec('keep', 180.0, 'samples kept for a diagnosis', 's', 10.0, 3600.0, True),
     Spec('seed', 1, 'seed of diagnoses by itself', '1', 0, 2**53),
+    own_effects.SPEC,
     Spec('estimator', 'estimator', 'name of the estimator node', read_only=True),
 )
 # How long the estimator may take to say whether it takes the augmented model [s].
@@ -46,6 +48,10 @@ class DiagnoserNode(WorkingNode):
         self._request: diagnosing.Request | None = None
         self._swap: Any = None
         super().__init__('diagnoser', SPECS)
+
+    def check(self, values: Mapping[str, Any]) -> None:
+        """Read the user's own effects."""
+        own_effects.load(values)
 
     def do_configure(self) -> None:
         """Start the worker; offer the action."""

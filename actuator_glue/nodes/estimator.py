@@ -13,7 +13,7 @@ from actuator_glue_msgs.srv import SetModel
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference.choice import ModelChoice, choose_model
-from actuator_glue.nodes import configuration, spin, topics
+from actuator_glue.nodes import configuration, own_effects, spin, topics
 from actuator_glue.nodes.estimating import compute, warm_up
 from actuator_glue.nodes.health import ERROR, Rate
 from actuator_glue.nodes.latched import Newest
@@ -37,6 +37,7 @@ class EstimatorNode(WorkingNode):
     def check(self, values: Mapping[str, Any]) -> None:
         """Refuse settings that contradict each other."""
         configuration.settings(values)
+        own_effects.load(values)
         choose_model(configuration.effects(values))
 
     def do_configure(self) -> None:

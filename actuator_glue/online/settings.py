@@ -156,5 +156,6 @@ class EstimatorSettings:
             raise InputError(f'{source}: estimator settings are no JSON ({error})') from error
         if not isinstance(values, dict):
             raise InputError(f'{source}: estimator settings are no JSON object')
-        values.pop('start', None)  # belongs to the model
+        for name in ('start', 'definitions'):  # belong to the model
+            values.pop(name, None)
         return EstimatorSettings.from_mapping(values, source)

@@ -14,6 +14,8 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference.choice import ModelChoice, choose_model
+from actuator_glue.model.effects import CATALOGUE
+from actuator_glue.model.effects.terms.definition import entries, mapping
 from actuator_glue.online.forecast import Prediction
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.settings import EstimatorSettings
@@ -75,13 +77,14 @@ def preview(message: Any) -> Preview:
 
 
 def model_choice(message: Any) -> ModelChoice:
-    """Return the model of an EstimatorSetup.
+    """Return the model of an EstimatorSetup; registers the effects that it defines.
 
     Raises:
         InputError: settings that cannot be read, or a model that the catalogue does not have.
     """
     try:
-        start = json.loads(message.settings).get('start') or ()
+        values = json.loads(message.settings)
+        start, defined = values.get('start') or (), values.get('definitions')
         names = list(message.parameter_names)
         box = {
             name: (float(lower), float(upper))
@@ -91,6 +94,8 @@ def model_choice(message: Any) -> ModelChoice:
         begin = {name: _NAN if value is None else float(value) for name, value in places}
     except (ValueError, TypeError, AttributeError) as error:
         raise InputError(f'EstimatorSetup: the model cannot be read ({error})') from error
+    for effect in entries(defined, 'EstimatorSetup') if defined else ():
+        CATALOGUE.register(effect, replace=True)
     return choose_model(list(message.effects), box, begin)
 
 
@@ -114,6 +119,10 @@ def estimator_setup(
         window: number of the first window it holds for.
         index: running index of that window's first sample.
     """
+    # What is no part of the package goes along: the bag alone is enough for a replay.
+    own = mapping(e for e in CATALOGUE.registered() if e.name in model.effects)
+    more = {'definitions': own} if own else {}
+    start = [None if np.isnan(v) else v for v in model.start]
     return {
         'index': index,
         'window': window,
@@ -126,9 +135,7 @@ def estimator_setup(
         'units': list(model.units),
         'lower': list(model.lower),
         'upper': list(model.upper),
-        'settings': json.dumps(
-            {**asdict(settings), 'start': [None if np.isnan(v) else v for v in model.start]}
-        ),
+        'settings': json.dumps({**asdict(settings), 'start': start, **more}),
     }
 
 

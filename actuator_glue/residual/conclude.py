@@ -21,10 +21,10 @@ from actuator_glue.residual.surrogate import Surrogate
 
 Progress = Callable[[str, float], None]
 
-# Effects with a mean response; the others are found by measurement.py and lines.py.
-MEAN_EFFECTS = tuple(
-    name for name, effect in CATALOGUE.items() if effect.variance is None and name != 'hum'
-)
+
+def mean_effects() -> tuple[str, ...]:
+    """Return the effects with a mean response; measurement.py and lines.py find the others."""
+    return tuple(n for n in CATALOGUE.searched() if CATALOGUE[n].variance is None and n != 'hum')
 
 
 @dataclass(frozen=True)
@@ -55,10 +55,10 @@ class Conclusion:
 def conclude(prepared: Prepared, settings: Settings, jobs: int, tell: Progress) -> Conclusion:
     """Search for what the model lacks and decide; nothing looks at the held-out part."""
     tell('base fit', 0.0)
-    search = Search(prepared.fit, MEAN_EFFECTS, jobs)
+    search = Search(prepared.fit, mean_effects(), jobs)
     line = lines.find(prepared.fit, search.base().error)
     if line is not None:
-        search = Search(lines.without(prepared.fit, line), MEAN_EFFECTS, jobs)
+        search = Search(lines.without(prepared.fit, line), mean_effects(), jobs)
     found = Attributor(search, settings, tell).run()
     result = _conclusion(prepared, search, found, settings, line)
     if result.decision.verdict != 'unexplained':

@@ -14,6 +14,8 @@ from contextlib import suppress
 from multiprocessing.connection import Connection
 from typing import Any, NamedTuple
 
+from actuator_glue.model.effects import CATALOGUE
+
 # Messages from the worker: (kind, payload).
 DONE, FAILED, PROGRESS, DIED = 'done', 'failed', 'progress', 'died'
 
@@ -53,9 +55,10 @@ class Worker:
     def submit(self, function: Callable[..., Any], *args: Any) -> None:
         """Have `function(*args, tell)` computed; `tell` sends a PROGRESS answer.
 
-        Returns at once; a pipe that is full holds up a thread, not the caller.
+        Returns at once; a pipe that is full holds up a thread, not the caller. The process knows
+        the effects that are registered here by then.
         """
-        self._tasks.put((function, args))
+        self._tasks.put((CATALOGUE.registered(), function, args))
 
     def restart(self) -> None:
         """End the process whatever it does and start another."""
@@ -142,9 +145,11 @@ def _serve(pipe: Connection, warm: Callable[[], None] | None, nice: int) -> None
         gc.freeze()
         pipe.send(None)
         while (task := pipe.recv()) is not None:
-            function, args = task
+            effects, function, args = task
             started = time.monotonic()
             try:
+                for effect in effects:
+                    CATALOGUE.register(effect, replace=True)
                 kind, payload = DONE, function(*args, tell)
             except Exception as error:
                 kind, payload = FAILED, f'{type(error).__name__}: {error}'

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from actuator_glue.model.commands import sweep
-from actuator_glue.model.effects import lti, run
+from actuator_glue.model.effects import CATALOGUE, run
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 
@@ -27,7 +27,7 @@ SETS = [*((name,) for name in SIZES), ('delay', 'valve-lag', 'sensor-lag'), tupl
 def scheme(structure: Structure, theta: Array, record: Record, rate: int) -> Array:
     """The response by the scheme that nonlinear effects need, sub-steps `rate` times finer."""
     values = structure.values(theta[np.newaxis])
-    parts = run.blocks(values, structure.switches, record, (1e-4, 0.02), rate)
+    parts = run.blocks(values, structure.switches, structure.program, record, (1e-4, 0.02), rate)
     return np.concatenate([x[:, 0].copy() for _, _, x in parts])
 
 
@@ -42,7 +42,7 @@ def test_the_scheme_converges_to_the_exact_path(
     theta = np.array(THETA + [v for name in effects for v in SIZES[name]])
     record = Record(U, U, 1.0 / RATE, stiffness, hold=hold)
     values = structure.values(theta[np.newaxis])
-    parts = run.exact_blocks(values, effects, record, (1e-4, 0.02))
+    parts = run.exact_blocks(values, *structure.exact, record, (1e-4, 0.02))
     exact = np.concatenate([x[:, 0].copy() for _, _, x in parts])
     errors = [
         float(np.abs(scheme(structure, theta, record, rate) - exact).max()) for rate in (2, 8)
@@ -68,6 +68,6 @@ def test_a_vanishing_time_constant_is_none() -> None:
 def test_every_linear_effect_takes_the_exact_path() -> None:
     """And one that is not keeps the structure off it."""
     assert all(Structure((name,)).linear for name in SIZES)
-    assert set(lti.EFFECTS) <= set(SIZES)
+    assert {e.name for e in CATALOGUE.values() if e.exact} <= set(SIZES)
     assert not Structure(('delay', 'backlash')).linear
     assert not Structure(('clock-skew',)).linear

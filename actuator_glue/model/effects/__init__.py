@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from actuator_glue.model.effects import command, flow, piston, sensor, specimen, valve
 from actuator_glue.model.effects.effect import Effect, Place, Scale, scale
+from actuator_glue.model.effects.registry import Registry
 
 _ENTRIES = (
     *command.EFFECTS,
@@ -14,7 +15,8 @@ _ENTRIES = (
     *sensor.EFFECTS,
 )
 
-# Every effect by its name on the command line, in the order command -> sensor.
-CATALOGUE: dict[str, Effect] = {effect.name: effect for effect in _ENTRIES}
+# Every effect by its name on the command line, in the order command -> sensor; registered ones
+# follow.
+CATALOGUE = Registry(_ENTRIES)
 
 __all__ = ['CATALOGUE', 'Effect', 'Place', 'Scale', 'scale']

@@ -150,10 +150,8 @@ def _yielded(w: Array, n: int, moved: Any, middle: Any, soft: Any) -> Any:
 
 
 @njit
-def look(
-    w: Array, n: int, push: Any, stiff: Any, dry: Any, guess: Any, gaps: bool, yields: bool
-) -> Any:
-    """Newton step: the increment against force and tangent of the specimen after `guess`.
+def specimen(w: Array, n: int, guess: Any, gaps: bool, yields: bool) -> Any:
+    """Force and tangent of the specimen after an increment `guess`.
 
     Where it yields, IN_MIDDLE and IN_SOFT hold `halfway` of the guess.
     """
@@ -172,7 +170,15 @@ def look(
     tangent *= w[r.STIFFNESS + n]
     if gaps:
         tangent = tangent if abs(there) >= g else 0.0
-    trial = push - w[r.STIFFNESS + n] * force + tangent * guess
+    return w[r.STIFFNESS + n] * force, tangent
+
+
+@njit
+def look(
+    w: Array, n: int, push: Any, stiff: Any, dry: Any, guess: Any, force: Any, tangent: Any
+) -> Any:
+    """Newton step: the increment against force and tangent of the specimen after `guess`."""
+    trial = push - force + tangent * guess
     return beyond(trial, dry) / (stiff + w[r.DAMPING_2 + n] + tangent)
 
 

@@ -16,6 +16,7 @@ DELAY = Effect(
     source='Horiuchi et al. 1999',
     starts=lambda s: ((0.001,), (0.004,), (0.01,)),
     switches=(rows.ON_LAG,),
+    exact=(),
 )
 
 GAIN = Effect(
@@ -27,6 +28,7 @@ GAIN = Effect(
     signature='linear; relative residual constant down to zero frequency',
     source='Jelali & Kroll 2003',
     starts=lambda s: ((1.01,), (0.99,), (1.05,), (0.95,)),
+    exact=(),
 )
 
 EFFECTS = (DELAY, GAIN)

@@ -8,6 +8,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
+from actuator_glue.model.effects.terms.expression import Expression
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.records import Array, Record
 
@@ -79,11 +80,15 @@ class Effect:
         source: literature.
         starts: sizes from which a fit may start, given the scale of the test; each row holds
             one value per parameter.
+        exact: states of the exact simulation it needs beside x and q (lti.py) where it is linear.
         switches: the kernel's stages it needs (rows.ON_...).
         output: post-step on the recorded displacement: (parameters (m, p), time (n, 1),
             displacement (n, m)) -> (n, m).
         variance: variance it adds to the measurement: (parameters (m, p), velocity of the
             recorded displacement (m, n) [m/s]) -> (m, n) [m^2]; such an effect leaves the mean.
+        expression: what it does to the signal of its place, where the compiled step has no stage
+            of its own for it (see terms.term).
+        searched: whether the diagnosis tries it.
     """
 
     name: str
@@ -94,6 +99,14 @@ class Effect:
     signature: str
     source: str
     starts: Starts
+    exact: tuple[int, ...] | None = None
     switches: tuple[int, ...] = ()
     output: Output | None = None
     variance: Variance | None = None
+    expression: Expression | None = None
+    searched: bool = True
+
+    @property
+    def linear(self) -> bool:
+        """Whether it leaves the loop linear, so that the exact simulation (lti.py) has it."""
+        return self.exact is not None or self.output is not None or self.variance is not None

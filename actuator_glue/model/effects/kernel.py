@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from actuator_glue.jit import njit
 from actuator_glue.model.effects import balance, lag, stages
 from actuator_glue.model.effects import rows as r
+from actuator_glue.model.effects.terms import machine, stage
 from actuator_glue.records import Array
 
 
@@ -93,28 +94,40 @@ def _curved(w: Array, rate: float, yields: bool) -> None:
     """Sub-step against a specimen whose tangent changes slowly: one Newton step."""
     for n in range(r.LANES):
         push, stiff = w[r.IN_PUSH + n], w[r.IN_STIFF + n]
-        dx = balance.look(w, n, push, stiff, w[r.COULOMB + n], w[r.DX + n], False, yields)
+        guess = w[r.DX + n]
+        force, tangent = balance.specimen(w, n, guess, False, yields)
+        dx = balance.look(w, n, push, stiff, w[r.COULOMB + n], guess, force, tangent)
         if yields:
             balance.finish_yield(w, n, dx, False)
         _end(w, n, rate, dx)
 
 
 @njit
-def _search(w: Array, rate: float, falls: bool, yields: bool) -> None:
-    """Sub-step against any specimen and friction: Newton steps, three with falling friction."""
+def _search(
+    w: Array, g: Array, program: machine.Code, rate: float, falls: bool, yields: bool, terms: bool
+) -> None:
+    """Sub-step against any specimen and friction: Newton steps, three unless all is smooth."""
     for n in range(r.LANES):
         w[r.IN_DX + n] = w[r.DX + n]
-    for _ in range(3 if falls else 2):
+    for _ in range(program[0, machine.TIMES] if terms else 3 if falls else 2):
         if yields:
             for n in range(r.LANES):
                 moved = balance.passed(w, n, w[r.IN_DX + n], True)
                 w[r.IN_MIDDLE + n], w[r.IN_SOFT + n] = balance.halfway(w, n, moved)
+        if terms:
+            stage.force(w, g, program, rate, yields)
         for n in range(r.LANES):
             push, stiff, guess = w[r.IN_PUSH + n], w[r.IN_STIFF + n], w[r.IN_DX + n]
             dry = w[r.COULOMB + n]
             if falls:
                 dry += balance.friction_rise(w, n, guess)
-            w[r.IN_DX + n] = balance.look(w, n, push, stiff, dry, guess, True, yields)
+            if terms:
+                # What weakens faster than the oil is stiff is not followed implicitly.
+                least = -0.5 * (stiff + w[r.DAMPING_2 + n])
+                force, tangent = g[machine.F, n], max(g[machine.D_F, n], least)
+            else:
+                force, tangent = balance.specimen(w, n, guess, True, yields)
+            w[r.IN_DX + n] = balance.look(w, n, push, stiff, dry, guess, force, tangent)
     for n in range(r.LANES):
         dx = w[r.IN_DX + n]
         if falls:
@@ -125,13 +138,27 @@ def _search(w: Array, rate: float, falls: bool, yields: bool) -> None:
 
 
 @njit
-def _substep(w: Array, on: NDArray[np.bool_], mean: float, rate: float, time: float) -> None:
+def _substep(
+    w: Array, g: Array, program: machine.Code, on: NDArray[np.bool_], mean: float, rate: float,
+    time: float,
+) -> None:  # fmt: skip
     """Carry the nonlinear loop on by one sub-step; `time` is its middle."""
     flows, falls, gaps = on[r.ON_FLOW], on[r.ON_STRIBECK], on[r.ON_GAP]
-    if flows:
+    if on[r.ON_TERMS]:
+        stage.valve(w, g, program, mean, rate, time)
+        stages.flow(w, on, time)
+        stage.flow(w, g, program, rate)
+    elif flows:
         for n in range(r.LANES):
             w[r.IN_Q + n], w[r.IN_DQ + n] = stages.valve(w, n, mean)
         stages.flow(w, on, time)
+    if on[r.ON_FORCE]:
+        _begin(w, mean, True, False, False)
+        if falls or on[r.ON_YIELD]:
+            _search(w, g, program, rate, True, True, True)
+        else:
+            _search(w, g, program, rate, False, False, True)
+        return
     if not (falls or on[r.ON_CURVED]):
         if flows:
             if gaps:
@@ -162,14 +189,14 @@ def _substep(w: Array, on: NDArray[np.bool_], mean: float, rate: float, time: fl
         _begin(w, mean, False, False, False)
     if falls:
         if yields:
-            _search(w, rate, True, True)
+            _search(w, g, program, rate, True, True, False)
         else:
-            _search(w, rate, True, False)
+            _search(w, g, program, rate, True, False, False)
     elif gaps:
         if yields:
-            _search(w, rate, False, True)
+            _search(w, g, program, rate, False, True, False)
         else:
-            _search(w, rate, False, False)
+            _search(w, g, program, rate, False, False, False)
     elif yields:
         _curved(w, rate, True)
     else:
@@ -180,6 +207,7 @@ def _substep(w: Array, on: NDArray[np.bool_], mean: float, rate: float, time: fl
 def advance(
     table: Array,
     on: NDArray[np.bool_],
+    program: machine.Code,
     u: Array,
     offset: int,
     begin: int,
@@ -192,9 +220,10 @@ def advance(
     """Write the sensed displacement at samples begin, begin+1, ... and carry the state on.
 
     Args:
-        table: (SIZE,), read and updated; its states stand at sample begin - 1, or at sample 0
-            where begin is 0.
+        table: (SIZE + registers,), read and updated; its states stand at sample begin - 1, or at
+            sample 0 where begin is 0.
         on: (SWITCHES,) which stages act.
+        program: instructions of effects written as expressions, which use the registers.
         u: command samples [m]; u[0] is sample `offset` of the stream.
         offset: stream index of u[0].
         begin: stream index of the first sample written.
@@ -205,7 +234,8 @@ def advance(
         force: (n, LANES) output, actuator force [N]; (0, LANES) where it is not wanted.
     """
     w = np.empty(r.SIZE)  # known to the compiler
-    w[:] = table
+    w[:] = table[: r.SIZE]
+    g = table[r.SIZE :].reshape(-1, r.LANES)
     places = np.empty(lag.PLACES, np.int32)
     lag.prepare(w, substeps)
     inverse = 1.0 / substeps
@@ -228,7 +258,7 @@ def advance(
                 mean, slope = stages.linear(u, offset, start, start + inverse)
             else:
                 mean = stages.held(u, at - offset)
-            _substep(w, on, mean, rate, (at + (j + 0.5) * inverse) * period)
+            _substep(w, g, program, on, mean, rate, (at + (j + 0.5) * inverse) * period)
             if on[r.ON_TRANSDUCER]:
                 for n in range(r.LANES):
                     corrected = stages.chains(w, n, mean, slope)
@@ -239,4 +269,4 @@ def advance(
         if want_force:
             for n in range(r.LANES):
                 force[i, n] = w[r.F + n]
-    table[:] = w
+    table[: r.SIZE] = w

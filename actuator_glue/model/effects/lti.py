@@ -30,8 +30,6 @@ from actuator_glue.model.effects.rows import LANES
 from actuator_glue.model.effects.stages import held
 from actuator_glue.records import Array
 
-# Effects that this file knows; it takes gain, delay and what acts on the record as well.
-EFFECTS: Final = ('delay', 'valve-lag', 'viscous-damping', 'payload-inertia', 'sensor-lag')
 NAMES: Final = (
     'beta_1', 'alpha_1_beta_0', 'alpha_2', 'alpha_3', 'gain', 'delay', 'valve_lag', 'damping',
     'mass', 'mass_damping', 'sensor_lag',
@@ -46,8 +44,13 @@ _FORCE: Final = _STATE + STATES * LANES
 _WHOLE: Final = _FORCE + STATES * LANES
 _TAPS: Final = _WHOLE + LANES
 SIZE: Final = _TAPS + 3 * LANES
-# The state an effect adds, velocity and force at once; NONE, or ALL for more than that.
-_ADDED: Final = {'viscous-damping': 2, 'payload-inertia': 3, 'valve-lag': 4, 'sensor-lag': 5}
+# States that effects add to x and q (Effect.exact): velocity, velocity and force, rate of the
+# flow, recorded displacement.
+VELOCITY: Final = (2,)
+MASS: Final = (2, 3)
+VALVE: Final = (4,)
+SENSOR: Final = (5,)
+# Which of them the step has: one, 3 for a mass, NONE, or ALL.
 _MASS: Final = 3
 NONE: Final = -2
 ALL: Final = -1
@@ -329,12 +332,13 @@ def advance(
     table[:] = w
 
 
-def third(effects: Iterable[str]) -> int:
-    """Return which one state effects add to x and q; NONE for none, ALL for several.
+def third(added: Iterable[tuple[int, ...] | None]) -> int:
+    """Return which states effects add to x and q, given Effect.exact of each.
 
-    A mass brings velocity and force, and with them what damps the velocity.
+    One state's number; 3 for a mass, which brings velocity and force, and with them what damps
+    the velocity; NONE for none, ALL for several.
     """
-    added = {_ADDED[name] for name in effects if name in _ADDED}
-    if added == {2, _MASS}:
+    states = {state for some in added for state in some or ()}
+    if states == set(MASS):
         return _MASS
-    return added.pop() if len(added) == 1 else ALL if added else NONE
+    return states.pop() if len(states) == 1 else ALL if states else NONE

@@ -39,9 +39,10 @@ LANES = 32
 SIZE = 99 * LANES
 
 # One flag per stage that can be skipped; ON_FLOW for any effect on the flow, ON_CURVED for any
-# specimen whose force is neither proportional nor has a gap only.
+# specimen whose force is neither proportional nor has a gap only; ON_TERMS for any expression in
+# the loop, ON_FORCE for one of a force.
 (
     ON_LAG, ON_FLOW, ON_PRESSURE, ON_DROOP, ON_CURVED, ON_STRIBECK, ON_GAP, ON_YIELD,
-    ON_TRANSDUCER,
-) = range(9)  # fmt: skip
-SWITCHES = 9
+    ON_TRANSDUCER, ON_TERMS, ON_FORCE,
+) = range(11)  # fmt: skip
+SWITCHES = 11

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.jit import njit
 from actuator_glue.model.effects import coefficients, kernel, lti, rows
+from actuator_glue.model.effects.terms import machine
+from actuator_glue.model.effects.terms.program import Program
 from actuator_glue.records import Array, Record
 
 # Sub-steps are at most this long: the error of one effect stays below 0.3 um on a 2 mm sweep.
@@ -64,17 +66,20 @@ class Envelope:
 @np.errstate(all='ignore')
 def tables(
     values: Mapping[str, Array],
+    program: Program,
     stiffness: float,
     substeps: int,
     period: float,
     start: tuple[float, float],
 ) -> Array:
-    """Return the kernel's tables at the first sample, shape (blocks, rows.SIZE).
+    """Return the kernel's tables at the first sample, shape (blocks, rows.SIZE + registers).
 
     The last block is filled up by repeating the last parameter set.
 
     Args:
-        values: parameters by name, each (m,), with all of coefficients.NAMES but 'envelope'.
+        values: parameters by name, each (m,), with all of coefficients.NAMES but 'envelope'; also
+            'origin', the time of the first sample since the test began [s], where it is not 0.
+        program: effects written as expressions.
         stiffness: specimen stiffness k [N/m].
         substeps: sub-steps per sample.
         period: sample period [s].
@@ -88,15 +93,28 @@ def tables(
             parameters[name] = value
     # A limit that is not a number must not pass for no limit: it makes the state not a number.
     one = np.where(np.isnan(total), np.nan, 1.0)
-    out = np.zeros((-(-len(total) // rows.LANES), rows.SIZE))
+    blocks = -(-len(total) // rows.LANES)
     x, v = start[0] * one, start[1] * one
-    coefficients.fill(parameters, stiffness, period / substeps, period, x, v, out)
+    step = period / substeps
+    out = np.zeros((blocks, rows.SIZE + program.registers.size))
+    coefficients.fill(parameters, stiffness, step, period, x, v, out)
+    if program.acts(machine.COMMAND, machine.FORCE):
+        which = np.minimum(np.arange(blocks * rows.LANES), len(total) - 1)
+        registers = program.start(values, which)
+        registers[:, machine.STEP], registers[:, machine.K] = step, stiffness
+        registers[:, machine.D_V_MIDDLE], registers[:, machine.D_V_END] = 1.0 / step, 1.5 / step
+        # What went before a record that begins in motion is not known.
+        registers[:, list(program.memory)] = 0.0 if start == (0.0, 0.0) else np.nan
+        for block in registers:
+            machine.execute(block, program.code, 1, int(program.code[0, machine.PREPARE]))
+        out[:, rows.SIZE :] = registers.reshape(blocks, -1)
     return out
 
 
 def blocks(
     values: Mapping[str, Array],
     on: NDArray[np.bool_],
+    program: Program,
     record: Record,
     start: tuple[float, float],
     rate: int = 1,
@@ -106,6 +124,7 @@ def blocks(
     Args:
         values: parameters of every compiled stage by name, each (m,).
         on: switches, (rows.SWITCHES,).
+        program: effects written as expressions.
         record: command, period, hold and known stiffness.
         start: position and velocity at the first sample.
         rate: how many times finer than usual the sub-steps are.
@@ -127,13 +146,14 @@ def blocks(
         substeps = base * int(factor)
         some = {name: value[which] for name, value in values.items()}
         members = (which[i : i + rows.LANES] for i in range(0, len(which), rows.LANES))
-        split = tables(some, stiffness, substeps, record.period, start)
+        split = tables(some, program, stiffness, substeps, record.period, start)
         for lanes, table in zip(members, split, strict=True):
             for begin in range(0, len(record), _CHUNK):
                 part = out[: min(_CHUNK, len(record) - begin)]
                 kernel.advance(
                     table,
                     on,
+                    program.code,
                     command,
                     -1,
                     begin,
@@ -148,17 +168,20 @@ def blocks(
 
 def exact_blocks(
     values: Mapping[str, Array],
-    effects: Sequence[str],
+    third: int,
+    delayed: bool,
     record: Record,
     start: tuple[float, float],
 ) -> Iterator[tuple[NDArray[np.intp], int, Array]]:
-    """Simulate a record with linear effects only, as `blocks` does, but exactly and faster."""
+    """Simulate a record with linear effects only, as `blocks` does, but exactly and faster.
+
+    `third` and `delayed` as `lti.advance` takes them.
+    """
     linear = record.hold == 'linear'
     before = record.command[:1] if start != (0.0, 0.0) else np.zeros(1)
     command = np.concatenate([before, record.command])
     nothing = np.empty((0, rows.LANES))
     out = np.empty((min(len(record), _CHUNK), rows.LANES))
-    third, delayed = lti.third(effects), 'delay' in effects
     split = lti.tables(values, record.known_stiffness(), record.period, linear, start)
     count = len(values['beta_1'])
     for block, table in enumerate(split):

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from actuator_glue.jit import njit
-from actuator_glue.model.effects import rows
+from actuator_glue.model.effects import lti, rows
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.records import Array
@@ -70,6 +70,7 @@ LAG = Effect(
     source='Jelali & Kroll 2003 (transducers)',
     starts=lambda s: ((0.0005,), (0.002,), (0.008,)),
     switches=(rows.ON_TRANSDUCER,),
+    exact=lti.SENSOR,
 )
 
 BIAS = Effect(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from actuator_glue.model.effects import rows
+from actuator_glue.model.effects import lti, rows
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.parameters import Parameter
 
@@ -19,6 +19,7 @@ DAMPING = Effect(
     starts=lambda s: tuple(
         (share * s.oil * s.stroke / s.velocity,) for share in (0.01, 0.05, 0.3)
     ),
+    exact=lti.VELOCITY,
 )
 
 INERTIA = Effect(
@@ -37,6 +38,7 @@ INERTIA = Effect(
         for hz in (80.0, 40.0, 20.0)
         for ratio in (0.1, 0.4)
     ),
+    exact=lti.MASS,
 )
 
 GAP = Effect(

@@ -54,11 +54,16 @@ def valve(w: Array, n: int, mean: float) -> Any:
     The command's mean is `mean` plus what is the lane's own.
     """
     u = w[r.GAIN + n] * (mean + w[r.IN_MEAN + n])
-    error = u + w[r.NULL + n] - w[r.X + n] - 0.5 * w[r.DX + n]
+    return spool(w, n, u + w[r.NULL + n] - w[r.X + n] - 0.5 * w[r.DX + n], -0.5)
+
+
+@njit
+def spool(w: Array, n: int, error: Any, slope: Any) -> Any:
+    """Mean spool flow and d(flow)/d(dx) from the control error and its d/d(dx)."""
     band, acting = w[r.DEADBAND + n], w[r.VALVE_E + n]
     left = error - min(max(error, -band), band)
     flow = acting * left + w[r.VALVE_Q + n] * w[r.Q + n] + w[r.VALVE_D + n] * w[r.QD + n]
-    return flow, (-0.5 * acting if abs(error) >= band else 0.0)
+    return flow, (slope * acting if abs(error) >= band else 0.0)
 
 
 @njit

@@ -1,0 +1,109 @@
+"""Effects of your own: read from a file, registered, saved.
+
+A registered effect is fitted, simulated, diagnosed and reported as those of the catalogue are.
+Files are YAML, or Python with nothing but literals; neither is executed (docs/effects.md).
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from actuator_glue.errors import InputError
+from actuator_glue.model.effects import CATALOGUE, Effect
+from actuator_glue.model.effects.terms.definition import entries, mapping
+from actuator_glue.model.effects.terms.entry import term
+from actuator_glue.model.parameters import Parameter
+
+register = CATALOGUE.register
+unregister = CATALOGUE.unregister
+
+__all__ = [
+    'CATALOGUE', 'Effect', 'Parameter', 'load_effects', 'read_effects', 'register', 'save_effects',
+    'term', 'unregister',
+]  # fmt: skip
+
+
+def load_effects(path: Path | str) -> tuple[Effect, ...]:
+    """Register the effects of a file and return them; replaces what was registered before.
+
+    Raises:
+        InputError: as `read_effects`, or a name that the catalogue has.
+    """
+    found = read_effects(path)
+    try:
+        for effect in found:
+            register(effect, replace=True)
+    except InputError as error:
+        raise InputError(f'{path}: {error}') from None
+    return found
+
+
+def read_effects(path: Path | str) -> tuple[Effect, ...]:
+    """Return the effects of a file: YAML, or a Python file whose EFFECTS is a literal.
+
+    Raises:
+        InputError: it cannot be read, or an effect cannot be used; says where.
+    """
+    path = Path(path)
+    try:
+        text = path.read_text(encoding='utf-8')
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else 'it is no text'
+        raise InputError(f'{path}: cannot be read ({reason})') from error
+    content = _literal(text, path) if path.suffix == '.py' else _yaml(text, path)
+    return entries(content, str(path))
+
+
+def save_effects(path: Path | str, effects: Iterable[Effect]) -> None:
+    """Write effects that are written as expressions to a YAML file for `load_effects`.
+
+    Raises:
+        InputError: the file cannot be written, or an effect has a compiled stage of its own.
+    """
+    chosen = tuple(effects)
+    for effect in chosen:
+        if effect.expression is None:
+            raise InputError(f'effect {effect.name!r} is not written as an expression')
+    text = yaml.safe_dump(mapping(chosen), sort_keys=False, allow_unicode=True)
+    try:
+        Path(path).write_text(text, encoding='utf-8')
+    except OSError as error:
+        raise InputError(f'{path}: cannot be written ({error.strerror})') from error
+
+
+def _yaml(text: str, path: Path) -> Any:
+    try:
+        return yaml.safe_load(text)
+    except yaml.YAMLError as error:
+        mark = getattr(error, 'problem_mark', None)
+        where = f', line {mark.line + 1}, column {mark.column + 1}' if mark else ''
+        raise InputError(f'{path}{where}: no YAML ({getattr(error, "problem", error)})') from None
+
+
+def _literal(text: str, path: Path) -> Any:
+    """Return the literal EFFECTS of a Python file that has nothing else; nothing is executed."""
+    try:
+        body = ast.parse(text).body
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        line = getattr(error, 'lineno', None) or 1
+        raise InputError(f'{path}, line {line}: no Python ({error})') from None
+    found = None
+    for node in body:
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
+            continue  # a docstring
+        named = isinstance(node, ast.Assign) and [ast.unparse(t) for t in node.targets]
+        try:
+            if named != ['EFFECTS']:
+                raise ValueError
+            found = ast.literal_eval(node.value)  # type: ignore[attr-defined]
+        except (ValueError, TypeError, RecursionError):
+            raise InputError(
+                f'{path}, line {node.lineno}: the file is read, not executed; it may hold '
+                'EFFECTS = {...} of literals only'
+            ) from None
+    return found

@@ -1,0 +1,81 @@
+"""The effects there are: those of the catalogue and those that somebody registers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from actuator_glue.errors import InputError
+from actuator_glue.model.effects import coefficients
+from actuator_glue.model.effects.effect import Effect
+from actuator_glue.model.parameters import NAMES as BASE
+
+
+class Registry(dict[str, Effect]):
+    """Effects by name, in the order in which their parameters stand in a model."""
+
+    def __init__(self, effects: Iterable[Effect]) -> None:
+        super().__init__()
+        self._own: frozenset[str] = frozenset()
+        for effect in effects:
+            self.register(effect)
+        self._own = frozenset(self)
+
+    def register(self, effect: Effect, *, replace: bool = False) -> Effect:
+        """Add an effect and return it; to add the same one again changes nothing.
+
+        Args:
+            effect: the effect.
+            replace: take it in place of another one that was registered under its name.
+
+        Raises:
+            InputError: its name or a parameter's belongs to another effect, or a parameter is one
+                that nothing takes.
+        """
+        known = self.get(effect.name)
+        if known is not None:
+            if known == effect:
+                return known
+            if replace and effect.name not in self._own:
+                del self[effect.name]
+                try:
+                    return self.register(effect)
+                except InputError:
+                    self[effect.name] = known
+                    raise
+            raise InputError(
+                f'effect {effect.name!r} is there already, with another definition; rename one'
+            )
+        owner = {p.name: e.name for e in self.values() for p in e.parameters}
+        owner.update(dict.fromkeys(BASE, 'Eq. (2)'))
+        acts = effect.output or effect.variance or effect.expression
+        for p in effect.parameters:
+            if p.name in owner:
+                raise InputError(
+                    f'effect {effect.name!r}: parameter {p.name!r} belongs to {owner[p.name]} '
+                    'already; names of parameters are unique, rename it'
+                )
+            if not acts and p.name not in coefficients.NAMES:
+                raise InputError(
+                    f'effect {effect.name!r}: nothing takes parameter {p.name!r}; it needs an '
+                    'expression, an output or a variance'
+                )
+        self[effect.name] = effect
+        return effect
+
+    def unregister(self, name: str) -> None:
+        """Forget an effect that was registered.
+
+        Raises:
+            InputError: there is none of that name, or it belongs to the catalogue.
+        """
+        if name in self._own or name not in self:
+            raise InputError(f'effect {name!r} is not one that was registered')
+        del self[name]
+
+    def registered(self) -> tuple[Effect, ...]:
+        """Return the effects beyond the catalogue, which other processes must be told of."""
+        return tuple(effect for name, effect in self.items() if name not in self._own)
+
+    def searched(self) -> tuple[str, ...]:
+        """Return the effects that the diagnosis tries."""
+        return tuple(name for name, effect in self.items() if effect.searched)

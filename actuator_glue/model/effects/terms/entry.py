@@ -1,0 +1,240 @@
+"""An entry of the catalogue from an expression: typical sizes and, for sensors, the post-step."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import lru_cache
+
+import numpy as np
+
+from actuator_glue.errors import InputError
+from actuator_glue.model.effects.effect import Effect, Place, Scale
+from actuator_glue.model.effects.rows import LANES
+from actuator_glue.model.effects.terms import machine as m
+from actuator_glue.model.effects.terms import program
+from actuator_glue.model.effects.terms.expression import SIGNAL, Expression, read, reserved
+from actuator_glue.model.parameters import TABLE_2, Parameter
+from actuator_glue.records import Array
+
+# Shares of its signal that an effect of a typical size changes.
+_SHARES = (0.01, 0.05, 0.25)
+# Sizes tried for it, and samples of the motion they are tried on.
+_LEAST, _SAMPLES = 1e-9, 200
+# How far from neutral an effect must be small, as a share of a parameter's range.
+_NEAR = 1e-9
+_SMALL = 1e-2
+# A test on which expressions are tried.
+_USUAL = Scale(1e-2, 0.1, 10.0, 1e-3, 1e5, TABLE_2)
+
+
+def term(
+    name: str,
+    equation: str,
+    parameters: tuple[Parameter, ...],
+    *,
+    group: str = '',
+    signature: str = 'none described',
+    source: str = 'expression of the user',
+    searched: bool = True,
+) -> Effect:
+    """Return the entry of an effect written as `place: symbol = expression`.
+
+    Args:
+        name: name on the command line.
+        equation: for example `sensor: y = y + cubic*y**3`; see docs/effects.md.
+        parameters: every one with a neutral value; all of them neutral are no effect.
+        group: effects that leave nearly the same trace; its own name if empty.
+        signature: what it leaves in the residual.
+        source: literature.
+        searched: whether the diagnosis tries it.
+
+    Raises:
+        InputError: the expression or a parameter cannot be used.
+    """
+    try:
+        _check(name, parameters)
+        found = _expression(equation, parameters)
+        place: Place = found.place  # type: ignore[assignment]
+        text = equation.partition(':')[2].strip()
+        effect = Effect(
+            name=name,
+            place=place,
+            equation=text,
+            parameters=parameters,
+            group=group or name,
+            signature=signature,
+            source=source,
+            starts=_Starts(name, equation, parameters),
+            expression=found,
+            output=_Sensor(name, equation, parameters) if place == 'sensor' else None,
+            searched=searched,
+        )
+        _check_neutral(effect)
+    except InputError as error:
+        raise InputError(f'effect {name!r}: {error}') from None
+    return effect
+
+
+def _check(name: str, parameters: tuple[Parameter, ...]) -> None:
+    if not name or not set(name) <= set('abcdefghijklmnopqrstuvwxyz0123456789-') or name[0] == '-':
+        raise InputError('a name has small letters, digits and hyphens')
+    if not parameters:
+        raise InputError('an effect needs a parameter whose neutral value switches it off')
+    for p in parameters:
+        if not (p.name.isidentifier() and p.name.isascii()) or p.name in reserved():
+            raise InputError(f'parameter {p.name!r}: not a name, or one with a meaning of its own')
+        if p.neutral is None or not (
+            np.isfinite([p.lower, p.upper]).all() and p.lower <= p.neutral <= p.upper
+        ):
+            raise InputError(
+                f'parameter {p.name!r}: bounds {p.lower:g} .. {p.upper:g} must be finite and '
+                f'hold the neutral value {p.neutral}'
+            )
+        if not p.lower < p.upper:
+            raise InputError(f'parameter {p.name!r}: the lower bound is not below the upper one')
+    if len({p.name for p in parameters}) < len(parameters):
+        raise InputError('two parameters have one name')
+
+
+@dataclass(frozen=True, slots=True)
+class _Starts:
+    """Typical sizes: those that change the signal by a share of it, in a sinusoidal motion."""
+
+    name: str
+    equation: str
+    parameters: tuple[Parameter, ...]
+
+    def __call__(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
+        found: list[tuple[float, ...]] = []
+        for j, parameter in enumerate(self.parameters):
+            neutral = float(parameter.neutral or 0.0)
+            for end in (parameter.upper, parameter.lower):
+                if end == neutral:
+                    continue
+                sizes = neutral + (end - neutral) * np.geomspace(_LEAST, 1.0, LANES)
+                table = _neutral(self.parameters)
+                table[:, j] = sizes
+                share = changed(self, table, scale)
+                for wanted in _SHARES:
+                    if (share >= wanted).any():
+                        found.append(tuple(table[int((share >= wanted).argmax())].tolist()))
+        # An effect that this motion does not show still needs somewhere to start.
+        middle = [0.1 * p.upper + 0.9 * float(p.neutral or 0.0) for p in self.parameters]
+        return tuple(dict.fromkeys(found)) or (tuple(middle),)
+
+
+@dataclass(frozen=True, slots=True)
+class _Sensor:
+    """Post-step on the recorded displacement."""
+
+    name: str
+    equation: str
+    parameters: tuple[Parameter, ...]
+
+    def __call__(self, table: Array, time: Array, y: Array) -> Array:
+        made = _program(self.equation, self.parameters)
+        out, when = np.empty(y.shape), np.ascontiguousarray(time[:, 0])
+        blocks = -(-len(table) // LANES)
+        which = np.minimum(np.arange(blocks * LANES), len(table) - 1)
+        values = {p.name: table[:, j] for j, p in enumerate(self.parameters)}
+        for block, registers in enumerate(made.start(values, which)):
+            lanes = slice(block * LANES, min((block + 1) * LANES, len(table)))
+            m.execute(registers, made.code, 1, int(made.code[0, m.PREPARE]))
+            m.sense(registers, made.code, when, y[:, lanes], out[:, lanes])
+        return out
+
+
+@lru_cache(maxsize=256)
+def _expression(equation: str, parameters: tuple[Parameter, ...]) -> Expression:
+    """Return the expression; tries whether it is exact."""
+    found = read(equation, tuple(p.name for p in parameters))
+    tried = replace(found, exact=True)
+    made = program.compiled([program.Written(tried, parameters)])
+    before, after = _tried(made, tried.place, _neutral(parameters), parameters, _USUAL)
+    return replace(found, exact=bool((after == before).all()))
+
+
+@lru_cache(maxsize=256)
+def _program(equation: str, parameters: tuple[Parameter, ...]) -> program.Program:
+    return program.compiled([program.Written(_expression(equation, parameters), parameters)])
+
+
+def _neutral(parameters: tuple[Parameter, ...]) -> Array:
+    """Return a table (LANES, p) of neutral parameters."""
+    row = [float(p.neutral or 0.0) for p in parameters]
+    return np.repeat(np.array([row]), LANES, axis=0)
+
+
+def changed(starts: _Starts, table: Array, scale: Scale) -> Array:
+    """Return by which share of itself each parameter set (LANES, p) changes its signal."""
+    made = _program(starts.equation, starts.parameters)
+    place = _expression(starts.equation, starts.parameters).place
+    before, after = _tried(made, place, table, starts.parameters, scale)
+    size = float(np.sqrt(np.mean(before**2)))
+    if place in ('specimen', 'piston'):
+        # Without a specimen there is no force to compare with.
+        size = max(size, 0.2 * scale.oil * scale.stroke)
+    with np.errstate(all='ignore'):
+        return np.asarray(np.sqrt(np.mean((after - before) ** 2, axis=0)) / size)
+
+
+def _tried(
+    made: program.Program,
+    place: str,
+    table: Array,
+    parameters: tuple[Parameter, ...],
+    scale: Scale,
+) -> tuple[Array, Array]:
+    """Return the signal in a sinusoidal motion, before (n, 1) and after (n, LANES) the effect."""
+    values = {p.name: table[:, j] for j, p in enumerate(parameters)}
+    g = made.start(values, np.arange(LANES))[0]
+    period = 2.0 * np.pi * scale.stroke / scale.velocity
+    step = 3.0 * period / _SAMPLES
+    motion = _motion(scale, step * np.arange(_SAMPLES, dtype=np.float64), period)
+    g[m.STEP], g[m.K] = step, scale.stiffness
+    for j, row in enumerate((m.BETA_1, m.ALPHA_1_BETA_0, m.ALPHA_2, m.ALPHA_3)):
+        g[row] = scale.theta[j]
+    m.execute(g, made.code, 1, int(made.code[0, m.PREPARE]))
+    part = program.PART[place]
+    first = int(made.code[0, part - 1])
+    last = int(made.code[0, part]) if part <= m.FORCE else len(made.code)
+    row = motion[SIGNAL[place]][0]
+    before, after = np.empty((_SAMPLES, 1)), np.empty((_SAMPLES, LANES))
+    for i in range(_SAMPLES):
+        for register, trace in motion.values():
+            g[register] = trace[i]
+        before[i] = g[row, 0]
+        m.execute(g, made.code, first, last)
+        after[i] = g[row]
+    return before, after
+
+
+def _motion(scale: Scale, time: Array, period: float) -> dict[str, tuple[int, Array]]:
+    """Return register and trace of everything that moves, for a sine of the test's size."""
+    beta_1, into, oil = scale.theta[0], max(float(scale.theta[1]), 1e-9), scale.oil
+    turn = 2.0 * np.pi / period
+    x = scale.stroke * np.sin(turn * time)
+    v = scale.stroke * turn * np.cos(turn * time)
+    error = beta_1 * oil * v / into
+    return {
+        't': (m.T, time), 'x': (m.X, x), 'y': (m.Y, x), 'v': (m.V, v), 'u': (m.U, x + error),
+        'e': (m.E, error), 'q': (m.Q, oil * v), 'f': (m.F, scale.stiffness * x),
+    }  # fmt: skip
+
+
+def _check_neutral(effect: Effect) -> None:
+    """Refuse an effect that does not vanish as its parameters become neutral."""
+    starts = effect.starts
+    assert isinstance(starts, _Starts)
+    table = _neutral(effect.parameters)
+    for j, p in enumerate(effect.parameters):
+        step = _NEAR * (p.upper - p.lower)
+        table[2 * j % LANES, j] = min(table[0, j] + step, p.upper)
+        table[(2 * j + 1) % LANES, j] = max(table[0, j] - step, p.lower)
+    share = changed(starts, table, _USUAL)
+    if not (share < _SMALL).all():
+        raise InputError(
+            f'{effect.equation!r} is still there with all parameters close to neutral ('
+            + ', '.join(f'{p.name} = {p.neutral:g}' for p in effect.parameters)
+            + '): at their neutral values Eq. (2) must be left'
+        )

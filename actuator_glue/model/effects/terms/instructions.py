@@ -1,0 +1,207 @@
+"""Instructions for the machine from the tree of an expression, with d/d(dx) beside every value."""
+
+from __future__ import annotations
+
+from typing import Final
+
+from actuator_glue.model.effects.terms import machine as m
+from actuator_glue.model.effects.terms.expression import Tree
+
+_ONE: Final = {
+    'neg': m.NEG, 'abs': m.ABS, 'sign': m.SIGN, 'sqrt': m.SQRT, 'exp': m.EXP, 'log': m.LOG,
+    'sin': m.SIN, 'cos': m.COS, 'tanh': m.TANH, 'atan': m.ATAN,
+}  # fmt: skip
+# Most factors of a power that is multiplied out.
+_MOST: Final = 16
+_TINY: Final = 1e-150
+
+# A register with the value, and one with the slope d/d(dx) where there is one.
+Dual = tuple[int, int | None]
+
+
+class Emitter:
+    """Registers and instructions of one part after another.
+
+    What depends on parameters alone goes in front (`prepare`); nothing is computed twice.
+
+    Attributes:
+        rows: registers so far.
+        constants: register of every constant.
+        memory: registers that remember.
+        prepare: instructions executed once.
+        code: instructions of the present part.
+        symbols: register and slope of what an expression may name.
+    """
+
+    def __init__(self, held: set[int]) -> None:
+        self.rows = m.FIXED
+        self.constants: dict[float, int] = {}
+        self.memory: list[int] = []
+        self.prepare: list[tuple[int, ...]] = []
+        self.code: list[tuple[int, ...]] = []
+        self.symbols: dict[str, Dual] = {}
+        self._held = set(held)
+        self._prepared: dict[tuple[int, ...], int] = {}
+        self._known: dict[tuple[int, ...], int] = {}
+
+    def forget(self) -> None:
+        """Forget what was computed from signals that have changed."""
+        self._known.clear()
+
+    def row(self, held: bool = False) -> int:
+        """Return a new register; `held` if it does not change during a test."""
+        self.rows += 1
+        if held:
+            self._held.add(self.rows - 1)
+        return self.rows - 1
+
+    def constant(self, value: float) -> int:
+        """Return the register of a number."""
+        if value not in self.constants:
+            self.constants[value] = self.row(held=True)
+        return self.constants[value]
+
+    def do(self, op: int, a: int, b: int = 0, c: int = 0, memory: bool = False) -> int:
+        """Return the register with the result of an operation, computed once."""
+        operands = [a, *([b] if b else []), *([c] if c else [])]
+        held = self._held.issuperset(operands) and not memory
+        known, code = (self._prepared, self.prepare) if held else (self._known, self.code)
+        key = op, a, b, c
+        if key not in known:
+            known[key] = self.row(held)
+            kept = self.row() if memory else 0
+            if memory:
+                self.memory.append(kept)
+            code.append((op, known[key], a, b, c, kept))
+        return known[key]
+
+    def _times(self, a: int, slope: int | None) -> int | None:
+        if slope is None or slope == self.constants.get(1.0):
+            return None if slope is None else a
+        return self.do(m.MUL, a, slope)
+
+    def _plus(self, a: int | None, b: int | None, op: int = m.ADD) -> int | None:
+        if a is None or b is None:
+            return a if b is None else b if op == m.ADD else self.do(m.NEG, b)
+        return self.do(op, a, b)
+
+    def emit(self, tree: Tree) -> Dual:
+        """Add the instructions of an expression, return where its value and slope are."""
+        name, parts = tree.operation, tree.operands
+        if name == 'number':
+            return self.constant(tree.value), None
+        if name == 'symbol':
+            return self.symbols[tree.name]
+        if name == 'pow':
+            return self._power(*parts)
+        found = [self.emit(part) for part in parts]
+        if name in _ONE:
+            return self._one(name, *found[0])
+        if name in ('add', 'sub', 'mul', 'div'):
+            return self._two(name, *found[0], *found[1])
+        if name in ('min', 'max'):
+            return self._chosen(name, *found)
+        if name == 'clip':
+            return self._chosen('min', self._chosen('max', found[0], found[1]), found[2])
+        if name == 'dead':
+            (a, da), (w, _) = found
+            least = self.do(m.NEG, w), None
+            inside, slope = self._chosen('min', self._chosen('max', found[0], least), (w, None))
+            return self.do(m.SUB, a, inside), self._plus(da, slope, m.SUB)
+        return self._remembered(name, *found)
+
+    def _two(self, name: str, a: int, da: int | None, b: int, db: int | None) -> Dual:
+        if name == 'mul':
+            return self.do(m.MUL, a, b), self._plus(self._times(b, da), self._times(a, db))
+        if name == 'div':
+            out = self.do(m.DIV, a, b)
+            top = self._plus(da, self._times(out, db), m.SUB)
+            return out, None if top is None else self.do(m.DIV, top, b)
+        op = m.ADD if name == 'add' else m.SUB
+        return self.do(op, a, b), self._plus(da, db, op)
+
+    def _one(self, name: str, a: int, da: int | None) -> Dual:
+        out = self.do(_ONE[name], a)
+        if da is None or name == 'sign':
+            return out, None
+        if name == 'neg':
+            return out, self.do(m.NEG, da)
+        one = self.constant(1.0)
+        if name in ('sqrt', 'log', 'atan'):
+            below = a
+            if name == 'sqrt':
+                safe = self.do(m.MAX, out, self.constant(_TINY))
+                below = self.do(m.ADD, safe, safe)
+            elif name == 'atan':
+                below = self.do(m.ADD, one, self.do(m.MUL, a, a))
+            return out, self.do(m.DIV, da, below)
+        if name == 'tanh':
+            gain = self.do(m.SUB, one, self.do(m.MUL, out, out))
+        elif name == 'sin':
+            gain = self.do(m.COS, a)
+        elif name == 'cos':
+            gain = self.do(m.NEG, self.do(m.SIN, a))
+        else:
+            gain = self.do(m.SIGN, a) if name == 'abs' else out
+        return out, self.do(m.MUL, gain, da)
+
+    def _chosen(self, name: str, left: Dual, right: Dual) -> Dual:
+        (a, da), (b, db) = left, right
+        out = self.do(m.MIN if name == 'min' else m.MAX, a, b)
+        if da is None and db is None:
+            return out, None
+        zero = self.constant(0.0)
+        first = self.do(m.LESS, a, b) if name == 'min' else self.do(m.LESS, b, a)
+        a_slope, b_slope = zero if da is None else da, zero if db is None else db
+        return out, self.do(m.SELECT, a_slope, b_slope, first)
+
+    def _power(self, base: Tree, exponent: Tree) -> Dual:
+        a, da = self.emit(base)
+        sign, power = 1, exponent
+        if exponent.operation == 'neg':
+            sign, power = -1, exponent.operands[0]
+        if power.operation == 'number' and power.value in range(_MOST + 1):
+            return self._whole(a, da, sign * int(power.value))
+        n, _ = self.emit(exponent)
+        out = self.do(m.POW, a, n)
+        if da is None:
+            return out, None
+        safe = self.do(m.MAX, a, self.constant(_TINY))
+        less = self.do(m.POW, safe, self.do(m.SUB, n, self.constant(1.0)))
+        return out, self.do(m.MUL, self.do(m.MUL, n, less), da)
+
+    def _whole(self, a: int, da: int | None, n: int) -> Dual:
+        """A power multiplied out, and its slope."""
+        if n < 0:
+            below, slope = self._whole(a, da, -n)
+            out = self.do(m.DIV, self.constant(1.0), below)
+            if slope is None:
+                return out, None
+            return out, self.do(m.NEG, self.do(m.MUL, self.do(m.MUL, out, out), slope))
+        if n == 0:
+            return self.constant(1.0), None
+        if n == 1:
+            return a, da
+        less, _ = self._whole(a, None, n - 1)
+        slope = self._times(self.do(m.MUL, self.constant(float(n)), less), da) if da else None
+        return self.do(m.MUL, less, a), slope
+
+    def _remembered(self, name: str, first: Dual, *rest: Dual) -> Dual:
+        a, da = first
+        one = self.constant(1.0)
+        if name == 'integral':
+            out = self.do(m.INTEGRAL, a, m.STEP, memory=True)
+            return out, self._times(self.do(m.MUL, self.constant(0.5), m.STEP), da)
+        other = rest[0][0]
+        if name == 'lag':
+            steps = self.do(m.DIV, m.STEP, other)
+            left = self.do(m.EXP, self.do(m.NEG, steps))
+            mean = self.do(m.DIV, self.do(m.SUB, one, left), steps)
+            out = self.do(m.LAG, a, left, mean, memory=True)
+            return out, self._times(self.do(m.SUB, one, mean), da)
+        if name == 'play':
+            out = self.do(m.PLAY, a, other, memory=True)
+            return out, self._times(self.do(m.EDGE, a, out, other), da) if da else None
+        step = self.do(m.MUL, other, m.STEP)
+        out = self.do(m.LIMIT, a, step, memory=True)
+        return out, self._times(self.do(m.EQUAL, a, out), da) if da else None

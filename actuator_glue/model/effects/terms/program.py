@@ -1,0 +1,173 @@
+"""From expressions to the machine's instructions, each with its derivative along the increment.
+
+The compiled step is implicit in the displacement increment dx, so that beside every value that
+depends on it d(value)/d(dx) is computed. What holds during a test is computed once, in front.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_glue.model.effects.rows import LANES
+from actuator_glue.model.effects.terms import machine as m
+from actuator_glue.model.effects.terms.expression import SIGNAL, Expression
+from actuator_glue.model.effects.terms.instructions import Emitter
+from actuator_glue.model.parameters import Parameter
+from actuator_glue.records import Array
+
+# The places in the order in which the parts of a program stand.
+_PARTS: Final = (('command',), ('valve',), ('flow',), ('specimen', 'piston'), ('sensor',))
+PART: Final = {place: i + 1 for i, places in enumerate(_PARTS) for place in places}
+_VALUE: Final = {'t': m.T, 'u': m.U, 'e': m.E, 'q': m.Q, 'f': m.F, 'x': m.X, 'v': m.V, 'y': m.Y}
+# d/d(dx) of what depends on the increment where a part is executed: a register, or a number.
+_MIDDLE: Final = {'e': -0.5, 'x': 0.5, 'v': m.D_V_MIDDLE}
+_END: Final = {'f': m.D_F, 'x': 1.0, 'v': m.D_V_END}
+_SLOPE: Final[dict[str, dict[str, int | float]]] = {
+    'command': {}, 'valve': _MIDDLE, 'flow': {**_MIDDLE, 'e': m.D_E, 'q': m.D_Q}, 'specimen': _END,
+    'piston': _END, 'sensor': {},
+}  # fmt: skip
+# Functions with a kink.
+_KINKS: Final = {'abs', 'sign', 'min', 'max', 'clip', 'dead', 'sqrt'}
+# Where the slope of a part's signal is left.
+_LEFT: Final = {'valve': m.D_E, 'flow': m.D_Q, 'specimen': m.D_F, 'piston': m.D_F}
+_HOLDS: Final = {
+    'beta_1': m.BETA_1, 'alpha_1_beta_0': m.ALPHA_1_BETA_0, 'alpha_2': m.ALPHA_2,
+    'alpha_3': m.ALPHA_3, 'k': m.K,
+}  # fmt: skip
+
+
+class Written(NamedTuple):
+    """An effect written as an expression."""
+
+    expression: Expression
+    parameters: tuple[Parameter, ...]
+
+
+@dataclass(frozen=True)
+class Program:
+    """Instructions of some effects and the registers they work on.
+
+    Attributes:
+        code: (1 + instructions, machine.WIDTH); row 0 says where each part but the last ends.
+        registers: (rows, LANES) with the constants.
+        parameters: register of every parameter.
+        memory: registers that remember.
+        switches: per effect its register that says whether it acts, its parameters, and their
+            neutral values: an effect all of whose parameters are neutral is not there.
+    """
+
+    code: m.Code
+    registers: Array
+    parameters: Mapping[str, int]
+    memory: tuple[int, ...]
+    switches: tuple[tuple[int, tuple[str, ...], tuple[float, ...]], ...]
+
+    def acts(self, first: int, last: int) -> bool:
+        """Whether the parts first .. last (machine.COMMAND, ...) have instructions."""
+        return bool(self.code[0, last] > self.code[0, first - 1])
+
+    def start(self, values: Mapping[str, Array], which: NDArray[np.intp]) -> Array:
+        """Return registers (blocks, rows, LANES) with the parameters of every lane.
+
+        Args:
+            values: parameters by name, each (m,).
+            which: parameter set of every lane, (blocks x LANES,).
+        """
+        out = np.repeat(self.registers[np.newaxis], len(which) // LANES, axis=0)
+        held = {'origin': m.ORIGIN, **_HOLDS, **self.parameters}
+        for name, row in held.items():
+            if name in values:
+                out[:, row] = values[name][which].reshape(-1, LANES)
+        for row, names, neutral in self.switches:
+            on = np.zeros(len(which), dtype=np.bool_)
+            for name, off in zip(names, neutral, strict=True):
+                on |= values[name][which] != off
+            out[:, row] = on.reshape(-1, LANES)
+        return out
+
+
+def compiled(effects: Iterable[Written]) -> Program:
+    """Return the program of some effects."""
+    builder, written = _Builder(), tuple(effects)
+    for places in _PARTS:
+        builder.part(e for place in places for e in written if e.expression.place == place)
+    return builder.program()
+
+
+class _Builder:
+    def __init__(self) -> None:
+        self._emitter = Emitter({m.STEP, m.D_V_MIDDLE, m.D_V_END, *_HOLDS.values()})
+        self._parameters: dict[str, int] = {}
+        self._switches: list[tuple[int, tuple[str, ...], tuple[float, ...]]] = []
+        self._parts: list[list[tuple[int, ...]]] = []
+        self._left: set[str] = set()
+        self._times = 1
+
+    def part(self, effects: Iterable[Written]) -> None:
+        """Add a part; every effect takes the signal that the one before has made."""
+        self._emitter.code = []
+        for effect in effects:
+            self._add(effect)
+        self._parts.append(self._emitter.code)
+
+    def _add(self, effect: Written) -> None:
+        into, names = self._emitter, tuple(p.name for p in effect.parameters)
+        place = effect.expression.place
+        for name in names:
+            self._parameters.setdefault(name, into.row(held=True))
+        slopes = {
+            s: slope if isinstance(slope, int) else into.constant(slope)
+            for s, slope in _SLOPE[place].items()
+        }
+        into.symbols = {
+            **{name: (row, None) for name, row in _HOLDS.items()},
+            **{name: (row, slopes.get(name)) for name, row in _VALUE.items()},
+            **{name: (self._parameters[name], None) for name in names},
+        }
+        signal = SIGNAL[place]
+        before, slope_before = into.symbols[signal]
+        if place in self._left:
+            slope_before = _LEFT[place]
+            into.symbols[signal] = before, slope_before
+        used = effect.expression.tree.words()
+        after, slope = into.emit(effect.expression.tree)
+        if slope_before is not None:
+            slope = into.constant(0.0) if slope is None else slope
+        if not effect.expression.exact:
+            on = into.row(held=True)
+            off = tuple(float(p.neutral or 0.0) for p in effect.parameters)
+            self._switches.append((on, names, off))
+            after = into.do(m.SELECT, after, before, on)
+            if slope is not None and slope_before is not None:
+                slope = into.do(m.SELECT, slope, slope_before, on)
+        if slope is not None and slope_before is not None and slope != _LEFT[place]:
+            into.code.append((m.COPY, _LEFT[place], slope, 0, 0, 0))
+        into.code.append((m.COPY, before, after, 0, 0, 0))
+        self._left.add(place)
+        if place in ('specimen', 'piston'):
+            self._times = max(self._times, 3 if 'v' in used else 2 if used & _KINKS else 1)
+        into.forget()
+
+    def program(self) -> Program:
+        """Return what has been added."""
+        code = [(0,) * m.WIDTH, *self._emitter.prepare]
+        ends = [len(code)]
+        for part in self._parts:
+            code += part
+            ends.append(len(code))
+        table = np.array(code, dtype=np.int32)
+        table[0, : m.TIMES] = ends[: m.TIMES]
+        # One Newton step where a force bends slowly, as for a hardening specimen; more for a
+        # kink, and for a force that follows the velocity, which may be steep.
+        table[0, m.TIMES] = self._times
+        registers = np.zeros((self._emitter.rows, LANES))
+        for value, row in self._emitter.constants.items():
+            registers[row] = value
+        return Program(
+            table, registers, self._parameters, tuple(self._emitter.memory), tuple(self._switches)
+        )
