@@ -124,6 +124,25 @@ def test_files_stay_small(path: Path) -> None:
     assert len(path.read_text(encoding='utf-8').splitlines()) <= 350
 
 
+OUTSIDE = sorted(p for f in ('studies', 'examples') for p in (ROOT.parent / f).rglob('*.py'))
+
+
+@pytest.mark.parametrize('path', OUTSIDE, ids=lambda p: str(p.relative_to(ROOT.parent)))
+def test_studies_and_examples_are_small_and_apart(path: Path) -> None:
+    """They use the package as others do; a study's computations through its `library` alone."""
+    text = path.read_text(encoding='utf-8')
+    assert len(text.splitlines()) <= 300
+    found = set(re.findall(r'^\s*(?:from|import) ([\w.]+)', text, re.MULTILINE))
+    tops = {name.partition('.')[0] for name in found}
+    assert not tops & {'rclpy', 'benchmarks', 'test'}
+    assert ('studies' if 'examples' in path.parts else 'examples') not in tops
+    assert not any(name.startswith('actuator_glue.nodes') for name in found)
+    if 'studies' in path.parts and path.name != 'library.py':
+        allowed = {'actuator_glue', 'actuator_glue.errors'}
+        apart = {n for n in found if n.startswith('actuator_glue') and n not in allowed}
+        assert all(n.startswith(('actuator_glue.report', 'actuator_glue.cli')) for n in apart)
+
+
 def test_command_line_imports_nothing_heavy() -> None:
     """`actuator-glue --help` answers at once: commands import what they need when they run."""
     commands = [f'actuator_glue.cli.{p.stem}' for p in (ROOT / 'cli').glob('[!_]*.py')]
