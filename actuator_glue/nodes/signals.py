@@ -51,6 +51,15 @@ class Stop:
         """End the node, without a signal."""
         self._event.set()
 
+    def done(self) -> None:
+        """Ignore further signals; the last thing a process does.
+
+        Python gives signals their default action while it shuts down: one that comes then would
+        make a failure of a node that has done its work.
+        """
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, signal.SIG_IGN)
+
     def _listen(self) -> None:
         first: float | None = None
         while True:

@@ -57,4 +57,5 @@ def main(make: Callable[[], SuiteNode], args: Sequence[str] | None = None) -> in
     executor.remove_node(node)
     node.destroy_node()
     rclpy.try_shutdown()
+    stop.done()
     return code

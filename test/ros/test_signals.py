@@ -8,6 +8,7 @@ import time
 
 import numpy as np
 import pytest
+from rclpy.duration import Duration
 from ros_nodes import recorded
 
 from actuator_glue.io.bag_reader import decoded
@@ -31,9 +32,11 @@ def test_a_doubled_signal_leaves_the_bag_whole(start, probe, tmp_path):
     probe.setup()
     for _ in range(200):
         probe.block(np.zeros(500), np.zeros(500))
+    for out in probe.setup_out, probe.samples_out:
+        assert out.wait_for_all_acked(Duration(seconds=20.0))
     assert end_as_launch_does(recorder) == 0, recorder.text
     assert (bag / 'metadata.yaml').exists(), recorder.text
-    assert len(recorded(bag)) % 500 == 0
+    assert np.array_equal(recorded(bag), np.arange(100_000))
 
 
 def test_a_second_signal_ends_a_node_that_hangs(tmp_path):
