@@ -64,12 +64,11 @@ def check_levels(levels: ArrayLike) -> Array:
     return checked
 
 
-def check_draws(draws: Array, weights: Array | None) -> tuple[Array, Array | None]:
-    """Return draws of shape (m, n) and weights of shape (m,) that sum to one.
+def check_draws(draws: Array) -> Array:
+    """Return draws of shape (m, n).
 
     Raises:
-        InputError: fewer than two draws, values that are not finite, weights that are negative,
-            not finite, all zero or of another length.
+        InputError: fewer than two draws, or values that are not finite.
     """
     draws = np.asarray(draws, dtype=np.float64)
     if draws.ndim != 2 or len(draws) < 2:
@@ -79,14 +78,7 @@ def check_draws(draws: Array, weights: Array | None) -> tuple[Array, Array | Non
         raise InputError(
             f'simulated draw {row} is not finite; drop diverging draws before taking a band'
         )
-    if weights is None:
-        return draws, None
-    weights = np.asarray(weights, dtype=np.float64)
-    if weights.shape != (len(draws),):
-        raise InputError(f'{len(draws)} draws but weights of shape {weights.shape}')
-    if not np.isfinite(weights).all() or (weights < 0).any() or not weights.sum() > 0:
-        raise InputError('weights must be finite, not negative and not all zero')
-    return draws, weights / weights.sum()
+    return draws
 
 
 def _weibull(columns: Array, wanted: Array) -> Array:
@@ -102,35 +94,26 @@ def _weibull(columns: Array, wanted: Array) -> Array:
     return np.asarray(low + (high - low) * (place - below)).T
 
 
-def band(
-    draws: Array, levels: Sequence[float] | Array = (0.95,), weights: Array | None = None
-) -> Band:
+def band(draws: Array, levels: Sequence[float] | Array = (0.95,)) -> Band:
     """Return central quantile bands of draws (m, n), column by column.
 
-    Without weights the quantile of level q is the order statistic at q (m + 1) (Weibull's
+    The quantile of level q is the order statistic at q (m + 1) (Weibull's
     plotting position), interpolated: the band then covers a further draw from the same
-    distribution with exactly its level, also for few draws (up to (m - 1)/(m + 1)). With
-    weights it is the inverse of the weighted empirical distribution, as GLUE takes it.
+    distribution with exactly its level, also for few draws (up to (m - 1)/(m + 1)).
 
     Args:
         draws: one simulated response per row, shape (m, n), any unit.
         levels: nominal share inside each band, shape (L,).
-        weights: weight of each draw, shape (m,), any positive scale.
 
     Raises:
         InputError: see `check_draws`, `check_levels`.
     """
-    draws, weights = check_draws(draws, weights)
+    draws = check_draws(draws)
     levels = check_levels(levels)
     wanted = np.concatenate([(1.0 - levels) / 2.0, [0.5], (1.0 + levels) / 2.0])
     quantiles = np.empty((len(wanted), draws.shape[1]))
     for start in range(0, draws.shape[1], COLUMNS_AT_ONCE):
         part = slice(start, start + COLUMNS_AT_ONCE)
-        if weights is None:
-            quantiles[:, part] = _weibull(np.ascontiguousarray(draws[:, part].T), wanted)
-        else:
-            quantiles[:, part] = np.quantile(
-                draws[:, part], wanted, axis=0, method='inverted_cdf', weights=weights
-            )
+        quantiles[:, part] = _weibull(np.ascontiguousarray(draws[:, part].T), wanted)
     count = len(levels)
     return Band(levels, quantiles[:count], quantiles[count], quantiles[count + 1 :])

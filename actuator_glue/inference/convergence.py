@@ -21,7 +21,8 @@ from actuator_glue.records import Array
 def gelman_rubin(draws: Array) -> Array:
     """Gelman-Rubin diagnostic of each parameter from the last half of each chain.
 
-    The paper's R-hat (Gelman and Rubin 1992; Vrugt 2016, Eq. 27), threshold 1.2.
+    The paper's R-hat (Gelman and Rubin 1992; Vrugt 2016, Eq. 27), threshold 1.2: with N chains
+    the variance between their means counts (N + 1)/N times.
 
     Args:
         draws: (steps, chains, p).
@@ -30,7 +31,9 @@ def gelman_rubin(draws: Array) -> Array:
         (p,); nan where fewer than two draws or chains remain or nothing moves.
     """
     half = draws[len(draws) // 2 :]
-    return np.asarray(_potential_reduction(np.ascontiguousarray(half.T)))
+    chains = draws.shape[1]
+    values = np.ascontiguousarray(half.T)
+    return np.asarray(_potential_reduction(values, (chains + 1.0) / max(chains, 1)))
 
 
 def rhat(draws: Array) -> Array:
@@ -64,7 +67,7 @@ def quick_rhat_and_ess(draws: Array) -> tuple[Array, Array]:
     split = _split(draws)
     if split is None:
         return np.full(draws.shape[2], np.nan), np.full(draws.shape[2], np.nan)
-    return np.asarray(_potential_reduction(split)), _effective(split)
+    return np.asarray(_potential_reduction(split, 1.0)), _effective(split)
 
 
 def rhat_and_ess(draws: Array) -> tuple[Array, Array]:
@@ -78,7 +81,7 @@ def rhat_and_ess(draws: Array) -> tuple[Array, Array]:
         values, np.argsort(values, axis=1), _scores(values.shape[1]), bulk.reshape(values.shape),
         folded.reshape(values.shape),
     )  # fmt: skip
-    reduction = np.maximum(_potential_reduction(bulk), _potential_reduction(folded))
+    reduction = np.maximum(_potential_reduction(bulk, 1.0), _potential_reduction(folded, 1.0))
     return reduction, _effective(bulk)
 
 
@@ -163,15 +166,15 @@ def _spread(chains: Array) -> tuple[float, float, Array]:
 
 
 @njit(fastmath=False)
-def _potential_reduction(values: Array) -> Array:
-    """sqrt(((n - 1)/n W + B/n) / W) for values (p, chains, n)."""
+def _potential_reduction(values: Array, pooled: float) -> Array:
+    """sqrt(((n - 1)/n W + pooled B/n) / W) for values (p, chains, n)."""
     chains, n = values.shape[1:]
     found = np.full(len(values), np.nan)
     if n < 2 or chains < 2:
         return found
     for i in range(len(values)):
         within, between, _ = _spread(values[i])
-        found[i] = math.sqrt((n - 1) / n + between / within)
+        found[i] = math.sqrt((n - 1) / n + pooled * between / within)
     return found
 
 

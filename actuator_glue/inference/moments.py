@@ -44,7 +44,6 @@ def moments(
     upper: ArrayLike,
     *,
     log_density: Array | None = None,
-    weights: Array | None = None,
 ) -> Moments:
     """Return the moments of posterior draws.
 
@@ -53,7 +52,6 @@ def moments(
         lower: lower bounds of the uniform prior, (p,).
         upper: upper bounds, (p,).
         log_density: log likelihood of each draw, (m,), for `best`.
-        weights: weight of each draw, (m,), any positive scale; None for equal weights.
 
     Raises:
         InputError: fewer than two draws, or shapes that do not fit.
@@ -61,16 +59,15 @@ def moments(
     draws = np.asarray(draws, dtype=np.float64)
     if draws.ndim != 2 or len(draws) < 2:
         raise InputError(f'moments need draws (m, p) with m >= 2, got shape {draws.shape}')
-    for name, values in (('log_density', log_density), ('weights', weights)):
-        if values is not None and np.shape(values) != (len(draws),):
-            raise InputError(f'{len(draws)} draws but {name} of shape {np.shape(values)}')
+    if log_density is not None and np.shape(log_density) != (len(draws),):
+        raise InputError(f'{len(draws)} draws but log_density of shape {np.shape(log_density)}')
     # Parameters as rows: sums then run along memory.
     columns = np.ascontiguousarray(draws.T)
-    mean = np.average(columns, axis=1, weights=weights)
+    mean = columns.mean(axis=1)
     centred = columns - mean[:, np.newaxis]
     square = centred * centred
-    variance = np.average(square, axis=1, weights=weights)
-    third = np.average(square * centred, axis=1, weights=weights)
+    variance = square.mean(axis=1)
+    third = (square * centred).mean(axis=1)
     stddev = np.sqrt(variance)
     prior = (np.asarray(upper, np.float64) - np.asarray(lower, np.float64)) / np.sqrt(12.0)
     with np.errstate(divide='ignore', invalid='ignore'):

@@ -109,19 +109,16 @@ def _second_moments(residual: Array, mean: float) -> tuple[float, float]:
     return squares, products
 
 
-def predictive_draws(
-    rng: np.random.Generator, draws: Array, residual: ResidualModel, weights: Array | None = None
-) -> Array:
+def predictive_draws(rng: np.random.Generator, draws: Array, residual: ResidualModel) -> Array:
     """Return simulated measurements, shape (m, n) [m]: each draw plus a residual path of its own.
 
-    Rows are whole paths with the residual's correlation in time. With weights the draws are
-    resampled first, so that rows of the result count alike.
+    Rows are whole paths with the residual's correlation in time.
 
     Raises:
         InputError: see `bands.check_draws`.
     """
-    draws, weights = check_draws(draws, weights)
-    rows = _rows(rng, len(draws), weights, len(draws))
+    draws = check_draws(draws)
+    rows = _rows(rng, len(draws), len(draws))
     mean, sd = residual.levels(rng, len(rows))
     innovation = rng.standard_normal((len(rows), draws.shape[1]))
     innovation[:, 1:] *= np.sqrt(1.0 - residual.phi**2)
@@ -134,7 +131,6 @@ def total_band(
     draws: Array,
     residual: ResidualModel,
     levels: Sequence[float] | Array = (0.95,),
-    weights: Array | None = None,
 ) -> Band:
     """Return the total predictive band of draws (m, n), sample by sample.
 
@@ -146,14 +142,13 @@ def total_band(
         draws: simulated responses of posterior draws, shape (m, n) [m].
         residual: residual model of the calibration record(s).
         levels: nominal coverages.
-        weights: weight of each draw, shape (m,).
 
     Raises:
         InputError: see `bands.check_draws`, `bands.check_levels`.
     """
-    draws, weights = check_draws(draws, weights)
+    draws = check_draws(draws)
     levels = check_levels(levels)
-    rows = _rows(rng, len(draws), weights, max(ENSEMBLE, len(draws)))
+    rows = _rows(rng, len(draws), max(ENSEMBLE, len(draws)))
     mean, sd = residual.levels(rng, len(rows))
     parts = []
     for start in range(0, draws.shape[1], COLUMNS_AT_ONCE):
@@ -168,11 +163,10 @@ def total_band(
     )
 
 
-def _rows(rng: np.random.Generator, count: int, weights: Array | None, size: int) -> np.ndarray:
+def _rows(rng: np.random.Generator, count: int, size: int) -> np.ndarray:
     # Systematic resampling: every row comes floor or ceil of its expected number of times.
-    share = np.full(count, 1.0 / count) if weights is None else weights
     places = (rng.random() + np.arange(size)) / size
-    return np.minimum(np.searchsorted(np.cumsum(share), places), count - 1)
+    return np.minimum(np.searchsorted(np.cumsum(np.full(count, 1.0 / count)), places), count - 1)
 
 
 def _as_list(residual: Array | Sequence[Array]) -> list[Array]:

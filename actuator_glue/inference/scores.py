@@ -46,26 +46,25 @@ def interval_score(observed: Array, lower: Array, upper: Array, level: float) ->
     return np.asarray((upper - lower) + 2.0 / (1.0 - level) * miss)
 
 
-def crps_ensemble(observed: Array, draws: Array, weights: Array | None = None) -> Array:
+def crps_ensemble(observed: Array, draws: Array) -> Array:
     """Return the continuous ranked probability score of each sample, shape (n,).
 
-    E|X - y| - E|X - X'|/2 over the (weighted) draws (Gneiting & Raftery 2007, Eq. 21), in the
+    E|X - y| - E|X - X'|/2 over the draws (Gneiting & Raftery 2007, Eq. 21), in the
     unit of the draws; smaller is better.
 
     Args:
         observed: observations, shape (n,).
         draws: one predicted response per row, shape (m, n).
-        weights: weight of each draw, shape (m,).
 
     Raises:
         InputError: see `bands.check_draws`; different lengths.
     """
-    draws, weights = check_draws(draws, weights)
+    draws = check_draws(draws)
     observed = np.asarray(observed, dtype=np.float64)
     if observed.shape != (draws.shape[1],):
         raise InputError(f'{draws.shape[1]} predicted samples but {observed.shape} observed')
     count = len(draws)
-    weight = np.full(count, 1.0 / count) if weights is None else weights
+    weight = np.full(count, 1.0 / count)
     parts = [
         _crps(
             observed[start : start + COLUMNS_AT_ONCE],

@@ -19,25 +19,6 @@ def test_band_of_few_draws_covers_a_further_draw_with_its_level(rng_seed: int) -
         assert abs(inside - level) < 4.5 * np.sqrt(level * (1 - level) / 40_000)
 
 
-def test_repeating_a_draw_is_giving_it_weight() -> None:
-    rng = np.random.default_rng(3)
-    draws = rng.normal(size=(60, 5))
-    times = rng.integers(0, 4, size=60)
-    weighted = band(draws, [0.5, 0.9], weights=times * 2.5)
-    repeated = np.repeat(draws, times, axis=0)
-    for level in (0.5, 0.9):
-        for limit, q in zip(weighted.at(level), ((1 - level) / 2, (1 + level) / 2), strict=True):
-            expected = np.quantile(repeated, q, axis=0, method='inverted_cdf')
-            np.testing.assert_array_equal(limit, expected)
-
-
-def test_equal_weights_agree_with_none() -> None:
-    draws = np.random.default_rng(4).normal(size=(4000, 3))
-    plain, weighted = band(draws, [0.95]), band(draws, [0.95], weights=np.full(4000, 7.0))
-    np.testing.assert_allclose(plain.lower, weighted.lower, atol=0.02)
-    np.testing.assert_allclose(plain.median, weighted.median, atol=0.02)
-
-
 def test_columns_taken_in_blocks_change_nothing() -> None:
     draws = np.random.default_rng(5).normal(size=(12, COLUMNS_AT_ONCE + 7))
     whole = band(draws, [0.6])
@@ -55,9 +36,6 @@ def test_columns_taken_in_blocks_change_nothing() -> None:
         (np.zeros(5), {}, 'two draws'),
         (np.zeros((1, 5)), {}, 'two draws'),
         (np.array([[0.0], [np.nan]]), {}, 'draw 1 is not finite'),
-        (np.zeros((3, 2)), {'weights': np.ones(2)}, '3 draws'),
-        (np.zeros((3, 2)), {'weights': np.zeros(3)}, 'not all zero'),
-        (np.zeros((3, 2)), {'weights': np.array([1.0, -1.0, 1.0])}, 'not negative'),
         (np.zeros((3, 2)), {'levels': [95.0]}, 'between 0 and 1'),
     ],
 )

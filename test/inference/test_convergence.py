@@ -10,12 +10,12 @@ from actuator_glue.inference.convergence import ess_bulk, gelman_rubin, rhat
 from actuator_glue.records import Array
 
 
-def _chains(rng: np.random.Generator, generations: int, chains: int, phi: Array) -> Array:
+def _chains(rng: np.random.Generator, steps: int, chains: int, phi: Array) -> Array:
     """AR(1) chains, one parameter per coefficient."""
-    noise = rng.standard_normal((generations, chains, len(phi)))
+    noise = rng.standard_normal((steps, chains, len(phi)))
     draws = np.empty_like(noise)
     draws[0] = noise[0]
-    for t in range(1, generations):
+    for t in range(1, steps):
         draws[t] = phi * draws[t - 1] + np.sqrt(1.0 - phi**2) * noise[t]
     return draws
 
@@ -23,12 +23,10 @@ def _chains(rng: np.random.Generator, generations: int, chains: int, phi: Array)
 PHI = np.array([0.0, 0.5, 0.95, -0.5, 0.99])
 
 
-@pytest.mark.parametrize(('generations', 'chains'), [(1000, 4), (333, 20), (51, 3), (10, 2)])
-def test_rhat_and_bulk_ess_are_those_of_arviz(
-    rng_seed: int, generations: int, chains: int
-) -> None:
+@pytest.mark.parametrize(('steps', 'chains'), [(1000, 4), (333, 20), (51, 3), (10, 2)])
+def test_rhat_and_bulk_ess_are_those_of_arviz(rng_seed: int, steps: int, chains: int) -> None:
     rng = np.random.default_rng(rng_seed)
-    draws = _chains(rng, generations, chains, PHI)
+    draws = _chains(rng, steps, chains, PHI)
     draws[:, 0, 1] += 0.4  # one chain elsewhere
     draws[..., 2] = np.exp(draws[..., 2])  # heavy tail
     draws[:, :, 3] = np.round(draws[:, :, 3], 1)  # ties
@@ -50,11 +48,15 @@ def test_stuck_chains_and_short_ones(rng_seed: int) -> None:
     assert np.isnan(gelman_rubin(apart[:, :1])).all()
 
 
-def test_gelman_rubin_is_the_paper_s(rng_seed: int) -> None:
+def test_gelman_rubin_is_as_published(rng_seed: int) -> None:
+    """Vrugt (2016), Eqs. 26 and 27, with T twice as many draws as are used."""
     draws = _chains(np.random.default_rng(rng_seed), 400, 3, PHI)
     half = draws[200:]
     n = len(half)
     within = half.var(axis=0, ddof=1).mean(axis=0)
     between = n * half.mean(axis=0).var(axis=0, ddof=1)
-    expected = np.sqrt(((n - 1) / n * within + between / n) / within)
+    count, total = draws.shape[1], 2 * n
+    target = (total - 2) / total * within + 2 / total * between
+    ratio = (count + 1) / count * target / within
+    expected = np.sqrt(ratio - (total - 2) / (count * total))
     assert np.allclose(gelman_rubin(draws), expected, rtol=1e-12)

@@ -58,17 +58,6 @@ def test_paths_have_the_residuals_correlation_and_each_draws_mean(rng_seed: int)
     assert np.mean(deviation**2) == pytest.approx(1.0, abs=6 * np.sqrt(2 * 19 / 300 / 500))
 
 
-def test_weights_choose_the_draws() -> None:
-    rng = np.random.default_rng(5)
-    model = fit_residual(1e-3 * rng.standard_normal(5000))
-    draws = np.repeat([[0.0], [1.0]], [9, 1], axis=0) * np.ones(6)
-    heavy = total_band(rng, draws, model, [0.9], weights=np.array([0.0] * 9 + [1.0]))
-    np.testing.assert_allclose(heavy.median, 1.0, atol=5e-4)
-    np.testing.assert_allclose(heavy.upper - heavy.lower, 2 * 1.645e-3, rtol=0.15)
-    rows = predictive_draws(rng, draws, model, weights=np.array([1.0] * 9 + [0.0]))
-    np.testing.assert_allclose(rows, 0.0, atol=0.01)
-
-
 def test_a_perfect_fit_has_a_residual_model() -> None:
     model = fit_residual(np.zeros(20))
     assert (model.mean, model.sd, model.phi) == (0.0, 0.0, 0.0)
