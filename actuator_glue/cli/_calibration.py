@@ -56,9 +56,15 @@ def sample(
         settle=settle,
     )
     with progress('calibrating', args.evaluations) as done:
-        return sample_posterior(
+        chains = sample_posterior(
             problem.target(), (args.seed,), args.evaluations, progress=lambda made, _: done(made)
         )
+    if not chains.annealed:
+        raise InputError(
+            f'{args.evaluations} evaluations ended on the way from the prior: no posterior was '
+            'reached; give more --evaluations'
+        )
+    return chains
 
 
 def sampled_model(

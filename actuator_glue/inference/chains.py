@@ -23,7 +23,7 @@ class Chains:
         log_density: log likelihood of each draw, (steps, chains).
         evaluations: likelihood evaluations of the whole run, the start included.
         start_evaluations: evaluations before the first step.
-        burn: first steps that adapted the proposals; not draws of the posterior.
+        burn: first steps, the adaptation among them; not draws of the posterior.
         annealed: False if the budget ended before the start had reached the posterior.
     """
 

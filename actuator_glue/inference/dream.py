@@ -183,12 +183,9 @@ def _later(state: State, now: ChainState, archive: Archive, fitted: int, steps: 
     )
 
 
-def _burn_in(settings: SamplerSettings, steps: int, warm: bool) -> int:
-    """Steps to discard: the adaptation; half of them where nothing led the chains in."""
-    half = steps // 2
-    if settings.start == 'prior' and not warm:
-        return max(min(settings.adaptation, steps - 1), half)
-    return min(settings.adaptation, half)
+def _burn_in(settings: SamplerSettings, steps: int) -> int:
+    """Steps to discard of so many: a share of the run, and never less than the adaptation."""
+    return min(max(settings.adaptation, int(settings.burn_in * steps)), steps)
 
 
 def sample(
@@ -255,7 +252,7 @@ def sample(
             log_density=log_densities[:done],
             evaluations=state.evaluations,
             start_evaluations=spent,
-            burn=_burn_in(settings, done, archive is not None),
+            burn=_burn_in(settings, done),
             annealed=state.power == 1.0,
         )
 

@@ -8,6 +8,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
+from actuator_glue.errors import InputError
 from actuator_glue.inference import dream
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.choice import ModelChoice
@@ -27,6 +28,8 @@ Likelihood: TypeAlias = Literal['glue', 'gaussian', 'ar1']
 
 # Points per parameter that can show a bend.
 _ENOUGH = 20
+# Steps after burn-in from which R-hat can be computed.
+_FEWEST = 4
 # Points of the prior that a start without an earlier posterior is fitted to.
 _PRIOR = 2000
 
@@ -133,7 +136,7 @@ def sample(
         progress: see `dream.sample`.
 
     Raises:
-        InputError: see `dream.sample`.
+        InputError: see `dream.sample`; the run ended before it had draws of the posterior.
     """
     settings = settings or SamplerSettings()
     transform, density, bounds = target.transform, target.log_likelihood, target.bounds
@@ -152,6 +155,11 @@ def sample(
         enough=enough,
         progress=progress,
     )
+    if len(chains.kept) < _FEWEST:
+        raise InputError(
+            f'the sampler was stopped after {len(chains.draws)} steps, of which {chains.burn} adapt '
+            'it: no posterior was reached; give it more time or evaluations'
+        )
     return chains if transform is None else _physical(chains, transform)
 
 

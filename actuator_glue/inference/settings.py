@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from actuator_glue.errors import InputError
-from actuator_glue.inference.moves import MOVES, Move
+from actuator_glue.inference.moves import MOVES, PUBLISHED, Move
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +25,8 @@ class SamplerSettings:
         thinning: the chains enter the archive every `thinning` steps (K).
         adaptation: steps in which shares, scales and outliers are adapted; all of them are
             burn-in and discarded.
+        burn_in: share of the run that is discarded, the adaptation included; more where that is
+            longer.
         start: 'annealed' finds the posterior by tempering the likelihood from the prior (or from
             the archive of an earlier run) before the chains start; 'prior' starts the chains at a
             Latin hypercube of the prior as Vrugt (2016) does.
@@ -43,6 +45,7 @@ class SamplerSettings:
     noise: float = 1e-6
     thinning: int = 2
     adaptation: int = 60
+    burn_in: float = 0.1
     start: Literal['annealed', 'prior'] = 'annealed'
     population: int | None = None
     steps: int = 10
@@ -62,6 +65,8 @@ class SamplerSettings:
         for name in ('unit_jump', 'jitter'):
             if not 0.0 <= getattr(self, name) <= 1.0:
                 raise InputError(f'sampler setting {name}={getattr(self, name)} is outside [0, 1]')
+        if not 0.0 <= self.burn_in < 1.0:
+            raise InputError(f'sampler setting burn_in={self.burn_in} is outside [0, 1)')
         if not 0.0 < self.survivors < 1.0:
             raise InputError(f'sampler setting survivors={self.survivors} is outside (0, 1)')
         fixed = [move.share for move in self.moves if move.share is not None]
@@ -78,6 +83,14 @@ class SamplerSettings:
             )
         if self.start not in ('annealed', 'prior'):
             raise InputError(f"sampler setting start={self.start!r}; use 'annealed' or 'prior'")
+
+    @staticmethod
+    def published() -> SamplerSettings:
+        """DREAM(ZS) as Vrugt (2016) runs it: three chains from the prior, his moves alone.
+
+        Half of the run is burn-in.
+        """
+        return SamplerSettings(chains=3, moves=PUBLISHED, start='prior', burn_in=0.5)
 
     def points(self, dimension: int) -> int:
         """Size of the population for so many parameters; never too few for their covariance."""

@@ -202,14 +202,15 @@ def _stop(job: Job, expired: Callable[[], bool] | None) -> Callable[[State], boo
 
 def _sampler(job: Job) -> SamplerSettings:
     """Settings of the sampler."""
+    # A window is short, and begins where the last one ended: its adaptation is all its burn-in.
+    base = SamplerSettings(chains=job.chains, adaptation=ADAPT, burn_in=0.0)
     if job.archive is None:
-        return SamplerSettings(chains=job.chains, adaptation=50)
+        return replace(base, adaptation=50)
     if not job.model.effects:
-        return SamplerSettings(chains=job.chains, adaptation=ADAPT, survivors=SURVIVORS)
-    sampler = SamplerSettings(chains=job.chains, adaptation=ADAPT)
+        return replace(base, survivors=SURVIVORS)
     # A warm start takes a quarter of the population, and moves a chain of so many steps each:
     # batches are full.
-    return replace(sampler, population=4 * sampler.steps * job.chains)
+    return replace(base, population=4 * base.steps * job.chains)
 
 
 def _archive(new: Array, old: Array | None) -> Array:

@@ -8,7 +8,6 @@ from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.convergence import gelman_rubin
 from actuator_glue.inference.likelihood import Errors, GlueLikelihood
 from actuator_glue.inference.moments import Moments, moments
-from actuator_glue.inference.moves import PUBLISHED
 from actuator_glue.inference.posterior import Target, sample
 from actuator_glue.inference.predictive import fit_residual, predictive_draws, total_band
 from actuator_glue.inference.scores import Scores, coverage, crps_ensemble, score
@@ -28,7 +27,7 @@ __all__ = [
     'EQUATION_3',
     'NAMES',
     'NOISE',
-    'PUBLISHED',
+
     'RATE',
     'STIFFNESS',
     'TABLE_2',

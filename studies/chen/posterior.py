@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.chen.library import (
-    PUBLISHED,
     Array,
     Chains,
     Errors,
@@ -23,7 +22,7 @@ from studies.chen.library import (
 )
 
 # The sampler the paper cites, as Vrugt (2016) runs it: three chains, from the prior.
-AS_PUBLISHED = SamplerSettings(chains=3, start='prior', moves=PUBLISHED)
+AS_PUBLISHED = SamplerSettings.published()
 
 # Called with the stage and the share of the whole study that is done.
 Progress = Callable[[str, float], None]

@@ -11,11 +11,14 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import targets
+from scipy import stats
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference.adaptation import rescue
 from actuator_glue.inference.dream import Chains, SamplerSettings, init, sample, step
 from actuator_glue.inference.moves import SNOOKER
+from actuator_glue.inference.posterior import Target
+from actuator_glue.inference.posterior import sample as sample_posterior
 from actuator_glue.records import Array
 
 
@@ -50,7 +53,66 @@ def test_same_seed_same_bits_in_another_process() -> None:
 def test_a_shorter_run_is_the_beginning_of_a_longer_one() -> None:
     long, short = _short(3, 6000), _short(3, 4000)
     assert np.array_equal(long.draws[: len(short.draws)], short.draws)
-    assert short.burn == long.burn == SamplerSettings().adaptation
+    assert short.burn == SamplerSettings().adaptation
+
+
+@pytest.mark.parametrize(('evaluations', 'share'), [(1500, 0.0), (1500, 0.9), (9000, 0.5)])
+def test_burn_in_is_a_share_of_the_run_and_never_ends_inside_the_adaptation(
+    evaluations: int, share: float
+) -> None:
+    archive = targets.scales().draw(np.random.default_rng(0), 400)
+    settings = SamplerSettings(population=100, burn_in=share)
+    target = targets.scales()
+    chains = sample(
+        np.random.default_rng(1), target.log_density, target.lower, target.upper,
+        evaluations=evaluations, settings=settings, archive=archive,
+    )  # fmt: skip
+    steps = len(chains.draws)
+    assert chains.burn == max(min(settings.adaptation, steps), int(share * steps))
+    assert len(chains.kept) == steps - chains.burn
+
+
+def test_a_run_that_ends_in_its_adaptation_gives_no_posterior() -> None:
+    target = targets.scales()
+    wanted = Target(target.log_density, (target.lower, target.upper))
+    settings = SamplerSettings(population=100)
+    with pytest.raises(InputError, match='no posterior was reached'):
+        sample_posterior(
+            wanted, (1,), 20_000, settings=settings, stop=lambda state: state.made >= 50
+        )
+    found = sample_posterior(
+        wanted, (1,), 20_000, settings=settings, stop=lambda state: state.made >= 90
+    )
+    assert len(found.kept) >= 30
+
+
+def test_variance_of_means_is_what_the_effective_sample_size_says(rng_seed: int) -> None:
+    """Over replicates, (mean - truth)^2 ESS / variance is chi-squared with as many degrees.
+
+    Twenty per cent either way are allowed to the reported ESS itself.
+    """
+    target, count = targets.scales(), 60
+    ratio = np.empty((count, 4))
+    for i, rng in enumerate(np.random.default_rng(rng_seed).spawn(count)):
+        chains = sample(rng, target.log_density, target.lower, target.upper, evaluations=8000)
+        error = (chains.posterior().mean(axis=0) - target.mean) / target.sd
+        ratio[i] = error**2 * chains.ess
+    total = ratio.sum(axis=0)
+    # One false failure in a million runs, over four parameters and two sides.
+    assert (total < 1.2 * stats.chi2.isf(1e-6 / 8, count)).all(), total / count
+    assert (total > 0.8 * stats.chi2.ppf(1e-6 / 8, count)).all(), total / count
+
+
+def test_the_published_sampler_has_the_published_moves_only() -> None:
+    published = SamplerSettings.published()
+    assert [move.name for move in published.moves] == ['parallel', 'snooker']
+    target = targets.scales()
+    chains = sample(
+        np.random.default_rng(1), target.log_density, target.lower, target.upper,
+        evaluations=6000, settings=published,
+    )  # fmt: skip
+    assert chains.draws.shape[1] == 3 and chains.start_evaluations == 3
+    assert chains.burn == len(chains.draws) // 2
 
 
 def test_step_leaves_the_given_state_as_it_is_and_branches_do_not_meet() -> None:
