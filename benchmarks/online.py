@@ -19,7 +19,7 @@ from actuator_glue.online import job as window_job
 from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.replay import at_once, items, replay, stream
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.stream import Preview, Setup
+from actuator_glue.online.stream import Preview, StreamSetup
 from actuator_glue.records import Record
 from actuator_glue.workers.reports import Reports
 
@@ -49,7 +49,7 @@ def live(seconds: float) -> dict[str, float]:
     missed = 0
     for item in stream(_record(seconds), block=50):
         began = time.perf_counter()
-        if isinstance(item, Setup):
+        if isinstance(item, StreamSetup):
             estimator.setup(item)
             continue
         if isinstance(item, Preview):

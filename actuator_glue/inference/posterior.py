@@ -157,8 +157,8 @@ def sample(
     )
     if len(chains.kept) < _FEWEST:
         raise InputError(
-            f'the sampler was stopped after {len(chains.draws)} steps, of which {chains.burn} adapt '
-            'it: no posterior was reached; give it more time or evaluations'
+            f'the run ended after {len(chains.draws)} steps, of which {chains.burn} are burn-in: '
+            'no posterior was reached; give it more time or evaluations'
         )
     return chains if transform is None else _physical(chains, transform)
 

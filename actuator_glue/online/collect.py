@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.stream import Block, Event, Setup, Window
-from actuator_glue.online.windows import Windows
+from actuator_glue.online.stream import Block, Event, StreamSetup, Window
+from actuator_glue.online.windows import SlidingWindows
 from actuator_glue.records import Record
 
 PIECE = 0.5  # s; what is kept ends at most this long before the last sample
@@ -25,10 +25,10 @@ class Collector:
     def __init__(self, seconds: float) -> None:
         self.seconds = seconds
         pieces = EstimatorSettings(window=PIECE, hop=PIECE, settle=0.0, time_budget=PIECE)
-        self._windows = Windows(pieces)
+        self._windows = SlidingWindows(pieces)
         self._kept: deque[Window] = deque(maxlen=max(1, round(seconds / PIECE)))
 
-    def setup(self, setup: Setup) -> list[Event]:
+    def setup(self, setup: StreamSetup) -> list[Event]:
         """Take a test set-up."""
         return self._windows.setup(setup)
 

@@ -21,10 +21,10 @@ from actuator_glue.online.stream import (
     Failed,
     Preview,
     Rejected,
-    Setup,
+    StreamSetup,
     Window,
 )
-from actuator_glue.online.windows import Tally, Windows
+from actuator_glue.online.windows import SlidingWindows, Tally
 from actuator_glue.records import MAX_DISPLACEMENT, Array
 
 # Forecasts wait for their samples for two or three hops; more only when windows are dropped.
@@ -85,7 +85,7 @@ class Estimator:
         self.live = live
         self.schedule = schedule
         self.running: Job | None = None
-        self._windows = Windows(settings)
+        self._windows = SlidingWindows(settings)
         self._waiting: list[Window] = []
         self._memory = _Memory()
         self._ahead = Ahead()
@@ -96,7 +96,7 @@ class Estimator:
         return self._windows.tally
 
     @property
-    def test(self) -> Setup | None:
+    def test(self) -> StreamSetup | None:
         """The test set-up that holds."""
         return self._windows.current
 
@@ -105,7 +105,7 @@ class Estimator:
         """The windows that wait, the next one first."""
         return tuple(self._waiting)
 
-    def setup(self, setup: Setup) -> list[Event]:
+    def setup(self, setup: StreamSetup) -> list[Event]:
         """Take a test set-up."""
         return self._windows.setup(setup)
 

@@ -12,10 +12,10 @@ from actuator_glue.online.estimator import Estimator, Schedule
 from actuator_glue.online.job import WindowResult, fit, report
 from actuator_glue.online.sampling import Job, WindowFit
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.stream import Block, Event, Failed, Preview, Rejected, Setup
+from actuator_glue.online.stream import Block, Event, Failed, Preview, Rejected, StreamSetup
 from actuator_glue.records import Record
 
-Item: TypeAlias = Setup | Block | Preview
+Item: TypeAlias = StreamSetup | Block | Preview
 Named: TypeAlias = tuple[str, Any]
 # A window that has been sampled and is to be reported.
 Sampled: TypeAlias = tuple[Job, WindowFit]
@@ -66,7 +66,7 @@ def _sampled(items: Iterable[Item], estimator: Estimator) -> Iterator[Event | Sa
 
 
 def _given(estimator: Estimator, item: Item) -> list[Event]:
-    if isinstance(item, Setup):
+    if isinstance(item, StreamSetup):
         return estimator.setup(item)
     if isinstance(item, Preview):
         return estimator.preview(item)
@@ -80,7 +80,7 @@ def stream(record: Record, block: int = 64) -> Iterator[Item]:
         record: a record; its stiffness is announced with it.
         block: samples per block.
     """
-    yield Setup(
+    yield StreamSetup(
         record.stiffness,
         record.period,
         record.actuator,

@@ -107,7 +107,7 @@ def _check_channel(
 
 
 @dataclass(frozen=True, slots=True)
-class Setup:
+class StreamSetup:
     """What must be known of a test to use its samples.
 
     Attributes:
@@ -140,7 +140,7 @@ class Setup:
         if not 0 <= self.index <= MAX_INDEX:
             raise InputError(f'{where}: the running index {self.index} is outside [0, 2^62]')
 
-    def same_test(self, other: Setup) -> bool:
+    def same_test(self, other: StreamSetup) -> bool:
         """Whether samples under both set-ups may be fitted together."""
         return (self.stiffness, self.period, self.actuator, self.hold) == (
             other.stiffness,

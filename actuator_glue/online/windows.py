@@ -14,7 +14,7 @@ from actuator_glue.online.stream import (
     Reason,
     Rejected,
     Restarted,
-    Setup,
+    StreamSetup,
     Window,
     check_block,
 )
@@ -71,7 +71,7 @@ class Tail:
         return part[0], part[1]
 
 
-class Windows:
+class SlidingWindows:
     """Turns blocks into windows.
 
     Windows end where the running index is a multiple of the hop, so that whoever joins a stream
@@ -85,8 +85,8 @@ class Windows:
     def __init__(self, settings: EstimatorSettings) -> None:
         self.settings = settings
         self.tally = Tally()
-        self.current: Setup | None = None
-        self._announced: list[Setup] = []
+        self.current: StreamSetup | None = None
+        self._announced: list[StreamSetup] = []
         self._tail: Tail | None = None
         self._window = self._hop = 0
         self._next: int | None = None
@@ -94,7 +94,7 @@ class Windows:
         self._last_stamp_ns = 0
         self._epoch = 0
 
-    def setup(self, setup: Setup) -> list[Event]:
+    def setup(self, setup: StreamSetup) -> list[Event]:
         """Take a test set-up; it holds from the sample it names, at once where that is past."""
         if self._next is not None and setup.index <= self._next:
             return self._begin(setup)
@@ -190,7 +190,7 @@ class Windows:
         self.tally.restarts += 1
         return Restarted(index, reason, f'window restarted: {message}')
 
-    def _begin(self, setup: Setup) -> list[Event]:
+    def _begin(self, setup: StreamSetup) -> list[Event]:
         before, self.current = self.current, setup
         if before is not None and setup.same_test(before):
             return []
@@ -224,7 +224,7 @@ class Windows:
                 windows.append(self._cut(end, stamp, setup, tail))
             start = stop
 
-    def _cut(self, end: int, stamp_ns: int, setup: Setup, tail: Tail) -> Window:
+    def _cut(self, end: int, stamp_ns: int, setup: StreamSetup, tail: Tail) -> Window:
         command, measured = tail.last(self._window)
         record = Record(
             command=command,

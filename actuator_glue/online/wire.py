@@ -19,7 +19,7 @@ from actuator_glue.model.effects.terms.definition import entries, mapping
 from actuator_glue.online.forecast import Prediction
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.stream import Block, Preview, Setup
+from actuator_glue.online.stream import Block, Preview, StreamSetup
 from actuator_glue.records import Array
 
 Fields = dict[str, Any]
@@ -51,7 +51,7 @@ def block(message: Any) -> Block:
     )
 
 
-def setup(message: Any) -> Setup:
+def setup(message: Any) -> StreamSetup:
     """Return the set-up of a TestSetup.
 
     Raises:
@@ -61,7 +61,7 @@ def setup(message: Any) -> Setup:
     name = str(message.actuator or message.header.frame_id)
     if not (np.isfinite(rate) and rate > 0.0):
         raise InputError(f'test set-up of {name!r}: rate {rate:g} Hz is not positive')
-    return Setup(
+    return StreamSetup(
         stiffness=None if np.isnan(stiffness) else stiffness,
         period=1.0 / rate,
         actuator=name,

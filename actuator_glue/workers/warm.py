@@ -13,7 +13,7 @@ from actuator_glue.online.job import WindowResult, run
 from actuator_glue.online.replay import stream
 from actuator_glue.online.sampling import Job
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.stream import Block, Preview, Setup
+from actuator_glue.online.stream import Block, Preview, StreamSetup
 from actuator_glue.records import Record
 
 
@@ -33,7 +33,7 @@ def warm_windows(compute: Callable[[Job], WindowResult] = run, swap: bool = True
     estimator = Estimator(settings, choose_model())
     estimator.preview(Preview(0, 1 / 200.0, command))
     for item in stream(Record(command, measured, 1 / 200.0, 1e5)):
-        if isinstance(item, Setup):
+        if isinstance(item, StreamSetup):
             estimator.setup(item)
         elif isinstance(item, Block):
             estimator.push(item)

@@ -6,7 +6,7 @@ from actuator_glue.model import linear
 from actuator_glue.model.commands import noise
 from actuator_glue.online.replay import stream
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.stream import Block, Setup
+from actuator_glue.online.stream import Block, StreamSetup
 from actuator_glue.records import Record
 
 THETA = np.array([134.0, 1.1e9, 2.5e5, 0.5])
@@ -35,7 +35,7 @@ def block(index, count=10, period=1.0 / RATE, stamp_ns=None, **channels):
 
 def setup(stiffness=250e3, index=0, period=1.0 / RATE, **more):
     """A test set-up at the tests' rate."""
-    return Setup(stiffness, period, index=index, **more)
+    return StreamSetup(stiffness, period, index=index, **more)
 
 
 __all__ = ['RATE', 'SETTINGS', 'THETA', 'block', 'record', 'setup', 'stream']

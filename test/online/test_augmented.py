@@ -11,7 +11,7 @@ from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.fitting import batch
 from actuator_glue.online.job import run
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.stream import Block, Setup
+from actuator_glue.online.stream import Block, StreamSetup
 from actuator_glue.records import Record
 
 # Sizes that leave about 20 um where Eq. (2) alone is fitted, the demonstration's noise being 10.
@@ -55,7 +55,7 @@ def test_windows_converge_soon_after_a_swap(effect):
     estimator = Estimator(settings, choose_model())
     results = []
     for item in stream(record):
-        if isinstance(item, Setup):
+        if isinstance(item, StreamSetup):
             estimator.setup(item)
         elif isinstance(item, Block):
             estimator.push(item)

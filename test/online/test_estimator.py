@@ -14,7 +14,7 @@ from actuator_glue.online.estimator import Ahead, Estimator, Schedule
 from actuator_glue.online.job import WindowResult, run
 from actuator_glue.online.published import differences
 from actuator_glue.online.replay import replay, stream
-from actuator_glue.online.stream import Block, Dropped, Failed, Preview, Setup
+from actuator_glue.online.stream import Block, Dropped, Failed, Preview, StreamSetup
 
 
 def results(items, **more):
@@ -54,7 +54,7 @@ class Live:
         self.models.append((0, estimator.model))
         busy = 0
         for item in items:
-            if isinstance(item, Setup):
+            if isinstance(item, StreamSetup):
                 self.events += estimator.setup(item)
             elif isinstance(item, Preview):
                 self.events += estimator.preview(item)
@@ -174,7 +174,7 @@ def test_a_change_of_model_is_repeated_to_the_bit():
 def test_a_gap_restarts_the_window_and_forecasts_across_it_are_dropped():
     whole = record(10.0)
     items = list(stream(whole, 10))
-    holed = [i for i in items if isinstance(i, Setup) or not 800 <= i.index < 830]
+    holed = [i for i in items if isinstance(i, StreamSetup) or not 800 <= i.index < 830]
     found = results(holed)
     assert all(
         not r.window.record.first_index < 830 <= r.window.end or r.window.end <= 800
@@ -193,7 +193,7 @@ def test_a_gap_restarts_the_window_and_forecasts_across_it_are_dropped():
 def test_another_actuator_starts_from_the_prior():
     first, second = record(3.0), record(3.0, seed=5)
     moved = [
-        Setup(0.0, 1 / RATE, 'other', index=len(first)),
+        StreamSetup(0.0, 1 / RATE, 'other', index=len(first)),
         *(
             Block(b.index + len(first), b.period, b.stamp_ns + 3 * 10**9, b.command, b.measured)
             for b in stream(second)
@@ -210,7 +210,7 @@ def test_a_command_that_does_not_move_is_left_out_and_said():
     rest = np.zeros(800)
     noise = 1e-5 * np.random.default_rng(0).standard_normal(800)
     still = [
-        Setup(250e3, 1 / RATE),
+        StreamSetup(250e3, 1 / RATE),
         Block(0, 1 / RATE, 10**18, rest, noise),
         *(
             Block(b.index + 800, b.period, b.stamp_ns + 4 * 10**9, b.command, b.measured)
@@ -227,7 +227,7 @@ def test_a_command_that_does_not_move_is_left_out_and_said():
 @pytest.mark.parametrize('values', [0.0, 1e-3])
 def test_dead_channels_give_no_posterior_and_no_crash(values):
     flat = np.full(1200, values)
-    told = list(replay([Setup(0.0, 1 / RATE), Block(0, 1 / RATE, 0, flat, flat)], SETTINGS))
+    told = list(replay([StreamSetup(0.0, 1 / RATE), Block(0, 1 / RATE, 0, flat, flat)], SETTINGS))
     assert not [r for r in told if is_result(r)]
     assert [e for e in told if isinstance(e, Failed)]
 
@@ -248,7 +248,7 @@ def test_few_windows_wait_live():
     whole = record(8.0)
     events = []
     for item in stream(whole, 200):
-        events += estimator.setup(item) if isinstance(item, Setup) else estimator.push(item)
+        events += estimator.setup(item) if isinstance(item, StreamSetup) else estimator.push(item)
         estimator.next_job()  # the first is never finished
     assert estimator.running is not None
     assert [w.number for w in estimator.waiting] == [9, 10, 11, 12]
@@ -260,7 +260,7 @@ def test_few_windows_wait_live():
 def test_windows_that_are_late_are_dropped_but_never_the_newest():
     estimator = Estimator(SETTINGS, choose_model(), live=True)
     for item in stream(record(3.5), 700):
-        estimator.setup(item) if isinstance(item, Setup) else estimator.push(item)
+        estimator.setup(item) if isinstance(item, StreamSetup) else estimator.push(item)
     assert [w.number for w in estimator.waiting] == [0, 1, 2, 3]
     assert not estimator.drop(lambda window: False)
     told = estimator.drop(lambda window: window.number < 2)
@@ -274,7 +274,7 @@ def test_a_window_that_waits_forecasts_from_its_own_end():
     whole = record(4.0)
     estimator.preview(Preview(0, whole.period, whole.command))
     for item in stream(whole, 50):
-        estimator.setup(item) if isinstance(item, Setup) else estimator.push(item)
+        estimator.setup(item) if isinstance(item, StreamSetup) else estimator.push(item)
     job = estimator.next_job()
     start, stop = job.window.end, job.forecast[1]
     assert start < stop < len(whole)

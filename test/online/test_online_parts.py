@@ -18,7 +18,7 @@ from actuator_glue.online.mixture import mixture_band
 from actuator_glue.online.replay import stream
 from actuator_glue.online.response import response_band
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.stream import Setup
+from actuator_glue.online.stream import StreamSetup
 
 
 @pytest.mark.parametrize('stiffness', [0.0, 250e3])
@@ -116,7 +116,7 @@ def test_the_collector_gives_back_the_record():
     collector = Collector(60.0)
     whole = record(10.0)
     for item in stream(whole):
-        (collector.setup if isinstance(item, Setup) else collector.push)(item)
+        (collector.setup if isinstance(item, StreamSetup) else collector.push)(item)
     (found,) = collector.records()
     assert len(found) > len(whole) - PIECE * RATE
     assert np.array_equal(found.measured, whole.measured[: len(found)])

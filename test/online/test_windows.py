@@ -9,7 +9,7 @@ from online_streams import RATE, block, setup
 from actuator_glue.errors import InputError
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import MAX_BLOCK, Rejected, Restarted
-from actuator_glue.online.windows import Tail, Windows
+from actuator_glue.online.windows import SlidingWindows, Tail
 
 SETTINGS = EstimatorSettings(window=0.5, hop=0.2, settle=0.0, time_budget=0.1)
 WINDOW, HOP = 100, 40
@@ -17,7 +17,7 @@ WINDOW, HOP = 100, 40
 
 def run(blocks, settings=SETTINGS, setups=()):
     """Push set-ups, then blocks; return windows and events."""
-    windows = Windows(settings)
+    windows = SlidingWindows(settings)
     events, found = [], []
     for announced in setups or (setup(),):
         events += windows.setup(announced)
@@ -194,7 +194,7 @@ def test_without_a_known_stiffness_there_are_no_windows():
 
 
 def test_before_any_set_up_there_are_no_windows():
-    windows = Windows(SETTINGS)
+    windows = SlidingWindows(SETTINGS)
     assert windows.push(block(0, 400)) == ([], [])
     windows.setup(setup())
     _, found = windows.push(block(400, 200))
@@ -202,7 +202,7 @@ def test_before_any_set_up_there_are_no_windows():
 
 
 def test_announced_set_ups_are_bounded():
-    windows = Windows(SETTINGS)
+    windows = SlidingWindows(SETTINGS)
     windows.setup(setup())
     windows.push(block(0, 10))
     for index in range(100, 5100):
