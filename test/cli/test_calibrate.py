@@ -50,7 +50,7 @@ def test_problem_r_from_csv_files(run, problem_r: Path, tmp_path: Path, rng_seed
 def test_draws_are_drawn(run, short_bag: Path, tmp_path: Path) -> None:
     """The posterior, each record and the bands over it; a file of something else is told."""
     draws, pictures = tmp_path / 'draws.npz', tmp_path / 'pictures'
-    done = run('calibrate', short_bag, '--evaluations', 6000, '--draws', draws)
+    done = run('calibrate', short_bag, '--evaluations', 12_000, '--draws', draws)
     assert done.code == 0, done.err
     done = run('plot', short_bag, '--draws', draws, '--out', pictures)
     assert done.code == 0, done.err
@@ -103,7 +103,7 @@ def test_formal_likelihoods(run, problem_r: Path, likelihood: str) -> None:
     """The formal ones run over the same records and are far narrower than G = 256."""
     records = (problem_r / 'r_1.csv', problem_r / 'r_2.csv')
     done = run(
-        'calibrate', *records, '--likelihood', likelihood, '--evaluations', 14_000, '--json', '-'
+        'calibrate', *records, '--likelihood', likelihood, '--evaluations', 24_000, '--json', '-'
     )
     assert done.code == 0, done.err
     assert done.json['parameters']['beta_1']['stddev'] < 0.7 * STDDEV[0]
