@@ -12,7 +12,7 @@ import pytest
 import actuator_glue
 
 ROOT = Path(__file__).resolve().parent.parent
-LISTED = ('*.py', 'py.typed', '*.msg', '*.srv', '*.action', '*.mplstyle', '*.j2', '*.xml')
+LISTED = ('*.py', 'py.typed', '*.msg', '*.srv', '*.action', '*.mplstyle', '*.j2', 'dds_*.xml')
 
 
 @pytest.fixture(scope='module')
