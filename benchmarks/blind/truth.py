@@ -26,7 +26,7 @@ def refitted(case: Case, records: Sequence[Record]) -> float:
     if case.kind == 'unknown':
         return float('nan')
     fit, held = Data.whole(records[:2]), Data.whole(records[2:])
-    search = Search(fit, tuple(CATALOGUE))
+    search = Search(fit, CATALOGUE.searched())
     search.scorer = Scorer.of(fit, splits_of(fit, search.base().error))
     trial = search.trial(())
     for name in names:

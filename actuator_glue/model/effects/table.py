@@ -32,6 +32,8 @@ def markdown() -> str:
             effect.source,
         )
         rows.append('| ' + ' | '.join(cell.replace('|', '\\|') for cell in cells) + ' |')
+    kept = ', '.join(f'`{e.name}`' for e in CATALOGUE.values() if not e.searched)
+    rows += ['', f'Not tried by the diagnosis, where their blind scores are not known: {kept}.']
     return '\n'.join(rows)
 
 

@@ -76,12 +76,15 @@ def _entry(name: str, body: Any) -> Effect:
     searched = body.get('searched', True)
     if not isinstance(searched, bool):
         raise InputError(f'effect {name!r}: searched is true or false, not {searched!r}')
+    texts = {key: str(body.get(key, '')) for key in _TEXTS}
     return term(
         name,
         f'{places[0]}: {body[places[0]]}',
         tuple(_parameter(f'effect {name!r}', str(p), v) for p, v in parameters.items()),
+        group=texts['group'],
+        signature=texts['signature'],
+        source=texts['source'],
         searched=searched,
-        **{key: str(body[key]) for key in _TEXTS if key in body},
     )
 
 

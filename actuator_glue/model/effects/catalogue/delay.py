@@ -1,4 +1,4 @@
-"""Effects between the recorded command and the summing junction."""
+"""Transport delay of the command."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from actuator_glue.model.effects import rows
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.parameters import Parameter
 
-DELAY = Effect(
+EFFECT = Effect(
     name='delay',
     place='command',
     equation='u_c(t) = u(t - tau)',
@@ -18,17 +18,3 @@ DELAY = Effect(
     switches=(rows.ON_LAG,),
     exact=(),
 )
-
-GAIN = Effect(
-    name='gain',
-    place='command',
-    equation='u_c = g u',
-    parameters=(Parameter('gain', '1', 0.7, 1.3, 'static gain of the command channel', 1.0),),
-    group='gain',
-    signature='linear; relative residual constant down to zero frequency',
-    source='Jelali & Kroll 2003',
-    starts=lambda s: ((1.01,), (0.99,), (1.05,), (0.95,)),
-    exact=(),
-)
-
-EFFECTS = (DELAY, GAIN)

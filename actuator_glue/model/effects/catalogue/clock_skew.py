@@ -1,0 +1,21 @@
+"""Two clocks of different rate."""
+
+from __future__ import annotations
+
+from actuator_glue.model.effects import rows
+from actuator_glue.model.effects.effect import Effect
+from actuator_glue.model.parameters import Parameter
+
+EFFECT = Effect(
+    name='clock-skew',
+    place='sensor',
+    equation='u_c(t) = u(t - eps t): the record lags more and more (eps > 0) behind the command',
+    parameters=(
+        Parameter('clock_skew', '1', -1e-3, 1e-3, 'relative rate error of the two clocks', 0.0),
+    ),
+    group='skew',
+    signature='lag grows with time',
+    source='Mills 1991 (frequency error of clocks)',
+    starts=lambda s: ((5e-5,), (-5e-5,), (3e-4,), (-3e-4,)),
+    switches=(rows.ON_LAG,),
+)

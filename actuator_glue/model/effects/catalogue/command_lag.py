@@ -1,0 +1,17 @@
+"""Low-pass in front of the controller."""
+
+from __future__ import annotations
+
+from actuator_glue.model.effects.terms.entry import term
+from actuator_glue.model.parameters import Parameter
+
+EFFECT = term(
+    'command-lag',
+    'command: u = lag(u, command_lag)',
+    (Parameter('command_lag', 's', 0.0, 0.05, 'time constant of the low-pass', 0.0),),
+    group='lag',
+    signature='linear; as a delay with a slight roll-off',
+    source='Horiuchi et al. 1999',
+    searched=False,
+    check=False,
+)

@@ -1,0 +1,17 @@
+"""Dry friction of the seals."""
+
+from __future__ import annotations
+
+from actuator_glue.model.effects.effect import Effect
+from actuator_glue.model.parameters import Parameter
+
+EFFECT = Effect(
+    name='coulomb-friction',
+    place='piston',
+    equation='f = f_specimen + F_c sign(v), |.| <= F_c while v = 0',
+    parameters=(Parameter('coulomb_force', 'N', 0.0, 2e4, 'dry friction of the seals', 0.0),),
+    group='friction',
+    signature='odd harmonics with the sign of the velocity; relative size falls as 1/A',
+    source='Armstrong-Helouvry et al. 1994; return mapping: Simo & Hughes 1998',
+    starts=lambda s: tuple((share * s.oil * s.stroke,) for share in (0.005, 0.02, 0.08)),
+)

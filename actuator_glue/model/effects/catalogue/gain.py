@@ -1,0 +1,18 @@
+"""Static gain of the command channel."""
+
+from __future__ import annotations
+
+from actuator_glue.model.effects.effect import Effect
+from actuator_glue.model.parameters import Parameter
+
+EFFECT = Effect(
+    name='gain',
+    place='command',
+    equation='u_c = g u',
+    parameters=(Parameter('gain', '1', 0.7, 1.3, 'static gain of the command channel', 1.0),),
+    group='gain',
+    signature='linear; relative residual constant down to zero frequency',
+    source='Jelali & Kroll 2003',
+    starts=lambda s: ((1.01,), (0.99,), (1.05,), (0.95,)),
+    exact=(),
+)

@@ -1,0 +1,17 @@
+"""Integral action of the controller."""
+
+from __future__ import annotations
+
+from actuator_glue.model.effects.terms.entry import term
+from actuator_glue.model.parameters import Parameter
+
+EFFECT = term(
+    'integral-action',
+    'valve: e = e + integral_rate*integral(e)',
+    (Parameter('integral_rate', '1/s', 0.0, 20.0, 'integral over proportional gain', 0.0),),
+    group='integral',
+    signature='linear; no static error, overshoot at low frequency; weak, it passes for a gain',
+    source='Jelali & Kroll 2003 (PI control)',
+    searched=False,
+    check=False,
+)

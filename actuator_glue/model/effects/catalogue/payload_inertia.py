@@ -1,0 +1,28 @@
+"""Mass that moves with the piston."""
+
+from __future__ import annotations
+
+import math
+
+from actuator_glue.model.effects import lti
+from actuator_glue.model.effects.effect import Effect
+from actuator_glue.model.parameters import Parameter
+
+EFFECT = Effect(
+    name='payload-inertia',
+    place='specimen',
+    equation="f = k x + m (v' + d v)",
+    parameters=(
+        Parameter('mass', 'kg', 0.0, 2e4, 'moving mass', 0.0),
+        Parameter('mass_damping', '1/s', 0.0, 500.0, 'damping over moving mass', 20.0),
+    ),
+    group='inertia',
+    signature='linear; resonance of the mass on the oil column',
+    source='Dyke et al. 1995; Merritt 1967',
+    starts=lambda s: tuple(
+        (s.oil / (2.0 * math.pi * hz) ** 2, 2.0 * ratio * 2.0 * math.pi * hz)
+        for hz in (80.0, 40.0, 20.0)
+        for ratio in (0.1, 0.4)
+    ),
+    exact=lti.MASS,
+)

@@ -1,0 +1,19 @@
+"""Overlap of the spool: a dead band of the control error."""
+
+from __future__ import annotations
+
+from actuator_glue.model.effects.effect import Effect
+from actuator_glue.model.parameters import Parameter
+
+EFFECT = Effect(
+    name='valve-deadband',
+    place='valve',
+    equation='e = D(u_c - x, w), D(e, w) = sign(e) max(|e| - w, 0)',
+    parameters=(
+        Parameter('deadband', 'm', 0.0, 2e-3, 'overlap as control error, half width', 0.0),
+    ),
+    group='lost-motion',
+    signature='odd harmonics; flat where the velocity is small; relative size falls as 1/A',
+    source='Merritt 1967; Tao & Kokotovic 1996',
+    starts=lambda s: ((0.005 * s.stroke,), (0.02 * s.stroke,), (0.06 * s.stroke,)),
+)

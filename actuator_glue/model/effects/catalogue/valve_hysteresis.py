@@ -1,0 +1,17 @@
+"""Hysteresis of the valve."""
+
+from __future__ import annotations
+
+from actuator_glue.model.effects.terms.entry import term
+from actuator_glue.model.parameters import Parameter
+
+EFFECT = term(
+    'valve-hysteresis',
+    'valve: e = play(e, valve_play)',
+    (Parameter('valve_play', 'm', 0.0, 2e-3, 'play as control error, half width', 0.0),),
+    group='lost-motion',
+    signature='minor loops: the valve answers a reversal late',
+    source='Merritt 1967; Tao & Kokotovic 1996 (play operator)',
+    searched=False,
+    check=False,
+)

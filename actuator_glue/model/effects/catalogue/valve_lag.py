@@ -1,0 +1,19 @@
+"""Second time constant of the valve."""
+
+from __future__ import annotations
+
+from actuator_glue.model.effects import lti
+from actuator_glue.model.effects.effect import Effect
+from actuator_glue.model.parameters import Parameter
+
+EFFECT = Effect(
+    name='valve-lag',
+    place='valve',
+    equation="T q'' + q' + beta_1 q = alpha_1 beta_0 (u_c - x)",
+    parameters=(Parameter('valve_lag', 's', 0.0, 0.02, 'second time constant of the valve', 0.0),),
+    group='lag',
+    signature='linear; residual grows with the square of frequency',
+    source='Merritt 1967; Jelali & Kroll 2003',
+    starts=lambda s: ((0.0005,), (0.002,), (0.006,)),
+    exact=lti.VALVE,
+)
