@@ -230,6 +230,23 @@ def test_blocks_and_neighbours_change_nothing(equation: str) -> None:
     assert np.array_equal(np.concatenate(parts), own)
 
 
+@pytest.mark.parametrize('place', ['command: u', 'valve: e', 'flow: q', 'force: f', 'sensor: y'])
+def test_two_at_one_place_follow_one_another(place: str) -> None:
+    """The second takes what the first has made: two gains are their product."""
+    signal = place[-1]
+    both = simulated(f'{place} = {signal}*(1 + own)*(1 - own)', 0.02)
+    size = (Parameter('other', '1', 0.0, 1.0, '', 0.0),)
+    CATALOGUE.register(term('other-effect', f'{place} = {signal}*(1 - other)', size))
+    CATALOGUE.register(
+        term('own-effect', f'{place} = {signal}*(1 + own)', one(0, 1)), replace=True
+    )
+    record, structure = Record(U, U, 1 / 256.0, K), Structure(('own-effect', 'other-effect'))
+    two = structure.simulate([*TABLE_2, 0.02, 0.02], record)
+    assert np.abs(two - both).max() < 1e-15
+    alone = structure.simulate([*TABLE_2, 0.0, 0.02], record)
+    assert np.abs(two - alone).max() > 1e-6
+
+
 def test_time_counts_from_the_start_of_the_test() -> None:
     """In a window as in the whole record."""
     late = simulated('flow: q = q*max(1 + own*t, 0)', 0.02, origin=5.0)

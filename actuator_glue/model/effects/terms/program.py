@@ -132,7 +132,7 @@ class _Builder:
         signal = SIGNAL[place]
         before, slope_before = into.symbols[signal]
         if place in self._left:
-            slope_before = _LEFT[place]
+            slope_before = _LEFT.get(place)
             into.symbols[signal] = before, slope_before
         used = effect.expression.tree.words()
         after, slope = into.emit(effect.expression.tree)
