@@ -1,14 +1,70 @@
-"""Online Bayesian calibration and diagnosis of servo-hydraulic actuators."""
+"""Online Bayesian calibration and diagnosis of servo-hydraulic actuators.
 
-import os
+    import actuator_glue as ag
+
+    record = ag.load('test.csv', stiffness=250e3)
+    posterior = ag.calibrate([record])
+    found = ag.diagnose([record])
+
+Names are imported when they are first used: importing the package costs nothing, changes nothing
+in the process and needs no ROS.
+"""
+
+from importlib import import_module as _import_module
+from os.path import realpath as _realpath
+from typing import TYPE_CHECKING, Any
 
 __version__ = '0.1.0'
 
-# Our matrices are small and our own threads and processes use the cores: BLAS threads on top only
-# wait for each other (measured: a diagnosis takes 1.7 times the processor time). A choice of the
-# user's stands; numpy imported before this package keeps its own.
-os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
-
 # A workspace reaches the sources through links, a virtual environment does not: compiled code is
 # kept by path, and both shall find it in one place.
-__path__ = [os.path.realpath(folder) for folder in __path__]
+__path__ = [_realpath(folder) for folder in __path__]
+
+if TYPE_CHECKING:
+    from actuator_glue import effects as effects
+    from actuator_glue.api.calibration import calibrate as calibrate
+    from actuator_glue.api.diagnosis import Diagnosis as Diagnosis
+    from actuator_glue.api.diagnosis import diagnose as diagnose
+    from actuator_glue.api.posterior import Calibration as Calibration
+    from actuator_glue.api.replay_result import Replay as Replay
+    from actuator_glue.api.replaying import replay as replay
+    from actuator_glue.api.simulation import Command as Command
+    from actuator_glue.api.simulation import simulate as simulate
+    from actuator_glue.errors import InputError as InputError
+    from actuator_glue.io.load import load as load
+    from actuator_glue.io.load import load_records as load_records
+    from actuator_glue.records import Record as Record
+
+# Public name: the module that holds it, and its name there ('' for the module itself).
+_PUBLIC = {
+    'Calibration': ('api.posterior', 'Calibration'),
+    'Command': ('api.simulation', 'Command'),
+    'Diagnosis': ('api.diagnosis', 'Diagnosis'),
+    'InputError': ('errors', 'InputError'),
+    'Record': ('records', 'Record'),
+    'Replay': ('api.replay_result', 'Replay'),
+    'calibrate': ('api.calibration', 'calibrate'),
+    'diagnose': ('api.diagnosis', 'diagnose'),
+    'effects': ('effects', ''),
+    'load': ('io.load', 'load'),
+    'load_records': ('io.load', 'load_records'),
+    'replay': ('api.replaying', 'replay'),
+    'simulate': ('api.simulation', 'simulate'),
+}
+__all__ = sorted(_PUBLIC)
+
+
+def __getattr__(name: str) -> Any:
+    """Import a public name at its first use."""
+    if name not in _PUBLIC:
+        raise AttributeError(f'module {__name__!r} has no attribute {name!r}')
+    module, attribute = _PUBLIC[name]
+    found = _import_module(f'{__name__}.{module}')
+    value = getattr(found, attribute) if attribute else found
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    """Return the public names."""
+    return [*__all__, '__version__']

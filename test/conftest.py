@@ -3,8 +3,12 @@
 import os
 from collections.abc import Callable
 
-import numpy as np
 import pytest
+
+# As nodes and the command line have it: results are compared bit by bit.
+os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
+
+import numpy as np
 
 
 @pytest.fixture

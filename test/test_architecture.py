@@ -21,7 +21,7 @@ EVERYTHING = CORE | {
 }  # fmt: skip
 # Each folder or top module, and what it may import besides itself.
 ARROWS = {
-    '__init__': set(),
+    '__init__': {'api', 'effects', 'errors', 'io', 'records'},  # names, imported when used
     'errors': set(),
     'records': {'errors'},
     'jit': set(),
@@ -34,8 +34,9 @@ ARROWS = {
     'report': CORE | {'online', 'residual', 'io'},
     'io': {'records', 'errors', 'interfaces'},
     'workers': CORE | {'online'},
-    'nodes': EVERYTHING,
-    'cli': EVERYTHING,
+    'api': EVERYTHING,
+    'nodes': EVERYTHING | {'api'},
+    'cli': EVERYTHING | {'api'},
 }
 # All below io but jit, which keeps compiled code in files.
 PURE = ('errors', 'records', 'normal', 'model', 'inference', 'online', 'residual')

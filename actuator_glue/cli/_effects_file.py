@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterable
-from typing import Any
 
 
 def add_effects_file(parser: argparse._ActionsContainer) -> None:
@@ -30,16 +28,3 @@ def load_effects(args: argparse.Namespace) -> None:
 
         for path in args.effects_file:
             effects.load_effects(path)
-
-
-def definitions(names: Iterable[str]) -> dict[str, Any]:
-    """Return `{'definitions': ...}` of those effects that are the user's own, else nothing.
-
-    What is saved with it can be read where the file is not at hand.
-    """
-    from actuator_glue.model.effects import CATALOGUE
-    from actuator_glue.model.effects.terms.definition import mapping
-
-    wanted = set(names)
-    own = mapping(e for e in CATALOGUE.registered() if e.name in wanted)
-    return {'definitions': own} if own else {}

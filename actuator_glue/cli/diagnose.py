@@ -7,19 +7,17 @@ the held-out records do not bear out what the fitting records say. 2: the input 
 from __future__ import annotations
 
 import argparse
-import time
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from actuator_glue.cli._effects_file import add_effects_file, definitions, load_effects
+from actuator_glue.cli._effects_file import add_effects_file, load_effects
 from actuator_glue.cli._output import add_json, note, progress, say, table, write_json
 from actuator_glue.cli._parser import Output
 from actuator_glue.cli._records import add_records, load
-from actuator_glue.errors import InputError
 from actuator_glue.records import Record
 
 if TYPE_CHECKING:
-    from actuator_glue.residual.diagnosis import Diagnosis
+    from actuator_glue.api.diagnosis import Diagnosis
 
 # Share of the whole work that is done when a stage begins.
 _STAGES = {
@@ -68,14 +66,10 @@ def run(args: argparse.Namespace) -> int:
     Raises:
         InputError: a record or option cannot be used.
     """
-    if args.seed < 0:
-        raise InputError(f'--seed {args.seed} is negative')
-    if args.jobs < 1:
-        raise InputError(f'--jobs {args.jobs} is below 1')
     load_effects(args)
     records, held = _load(args)
 
-    from actuator_glue.residual.diagnose import diagnose
+    from actuator_glue.api.diagnosis import diagnose
 
     at = 0.0
     with progress('diagnose', 1.0) as done:
@@ -86,18 +80,11 @@ def run(args: argparse.Namespace) -> int:
             at = max(at, _STAGES[stage] + share * (min(later) - _STAGES[stage]))
             done(at)
 
-        found = diagnose(
-            records,
-            held or None,
-            seed=args.seed,
-            jobs=args.jobs,
-            progress=tell,
-            clock=time.perf_counter,
-        )
+        found = diagnose(records, held or None, seed=args.seed, jobs=args.jobs, progress=tell)
     _show(found, args)
-    write_json({**found.to_json(), **definitions(found.structure)}, args.json)
+    write_json(found.to_json(), args.json)
     if args.report is not None:
-        _report(found, args.report)
+        found.report(args.report)
     return 0 if found.complete else 1
 
 
@@ -159,14 +146,3 @@ def _show(found: Diagnosis, args: argparse.Namespace) -> None:
     )
     for line in found.advice:
         note(line)
-
-
-def _report(found: Diagnosis, out: str) -> None:
-    from pathlib import Path
-
-    from actuator_glue.report.diagnosis import write_report
-
-    try:
-        write_report(found, Path(out))
-    except OSError as error:
-        raise InputError(f'{out}: cannot be written ({error.strerror or error})') from error

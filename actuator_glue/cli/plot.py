@@ -6,7 +6,6 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from actuator_glue.cli._draws import Draws
 from actuator_glue.cli._output import note, say
 from actuator_glue.cli._parser import add_force, claim
 from actuator_glue.cli._records import add_records, load
@@ -14,6 +13,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.records import Record
 
 if TYPE_CHECKING:
+    from actuator_glue.api.posterior import Calibration
     from actuator_glue.report.bag_content import Content
 
 
@@ -27,8 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--draws',
         metavar='DRAWS.npz',
-        help='posterior draws of `calibrate --draws`: also their picture, and their bands over '
-        'every record',
+        help='what `calibrate --save` wrote: also its picture, and its bands over every record',
     )
     parser.add_argument(
         '--format', choices=('png', 'svg', 'pdf'), default='png', help='default png'
@@ -49,15 +48,17 @@ def run(args: argparse.Namespace) -> int:
     except OSError as error:
         raise InputError(f'{folder}: cannot be made ({error.strerror or error})') from error
     records = load(args)
-    draws = None if args.draws is None else Draws.read(Path(args.draws))
-    if draws is not None:
-        draws.draw(folder, args)
+    posterior = None
+    if args.draws is not None:
+        from actuator_glue.api.posterior import Calibration
+
+        posterior = Calibration.load(args.draws)
+        _draw_posterior(posterior, folder / f'{Path(args.draws).stem}.{args.format}', args)
     for i, record in enumerate(records, start=1):
         name = f'{_stem(record)}_{i}' if len(records) > 1 else _stem(record)
         _draw(record, claim(folder / f'{name}.{args.format}', args), args)
-        if draws is not None:
-            bands = claim(folder / f'{name}_bands.{args.format}', args)
-            draws.draw_bands(record, bands, args)
+        if posterior is not None:
+            _draw_bands(posterior, record, folder / f'{name}_bands.{args.format}', args)
     for path in args.records:
         if is_bag(path):
             _draw_estimate(Path(path), folder, args)
@@ -75,6 +76,26 @@ def _draw(record: Record, path: Path, args: argparse.Namespace) -> None:
 
     style.save(record_figure(record), path)
     say(f'{path}: {len(record)} samples of {record.source}', args)
+
+
+def _draw_posterior(found: Calibration, path: Path, args: argparse.Namespace) -> None:
+    from actuator_glue.report import style
+
+    style.save(found.plot(), claim(path, args))
+    say(f'{path}: {len(found.posterior)} draws of {args.draws}', args)
+
+
+def _draw_bands(found: Calibration, record: Record, path: Path, args: argparse.Namespace) -> None:
+    from actuator_glue.api.calibration_report import LEVEL, bands_figure
+    from actuator_glue.report import style
+
+    figure, inside = bands_figure(found, record)
+    style.save(figure, claim(path, args))
+    say(
+        f'{path}: {100 * LEVEL:.0f} % bands; the total one holds {100 * inside:.1f} % of the '
+        'samples it was made from',
+        args,
+    )
 
 
 def _draw_estimate(bag: Path, folder: Path, args: argparse.Namespace) -> None:

@@ -7,19 +7,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from actuator_glue.cli._effects import NOISE, chosen, unseen
-from actuator_glue.cli._effects_file import add_effects_file, definitions, load_effects
+from actuator_glue.cli._effects_file import add_effects_file, load_effects
 from actuator_glue.cli._output import note, progress, write_json
 from actuator_glue.cli._parser import claim, number
 from actuator_glue.cli._save import add_out, check_out, save
 from actuator_glue.errors import InputError
-from actuator_glue.records import Array, Record
+from actuator_glue.records import Record
 
 if TYPE_CHECKING:
-    from actuator_glue.model.plant import Plant
+    from actuator_glue.api.simulation import Command, Sensors
 
 COMMANDS = ('sweep', 'sine', 'noise', 'earthquake')
-BLOCK = 4096  # samples simulated at a time
 PAUSE = 1_000_000_000  # ns between two tests of one bag
 
 
@@ -97,30 +95,83 @@ def run(args: argparse.Namespace) -> int:
     if args.plant == 'problem-r':
         save(_problem_r(args), args)
         return 0
-    command, rate = _command(args)
-    stiffnesses = args.stiffness or [0.0]
     records: list[Record] = []
-    truth: dict[str, Any] = {}
-    with progress('simulating', len(command) * len(stiffnesses)) as done:
+    command = _command(args)
+    stiffnesses = args.stiffness or [0.0]
+    with progress('simulating', len(stiffnesses)) as done:
         for test, stiffness in enumerate(stiffnesses):
-            plant, truth = _plant(args, stiffness, command, rate, test)
             start = records[-1].stamp_ns(len(records[-1])) + PAUSE if records else PAUSE
-            record = _measure(plant, command, rate, done, test * len(command))
-            # The benchmark's specimen is part of its transfer system.
-            known = truth.get('specimen_stiffness', stiffness)
-            record = replace(record, stiffness=known, hold=args.hold, start_ns=start)
-            records.append(replace(record, actuator=args.actuator))
+            record = _test(args, command, stiffness, test)
+            records.append(replace(record, start_ns=start, actuator=args.actuator))
+            done(test + 1)
     save(records, args)
     if args.effect:
-        write_json({'schema': 'actuator_glue.truth/1', **truth}, str(sealed))
+        write_json(_truth(args, command, stiffnesses[-1]), str(sealed))
         note(f'what was switched on is in {sealed}')
-        for line in unseen(args, stiffnesses, command, rate):
+        for line in _unseen(args, command, stiffnesses):
             note(line)
     return 0
 
 
-def _given(value: float | None, default: float) -> float:
-    return default if value is None else value
+def _test(
+    args: argparse.Namespace, command: Command | Record, stiffness: float, test: int
+) -> Record:
+    from actuator_glue.api.simulation import simulate
+
+    return simulate(
+        command,
+        stiffness=stiffness,
+        theta=args.theta,
+        effects=dict(map(_parse_effect, args.effect)),
+        sensors=_sensors(args),
+        plant=args.plant,
+        hold=args.hold,
+        seed=(args.seed, test),
+    )
+
+
+def _sensors(args: argparse.Namespace) -> Sensors:
+    from actuator_glue.api.simulation import Sensors
+
+    noise = None if args.noise_mm is None else args.noise_mm * 1e-3
+    force = 2.0 if args.force_noise_n is None else args.force_noise_n
+    return Sensors(noise, force, args.bits)
+
+
+def _unseen(
+    args: argparse.Namespace, command: Command | Record, stiffnesses: list[float]
+) -> list[str]:
+    from actuator_glue.api.visibility import unseen
+
+    effects = dict(map(_parse_effect, args.effect))
+    return unseen(
+        command,
+        stiffnesses,
+        effects,
+        theta=args.theta,
+        sensors=_sensors(args),
+        hold=args.hold,
+    )
+
+
+def _truth(
+    args: argparse.Namespace, command: Command | Record, stiffness: float
+) -> dict[str, Any]:
+    """Return what is true about the plant."""
+    from actuator_glue.api.definitions import definitions
+    from actuator_glue.api.simulation import samples_of, sizes
+
+    samples = samples_of(command)
+    effects = dict(map(_parse_effect, args.effect))
+    structure, theta = sizes(samples, command.rate, stiffness, effects, args.theta)
+    return {
+        'schema': 'actuator_glue.truth/1',
+        'plant': args.plant,
+        'theta': dict(zip(structure.names, theta.tolist(), strict=True)),
+        'effects': list(structure.effects),
+        **definitions(structure.effects),
+        'seed': args.seed,
+    }
 
 
 def _problem_r(args: argparse.Namespace) -> list[Record]:
@@ -143,92 +194,43 @@ def _problem_r(args: argparse.Namespace) -> list[Record]:
     ]
 
 
-def _command(args: argparse.Namespace) -> tuple[Array, float]:
-    """Return the command [m] and its rate [Hz]."""
+def _command(args: argparse.Namespace) -> Command | Record:
+    """Return the command: a shape, or that of a file."""
+    from actuator_glue.api.simulation import Command
     from actuator_glue.model import commands
 
-    if args.shape not in COMMANDS:
-        from actuator_glue.io.load import load_records
+    amplitude = None if args.amplitude_mm is None else args.amplitude_mm * 1e-3
+    if args.shape in COMMANDS:
+        given = {
+            'rate': args.rate,
+            'duration': args.duration,
+            'amplitude': amplitude,
+            'low': args.f0,
+            'high': args.frequency if args.shape == 'sine' else args.f1,
+            'seed': args.command_seed,
+        }
+        return Command(args.shape, **{k: v for k, v in given.items() if v is not None})
+    from actuator_glue.io.load import load_records
 
-        if not Path(args.shape).exists():
-            raise InputError(
-                f'--command {args.shape}: neither one of {", ".join(COMMANDS)} nor a file'
-            )
-        record = load_records(args.shape, channels=args.channels, hold=args.hold)[0]
-        amplitude = None if args.amplitude_mm is None else args.amplitude_mm * 1e-3
-        rate = _given(args.rate, record.rate)
-        return commands.recorded(record, rate, amplitude), rate
-    rate, duration = _given(args.rate, 1000.0), _given(args.duration, 60.0)
-    peak, f1 = _given(args.amplitude_mm, 2.0) * 1e-3, _given(args.f1, 10.0)
-    if args.shape == 'sweep':
-        return commands.sweep(rate, duration, _given(args.f0, 0.0), f1, peak), rate
-    if args.shape == 'sine':
-        return commands.sine(rate, duration, args.frequency, peak), rate
-    if args.shape == 'noise':
-        return commands.noise(
-            rate, duration, _given(args.f0, 0.1), f1, peak, args.command_seed
-        ), rate
-    return commands.earthquake(rate, duration, peak, args.command_seed), rate
-
-
-def _plant(
-    args: argparse.Namespace, stiffness: float, command: Array, rate: float, test: int
-) -> tuple[Plant, dict[str, Any]]:
-    """Return the plant of one test and what is true about it."""
-    import numpy as np
-
-    from actuator_glue.model import benchmark_plant
-    from actuator_glue.model.plant import MeasuredPlant
-    from actuator_glue.model.sensor import SensorSpec
-    from actuator_glue.model.stream import Stream
-
-    seed = int(np.random.SeedSequence((args.seed, test)).generate_state(1)[0])
-    noise = None if args.noise_mm is None else args.noise_mm * 1e-3
-    if args.plant == 'benchmark':
-        if args.effect or args.theta:
-            raise InputError('the benchmark plant takes no --theta and no --effect')
-        if stiffness:
-            raise InputError('the benchmark plant has its own specimen; leave --stiffness out')
-        spec = benchmark_plant.DISPLACEMENT_SENSOR
-        if noise is not None:
-            spec = replace(spec, noise=noise)
-        made = benchmark_plant.benchmark_plant(
-            period=1.0 / rate, hold=args.hold, seed=seed, displacement=spec
+    if not Path(args.shape).exists():
+        raise InputError(
+            f'--command {args.shape}: neither one of {", ".join(COMMANDS)} nor a file'
         )
-        return made, {'specimen_stiffness': benchmark_plant.BenchmarkParameters().stiffness}
-    structure, theta = chosen(args, stiffness, command, rate)
-    stream = Stream(
-        structure,
-        theta,
-        stiffness=stiffness,
-        period=1.0 / rate,
-        hold=args.hold,
-        rng=np.random.default_rng((seed, 1)),
-    )
-    span = 2.0 * float(np.abs(command).max()) or 1e-3
-    force = _given(args.force_noise_n, 2.0)
-    made = MeasuredPlant(
-        stream,
-        SensorSpec(NOISE if noise is None else noise, args.bits, span),
-        SensorSpec(force, args.bits, max(2.0 * stiffness * span, 1e3)),
-        seed,
-    )
-    truth = {
-        'plant': args.plant,
-        'theta': dict(zip(structure.names, theta.tolist(), strict=True)),
-        'effects': list(structure.effects),
-        **definitions(structure.effects),
-        'seed': args.seed,
-    }
-    return made, truth
+    record = load_records(args.shape, channels=args.channels, hold=args.hold)[0]
+    rate = record.rate if args.rate is None else args.rate
+    samples = commands.recorded(record, rate, amplitude)
+    return Record(samples, samples, 1.0 / rate)
 
 
-def _measure(plant: Plant, command: Array, rate: float, done: Any, before: int) -> Record:
-    import numpy as np
-
-    measured, force = np.empty(len(command)), np.empty(len(command))
-    for start in range(0, len(command), BLOCK):
-        part = slice(start, min(start + BLOCK, len(command)))
-        measured[part], force[part] = plant.step(command[part])
-        done(before + part.stop)
-    return Record(command, measured, 1.0 / rate, force=force, source='simulated')
+def _parse_effect(text: str) -> tuple[str, dict[str, float]]:
+    name, _, rest = text.partition(':')
+    values = {}
+    for item in filter(None, rest.split(',')):
+        key, sign, value = item.partition('=')
+        try:
+            values[key.strip()] = float(value)
+        except ValueError:
+            sign = ''
+        if not sign:
+            raise InputError(f'--effect {text}: {item!r} is not PARAMETER=VALUE')
+    return name.strip(), values

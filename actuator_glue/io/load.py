@@ -14,6 +14,30 @@ from actuator_glue.io.channel_map import ChannelMap, read_channel_map
 from actuator_glue.records import Hold, Record, check_stiffness
 
 
+def load(
+    path: Path | str,
+    *,
+    stiffness: float | None = None,
+    channels: ChannelMap | Path | str | None = None,
+    hold: Hold | None = None,
+) -> Record:
+    """Return the one record of a bag or laboratory file.
+
+    Args:
+        path: bag folder, .mcap, .mat or delimited text.
+        stiffness: specimen stiffness [N/m]; None for what the file says.
+        channels: channel map for a laboratory file.
+        hold: how the command runs between its samples; None for what the file says.
+
+    Raises:
+        InputError: the file cannot be used, or holds several records.
+    """
+    found = load_records(path, stiffness=stiffness, channels=channels, hold=hold)
+    if len(found) > 1:
+        raise InputError(f'{path} holds {len(found)} records; `load_records` returns them all')
+    return found[0]
+
+
 def load_records(
     paths: Sequence[Path | str] | Path | str,
     *,

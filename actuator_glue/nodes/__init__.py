@@ -1,1 +1,7 @@
 """ROS 2 nodes: each converts, hands on, publishes."""
+
+import os
+
+# A node and its workers share few cores: threads of the linear algebra on top would only wait for
+# each other. What somebody has set stands.
+os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')

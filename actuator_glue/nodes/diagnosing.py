@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import time
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,6 +11,7 @@ import numpy as np
 from actuator_glue_msgs.msg import Candidate, Effect
 from actuator_glue_msgs.srv import SetModel
 
+from actuator_glue.api.diagnosis import Diagnosis, diagnose
 from actuator_glue.errors import InputError
 from actuator_glue.io.load import load_records
 from actuator_glue.model.commands import noise
@@ -19,8 +19,7 @@ from actuator_glue.model.structure import Structure
 from actuator_glue.nodes.messages import fill
 from actuator_glue.online.wire import Fields, Head
 from actuator_glue.records import Record
-from actuator_glue.residual.diagnose import diagnose
-from actuator_glue.residual.diagnosis import Diagnosis, Finding
+from actuator_glue.residual.diagnosis import Finding
 from actuator_glue.workers.worker import Tell
 
 
@@ -116,8 +115,8 @@ def work(request: Request, tell: Tell) -> Outcome:
             records,
             holdout,
             seed=request.seed,
+            jobs=1,
             progress=lambda stage, fraction: tell((stage, fraction)),
-            clock=time.monotonic,
         )
     except InputError as error:
         return Outcome(message=str(error))

@@ -8,14 +8,14 @@ from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.records import source_name
 from actuator_glue.report import diagnosis_figures as figures
 from actuator_glue.report.html import Block, Note, Picture, Section, Table, Text, write
-from actuator_glue.residual.diagnosis import Diagnosis
+from actuator_glue.residual.diagnosis import DiagnosisData
 
 
 def _um(value: float) -> str:
     return f'{1e6 * value:.2f}'
 
 
-def _error(found: Diagnosis) -> Section:
+def _error(found: DiagnosisData) -> Section:
     e = found.error
     sides = (
         ('before: Eq. (2), refitted', e.before, e.before_ci, found.coverage[0]),
@@ -49,7 +49,7 @@ def _error(found: Diagnosis) -> Section:
     return Section('Error before and after', blocks)
 
 
-def _effects(found: Diagnosis) -> Section:
+def _effects(found: DiagnosisData) -> Section:
     blocks: list[Block] = []
     if found.effects:
         rows = [
@@ -113,7 +113,7 @@ def _effects(found: Diagnosis) -> Section:
     return Section('What is missing', blocks)
 
 
-def _residual(found: Diagnosis) -> Section:
+def _residual(found: DiagnosisData) -> Section:
     a = found.alarm
     tests = [[name, f'{value:.3g}'] for name, value in a.tests.items()]
     rows = [
@@ -152,7 +152,7 @@ def _residual(found: Diagnosis) -> Section:
     )  # fmt: skip
 
 
-def _records(found: Diagnosis) -> Section:
+def _records(found: DiagnosisData) -> Section:
     rows = [
         [
             source_name(t.source),
@@ -167,11 +167,11 @@ def _records(found: Diagnosis) -> Section:
     return Section('Records', [Table(header, rows, 'What was read, and from where.', prose=True)])
 
 
-def write_report(found: Diagnosis, path: Path) -> Path:
+def write_report(found: DiagnosisData, path: Path) -> Path:
     """Write the report of a diagnosis and return its path.
 
     Raises:
         OSError: the file cannot be written.
     """
     sections = [_error(found), _effects(found), _residual(found), _records(found)]
-    return write(path, 'Diagnosis', found.summary(), sections)
+    return write(path, 'DiagnosisData', found.summary(), sections)

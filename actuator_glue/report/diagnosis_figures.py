@@ -21,7 +21,7 @@ from actuator_glue.report.style import (
     new_figure,
     styled,
 )
-from actuator_glue.residual.diagnosis import Diagnosis, Trace
+from actuator_glue.residual.diagnosis import DiagnosisData, Trace
 
 BEFORE, AFTER = DETERMINISTIC, TOTAL
 _POINTS = 4000  # per line: more cannot be seen
@@ -37,17 +37,17 @@ def stretches(trace: Trace) -> list[slice]:
     return [slice(a, b) for a, b in pairwise(bounds)]
 
 
-def moved(found: Diagnosis) -> bool:
+def moved(found: DiagnosisData) -> bool:
     """Whether an effect was added that changes the simulated motion; others add to the noise."""
     return any(e.noise is None for e in found.effects)
 
 
-def _sides(found: Diagnosis) -> list[tuple[str, str]]:
+def _sides(found: DiagnosisData) -> list[tuple[str, str]]:
     """Return field of a `Trace` and colour of what is drawn: one where nothing was added."""
     return [('before', BEFORE), ('after', AFTER)][: 2 if moved(found) else 1]
 
 
-def _text(found: Diagnosis, side: str) -> str:
+def _text(found: DiagnosisData, side: str) -> str:
     return side if moved(found) else 'Eq. (2), refitted'
 
 
@@ -72,7 +72,7 @@ def _lines(trace: Trace, *columns: Array) -> Array:
 
 
 @styled
-def residuals_in_time(found: Diagnosis) -> Figure:
+def residuals_in_time(found: DiagnosisData) -> Figure:
     """Residual of every record against time, before and after."""
     figure = new_figure(1.6 * len(found.traces) + 0.8)
     grid = figure.subplots(len(found.traces), 1, squeeze=False)[:, 0]
@@ -99,7 +99,7 @@ def _density(trace: Trace, residual: Array) -> tuple[Array, Array]:
 
 
 @styled
-def residuals_in_frequency(found: Diagnosis) -> Figure:
+def residuals_in_frequency(found: DiagnosisData) -> Figure:
     """Density of the residual of every record, before and after."""
     columns = min(len(found.traces), 2)
     rows = -(-len(found.traces) // columns)
@@ -146,7 +146,7 @@ def _smooth(trace: Trace, values: Array) -> Array:
 
 
 @styled
-def loops(found: Diagnosis) -> Figure:
+def loops(found: DiagnosisData) -> Figure:
     """Residual against displacement (slow part) and against velocity, before and after."""
     figure = new_figure(2.1 * len(found.traces) + 0.4)
     grid = figure.subplots(len(found.traces), 2, squeeze=False)
@@ -172,7 +172,7 @@ def loops(found: Diagnosis) -> Figure:
 
 
 @styled
-def ranking(found: Diagnosis) -> Figure:
+def ranking(found: DiagnosisData) -> Figure:
     """Error that each single candidate leaves on the fitting part."""
     shown = found.candidates[:14][::-1]
     figure = new_figure(0.22 * len(shown) + 1.0)
@@ -187,7 +187,7 @@ def ranking(found: Diagnosis) -> Figure:
 
 
 @styled
-def posteriors(found: Diagnosis) -> Figure:
+def posteriors(found: DiagnosisData) -> Figure:
     """Marginal posterior of every effect parameter."""
     estimates = {n: p for e in found.effects for n, p in e.parameters.items()}
     names = found.names[4:]
@@ -208,7 +208,7 @@ def posteriors(found: Diagnosis) -> Figure:
 
 
 @styled
-def bands(found: Diagnosis) -> Figure:
+def bands(found: DiagnosisData) -> Figure:
     """95 % bands on one second of the held-out part where before and after differ most.
 
     The lower panels show the same less the middle of the band.

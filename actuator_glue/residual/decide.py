@@ -23,7 +23,7 @@ class Decision:
     """Verdict on the fitting part.
 
     Attributes:
-        verdict: see Diagnosis.
+        verdict: see DiagnosisData
         final: structure to go on with: all additions that are supported.
         names: its effects, named as findings.
         measured: measurement effects, named as findings.

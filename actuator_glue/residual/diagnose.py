@@ -18,7 +18,7 @@ from actuator_glue.residual.attribute import Attribution
 from actuator_glue.residual.conclude import Progress, conclude, with_the_right_hold
 from actuator_glue.residual.decide import Decision
 from actuator_glue.residual.detect import alarm_of
-from actuator_glue.residual.diagnosis import Candidate, Diagnosis, Finding
+from actuator_glue.residual.diagnosis import Candidate, DiagnosisData, Finding
 from actuator_glue.residual.estimate import Estimate
 from actuator_glue.residual.fit import Space
 from actuator_glue.residual.hygiene import prepare
@@ -40,7 +40,7 @@ def diagnose(
     progress: Progress | None = None,
     settings: Settings | None = None,
     clock: Clock | None = None,
-) -> Diagnosis:
+) -> DiagnosisData:
     """Diagnose records whose specimen stiffness is known.
 
     Args:
@@ -93,7 +93,7 @@ def diagnose(
     moved = any(e.noise is None for e in effects)
     judged = verdict.conclude(decision.verdict, moved, error, found.material)
     tell('done', 1.0)
-    return Diagnosis(
+    return DiagnosisData(
         verdict=judged,
         effects=effects,
         error=error,

@@ -193,7 +193,7 @@ class Trace:
 
 
 @dataclass(frozen=True, slots=True)
-class Diagnosis:
+class DiagnosisData:
     """Verdict, evidence and the augmented model.
 
     Attributes:

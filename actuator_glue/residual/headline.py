@@ -9,7 +9,7 @@ from actuator_glue.records import source_name
 from actuator_glue.residual.verdict import misses
 
 if TYPE_CHECKING:
-    from actuator_glue.residual.diagnosis import Diagnosis, Finding
+    from actuator_glue.residual.diagnosis import DiagnosisData, Finding
 
 
 def _named(effect: Finding) -> str:
@@ -18,7 +18,7 @@ def _named(effect: Finding) -> str:
     return effect.name + where + others
 
 
-def _noise(found: Diagnosis) -> str:
+def _noise(found: DiagnosisData) -> str:
     """Say how large the noise is, by itself or beside the error, and what is known to make it."""
     floor = found.error.noise_floor
     parts = [f'{1e6 * (e.noise or 0.0):.1f} um by {e.name}' for e in found.effects if e.noise]
@@ -29,7 +29,7 @@ def _noise(found: Diagnosis) -> str:
     return f'{text} ({", ".join(parts)})' if parts else text
 
 
-def headline(found: Diagnosis) -> str:
+def headline(found: DiagnosisData) -> str:
     """Return the verdict in one line, never more than the held-out part bears out."""
     names = ', '.join(_named(e) for e in found.effects if e.noise is None)
     before, after = 1e6 * found.error.before, 1e6 * found.error.after

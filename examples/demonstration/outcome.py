@@ -15,7 +15,7 @@ from actuator_glue.online.job import WindowResult
 from actuator_glue.online.published import Comparison, compare, published
 from actuator_glue.online.replay import items, replay
 from actuator_glue.report.bag_content import Content
-from actuator_glue.residual.diagnosis import Diagnosis
+from actuator_glue.residual.diagnosis import DiagnosisData
 from actuator_glue.workers.reports import Reports
 
 SCHEMA = 'examples.demonstration/1'
@@ -66,7 +66,7 @@ class Outcome:
     sent: int
     content: Content
     comparison: Comparison
-    diagnosis: Diagnosis | None = None
+    diagnosis: DiagnosisData | None = None
     seconds: float = float('nan')
 
     def count(self, key: str) -> int:
@@ -187,7 +187,7 @@ class Outcome:
         return table
 
 
-def verdict(diagnosis: Diagnosis) -> list[str]:
+def verdict(diagnosis: DiagnosisData) -> list[str]:
     """Return what people want to know, line by line."""
     error = diagnosis.error
     lines = [f'diagnosis {diagnosis.summary()}']

@@ -11,7 +11,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.report import style
 from actuator_glue.report.bag_content import Content
 from actuator_glue.report.diagnosis_figures import stretches
-from actuator_glue.residual.diagnosis import Diagnosis, Trace
+from actuator_glue.residual.diagnosis import DiagnosisData, Trace
 
 UM = 1e6
 MM = 1e3
@@ -61,7 +61,7 @@ def _changes(content: Content) -> list[tuple[int, str]]:
     return found
 
 
-def residual(diagnosis: Diagnosis, path: Path) -> Path:
+def residual(diagnosis: DiagnosisData, path: Path) -> Path:
     """Draw the held-out residual before and after, against time and against displacement."""
     held = [t for t in diagnosis.traces if t.held_out]
     trace = max(held or diagnosis.traces, key=lambda t: len(t.measured))
@@ -69,7 +69,7 @@ def residual(diagnosis: Diagnosis, path: Path) -> Path:
 
 
 @style.styled
-def _draw(diagnosis: Diagnosis, trace: Trace) -> Figure:
+def _draw(diagnosis: DiagnosisData, trace: Trace) -> Figure:
     figure = style.new_figure(4.6)
     panels = figure.subplots(2, 2, sharex='col', sharey=True, width_ratios=(1.7, 1.0))
     with_effects = ' + '.join(['Eq. (2)', *diagnosis.structure])

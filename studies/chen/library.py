@@ -20,7 +20,7 @@ from actuator_glue.model.problem_r import records as reconstructed_tests
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 from actuator_glue.residual.diagnose import diagnose
-from actuator_glue.residual.diagnosis import Diagnosis
+from actuator_glue.residual.diagnosis import DiagnosisData
 
 __all__ = [
     'BASE',
@@ -34,7 +34,7 @@ __all__ = [
     'Array',
     'Band',
     'Chains',
-    'Diagnosis',
+    'DiagnosisData',
     'Errors',
     'ExactErrors',
     'GlueLikelihood',

@@ -15,7 +15,7 @@ from studies.chen.identify import (
     fit_physical,
     fit_transfer_function,
 )
-from studies.chen.library import Diagnosis, ExactErrors, Record, diagnose, reconstructed_tests
+from studies.chen.library import DiagnosisData, ExactErrors, Record, diagnose, reconstructed_tests
 from studies.chen.posterior import Laboratory, Posterior, Progress
 from studies.chen.published import CHOSEN, SHAPING_FACTORS, SHOWN
 
@@ -116,7 +116,7 @@ class Results:
     frequency: dict[str, tuple[dict[str, responses.FrequencyBand], ...]]
     time: dict[str, tuple[responses.TimeBand, ...]]
     refits: dict[str, misfit.Refit]
-    diagnoses: dict[str, Diagnosis]
+    diagnoses: dict[str, DiagnosisData]
     covered: list[Coverage]
 
     @property

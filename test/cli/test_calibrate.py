@@ -56,7 +56,7 @@ def test_draws_are_drawn(run, short_bag: Path, tmp_path: Path) -> None:
     assert done.code == 0, done.err
     assert {p.name for p in pictures.iterdir()} == {'draws.png', 'bag.png', 'bag_bands.png'}
     for wrong in (short_bag / 'metadata.yaml', tmp_path / 'nothing.npz'):
-        assert 'no draws' in run('plot', short_bag, '--draws', wrong).message
+        assert 'calibration' in run('plot', short_bag, '--draws', wrong).message
 
 
 def test_one_free_test_leaves_parameters_to_the_prior(run, problem_r: Path) -> None:

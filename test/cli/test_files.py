@@ -121,12 +121,14 @@ def test_outputs_are_overwritten_only_by_force(run, tmp_path: Path, short_bag: P
     for name in ('a.csv', 'a.mat', 'a', 'bag_2.5'):
         out = tmp_path / name
         assert run('convert', short_bag, out).code == 0
-        before = sorted(out.glob('*')) or out.read_bytes()
+        # A MATLAB file begins with the time of day.
+        skipped = 128 if name.endswith('.mat') else 0
+        before = sorted(out.glob('*')) or out.read_bytes()[skipped:]
         assert 'exists already' in run('convert', short_bag, out).message
         assert '--force' in run('convert', short_bag, out).message
         done = run('convert', '--force', short_bag, out)
         assert done.code == 0, done.err
-        assert (sorted(out.glob('*')) or out.read_bytes()) == before
+        assert (sorted(out.glob('*')) or out.read_bytes()[skipped:]) == before
         assert len(load_records(out)[0]) == 801
     assert 'folders' in run('convert', short_bag, tmp_path / 'a.mcap').message
     (tmp_path / 'precious').mkdir()

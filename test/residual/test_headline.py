@@ -6,9 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from actuator_glue.api import diagnosis as module
 from actuator_glue.cli.main import main
-from actuator_glue.residual import diagnose as module
-from actuator_glue.residual.diagnosis import Alarm, Diagnosis, Finding, HeldOutError, Verdict
+from actuator_glue.residual.diagnosis import Alarm, DiagnosisData, Finding, HeldOutError, Verdict
 from actuator_glue.residual.verdict import conclude
 
 NONE = np.empty((0, 4))
@@ -21,14 +21,14 @@ def finding(name: str, noise: float | None = None) -> Finding:
 
 def diagnosis(
     verdict: Verdict, before: float, after: float, *effects: Finding, noise: float = 10e-6
-) -> Diagnosis:
+) -> DiagnosisData:
     """A diagnosis with held-out errors before and after [m]."""
     removed = (before**2 - after**2) / max(before**2 - noise**2, 1e-12)
     about = (removed - 0.1, removed + 0.1)
     error = HeldOutError(before, (0, 1), after, (0, 1), noise, removed, about, before)
     alarm = Alarm(verdict != 'none', 1e-5, 5e-6, noise, 0.01)
     judged = conclude(verdict, any(e.noise is None for e in effects), error, alarm.threshold)
-    return Diagnosis(
+    return module.Diagnosis(
         judged, effects, error, (), (0.9, 0.9), alarm, (), {}, (), (), NONE, 1.0, NONE, (),
         {}, {'left': 12e-6}, 1.0,
     )  # fmt: skip
@@ -91,7 +91,7 @@ def diagnosis(
     ],
 )
 def test_the_headline_follows_the_held_out_part(
-    found: Diagnosis,
+    found: DiagnosisData,
     says: str,
     complete: bool,
     monkeypatch: pytest.MonkeyPatch,

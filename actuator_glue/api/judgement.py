@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Mapping, Sequence
 
-from actuator_glue.errors import InputError
-from actuator_glue.records import Record
+import numpy as np
 
-if TYPE_CHECKING:
-    from actuator_glue.inference.at_bound import Pressed
-    from actuator_glue.inference.chains import Chains
+from actuator_glue.api.posterior import FitError, Marginal
+from actuator_glue.inference.at_bound import Pressed
+from actuator_glue.records import Array, Record
 
 # R-hat above which draws are not yet the posterior (Vehtari et al. 2021).
 CONVERGED = 1.01
@@ -18,40 +16,30 @@ TIED = 0.99  # correlation above which two parameters are only known together
 MISFIT = 0.1  # share of a record's spread: a model that leaves more does not describe the test
 
 
-def bounds(given: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """Return the bounds of options NAME=LO:HI by parameter.
-
-    Raises:
-        InputError: not of this form, or a parameter twice.
-    """
-    out: dict[str, tuple[float, float]] = {}
-    for text in given:
-        name, _, values = text.partition('=')
-        try:
-            lower, upper = map(float, values.split(':'))
-        except ValueError:
-            raise InputError(f'--bounds {text}: give NAME=LO:HI, as in beta_1=0:800') from None
-        if name in out:
-            raise InputError(f'--bounds {text}: {name} has bounds already')
-        out[name] = (lower, upper)
-    return out
+def converged(parameters: Mapping[str, Marginal]) -> bool:
+    """Whether the chains of every parameter have met."""
+    return all(p.rhat <= CONVERGED for p in parameters.values())
 
 
-def problems(found: Sequence[Pressed], units: dict[str, str], fit: dict[str, Any]) -> list[str]:
+def problems(
+    found: Sequence[Pressed], parameters: Mapping[str, Marginal], fit: FitError
+) -> list[str]:
     """Return why a posterior must not be used as it stands, one line each; empty where it may.
 
     Args:
         found: parameters at a bound.
-        units: unit of each parameter.
-        fit: error of the best draw, see `fit_error`.
+        parameters: posterior of each parameter.
+        fit: error of the best draw.
     """
     told = []
-    poor = [r for r in fit['records'] if r['nrmse'] is not None and r['nrmse'] > MISFIT]
+    poor = [r for r in fit.records if r.nrmse is not None and r.nrmse > MISFIT]
     if poor:
-        where = ', '.join(f'{100 * r["nrmse"]:.0f} % in {r["source"] or "a record"}' for r in poor)
+        where = ', '.join(
+            f'{100 * (r.nrmse or 0.0):.0f} % in {r.source or "a record"}' for r in poor
+        )
         offset = ''
-        if any(abs(r['offset_m']) > 0.5 * r['rms_m'] for r in poor):
-            most = max((r['offset_m'] for r in poor), key=abs)
+        if any(abs(r.offset_m) > 0.5 * r.rms_m for r in poor):
+            most = max((r.offset_m for r in poor), key=abs)
             offset = f' (a constant offset of {1e3 * most:.3g} mm takes part of it)'
         told.append(
             f'the model does not fit: the best draw leaves {where} of the spread measured'
@@ -61,7 +49,8 @@ def problems(found: Sequence[Pressed], units: dict[str, str], fit: dict[str, Any
     for p in found:
         if p.physical:
             continue
-        unit = '' if units[p.name] == '1' else f' {units[p.name]}'
+        unit = parameters[p.name].unit
+        unit = '' if unit == '1' else f' {unit}'
         told.append(
             f'{p.name} is pressed against the {p.side} bound {p.bound:g}{unit} of its prior: the '
             'records ask for more, and its mean and spread are those of the bound; widen it with '
@@ -71,18 +60,16 @@ def problems(found: Sequence[Pressed], units: dict[str, str], fit: dict[str, Any
 
 
 def remarks(
-    records: list[Record],
-    parameters: dict[str, dict[str, Any]],
-    chains: Chains,
-    converged: bool,
+    records: Sequence[Record],
+    parameters: Mapping[str, Marginal],
+    draws: Array,
+    met: bool,
     found: Sequence[Pressed],
 ) -> list[str]:
     """Return what these records cannot tell, and what would."""
-    import numpy as np
-
     told = []
-    if not chains.annealed or not converged:
-        told.append(f'not converged (R-hat above {CONVERGED}); give more --evaluations')
+    if not met:
+        told.append(f'not converged (R-hat above {CONVERGED}); give more evaluations')
     told += [
         f'{p.name} lies at 0, below which it has no meaning: the records tell how large it is at '
         'most'
@@ -90,8 +77,8 @@ def remarks(
         if p.physical
     ]
     names = list(parameters)
-    open_ = [f'{n}: little more than its prior' for n in names if parameters[n]['prior_dominated']]
-    correlation = np.corrcoef(chains.posterior(), rowvar=False)
+    open_ = [f'{n}: little more than its prior' for n in names if parameters[n].prior_dominated]
+    correlation = np.corrcoef(draws, rowvar=False)
     for i, j in zip(*np.triu_indices(len(names), 1), strict=True):
         if abs(correlation[i, j]) > TIED:
             open_.append(f'{names[i]} and {names[j]}: only a combination of them is known')

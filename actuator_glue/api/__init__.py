@@ -1,0 +1,1 @@
+"""What `import actuator_glue` offers: records in, typed results out; no printing, no ROS."""

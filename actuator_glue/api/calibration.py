@@ -1,0 +1,224 @@
+"""Calibration: the joint posterior of Eq. (2) and effects from one or several records."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Literal
+
+import numpy as np
+
+from actuator_glue.api import judgement
+from actuator_glue.api.compilation import compilation
+from actuator_glue.api.posterior import Calibration, FitError, Marginal, RecordError, Source
+from actuator_glue.errors import InputError
+from actuator_glue.inference.at_bound import pressed
+from actuator_glue.inference.chains import Chains
+from actuator_glue.inference.choice import ModelChoice, choose_model
+from actuator_glue.inference.moments import moments
+from actuator_glue.inference.posterior import Problem, sample
+from actuator_glue.model.exact import Initial
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Array, Record
+from actuator_glue.residual.hygiene import SETTLE, clean, initial_state
+
+Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationOptions:
+    """How to calibrate; every one has the default of the command line.
+
+    Attributes:
+        effects: effects of the catalogue beyond Eq. (2), by name.
+        bounds: prior bounds by parameter [its unit] in place of those of Table 3 or the catalogue.
+        likelihood: 'glue' is Eq. (4); 'gaussian' and 'ar1' are formal ones.
+        shaping_factor: G of L = -G ln Var[E], Eq. (4); used with 'glue' only.
+        evaluations: likelihood evaluations.
+        seed: seed of the sampler.
+        initial: state at the first sample, 'rest', 'measured', or 'auto' to look.
+        settle: start of each record that only lets the initial state be forgotten [s]; None for
+            0 from rest, else 1.
+    """
+
+    effects: tuple[str, ...] = ()
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    likelihood: Literal['glue', 'gaussian', 'ar1'] = 'glue'
+    shaping_factor: float = 256.0
+    evaluations: int = 60_000
+    seed: int = 1
+    initial: Literal['auto', 'rest', 'measured'] = 'auto'
+    settle: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise InputError(f'seed {self.seed} is negative')
+        if self.settle is not None and self.settle < 0.0:
+            raise InputError(f'settle {self.settle:g} s is negative')
+        for name, known in (
+            ('likelihood', ('glue', 'gaussian', 'ar1')),
+            ('initial', ('auto', 'rest', 'measured')),
+        ):
+            if getattr(self, name) not in known:
+                raise InputError(
+                    f'{name} {getattr(self, name)!r} is unknown; use one of {", ".join(known)}'
+                )
+
+
+def calibrate(
+    records: Sequence[Record] | Record,
+    options: CalibrationOptions | None = None,
+    *,
+    progress: Progress | None = None,
+    **changes: Any,
+) -> Calibration:
+    """Draw from the joint posterior of Eq. (2) and effects given records (DREAM(ZS), GLUE).
+
+    Args:
+        records: one or several tests of one actuator, each with its specimen stiffness.
+        options: how to calibrate; see CalibrationOptions.
+        progress: called with the evaluations made so far.
+        changes: options by name that replace those of `options`.
+
+    Returns:
+        The posterior: moments, draws, error of the best draw, and what forbids or limits its use.
+
+    Raises:
+        InputError: a record that cannot be fitted, or an option that cannot be used.
+
+    Example:
+        >>> posterior = calibrate([free, clamped], seed=3)  # doctest: +SKIP
+        >>> posterior.parameters['beta_1'].mean  # doctest: +SKIP
+    """
+    options = chosen(options or CalibrationOptions(), changes)
+    given = [records] if isinstance(records, Record) else list(records)
+    model = sampled_model(options)
+    cleaned, notes = clean(given)
+    initial: Initial = 'measured'
+    if options.initial == 'rest' or (
+        options.initial == 'auto' and all(initial_state(r) == 'rest' for r in cleaned)
+    ):
+        initial = 'rest'
+    settle = options.settle
+    if settle is None:
+        settle = SETTLE if initial == 'measured' else 0.0
+    started = time.perf_counter()
+    with compilation() as compiled:
+        problem = Problem(
+            records=cleaned,
+            model=model,
+            likelihood=options.likelihood,
+            shaping_factor=options.shaping_factor,
+            initial=initial,
+            settle=settle,
+        )
+        chains = sample(
+            problem.target(),
+            (options.seed,),
+            options.evaluations,
+            progress=None if progress is None else lambda made, _: progress(made),
+        )
+    seconds = time.perf_counter() - started - sum(compiled)
+    fit = _fit(model, chains.best, cleaned, initial, settle)
+    parameters = _marginals(model, chains)
+    at_bound = pressed(chains.posterior(), model.names, *model.bounds)
+    converged = chains.annealed and judgement.converged(parameters)
+    return Calibration(
+        parameters=parameters,
+        draws=chains.kept,
+        best=chains.best,
+        log_density=chains.log_density[chains.burn :],
+        error=fit,
+        at_bound=at_bound,
+        problems=tuple(judgement.problems(at_bound, parameters, fit)),
+        notes=(
+            *judgement.remarks(cleaned, parameters, chains.posterior(), converged, at_bound),
+            *notes,
+        ),
+        converged=converged,
+        effects=model.effects,
+        likelihood=options.likelihood,
+        shaping_factor=options.shaping_factor if options.likelihood == 'glue' else None,
+        seed=options.seed,
+        initial=initial,
+        settle=settle,
+        evaluations=chains.evaluations,
+        seconds=seconds,
+        compile_seconds=sum(compiled),
+        sources=tuple(Source.of(r) for r in cleaned),
+        records=tuple(cleaned),
+    )
+
+
+def chosen(options: CalibrationOptions, changes: Mapping[str, Any]) -> CalibrationOptions:
+    """Return options with some of them replaced.
+
+    Raises:
+        InputError: no such option, or a value that cannot be used.
+    """
+    known = [f.name for f in fields(CalibrationOptions)]
+    unknown = sorted(set(changes) - set(known))
+    if unknown:
+        raise InputError(
+            f'calibrate has no option {", ".join(unknown)}; it has {", ".join(known)}'
+        )
+    if 'effects' in changes:
+        changes = {**changes, 'effects': tuple(changes['effects'])}
+    return replace(options, **changes)
+
+
+def sampled_model(options: CalibrationOptions) -> ModelChoice:
+    """Return what is sampled: the model's parameters, and the errors' where they have one.
+
+    Raises:
+        InputError: unknown effect or parameter, or bounds that leave nothing between them or
+            reach below zero where a parameter cannot.
+    """
+    for parameter in Structure(options.effects).parameters:
+        least = options.bounds.get(parameter.name, (0.0, 0.0))[0]
+        if parameter.lower == 0.0 and least < 0.0:
+            raise InputError(f'{parameter.name} cannot be negative; its bounds start at {least:g}')
+    model = choose_model(options.effects, options.bounds)
+    return model.with_autocorrelation() if options.likelihood == 'ar1' else model
+
+
+def _marginals(model: ModelChoice, chains: Chains) -> dict[str, Marginal]:
+    import arviz as az
+
+    lower, upper = model.bounds
+    found = moments(chains.posterior(), lower, upper)
+    # arviz wants (chain, draw, parameter).
+    data = az.convert_to_dataset({'theta': np.swapaxes(chains.kept, 0, 1)})
+    rhat, ess = az.rhat(data)['theta'].values, az.ess(data)['theta'].values
+    return {
+        name: Marginal(
+            mean=float(found.mean[i]),
+            stddev=float(found.stddev[i]),
+            skewness=float(found.skewness[i]),
+            cov=float(found.cov[i]),
+            rhat=float(rhat[i]),
+            ess=float(ess[i]),
+            best=float(chains.best[i]),
+            unit=unit,
+            bounds=(float(lower[i]), float(upper[i])),
+            prior_dominated=bool(found.prior_dominated[i]),
+        )
+        for i, (name, unit) in enumerate(zip(model.names, model.units, strict=True))
+    }
+
+
+def _fit(
+    model: ModelChoice, best: Array, records: list[Record], initial: Initial, settle: float
+) -> FitError:
+    """Return the error of the best draw, over all records and in each."""
+    structure = Structure(model.effects)
+    counts = [round(settle / r.period) for r in records]
+    residuals = structure.errors(records, counts, initial).residuals(best[: len(structure.names)])
+    measured = [r.measured[n:] for r, n in zip(records, counts, strict=True)]
+    whole = RecordError.of('', np.concatenate(residuals), np.concatenate(measured))
+    each = (
+        RecordError.of(r.source, e, y)
+        for r, e, y in zip(records, residuals, measured, strict=True)
+    )
+    return FitError(whole.rms_m, whole.nrmse, tuple(each))

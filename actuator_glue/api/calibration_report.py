@@ -1,0 +1,137 @@
+"""A calibration as pictures and pages: bands over a record, the table of moments, the report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from actuator_glue.errors import InputError
+from actuator_glue.inference.bands import band
+from actuator_glue.inference.predictive import fit_residual, total_band
+from actuator_glue.model.exact import Initial
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Record, source_name
+from actuator_glue.report import html
+from actuator_glue.report.timeseries import band_at_zooms, even_zooms
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from actuator_glue.api.posterior import Calibration
+
+ENSEMBLE = 200  # draws that are simulated for a band
+LEVEL = 0.95
+HEADER = ('parameter', 'unit', 'mean', 'sd', 'skew', 'COV', 'R-hat', 'ESS')
+
+
+def bands_figure(found: Calibration, record: Record) -> tuple[Figure, float]:
+    """Draw the parameter band and the total predictive band over a record.
+
+    Returns:
+        The figure, and the share of the record's samples inside the total 95 % band.
+
+    Raises:
+        InputError: the record's stiffness is not known.
+    """
+    structure = Structure(found.effects)
+    count = len(structure.names)
+    draws = found.posterior
+    rows = np.linspace(0, len(draws) - 1, min(ENSEMBLE, len(draws))).astype(np.intp)
+    initial: Initial = 'rest' if found.initial == 'rest' else 'measured'
+    simulated = structure.simulate(draws[rows, :count], record, initial=initial)
+    best = structure.simulate(found.best[:count], record, initial=initial)
+    residual = fit_residual(record.measured - best, parameters=count)
+    total = total_band(np.random.default_rng(0), simulated, residual, (LEVEL,))
+    inside = (record.measured >= total.lower[0]) & (record.measured <= total.upper[0])
+    figure = band_at_zooms(
+        record,
+        band(simulated, (LEVEL,)),
+        even_zooms(record),
+        level=LEVEL,
+        total=total,
+        title=source_name(record.source),
+    )
+    return figure, float(inside.mean())
+
+
+def moment_rows(found: Calibration) -> list[tuple[str, ...]]:
+    """Return a row of text for each parameter, under HEADER."""
+    return [
+        (
+            name,
+            p.unit,
+            f'{p.mean:.5g}',
+            f'{p.stddev:.3g}',
+            f'{p.skewness:.2f}',
+            f'{p.cov:.3g}',
+            f'{p.rhat:.4f}',
+            f'{p.ess:.0f}',
+        )
+        for name, p in found.parameters.items()
+    ]
+
+
+def moments_title(found: Calibration) -> str:
+    """Return the title of the table of moments."""
+    g = found.shaping_factor
+    how = f'G = {g:g}' if g is not None else found.likelihood
+    return f'Posterior moments, {len(found.sources)} record(s), {how}'
+
+
+def error_line(found: Calibration) -> str:
+    """Return the error of the best draw in one line."""
+    share = found.error.nrmse
+    percent = '-' if share is None else f'{100 * share:.2f} %'
+    return (
+        f'error of the best draw: {1e3 * found.error.rms_m:.4g} mm rms, {percent} of the spread '
+        'measured'
+    )
+
+
+def moments_html(found: Calibration) -> str:
+    """Return problems, moments and error as a fragment of HTML."""
+
+    def row(cells: Sequence[str], tag: str) -> str:
+        return '<tr>' + ''.join(f'<{tag}>{escape(c)}</{tag}>' for c in cells) + '</tr>'
+
+    lines = [f'<p><b>{escape(line)}</b></p>' for line in found.problems]
+    lines += [f'<table><caption>{escape(moments_title(found))}</caption>', row(HEADER, 'th')]
+    lines += [row(cells, 'td') for cells in moment_rows(found)]
+    lines += ['</table>', f'<p>{escape(error_line(found))}</p>']
+    lines += [f'<p>{escape(line)}</p>' for line in found.notes]
+    return '\n'.join(lines)
+
+
+def write_report(found: Calibration, path: Path) -> Path:
+    """Write the report of a calibration, one HTML file, and return its path.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    blocks: list[html.Block] = [
+        html.Table(HEADER, moment_rows(found), moments_title(found)),
+        html.Text(error_line(found)),
+        html.Picture.of(found.plot(), 'Distribution of each parameter, and of each pair.'),
+    ]
+    blocks += [html.Note(line) for line in found.notes]
+    sections = [html.Section('Posterior', blocks)]
+    if found.records:
+        pictures = []
+        for record in found.records:
+            figure, inside = bands_figure(found, record)
+            name = source_name(record.source) or 'a record'
+            caption = (
+                f'{name}: 95 % bands; the total one holds {100 * inside:.1f} % of the samples.'
+            )
+            pictures.append(html.Picture.of(figure, caption))
+        sections.append(html.Section('Bands over the records', pictures))
+    lead = '; '.join(found.problems) or error_line(found)
+    made = f'{found.evaluations} evaluations, seed {found.seed}'
+    try:
+        return html.write(path, 'Calibration', lead, sections, made=made)
+    except OSError as error:
+        raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error

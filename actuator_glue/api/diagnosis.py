@@ -1,0 +1,132 @@
+"""Diagnosis: is the model enough for given records, and if not, what does it lack."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import fields
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from actuator_glue.api import store
+from actuator_glue.api.definitions import definitions
+from actuator_glue.errors import InputError
+from actuator_glue.records import Record
+from actuator_glue.residual import diagnose as core
+from actuator_glue.residual.diagnosis import SCHEMA, DiagnosisData
+from actuator_glue.residual.estimate import Json
+
+if TYPE_CHECKING:
+    import arviz
+    from matplotlib.figure import Figure
+
+Progress = Callable[[str, float], None]
+
+
+class Diagnosis(DiagnosisData):
+    """Verdict, evidence and the augmented model, with its files and pictures."""
+
+    def to_json(self) -> Json:
+        """Return the object of schema `actuator_glue.diagnosis/1` (curves and draws left out)."""
+        return {**super().to_json(), **definitions(self.structure)}
+
+    def save(self, path: Path | str) -> Path:
+        """Write everything, curves and draws included, to one .npz file; return its path.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        return store.save(path, SCHEMA, self, self.structure)
+
+    @classmethod
+    def load(cls, path: Path | str) -> Diagnosis:
+        """Return what `save` wrote.
+
+        Raises:
+            InputError: the file cannot be read, or holds no diagnosis.
+        """
+        return store.load(path, SCHEMA, cls)
+
+    @property
+    def inference_data(self) -> arviz.InferenceData:
+        """Draws of the augmented model for arviz, one chain; bounds and units as attributes."""
+        import arviz as az
+
+        draws = {n: self.posterior[None, :, i] for i, n in enumerate(self.names)}
+        data = az.from_dict(posterior=draws)
+        known = dict(self.base)
+        for effect in self.effects:
+            known |= effect.parameters
+        for name, estimate in known.items():
+            if name in draws:
+                data.posterior[name].attrs['unit'] = estimate.unit
+                if estimate.bounds:
+                    data.posterior[name].attrs['lower'] = estimate.bounds[0]
+                    data.posterior[name].attrs['upper'] = estimate.bounds[1]
+        return data
+
+    def plot(self) -> Figure:
+        """Return a figure of the predictive bands before and after, where they differ most."""
+        from actuator_glue.report.diagnosis_figures import bands
+
+        return bands(self)
+
+    def report(self, path: Path | str) -> Path:
+        """Write a report, one HTML file, and return its path.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        from actuator_glue.report.diagnosis import write_report
+
+        try:
+            return write_report(self, Path(path))
+        except OSError as error:
+            raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error
+
+    def _repr_html_(self) -> str:
+        """Return verdict, effects and advice, for notebooks."""
+        rows = ''.join(
+            f'<tr><td>{escape(e.name)}</td><td>{escape(n)}</td>'
+            f'<td>{p.mean:.4g} &plusmn; {p.stddev:.2g} {escape(p.unit)}</td></tr>'
+            for e in self.effects
+            for n, p in e.parameters.items()
+        )
+        notes = ''.join(f'<li>{escape(line)}</li>' for line in self.advice)
+        return f'<p><b>{escape(self.summary())}</b></p><table>{rows}</table><ul>{notes}</ul>'
+
+
+def diagnose(
+    records: Sequence[Record] | Record,
+    holdout: Sequence[Record] | Record | None = None,
+    *,
+    seed: int = 1,
+    jobs: int = 2,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """Ask whether Eq. (2) explains records and, if not, which effects it lacks.
+
+    Args:
+        records: one or several tests of one actuator, each with its specimen stiffness.
+        holdout: record(s) that decide nothing and give the error before and after; without one,
+            every fourth block of each record is set aside before any look.
+        seed: seed of every random step; the same seed gives the same diagnosis.
+        jobs: threads for the refits of candidates; the result does not depend on it.
+        progress: called with (stage, share of it done in [0, 1]).
+
+    Returns:
+        Verdict, additions with their evidence, error before and after, the augmented model.
+
+    Raises:
+        InputError: stiffness not known, records too short, channels that cannot belong together.
+    """
+    if seed < 0:
+        raise InputError(f'seed {seed} is negative')
+    if jobs < 1:
+        raise InputError(f'jobs {jobs} is below 1')
+    given = [records] if isinstance(records, Record) else list(records)
+    found = core.diagnose(
+        given, holdout, seed=seed, jobs=jobs, progress=progress, clock=time.perf_counter
+    )
+    return Diagnosis(**{f.name: getattr(found, f.name) for f in fields(found)})

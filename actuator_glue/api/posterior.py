@@ -1,0 +1,256 @@
+"""The result of a calibration: what is known of each parameter, the draws, files and pictures."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from actuator_glue.api import store
+from actuator_glue.api.definitions import definitions
+from actuator_glue.inference.at_bound import Pressed
+from actuator_glue.records import Array, Record
+
+if TYPE_CHECKING:
+    import arviz
+    from matplotlib.figure import Figure
+
+SCHEMA = 'actuator_glue.calibration/1'
+
+
+@dataclass(frozen=True, slots=True)
+class Marginal:
+    """Posterior of one parameter, in its SI unit.
+
+    Attributes:
+        mean, stddev, skewness: moments of the draws.
+        cov: coefficient of variation, stddev / |mean|.
+        rhat: rank-normalised split R-hat (Vehtari et al. 2021), by arviz.
+        ess: bulk effective sample size, by arviz.
+        best: value of the draw of the highest likelihood.
+        unit: SI unit.
+        bounds: of the uniform prior.
+        prior_dominated: the draws are about as wide as the prior.
+    """
+
+    mean: float
+    stddev: float
+    skewness: float
+    cov: float
+    rhat: float
+    ess: float
+    best: float
+    unit: str
+    bounds: tuple[float, float]
+    prior_dominated: bool
+
+
+@dataclass(frozen=True, slots=True)
+class RecordError:
+    """Free-run error of the best draw in one record.
+
+    Attributes:
+        source: the record.
+        rms_m: root mean square [m].
+        offset_m: its mean [m].
+        nrmse: share of the spread measured; None where nothing moves.
+    """
+
+    source: str
+    rms_m: float
+    offset_m: float
+    nrmse: float | None
+
+    @classmethod
+    def of(cls, source: str, error: Array, measured: Array) -> RecordError:
+        """Return it for errors (n,) of measured displacement (n,) [m]."""
+        rms, spread = float(np.sqrt(np.mean(error**2))), float(measured.std())
+        return cls(source, rms, float(np.mean(error)), rms / spread if spread > 0.0 else None)
+
+
+@dataclass(frozen=True, slots=True)
+class FitError:
+    """Free-run error of the best draw over all records [m], as share of their spread, and each."""
+
+    rms_m: float
+    nrmse: float | None
+    records: tuple[RecordError, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A record that was calibrated with."""
+
+    source: str
+    samples: int
+    rate_hz: float
+    stiffness_n_per_m: float | None
+    hold: str
+
+    @classmethod
+    def of(cls, record: Record) -> Source:
+        """Describe a record."""
+        return cls(record.source, len(record), record.rate, record.stiffness, record.hold)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Calibration:
+    """A joint posterior, and what forbids or limits its use.
+
+    Attributes:
+        parameters: posterior of each parameter by name.
+        draws: draws after burn-in, shape (steps, chains, p), SI units.
+        log_density: log likelihood of each draw, shape (steps, chains).
+        best: draw of the highest likelihood, shape (p,).
+        error: free-run error of the best draw.
+        at_bound: parameters that a bound of the prior holds.
+        problems: why the posterior must not be used as it stands; empty where it may.
+        notes: what these records cannot tell, and what was done to them.
+        converged: R-hat of every parameter is at most 1.01.
+        effects: effects of the model beyond Eq. (2).
+        likelihood: 'glue', 'gaussian' or 'ar1'.
+        shaping_factor: G of Eq. (4); None with a formal likelihood.
+        seed: seed of the sampler.
+        initial: state at a record's first sample, 'rest' or 'measured'.
+        settle: uncounted start of each record [s].
+        evaluations: likelihood evaluations.
+        seconds: how long it took, compilation left out.
+        compile_seconds: compilation, which only the first use of an installation pays.
+        sources: the records, described.
+        records: the records themselves as they were fitted; empty after `load`.
+    """
+
+    parameters: dict[str, Marginal]
+    draws: Array
+    log_density: Array
+    best: Array
+    error: FitError
+    at_bound: tuple[Pressed, ...]
+    problems: tuple[str, ...]
+    notes: tuple[str, ...]
+    converged: bool
+    effects: tuple[str, ...]
+    likelihood: str
+    shaping_factor: float | None
+    seed: int
+    initial: str
+    settle: float
+    evaluations: int
+    seconds: float
+    compile_seconds: float
+    sources: tuple[Source, ...]
+    records: tuple[Record, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Parameters in the order of the draws' columns."""
+        return tuple(self.parameters)
+
+    @property
+    def posterior(self) -> Array:
+        """Draws of all chains, shape (m, p), SI units."""
+        return self.draws.reshape(-1, self.draws.shape[2])
+
+    @property
+    def inference_data(self) -> arviz.InferenceData:
+        """The draws for arviz: posterior, log likelihood, bounds and units as attributes."""
+        import arviz as az
+
+        data = az.from_dict(
+            posterior={n: self.draws[:, :, i].T for i, n in enumerate(self.names)},
+            sample_stats={'lp': self.log_density.T},
+        )
+        for name, marginal in self.parameters.items():
+            data.posterior[name].attrs |= {
+                'unit': marginal.unit,
+                'prior': 'uniform',
+                'lower': marginal.bounds[0],
+                'upper': marginal.bounds[1],
+            }
+        data.posterior.attrs |= {'likelihood': self.likelihood, 'effects': list(self.effects)}
+        return data
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object of schema `actuator_glue.calibration/1` (draws left out)."""
+        return {
+            'schema': SCHEMA,
+            'parameters': {n: asdict(p) for n, p in self.parameters.items()},
+            'evaluations': self.evaluations,
+            'seconds': self.seconds,
+            'compile_seconds': self.compile_seconds,
+            'error': asdict(self.error),
+            'problems': list(self.problems),
+            'at_bound': [p.to_json() for p in self.at_bound],
+            'notes': list(self.notes),
+            'converged': self.converged,
+            'effects': list(self.effects),
+            **definitions(self.effects),
+            'likelihood': self.likelihood,
+            'shaping_factor': self.shaping_factor,
+            'seed': self.seed,
+            'initial': self.initial,
+            'settle_s': self.settle,
+            'records': [asdict(s) for s in self.sources],
+        }
+
+    def save(self, path: Path | str) -> Path:
+        """Write draws, bounds, units and provenance to one .npz file; return its path.
+
+        Arrays for other readers: `draws` (m, p), `names` (p,), `units` (p,).
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        return store.save(
+            path,
+            SCHEMA,
+            replace(self, records=()),
+            self.effects,
+            draws=self.posterior,
+            names=np.array(self.names),
+            units=np.array([p.unit for p in self.parameters.values()]),
+        )
+
+    @classmethod
+    def load(cls, path: Path | str) -> Calibration:
+        """Return what `save` wrote; the records themselves are not in it.
+
+        Raises:
+            InputError: the file cannot be read, or holds no calibration.
+        """
+        return store.load(path, SCHEMA, cls)
+
+    def plot(self) -> Figure:
+        """Return a figure of every parameter's distribution and every pair of them."""
+        from actuator_glue.report.posterior import posterior_figure
+
+        units = [p.unit for p in self.parameters.values()]
+        return posterior_figure(self.posterior, self.names, units)
+
+    def plot_bands(self, record: Record) -> Figure:
+        """Return a figure of the parameter band and the total predictive band over a record.
+
+        Raises:
+            InputError: the record's stiffness is not known.
+        """
+        from actuator_glue.api.calibration_report import bands_figure
+
+        return bands_figure(self, record)[0]
+
+    def report(self, path: Path | str) -> Path:
+        """Write a report, one HTML file, and return its path.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        from actuator_glue.api.calibration_report import write_report
+
+        return write_report(self, Path(path))
+
+    def _repr_html_(self) -> str:
+        """Return the moments as a table, for notebooks."""
+        from actuator_glue.api.calibration_report import moments_html
+
+        return moments_html(self)

@@ -1,0 +1,158 @@
+"""The result of a replay: what was estimated in each window, and how it compares with live."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from actuator_glue.api import store
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SCHEMA = 'actuator_glue.replay/1'
+
+
+@dataclass(frozen=True, slots=True)
+class WindowParameter:
+    """Posterior of one parameter in one window, SI units."""
+
+    mean: float
+    stddev: float
+    skewness: float
+    cov: float
+    rhat: float
+    ess: float
+
+
+@dataclass(frozen=True, slots=True)
+class WindowError:
+    """Error of a window's best draw: rms [m], and as share of the spread measured."""
+
+    rms_m: float
+    nrmse: float
+
+
+@dataclass(frozen=True, slots=True)
+class ScoredBand:
+    """A forecast that has been scored: its levels, and coverage and mean width [m] at each."""
+
+    kind: str
+    index: int
+    levels: tuple[float, ...]
+    coverage: tuple[float, ...]
+    width_m: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Window:
+    """What was estimated in one window.
+
+    Attributes:
+        window: its number.
+        index: running index of its first sample.
+        samples: how many it has.
+        end_s: stream time of its end [s].
+        parameters: posterior of each parameter.
+        evaluations: likelihood evaluations.
+        converged: R-hat is below the limit of the settings.
+        error: of the best draw.
+        bands: forecasts that ended in this window.
+    """
+
+    window: int
+    index: int
+    samples: int
+    end_s: float
+    parameters: dict[str, WindowParameter]
+    evaluations: int
+    converged: bool
+    error: WindowError
+    bands: tuple[ScoredBand, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Compared:
+    """Replayed numbers held against those published live.
+
+    Attributes:
+        posteriors: how many were compared.
+        bands: how many were compared.
+        differing: one line for each that differs or is missing.
+    """
+
+    posteriors: int
+    bands: int
+    differing: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Replay:
+    """All windows of a stream, and whether they are what was published live.
+
+    Attributes:
+        bag: what was replayed.
+        settings: settings of the estimator that a replay may change.
+        effects: effects of the last window's model beyond Eq. (2).
+        windows: the windows, in order.
+        events: what happened besides, one line each.
+        identical: replay and live agree bit by bit; None where nothing was published live.
+        compared: how that was found; None where nothing was published live.
+        data_seconds: length of the usable samples [s].
+        seconds: how long the replay took.
+        notes: what limits the answer.
+    """
+
+    bag: str
+    settings: dict[str, float]
+    effects: tuple[str, ...]
+    windows: tuple[Window, ...]
+    events: tuple[str, ...]
+    identical: bool | None
+    compared: Compared | None
+    data_seconds: float
+    seconds: float
+    notes: tuple[str, ...] = ()
+
+    @property
+    def times_real_time(self) -> float:
+        """Seconds of data per second."""
+        return self.data_seconds / self.seconds if self.seconds > 0.0 else 0.0
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object of schema `actuator_glue.replay/1`."""
+        return {
+            'schema': SCHEMA,
+            **asdict(self),
+            'times_real_time': self.times_real_time,
+        }
+
+    def save(self, path: Path | str) -> Path:
+        """Write everything to one .npz file; return its path.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        return store.save(path, SCHEMA, self)
+
+    @classmethod
+    def load(cls, path: Path | str) -> Replay:
+        """Return what `save` wrote.
+
+        Raises:
+            InputError: the file cannot be read, or holds no replay.
+        """
+        return store.load(path, SCHEMA, cls)
+
+    def plot(self) -> Figure:
+        """Return a figure of every parameter against time, with two standard deviations."""
+        from actuator_glue.api.replay_figure import parameters_figure
+
+        return parameters_figure(self)
+
+    def _repr_html_(self) -> str:
+        """Return what came out, in one line, for notebooks."""
+        said = {None: 'nothing published live to compare with', True: 'identical to live'}
+        verdict = said.get(self.identical, 'NOT identical to live')
+        return f'<p>{len(self.windows)} windows over {self.data_seconds:.1f} s: {verdict}</p>'

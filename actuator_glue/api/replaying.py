@@ -1,0 +1,233 @@
+"""Replay: the online estimator over a bag or records, held against what it published live."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from actuator_glue.api.replay_result import (
+    Compared,
+    Replay,
+    ScoredBand,
+    Window,
+    WindowError,
+    WindowParameter,
+)
+from actuator_glue.errors import InputError
+from actuator_glue.io.bag_reader import Summary, decoded, is_bag, summarise
+from actuator_glue.io.load import load_records
+from actuator_glue.online.job import WindowResult
+from actuator_glue.online.published import Comparison, Published, compare, published
+from actuator_glue.online.replay import Item, items, stream
+from actuator_glue.online.replay import replay as run
+from actuator_glue.online.settings import EstimatorSettings
+from actuator_glue.online.stream import Block, Rejected, check_block
+from actuator_glue.records import Record
+from actuator_glue.workers.reports import Reports
+
+INPUTS = ('SampleBlock', 'TestSetup')
+RESULTS = ('EstimatorSetup', 'PosteriorMoments', 'PredictionBand')
+OVERRIDES = ('window', 'hop', 'settle', 'shaping_factor', 'evaluations', 'seed')
+
+Progress = Callable[[float], None]
+
+
+@dataclass(slots=True)
+class _Run:
+    """A replay under way: where samples come from, what was published, what is known so far."""
+
+    source: str
+    items: Iterator[Item]
+    total: int = 0
+    live: Published | None = None
+    notes: list[str] = field(default_factory=list)
+    windows: list[Window] = field(default_factory=list)
+    events: list[str] = field(default_factory=list)
+    effects: tuple[str, ...] = ()
+    data_seconds: float = 0.0
+
+
+def replay(
+    source: Path | str | Record | Sequence[Record],
+    *,
+    namespace: str | None = None,
+    progress: Progress | None = None,
+    **settings: Any,
+) -> Replay:
+    """Run the online estimator over recorded samples: the code that runs live, without a clock.
+
+    Args:
+        source: a bag, a laboratory file, or records; where a bag holds what a live estimator
+            published and no setting is given, both are compared bit by bit.
+        namespace: whose samples, where a bag has several actuators.
+        progress: called with the share of the messages read.
+        settings: window [s], hop [s], settle [s], shaping_factor, evaluations, seed.
+
+    Raises:
+        InputError: unusable bag, record or setting, or not one window could be estimated.
+    """
+    unknown = sorted(set(settings) - set(OVERRIDES))
+    if unknown:
+        raise InputError(
+            f'replay has no setting {", ".join(unknown)}; it has {", ".join(OVERRIDES)}'
+        )
+    asked = {name: value for name, value in settings.items() if value is not None}
+    under_way = _open(source, namespace, compare_live=not asked)
+    started = time.perf_counter()
+    used = _settings(under_way.live, asked)
+    comparison = _estimate(under_way, used, progress or (lambda share: None))
+    if not under_way.windows:
+        raise InputError(f'{under_way.source}: not one window could be estimated')
+    return Replay(
+        bag=under_way.source,
+        settings={name: getattr(used, name) for name in OVERRIDES},
+        effects=under_way.effects,
+        windows=tuple(under_way.windows),
+        events=tuple(under_way.events),
+        identical=None if comparison is None else comparison.identical,
+        compared=None
+        if comparison is None
+        else Compared(comparison.windows, comparison.bands, tuple(comparison.differing)),
+        data_seconds=under_way.data_seconds,
+        seconds=time.perf_counter() - started,
+        notes=tuple(under_way.notes),
+    )
+
+
+def _open(
+    source: Path | str | Record | Sequence[Record], namespace: str | None, compare_live: bool
+) -> _Run:
+    if isinstance(source, (Path, str)) and is_bag(source):
+        return _open_bag(str(source), namespace, compare_live)
+    if isinstance(source, (Path, str)):
+        source = load_records(source)
+    records = [source] if isinstance(source, Record) else list(source)
+    for record in records:
+        record.known_stiffness()
+    name = records[0].source or 'records' if records else 'no record'
+    return _Run(name, (item for record in records for item in stream(record)))
+
+
+def _open_bag(bag: str, namespace: str | None, compare_live: bool) -> _Run:
+    summary = summarise(bag)
+    names = _topics(bag, summary, namespace)
+    topics = [summary.topics[name] for name in names]
+    rejected: list[Rejected] = []
+    out = _Run(bag, iter(()), sum(t.count for t in topics))
+
+    def told() -> Iterator[Item]:
+        for item in items(decoded(bag, INPUTS, topics=names), rejected):
+            out.notes += [r.message for r in rejected]
+            rejected.clear()
+            yield item
+
+    out.items = told()
+    if compare_live and any(t.type.endswith('PosteriorMoments') and t.count for t in topics):
+        out.live = published(decoded(bag, RESULTS, topics=names))
+        if out.live.settings is None or not out.live.models:
+            out.notes.append(
+                'the bag has posteriors but no EstimatorSetup: there is nothing to compare with'
+            )
+            out.live = None
+    return out
+
+
+def _topics(bag: str, summary: Summary, namespace: str | None) -> list[str]:
+    """Return the topics of one actuator; all of them where the bag has only one."""
+    samples = [t.name for t in summary.topics.values() if t.type.endswith('/SampleBlock')]
+    spaces = [name.rpartition('/')[0] for name in samples]
+    if namespace is not None:
+        wanted = '/' + namespace.strip('/') if namespace.strip('/') else ''
+        if wanted not in spaces:
+            raise InputError(
+                f'{bag}: no samples under {namespace!r}; there are samples under '
+                f'{", ".join(s or "/" for s in spaces) or "nothing"}'
+            )
+    elif len(samples) > 1:
+        raise InputError(
+            f'{bag}: samples of {len(samples)} actuators ({", ".join(samples)}); choose one with '
+            '--namespace'
+        )
+    else:
+        wanted = spaces[0] if spaces else ''
+    return [t for t in summary.topics if t.rpartition('/')[0] == wanted]
+
+
+def _settings(live: Published | None, asked: dict[str, Any]) -> EstimatorSettings:
+    if live is not None and live.settings is not None:
+        return live.settings
+    # No clock runs here, so a budget of time says nothing; it must only fit the hop.
+    if 'hop' in asked:
+        asked = {**asked, 'time_budget': min(0.5, asked['hop'])}
+    return EstimatorSettings.from_mapping(asked, 'options')
+
+
+def _estimate(out: _Run, settings: EstimatorSettings, done: Progress) -> Comparison | None:
+    """Run the estimator, filling in what is told of windows; compare with the live run."""
+    live = out.live
+
+    def counted() -> Iterator[Item]:
+        for place, item in enumerate(out.items):
+            if isinstance(item, Block):
+                out.data_seconds += _usable_seconds(item)
+            done(place / out.total if out.total else 0.0)
+            yield item
+
+    def results(reports: Reports) -> Iterator[WindowResult]:
+        model = live.models[0][1] if live is not None else None
+        schedule = live.schedule() if live is not None else None
+        for told in run(counted(), settings, model, schedule, reports):
+            if isinstance(told, WindowResult):
+                # Not the result itself: its samples and bands are many.
+                out.windows.append(_window(told))
+                out.effects = told.model.effects
+                yield told
+            else:
+                out.events.append(getattr(told, 'message', str(told)))
+
+    # Without a live run to hold them against, nobody sees the limits of bands.
+    with Reports(limits=live is not None) as reports:
+        found = results(reports)
+        comparison = None if live is None else compare(found, live)
+        for _ in found:  # all of them, where nothing was compared
+            pass
+    return comparison
+
+
+def _usable_seconds(block: Block) -> float:
+    try:
+        return len(block) * check_block(block).period
+    except InputError:
+        return 0.0  # told by the estimator
+
+
+def _window(r: WindowResult) -> Window:
+    assert r.moments is not None and r.rhat is not None and r.ess is not None
+    record, m = r.window.record, r.moments
+    columns = (m.mean, m.stddev, m.skewness, m.cov, r.rhat, r.ess)
+    return Window(
+        window=r.window.number,
+        index=record.first_index,
+        samples=len(record),
+        end_s=(record.first_index + len(record)) * record.period,
+        parameters={
+            name: WindowParameter(*(float(values[i]) for values in columns))
+            for i, name in enumerate(r.model.names)
+        },
+        evaluations=r.evaluations,
+        converged=r.converged,
+        error=WindowError(float(r.rms_error), float(r.nrmse)),
+        bands=tuple(
+            ScoredBand(
+                p.kind,
+                p.index,
+                tuple(map(float, p.band.levels)),
+                tuple(map(float, () if p.coverage is None else p.coverage)),
+                tuple(map(float, p.width)),
+            )
+            for p in r.scored
+        ),
+    )

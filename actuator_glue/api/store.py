@@ -1,0 +1,102 @@
+"""Results as one file: typed dataclasses and their arrays in an .npz, nothing pickled."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+import types
+import typing
+import zipfile
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from actuator_glue.api.definitions import definitions, register
+from actuator_glue.errors import InputError
+from actuator_glue.records import Array
+
+T = TypeVar('T')
+_CONTENT = 'content'
+
+
+def save(
+    path: Path | str, schema: str, value: Any, effects: Iterable[str] = (), **more: Any
+) -> Path:
+    """Write a dataclass to one .npz file and return its path.
+
+    Args:
+        path: where to.
+        schema: what it is; `load` refuses any other.
+        value: a dataclass whose fields are numbers, texts, arrays, dataclasses, or tuples and
+            dictionaries of these.
+        effects: effects it needs; those of the user's own are written with it.
+        more: further arrays, for readers that know nothing of the rest.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    arrays: dict[str, Any] = {}
+    text = np.array(
+        json.dumps({'schema': schema, 'value': _pack(value, arrays), **definitions(effects)})
+    )
+    path = Path(path)
+    try:
+        with path.open('wb') as file:
+            np.savez_compressed(file, allow_pickle=False, **{**more, **arrays, _CONTENT: text})
+    except OSError as error:
+        raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error
+    return path
+
+
+def load(path: Path | str, schema: str, cls: type[T]) -> T:
+    """Return what `save` wrote; registers the effects that it defines.
+
+    Raises:
+        InputError: the file cannot be read, or holds something else.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            content = json.loads(str(file[_CONTENT]))
+            if content['schema'] != schema:
+                raise InputError(f'{path}: holds {content["schema"]}, not {schema}')
+            if 'definitions' in content:
+                register(content['definitions'], str(path))
+            return typing.cast(T, _unpack(cls, content['value'], file))
+    except InputError:
+        raise
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        raise InputError(f'{path}: holds no {schema} ({error})') from error
+
+
+def _pack(value: Any, arrays: dict[str, Any]) -> Any:
+    if isinstance(value, np.ndarray):
+        key = f'array_{len(arrays)}'
+        arrays[key] = value
+        return key
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        return {f.name: _pack(getattr(value, f.name), arrays) for f in dataclasses.fields(value)}
+    if isinstance(value, dict):
+        return {str(k): _pack(v, arrays) for k, v in value.items()}
+    if isinstance(value, (tuple, list)):
+        return [_pack(v, arrays) for v in value]
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _unpack(kind: Any, value: Any, arrays: Any) -> Any:
+    if kind == Array:
+        return np.asarray(arrays[value])
+    if dataclasses.is_dataclass(kind) and isinstance(kind, type):
+        hints = typing.get_type_hints(kind)
+        return kind(**{name: _unpack(hints[name], v, arrays) for name, v in value.items()})
+    origin, inner = typing.get_origin(kind), typing.get_args(kind)
+    if origin in (typing.Union, types.UnionType):
+        real = next(k for k in inner if k is not type(None))
+        return None if value is None else _unpack(real, value, arrays)
+    if origin is tuple:
+        kinds = (inner[0],) * len(value) if inner[-1] is Ellipsis else inner
+        return tuple(_unpack(k, v, arrays) for k, v in zip(kinds, value, strict=True))
+    if origin is dict:
+        return {name: _unpack(inner[1], v, arrays) for name, v in value.items()}
+    return value

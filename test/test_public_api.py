@@ -1,0 +1,143 @@
+"""The public API: what a notebook imports, and that the command line says the same."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import actuator_glue as ag
+from actuator_glue.cli.main import main
+
+NAMES = {
+    'Calibration', 'Command', 'Diagnosis', 'InputError', 'Record', 'Replay', 'calibrate',
+    'diagnose', 'effects', 'load', 'load_records', 'replay', 'simulate',
+}  # fmt: skip
+
+
+@pytest.fixture(scope='module')
+def record() -> ag.Record:
+    """A short test under a specimen stiffness."""
+    return ag.simulate(ag.Command(rate=200.0, duration=20.0), stiffness=250e3, seed=3)
+
+
+@pytest.fixture(scope='module')
+def posterior(record: ag.Record) -> ag.Calibration:
+    """A short calibration."""
+    return ag.calibrate(record, evaluations=6000, seed=5)
+
+
+def test_the_package_shows_its_names() -> None:
+    """`dir` shows what there is, and every name can be had."""
+    assert set(ag.__all__) == NAMES
+    assert set(dir(ag)) == NAMES | {'__version__'}
+    for name in NAMES:
+        assert getattr(ag, name) is not None
+    with pytest.raises(AttributeError, match='nothing'):
+        _ = ag.nothing
+
+
+def test_importing_costs_and_changes_nothing() -> None:
+    """No heavy library, no environment variable, no thread, in at most 0.3 s (best of five)."""
+    code = (
+        'import os, sys, threading, time; before = dict(os.environ); t = time.perf_counter();'
+        'import actuator_glue; t = time.perf_counter() - t;'
+        'heavy = {"numpy", "numba", "scipy", "rclpy", "matplotlib"} & set(sys.modules);'
+        'print(t, not heavy, dict(os.environ) == before, threading.active_count())'
+    )
+    # The bootstrapper of ROS wheels starts Python anew: only the package itself is timed.
+    rows = [
+        subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
+        .stdout.split()
+        for _ in range(5)
+    ]  # fmt: skip
+    assert all(row[1:] == ['True', 'True', '1'] for row in rows)
+    assert min(float(row[0]) for row in rows) <= 0.3
+
+
+def test_a_calibration_is_kept(posterior: ag.Calibration, tmp_path: Path) -> None:
+    """What is loaded says what was saved; nothing but arrays and text is in the file."""
+    path = posterior.save(tmp_path / 'posterior.npz')
+    again = ag.Calibration.load(path)
+    assert again.to_json() == posterior.to_json()
+    np.testing.assert_array_equal(again.draws, posterior.draws)
+    np.testing.assert_array_equal(again.log_density, posterior.log_density)
+    with np.load(path, allow_pickle=False) as file:
+        assert file['names'].tolist() == list(posterior.parameters)
+        assert file['draws'].shape == posterior.posterior.shape
+    for wrong in (Path(__file__), tmp_path / 'nothing.npz'):
+        with pytest.raises(ag.InputError, match=wrong.name):
+            ag.Calibration.load(wrong)
+
+
+def test_a_calibration_is_shown(posterior: ag.Calibration, tmp_path: Path) -> None:
+    """Figures, a report, a table for notebooks, and arviz's form of the draws."""
+    assert len(posterior.plot().axes) == 16
+    assert posterior.plot_bands(posterior.records[0]).axes
+    assert 'beta_1' in posterior._repr_html_()
+    page = posterior.report(tmp_path / 'report.html').read_text()
+    assert 'Posterior moments' in page and page.count('<img') == 2
+    data = posterior.inference_data
+    assert data.posterior['beta_1'].attrs['unit'] == '1/s'
+    assert data.posterior['beta_1'].attrs['upper'] == 400.0
+    steps, chains, _ = posterior.draws.shape
+    assert data.posterior['beta_1'].shape == (chains, steps)
+    mean = float(data.posterior['alpha_2'].mean())
+    assert mean == pytest.approx(posterior.parameters['alpha_2'].mean)
+
+
+def test_a_diagnosis_is_kept_and_shown(record: ag.Record, tmp_path: Path) -> None:
+    """The same for a diagnosis."""
+    found = ag.diagnose(record)
+    again = ag.Diagnosis.load(found.save(tmp_path / 'diagnosis.npz'))
+    assert json.dumps(again.to_json()) == json.dumps(found.to_json())
+    np.testing.assert_array_equal(again.traces[0].measured, found.traces[0].measured)
+    assert again.plot().axes
+    assert again.report(tmp_path / 'report.html').exists()
+    assert found.summary().split(':')[0] in found._repr_html_()
+    assert set(found.inference_data.posterior) == set(found.names)
+    with pytest.raises(ag.InputError, match='holds'):
+        ag.Calibration.load(tmp_path / 'diagnosis.npz')
+
+
+def written(tmp_path: Path, *command: object) -> dict[str, object]:
+    """Run a command and return its JSON."""
+    out = tmp_path / 'out.json'
+    assert main([*map(str, command), '--json', str(out), '--force']) in (0, 1)
+    return dict(json.loads(out.read_text()))
+
+
+def test_the_command_line_gives_the_same_numbers(tmp_path: Path) -> None:
+    """Defaults included: nothing is said but the file, its stiffness, and fewer evaluations."""
+    file = tmp_path / 'test.csv'
+    made = ag.simulate(ag.Command(rate=200.0, duration=15.0), stiffness=250e3, seed=2)
+    options = '--rate 200 --duration 15 --stiffness 250e3 --seed 2 --unit m'
+    code = main(['simulate', str(file), *options.split()])
+    assert code == 0
+    record = ag.load(file, stiffness=250e3)
+    np.testing.assert_array_equal(record.measured, made.measured)
+    untimed = {'seconds', 'compile_seconds', 'times_real_time'}
+    more = ('--stiffness', '250e3')
+    pairs = (
+        (ag.calibrate(record, evaluations=6000).to_json(),
+         written(tmp_path, 'calibrate', file, *more, '--evaluations', 6000)),
+        (ag.diagnose(record).to_json(), written(tmp_path, 'diagnose', file, *more)),
+        (ag.replay(record).to_json(), written(tmp_path, 'replay', file, *more)),
+    )  # fmt: skip
+    for ours, theirs in pairs:
+        kept = {k: v for k, v in json.loads(json.dumps(ours)).items() if k not in untimed}
+        assert kept == {k: v for k, v in theirs.items() if k not in untimed}
+
+
+def test_unknown_options_are_refused(record: ag.Record) -> None:
+    """A misspelt option is an error that names the known ones."""
+    with pytest.raises(ag.InputError, match='evaluations'):
+        ag.calibrate(record, evaluation=100)
+    with pytest.raises(ag.InputError, match='likelihood'):
+        ag.calibrate(record, likelihood='guess')
+    with pytest.raises(ag.InputError, match='hop'):
+        ag.replay(record, hops=1.0)
+    with pytest.raises(ag.InputError, match='seed'):
+        ag.diagnose(record, seed=-1)
