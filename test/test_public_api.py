@@ -26,7 +26,7 @@ def record() -> ag.Record:
 @pytest.fixture(scope='module')
 def posterior(record: ag.Record) -> ag.Calibration:
     """A short calibration."""
-    return ag.calibrate(record, evaluations=6000, seed=5)
+    return ag.calibrate(record, evaluations=24_000, seed=5)
 
 
 def test_the_package_shows_its_names() -> None:
@@ -121,8 +121,8 @@ def test_the_command_line_gives_the_same_numbers(tmp_path: Path) -> None:
     untimed = {'seconds', 'compile_seconds', 'times_real_time'}
     more = ('--stiffness', '250e3')
     pairs = (
-        (ag.calibrate(record, evaluations=6000).to_json(),
-         written(tmp_path, 'calibrate', file, *more, '--evaluations', 6000)),
+        (ag.calibrate(record, evaluations=24_000).to_json(),
+         written(tmp_path, 'calibrate', file, *more, '--evaluations', 24_000)),
         (ag.diagnose(record).to_json(), written(tmp_path, 'diagnose', file, *more)),
         (ag.replay(record).to_json(), written(tmp_path, 'replay', file, *more)),
     )  # fmt: skip

@@ -120,10 +120,15 @@ def calibrate(
             progress=None if progress is None else lambda made, _: progress(made),
         )
     seconds = time.perf_counter() - started - sum(compiled)
+    if not chains.annealed:
+        raise InputError(
+            f'{options.evaluations} evaluations ended on the way from the prior: no posterior was '
+            'reached; give more --evaluations'
+        )
     fit = _fit(model, chains.best, cleaned, initial, settle)
     parameters = _marginals(model, chains)
     at_bound = pressed(chains.posterior(), model.names, *model.bounds)
-    converged = chains.annealed and judgement.converged(parameters)
+    converged = judgement.converged(parameters)
     return Calibration(
         parameters=parameters,
         draws=chains.kept,
