@@ -6,11 +6,11 @@ import time
 
 import numpy as np
 
+from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.model import commands
 from actuator_glue.model.stream import Stream
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
-from actuator_glue.residual.diagnose import diagnose
 
 RATE = 1000.0
 THETA = np.array([134.0, 1.1e9, 2.5e5, 0.5])

@@ -17,7 +17,7 @@ SOURCES = sorted(p for p in ROOT.rglob('*.py'))
 BOTTOM = {'errors', 'records', 'jit', 'normal'}
 CORE = BOTTOM | {'model', 'inference'}
 EVERYTHING = CORE | {
-    'online', 'residual', 'report', 'io', 'interfaces', 'workers', 'effects',
+    'online', 'diagnosis', 'report', 'io', 'interfaces', 'workers', 'effects',
 }  # fmt: skip
 # Each folder or top module, and what it may import besides itself.
 ARROWS = {
@@ -30,8 +30,8 @@ ARROWS = {
     'effects': BOTTOM | {'model'},
     'inference': BOTTOM | {'model'},
     'online': CORE,
-    'residual': CORE,
-    'report': CORE | {'online', 'residual', 'io'},
+    'diagnosis': CORE,
+    'report': CORE | {'online', 'diagnosis', 'io'},
     'io': {'records', 'errors', 'interfaces'},
     'workers': CORE | {'online'},
     'api': EVERYTHING,
@@ -39,7 +39,7 @@ ARROWS = {
     'cli': EVERYTHING | {'api'},
 }
 # All below io but jit, which keeps compiled code in files.
-PURE = ('errors', 'records', 'normal', 'model', 'inference', 'online', 'residual')
+PURE = ('errors', 'records', 'normal', 'model', 'inference', 'online', 'diagnosis')
 ROS = ('rclpy', 'launch', 'ament_index_python')
 HEAVY = ('numba', 'scipy', 'matplotlib', 'arviz', 'control', 'statsmodels', 'rosbags', 'rclpy')
 

@@ -12,6 +12,7 @@ import numpy as np
 from actuator_glue.api import judgement
 from actuator_glue.api.compilation import compilation
 from actuator_glue.api.posterior import Calibration, FitError, Marginal, RecordError, Source
+from actuator_glue.diagnosis.preparation import SETTLE, clean, initial_state
 from actuator_glue.errors import InputError
 from actuator_glue.inference.at_bound import pressed
 from actuator_glue.inference.chains import Chains
@@ -21,7 +22,6 @@ from actuator_glue.inference.posterior import Problem, sample
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
-from actuator_glue.residual.hygiene import SETTLE, clean, initial_state
 
 Progress = Callable[[float], None]
 

@@ -11,11 +11,11 @@ from typing import TYPE_CHECKING
 
 from actuator_glue.api import store
 from actuator_glue.api.definitions import definitions
+from actuator_glue.diagnosis import diagnose as core
+from actuator_glue.diagnosis.estimate import Json
+from actuator_glue.diagnosis.result import SCHEMA, DiagnosisData
 from actuator_glue.errors import InputError
 from actuator_glue.records import Record
-from actuator_glue.residual import diagnose as core
-from actuator_glue.residual.diagnosis import SCHEMA, DiagnosisData
-from actuator_glue.residual.estimate import Json
 
 if TYPE_CHECKING:
     import arviz

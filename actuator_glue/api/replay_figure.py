@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 def parameters_figure(found: Replay) -> Figure:
     """Draw every parameter's mean and two standard deviations against time.
 
-    Windows of another model than the last one's are left out: their parameters are others.
+    Homogeneity of another model than the last one's are left out: their parameters are others.
     """
     names = list(found.windows[-1].parameters)
     windows = [w for w in found.windows if list(w.parameters) == names]

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from actuator_glue.inference.evaluate import LogDensity
 from actuator_glue.jit import njit
-from actuator_glue.model import kernel, laguerre, quadratic, ridge
-from actuator_glue.model.fast import Samples
+from actuator_glue.model import kernel, ridge
+from actuator_glue.model.fast import laguerre, quadratic
+from actuator_glue.model.fast.errors import Samples
 from actuator_glue.records import Array
 
 

@@ -12,6 +12,7 @@ from actuator_glue_msgs.msg import Candidate, Effect
 from actuator_glue_msgs.srv import SetModel
 
 from actuator_glue.api.diagnosis import Diagnosis, diagnose
+from actuator_glue.diagnosis.result import Finding
 from actuator_glue.errors import InputError
 from actuator_glue.io.load import load_records
 from actuator_glue.model.commands import noise
@@ -19,7 +20,6 @@ from actuator_glue.model.structure import Structure
 from actuator_glue.nodes.messages import fill
 from actuator_glue.online.wire import Fields, Head
 from actuator_glue.records import Record
-from actuator_glue.residual.diagnosis import Finding
 from actuator_glue.workers.worker import Tell
 
 

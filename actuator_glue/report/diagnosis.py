@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.records import source_name
 from actuator_glue.report import diagnosis_figures as figures
 from actuator_glue.report.html import Block, Note, Picture, Section, Table, Text, write
-from actuator_glue.residual.diagnosis import DiagnosisData
 
 
 def _um(value: float) -> str:

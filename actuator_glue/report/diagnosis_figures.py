@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from scipy import signal
 
+from actuator_glue.diagnosis.result import DiagnosisData, Trace
 from actuator_glue.records import Array, source_name
 from actuator_glue.report import style
 from actuator_glue.report.style import (
@@ -21,7 +22,6 @@ from actuator_glue.report.style import (
     new_figure,
     styled,
 )
-from actuator_glue.residual.diagnosis import DiagnosisData, Trace
 
 BEFORE, AFTER = DETERMINISTIC, TOTAL
 _POINTS = 4000  # per line: more cannot be seen

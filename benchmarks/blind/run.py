@@ -32,9 +32,9 @@ def one(seed: int, cache: Path, generator: str) -> dict[str, Any]:
         return dict(json.loads(path.read_text()))
     import truth
 
+    from actuator_glue.diagnosis.diagnose import diagnose
+    from actuator_glue.diagnosis.thresholds import Thresholds
     from actuator_glue.records import Record
-    from actuator_glue.residual.diagnose import diagnose
-    from actuator_glue.residual.settings import Settings
 
     case = import_module(generator).build(seed)
     names = ('sweep-0', 'sweep-250', 'held')
@@ -42,7 +42,7 @@ def one(seed: int, cache: Path, generator: str) -> dict[str, Any]:
     records = [Record(u, y, 1.0 / case.rate, stiffness=k, source=s) for u, y, k, s in rows]
     start = time.perf_counter()
     found = diagnose(
-        records[:2], records[2], seed=seed, settings=Settings(evaluations=0),
+        records[:2], records[2], seed=seed, settings=Thresholds(evaluations=0),
         clock=time.perf_counter,
     )  # fmt: skip
     result = {

@@ -104,7 +104,7 @@ def table(summary: Json) -> str:
         if isinstance(value, dict) and 'ci' in value:
             lines.append(_line(key, value))
         elif key == 'detection_by_ratio':
-            lines += [_line(f'detected, residual/noise {k}', v) for k, v in value.items()]
+            lines += [_line(f'detected, diagnosis/noise {k}', v) for k, v in value.items()]
         elif isinstance(value, dict):
             lines.append(f'{key:34s} median {value["median"]}, 90 % {value["p90"]}')
         else:

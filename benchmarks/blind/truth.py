@@ -7,12 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from case import Case
 
+from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.score import Scorer, splits_of
+from actuator_glue.diagnosis.search import Search
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
-from actuator_glue.residual.data import Data
-from actuator_glue.residual.score import Scorer, splits_of
-from actuator_glue.residual.search import Search
 
 
 def floor(case: Case) -> float:

@@ -10,12 +10,12 @@ from rich import box
 from rich.console import Console
 from rich.table import Table
 
+from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.io.bag_reader import decoded
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.published import Comparison, compare, published
 from actuator_glue.online.replay import items, replay
 from actuator_glue.report.bag_content import Content
-from actuator_glue.residual.diagnosis import DiagnosisData
 from actuator_glue.workers.reports import Reports
 
 SCHEMA = 'examples.demonstration/1'

@@ -7,11 +7,11 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from actuator_glue.diagnosis.result import DiagnosisData, Trace
 from actuator_glue.errors import InputError
 from actuator_glue.report import style
 from actuator_glue.report.bag_content import Content
 from actuator_glue.report.diagnosis_figures import stretches
-from actuator_glue.residual.diagnosis import DiagnosisData, Trace
 
 UM = 1e6
 MM = 1e3

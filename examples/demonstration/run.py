@@ -11,9 +11,9 @@ from typing import Any
 
 from rich.console import Console
 
+from actuator_glue.diagnosis.diagnose import diagnose as diagnose_records
 from actuator_glue.errors import InputError
 from actuator_glue.report import bag_content, estimate_figures
-from actuator_glue.residual.diagnose import diagnose as diagnose_records
 from examples.demonstration import pictures
 from examples.demonstration.outcome import Outcome, replay_bag
 from examples.demonstration.processes import Node, Nodes

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from actuator_glue.diagnosis.diagnose import diagnose
+from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.errors import InputError
 from actuator_glue.inference.bands import Band, band
 from actuator_glue.inference.chains import Chains
@@ -19,8 +21,6 @@ from actuator_glue.model.problem_r import EQUATION_3, NOISE, RATE, STIFFNESS
 from actuator_glue.model.problem_r import records as reconstructed_tests
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
-from actuator_glue.residual.diagnose import diagnose
-from actuator_glue.residual.diagnosis import DiagnosisData
 
 __all__ = [
     'BASE',

@@ -14,6 +14,8 @@ import pytest
 
 from actuator_glue import effects
 from actuator_glue.cli.main import main
+from actuator_glue.diagnosis.diagnose import diagnose
+from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.errors import InputError
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.model.effects import CATALOGUE
@@ -22,8 +24,6 @@ from actuator_glue.online import wire
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.records import Record
 from actuator_glue.report.diagnosis import write_report
-from actuator_glue.residual.diagnose import diagnose
-from actuator_glue.residual.settings import Settings
 from actuator_glue.workers.worker import DONE, Answer, Worker
 
 CUBIC = """\
@@ -86,7 +86,7 @@ def test_diagnose_and_report(own: str, tmp_path: Path) -> None:
         record = Record(sweep, sweep, 1 / rate, stiffness=k)
         y = Structure(('bent-sensor',)).simulate([*theta, 20.0, 1e4], record)
         records.append(replace(record, measured=y + 1e-5 * rng.standard_normal(len(t))))
-    found = diagnose(records, settings=Settings(evaluations=0))
+    found = diagnose(records, settings=Thresholds(evaluations=0))
     assert [e.name for e in found.effects] == ['bent-sensor']
     assert found.effects[0].parameters['bend'].mean == pytest.approx(20.0, rel=0.1)
     report = tmp_path / 'report.html'

@@ -8,8 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy import signal
 
-from actuator_glue.model import gram, kernel, laguerre
-from actuator_glue.model.laguerre import BLOCK
+from actuator_glue.model import kernel
+from actuator_glue.model.fast import gram, laguerre
+from actuator_glue.model.fast.laguerre import BLOCK
 
 K = 32
 

@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from actuator_glue.report import diagnosis_figures as figures
-from actuator_glue.report.diagnosis import write_report
-from actuator_glue.residual.diagnosis import (
+from actuator_glue.diagnosis.result import (
     Alarm,
     Candidate,
     Diagnosis,
@@ -20,6 +18,8 @@ from actuator_glue.residual.diagnosis import (
     HeldOutError,
     Trace,
 )
+from actuator_glue.report import diagnosis_figures as figures
+from actuator_glue.report.diagnosis import write_report
 
 RATE = 100.0
 FOLDER = '/laboratory/2026/campaign'

@@ -11,8 +11,8 @@ from actuator_glue_msgs.msg import Diagnosis
 from rclpy.action import ActionClient
 from rclpy.qos import DurabilityPolicy, QoSProfile
 
+from actuator_glue.diagnosis.result import SCHEMA
 from actuator_glue.io.bag_reader import decoded
-from actuator_glue.residual.diagnosis import SCHEMA
 
 BAGS = Path(__file__).resolve().parents[2] / 'bags'
 

@@ -1,0 +1,151 @@
+"""What to do next, in sentences for people."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from actuator_glue.diagnosis.completeness import Decision
+from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.estimate import Estimate, Json
+from actuator_glue.diagnosis.homogeneity import Homogeneity
+from actuator_glue.diagnosis.model_selection import Selection
+from actuator_glue.diagnosis.regression import Surrogate
+from actuator_glue.diagnosis.result import HeldOutError
+from actuator_glue.diagnosis.verdict import misses
+from actuator_glue.inference.at_bound import Pressed
+from actuator_glue.model.effects import CATALOGUE
+
+# The experiment that separates two groups of effects (issue: second amplitude, down-sweep, ...).
+_EXPERIMENT = {
+    'lag': 'a sweep to a higher frequency (a delay does not roll off, a lag does)',
+    'offset': 'a record with leakage to feel it: high stiffness held at a constant offset',
+    'lost-motion': 'a second amplitude (0.5 mm): play keeps its width',
+    'friction': 'a slow triangle wave at a second amplitude; the force channel shows it directly',
+    'gain': 'a second specimen stiffness, and a static step',
+    'flow-time': 'a down-sweep: time and frequency then run against each other',
+}
+# Above this a posterior's spread may be off by a tenth and more.
+_CONVERGED = 1.2
+_OTHERWISE = 'a second amplitude, a down-sweep or a record with another specimen stiffness'
+
+
+def _where(row: Json) -> str:
+    """Say where the rest of one record sits: frequency, amplitude and time."""
+    f, x, t = row['frequency_hz'], row['displacement'], row['time_s']
+    band = f'{f[0]:g} to {f[1]:g} Hz' if f else 'no one frequency'
+    return (
+        f'{row["source"]}: the rest sits at {band}, displacements of '
+        f'{1e3 * x[0]:.2g} to {1e3 * x[1]:.2g} mm and {t[0]:g} to {t[1]:g} s '
+        f'(middle 80 %), {100 * row["share_at_low_velocity"]:.0f} % of it in the slow half'
+    )
+
+
+def of(
+    decision: Decision,
+    found: Selection,
+    generic: Surrogate,
+    stretches: dict[str, Homogeneity],
+) -> tuple[str, ...]:
+    """Advice for a decision."""
+    out = []
+    for name in decision.names:
+        tied = [r.name for r in found.rivals[name] if r.tied and r.name != name]
+        if tied:
+            group = CATALOGUE[name].group
+            same = all(CATALOGUE[t].group == group for t in tied)
+            way = _EXPERIMENT.get(group, _OTHERWISE) if same else _OTHERWISE
+            out.append(f'{name} cannot be told from {", ".join(tied)} here; record {way}')
+        if stretches[name].agree is False:
+            sizes = ', '.join(f'{v:.3g}' for v in stretches[name].values)
+            unit = CATALOGUE[name].parameters[0].unit
+            out.append(
+                f'{name} does not agree across the halves of the records ({sizes} {unit}): its '
+                'size changes with time, frequency or stiffness, or it stands for something else'
+            )
+    own = decision.final.own
+    if own is not None:
+        out.append(
+            f'{decision.final.added} acts in one record only: that channel may have been set '
+            'differently between these tests; check its setting, or diagnose them apart'
+        )
+    if decision.verdict == 'unexplained':
+        best = found.singles[0].added if found.singles else ''
+        nearest = (
+            'the additions may stand for something that the catalogue does not hold'
+            if decision.names
+            else f'closest in the catalogue, not enough: {best}'
+        )
+        out.append(
+            f'{1e6 * decision.left:.1f} um of structure remain '
+            f'(limit {1e6 * decision.limit:.1f}); {nearest}; look where `remaining` points, '
+            'and record the force channel and a second amplitude'
+        )
+        out += [_where(row) for row in decision.remaining['records']]
+        out.append(
+            f'a generic regression on {len(generic.features)} features of the motion '
+            f'({", ".join(generic.features)}) leaves {1e6 * generic.error:.1f} um out of sample, '
+            f'{" + ".join(generic.structure)} {1e6 * generic.structure_error:.1f} um; '
+            + (
+                f'in the loop it looks like the {generic.place}'
+                if generic.place
+                else 'it follows no simple function of the motion, at no one place in the loop'
+            )
+        )
+    if decision.verdict == 'none' and found.structure > 0.0:
+        out.append(
+            f'structure of {1e6 * found.structure:.1f} um is immaterial '
+            f'(threshold {1e6 * found.material:.1f} um)'
+        )
+    return tuple(out)
+
+
+def unidentified(data: Data, estimates: dict[str, Estimate]) -> tuple[str, ...]:
+    """Say which parameters the records do not fix: their posterior is that of the bounds."""
+    loose = {n: e for n, e in estimates.items() if not e.identified and e.bounds}
+    if not loose:
+        return ()
+    names = ', '.join(
+        f'{n} (bounds {e.bounds[0]:g} to {e.bounds[1]:g} {e.unit})'
+        for n, e in loose.items()
+        if e.bounds
+    )
+    free = all(r.known_stiffness() == 0.0 for r in data.records)
+    more = (
+        '; without specimen only beta_1 and alpha_1_beta_0/alpha_2 are identified: add a record '
+        'with a known specimen stiffness'
+        if free
+        else ''
+    )
+    return (f'not identified by these records, their spread is that of the bounds: {names}{more}',)
+
+
+def unconverged(rhat: float) -> tuple[str, ...]:
+    """Say so where the chains of the posterior have not met; NaN says nothing."""
+    if not rhat > _CONVERGED:
+        return ()
+    return (
+        f'the chains of the posterior have not met (R-hat {rhat:.2f}): its spreads are rough, its '
+        'names and errors do not depend on them',
+    )
+
+
+def contradicted(error: HeldOutError, material: float) -> tuple[str, ...]:
+    """Say so where the held-out part shows far more than noise."""
+    if not misses(error, material):
+        return ()
+    return (
+        f'the held-out part leaves {1e6 * error.after:.1f} um where '
+        f'{1e6 * error.noise_floor:.1f} um are noise: it may show what the fitting records do '
+        'not; add a record like it to them',
+    )
+
+
+def at_bound(found: Sequence[Pressed], estimates: dict[str, Estimate]) -> tuple[str, ...]:
+    """Say which parameters a bound holds: their mean and spread are those of the bound."""
+    return tuple(
+        f'{p.name} is pressed against the {p.side} bound {p.bound:g} '
+        f'{estimates[p.name].unit} of its range: its size is that of the bound, and the records '
+        'ask for something else'
+        for p in found
+        if not p.physical
+    )

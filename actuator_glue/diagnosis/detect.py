@@ -1,0 +1,119 @@
+"""The alarm: is there structure in the residual of Eq. (2), and of what kind."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import signal, stats
+
+from actuator_glue.diagnosis.completeness import Decision
+from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.measurement import Measured
+from actuator_glue.diagnosis.model_selection import Selection
+from actuator_glue.diagnosis.noise import Split, split
+from actuator_glue.diagnosis.result import Alarm
+from actuator_glue.diagnosis.score import splits_of
+from actuator_glue.records import Array
+
+_RESAMPLES = 99
+_LAGS = 20
+
+
+def surrogate(part: Split, size: int, period: float, rng: np.random.Generator) -> Array:
+    """Gaussian noise (size,) with the noise density of a split: the null of the alarm [m]."""
+    frequency = np.fft.rfftfreq(size, period)
+    density = np.interp(frequency, part.frequency, part.psd)
+    # One-sided density S: E|X|^2 = S n / (2 T) of the unnormalised transform.
+    spectrum = np.sqrt(0.25 * density * size / period) * (
+        rng.standard_normal(len(frequency)) + 1j * rng.standard_normal(len(frequency))
+    )
+    spectrum[0] = 0.0
+    return np.fft.irfft(spectrum, size)
+
+
+def p_value(data: Data, splits: list[Split], seed: int) -> float:
+    """Bootstrap p-value of the structure of all records under stationary noise."""
+    rng = np.random.default_rng([seed, 2])
+    observed = sum(s.mean_square - s.noise**2 for s in splits)
+    above = 1
+    for _ in range(_RESAMPLES):
+        total = 0.0
+        for part, where, period in zip(splits, data.parts, data.periods, strict=True):
+            again = split(surrogate(part, where.stop - where.start, period, rng), period)
+            total += again.mean_square - again.noise**2
+        above += total >= observed
+    return above / (_RESAMPLES + 1)
+
+
+def ljung_box(error: Array) -> float:
+    """P-value of the first 20 autocorrelations of a residual (n,) under whiteness.
+
+    Lag by lag: a library's correlation over all lags takes the square of a long record.
+    """
+    e, n = error - error.mean(), len(error)
+    lags = np.arange(1, _LAGS + 1)
+    r = np.array([e[k:] @ e[:-k] for k in lags]) / (float(e @ e) or 1.0)
+    return float(stats.chi2.sf(n * (n + 2) * np.sum(r**2 / (n - lags)), _LAGS))
+
+
+def _even_odd(error: Array, output: Array) -> tuple[float, float]:
+    """Shares of the error explained by even and by odd powers of displacement and velocity."""
+    x = output / max(float(np.abs(output).max()), 1e-12)
+    v = np.gradient(output)
+    v = v / max(float(np.abs(v).max()), 1e-30)
+    even = np.stack([x**2, v**2, x * v, np.abs(x), np.abs(v), np.ones_like(x)])
+    odd = np.stack([x**3, v**3, x**2 * v, x * v**2, np.sign(v), x * np.abs(x), v * np.abs(v)])
+    shares = []
+    for basis in (even, odd):
+        weights, *_ = np.linalg.lstsq(basis.T, error, rcond=1e-10)
+        shares.append(1.0 - float(np.mean((error - weights @ basis) ** 2) / np.mean(error**2)))
+    return shares[0], shares[1]
+
+
+def statistics(data: Data, error: Array) -> dict[str, float]:
+    """Statistics of a residual that people look at.
+
+    ljung_box_p (smallest over records, 20 lags), input_correlation (largest normalised
+    cross-correlation with the command within 0.5 s), even_share and odd_share (of variance),
+    trend (m/s, largest).
+    """
+    out = {
+        'ljung_box_p': 1.0,
+        'input_correlation': 0.0,
+        'even_share': 0.0,
+        'odd_share': 0.0,
+        'trend': 0.0,
+    }
+    rows = zip(
+        data.records, data.masks, data.split(error), data.split(data.target - error),
+        data.times, data.periods, strict=True,
+    )  # fmt: skip
+    for record, mask, e, y, t, period in rows:
+        out['ljung_box_p'] = min(out['ljung_box_p'], ljung_box(e))
+        u = record.command[mask] - record.command[mask].mean()
+        lags = round(0.5 / period)
+        cross = signal.correlate(e - e.mean(), u, mode='same', method='fft')
+        near = cross[len(e) // 2 - lags : len(e) // 2 + lags + 1]
+        norm = float(np.sqrt(((e - e.mean()) ** 2).sum() * (u**2).sum())) or 1.0
+        out['input_correlation'] = max(out['input_correlation'], float(np.abs(near).max()) / norm)
+        even, odd = _even_odd(e, y)
+        out['even_share'] = max(out['even_share'], even)
+        out['odd_share'] = max(out['odd_share'], odd)
+        slope = float(np.polyfit(t, e, 1)[0])
+        if abs(slope) > abs(out['trend']):
+            out['trend'] = slope
+    return out
+
+
+def alarm_of(
+    found: Selection, seen: tuple[Measured, ...], decision: Decision, data: Data, seed: int
+) -> Alarm:
+    """Describe the alarm that the decision stands on."""
+    error = found.base.fit.error
+    return Alarm(
+        raised=decision.verdict != 'none',
+        structured=max([found.structure, *found.removed.values(), *(m.rms for m in seen)]),
+        threshold=found.material,
+        noise=found.noise,
+        p_value=p_value(data, splits_of(data, error), seed),
+        tests=statistics(data, error),
+    )

@@ -1,0 +1,48 @@
+"""The one line of a diagnosis, from the numbers that its notes, JSON and exit code have."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from actuator_glue.diagnosis.verdict import misses
+from actuator_glue.records import source_name
+
+if TYPE_CHECKING:
+    from actuator_glue.diagnosis.result import DiagnosisData, Finding
+
+
+def _named(effect: Finding) -> str:
+    where = f' in {", ".join(map(source_name, effect.records))} only' if effect.records else ''
+    others = f' (or {", ".join(effect.alternatives)})' if effect.alternatives else ''
+    return effect.name + where + others
+
+
+def _noise(found: DiagnosisData) -> str:
+    """Say how large the noise is, by itself or beside the error, and what is known to make it."""
+    floor = found.error.noise_floor
+    parts = [f'{1e6 * (e.noise or 0.0):.1f} um by {e.name}' for e in found.effects if e.noise]
+    text = f'noise {1e6 * floor:.1f} um'
+    if misses(found.error, found.alarm.threshold):
+        times = found.error.after / floor if floor > 0.0 else math.inf
+        text = f'{times:.1f} times the noise of {1e6 * floor:.1f} um'
+    return f'{text} ({", ".join(parts)})' if parts else text
+
+
+def headline(found: DiagnosisData) -> str:
+    """Return the verdict in one line, never more than the held-out part bears out."""
+    names = ', '.join(_named(e) for e in found.effects if e.noise is None)
+    before, after = 1e6 * found.error.before, 1e6 * found.error.after
+    change = f'held-out error {before:.1f} -> {after:.1f} um' if names else (
+        f'held-out error {after:.1f} um'
+    )  # fmt: skip
+    change = f'{change}, {_noise(found)}'
+    if found.verdict == 'undecided':
+        asked = f'for {names}, the held-out part does not' if names else 'for nothing'
+        return f'undecided: the fitting records ask {asked}; {change}'
+    if found.verdict == 'unexplained':
+        rest = f'{1e6 * found.remaining["left"]:.1f} um of structure in the fitting records remain'
+        if not names:
+            return f'the model is not enough and no addition is supported: {change}; {rest}'
+        return f'added, but not the whole story: {names}; {change}; {rest}'
+    return f'missing: {names}; {change}' if names else f'the model is enough: {change}'

@@ -1,0 +1,110 @@
+"""Whether an effect has the same size in separate stretches of the records (Cochran 1954)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy import stats
+
+from actuator_glue.diagnosis.score import Scorer
+from actuator_glue.diagnosis.search import Trial
+from actuator_glue.model.effects import CATALOGUE
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Array
+
+_STRETCHES = 2  # of every record
+_LEVEL = 0.01
+_SPREAD = 0.25  # of the effect's size: a significant but smaller spread matters to nobody
+_KNOWN = 0.5  # a stretch counts where its standard error is below this share of the size
+
+
+@dataclass(frozen=True)
+class Homogeneity:
+    """An effect's size in each stretch that fixes it.
+
+    Attributes:
+        values: leading parameter per stretch, in the order of time and records [its unit].
+        stddev: their standard errors, inflated for coloured residuals.
+        p_value: of equal sizes (NaN with fewer than two stretches).
+        agree: False where p < 0.01 and the values spread by more than a quarter of the size;
+            None where fewer than two stretches fix the size.
+    """
+
+    values: tuple[float, ...]
+    stddev: tuple[float, ...]
+    p_value: float
+    agree: bool | None
+
+
+def agreement(trial: Trial, scorer: Scorer) -> dict[str, Homogeneity]:
+    """Refit the leading parameter of every effect on the halves of each record.
+
+    One Gauss-Newton step from the joint fit, on the whitened residual: the effect's leading
+    parameter is free in every stretch, all other parameters are free but common, so a stretch
+    that cannot identify Eq. (2) by itself borrows it from the rest. Standard errors are inflated
+    by the block-clustered (sandwich) variance (Liang and Zeger 1986), never deflated.
+    """
+    error, jac = scorer.whiten(trial.fit.error), scorer.whiten(trial.fit.jacobian)
+    edges = [
+        (int(a), int(b))
+        for part in scorer.data.parts
+        for a, b in _halves(part)
+    ]  # fmt: skip
+    model = Structure(trial.effects)
+    out = {}
+    for name in trial.effects:
+        row = int(np.arange(len(trial.fit.theta))[model.columns(name)][0])
+        split = np.zeros((len(edges), len(error)))
+        for i, (a, b) in enumerate(edges):
+            split[i, a:b] = jac[row, a:b]
+        value = float(trial.fit.theta[row])
+        size = abs(value - (CATALOGUE[name].parameters[0].neutral or 0.0))
+        rows = np.concatenate([split, np.delete(jac, row, axis=0)])
+        out[name] = _compare(rows, error, scorer.blocks, len(edges), value, size)
+    return out
+
+
+def _halves(part: slice) -> list[tuple[int, int]]:
+    edges = np.linspace(part.start, part.stop, _STRETCHES + 1).astype(int)
+    return list(zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True))
+
+
+def _compare(
+    rows: Array,
+    error: Array,
+    blocks: tuple[slice, ...],
+    count: int,
+    value: float,
+    size: float,
+) -> Homogeneity:
+    """Solve for the stretches' shifts (the first `count` rows) and test that they are equal."""
+    scale = np.sqrt(np.einsum('pn,pn->p', rows, rows))
+    known = scale > 0.0
+    rows, scale = rows[known] / scale[known, None], scale[known]
+    count = int(known[:count].sum())
+    inverse = np.linalg.pinv(rows @ rows.T, rcond=1e-10, hermitian=True)
+    shift = inverse @ (rows @ error)
+    left = error - shift @ rows
+    pulls = np.stack([rows[:, b] @ left[b] for b in blocks])
+    robust = inverse @ (pulls.T @ pulls) @ inverse * len(blocks) / max(1, len(blocks) - len(rows))
+    nominal = np.diag(inverse)[:count]
+    inflation = max(1.0, float(np.mean(np.diag(robust)[:count] / np.maximum(nominal, 1e-300))))
+    covariance = inflation * inverse[:count, :count] / np.outer(scale[:count], scale[:count])
+    shifts = (shift / scale)[:count]
+    deviation = np.sqrt(np.diag(covariance))
+    use = deviation < _KNOWN * size
+    values, deviation = value + shifts[use], deviation[use]
+    sizes = tuple(float(v) for v in values), tuple(float(s) for s in deviation)
+    freedom = int(use.sum()) - 1
+    if freedom < 1:
+        return Homogeneity(*sizes, float('nan'), None)
+    contrast = np.eye(freedom + 1)[1:] - np.eye(freedom + 1)[0]
+    difference = contrast @ values
+    inner = contrast @ covariance[np.ix_(use, use)] @ contrast.T
+    q = float(difference @ np.linalg.pinv(inner, hermitian=True) @ difference)
+    p = float(stats.f.sf(q / freedom, freedom, max(1, len(blocks) - len(rows))))
+    weights = 1.0 / deviation**2
+    mean = float(np.average(values, weights=weights))
+    spread = float(np.sqrt(np.average((values - mean) ** 2, weights=weights)))
+    return Homogeneity(*sizes, p, not (p < _LEVEL and spread > _SPREAD * size))

@@ -1,0 +1,144 @@
+"""A stationary line in the residual that the command does not have: hum of the mains.
+
+It has no mean response, so it must not count as noise that hides smaller effects: it is taken out
+of the fitting records before any effect is sought, each with its own phase.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage, signal
+
+from actuator_glue.diagnosis.data import Data
+from actuator_glue.records import Array
+
+_CLEAR = 60.0  # of the median power, 40 times the mean: one in 10^6 records of noise
+_LOWEST = 2.0  # Hz
+_ORDERS = 9  # harmonics of a sinusoidal command are its response, not hum
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of one frequency with a phase of its own in each record.
+
+    Attributes:
+        frequency: [Hz].
+        amplitudes: cosine and sine amplitude per record, (R, 2) [m].
+        floor: mean square of what remains without it [m^2].
+        size: counted samples.
+        duration: longest record [s].
+    """
+
+    frequency: float
+    amplitudes: Array
+    floor: float
+    size: int
+    duration: float
+
+    @property
+    def rms(self) -> float:
+        """Rms of the line, mean over the records [m]."""
+        return float(np.sqrt(0.5 * np.mean(np.sum(self.amplitudes**2, axis=1))))
+
+    @property
+    def nats(self) -> float:
+        """Log-likelihood gained by the line, white noise."""
+        return 0.5 * self.size * float(np.log1p(self.rms**2 / max(self.floor, 1e-30)))
+
+    @property
+    def values(self) -> tuple[float, float, float]:
+        """Cosine and sine amplitude of the strongest record [m], frequency [Hz]."""
+        first = self.amplitudes[int(np.argmax(np.sum(self.amplitudes**2, axis=1)))]
+        return float(first[0]), float(first[1]), self.frequency
+
+    @property
+    def stddev(self) -> tuple[float, float, float]:
+        """Standard deviations of `values` (Rife and Boorstyn 1974)."""
+        spread = float(np.sqrt(2.0 * max(self.floor, 0.0) / self.size))
+        line = float(np.sqrt(6.0 * max(self.floor, 0.0) / (np.pi**2 * self.size)) / self.duration)
+        return spread, spread, line / max(float(np.hypot(*self.values[:2])), 1e-12)
+
+
+def _basis(time: Array, frequency: float) -> Array:
+    angle = 2.0 * np.pi * frequency * time
+    return np.stack([np.cos(angle), np.sin(angle)])
+
+
+def amplitudes(error: Array, time: Array, frequency: float) -> Array:
+    """Least-squares cosine and sine amplitudes of a line (2,) [m]."""
+    basis = _basis(time, frequency)
+    return np.asarray(np.linalg.solve(basis @ basis.T, basis @ error))
+
+
+def _peaks(values: Array, period: float) -> tuple[Array, Array]:
+    """Frequencies and power over the local median, zero outside the usable band."""
+    spectrum = np.abs(np.fft.rfft(signal.detrend(values) * np.hanning(len(values)))) ** 2
+    level = ndimage.median_filter(spectrum, 201, mode='reflect') + 1e-300
+    f = np.fft.rfftfreq(len(values), period)
+    inside = (f > _LOWEST) & (f < 0.48 / period)
+    return np.asarray(f), np.asarray(np.where(inside, spectrum / level, 0.0))
+
+
+def _of_command(frequency: Array, command: Array, period: float) -> NDArray[np.bool_]:
+    """Which frequencies are harmonics of lines of the command."""
+    spectrum = np.abs(np.fft.rfft(signal.detrend(command) * np.hanning(len(command)))) ** 2
+    f = np.fft.rfftfreq(len(command), period)
+    # A sinusoid holds its power in three bins, a sweep or an earthquake in hundreds.
+    tones = f[spectrum > 0.03 * spectrum.sum()]
+    width = 3.0 / (len(command) * period)
+    out = np.zeros(len(frequency), dtype=np.bool_)
+    for order in range(1, _ORDERS + 1):
+        for tone in tones:
+            out |= np.abs(frequency - order * tone) < order * width
+    return out
+
+
+def find(data: Data, errors: Array) -> Line | None:
+    """Return a stationary line of the residual (N,) [m] that is none of the command's.
+
+    Each record has its own phase: mains is not synchronous with a test.
+    """
+    best = (0.0, 0.0)
+    parts = data.split(errors)
+    rows = zip(data.records, data.masks, parts, data.periods, strict=True)
+    for record, mask, error, period in rows:
+        f, ratio = _peaks(error, period)
+        ratio[_of_command(f, record.command[mask], period)] = 0.0
+        at = int(np.argmax(ratio))
+        if ratio[at] > best[0]:
+            best = (float(ratio[at]), float(f[at]))
+    if best[0] < _CLEAR:
+        return None
+    duration = max(r.duration for r in data.records)
+    frequency = best[1]
+
+    def power(hertz: float) -> float:
+        found = [amplitudes(e, t, hertz) for e, t in zip(parts, data.times, strict=True)]
+        return float(sum(a @ a for a in found))
+
+    for width in (0.5, 0.1, 0.02):
+        tried = frequency + np.linspace(-1, 1, 21) * width / duration * 2
+        frequency = float(tried[int(np.argmax([power(f) for f in tried]))])
+    found = np.stack([amplitudes(e, t, frequency) for e, t in zip(parts, data.times, strict=True)])
+    floor = float(np.mean(errors**2)) - 0.5 * float(np.mean(np.sum(found**2, axis=1)))
+    return Line(frequency, found, floor, len(errors), duration)
+
+
+def without(data: Data, line: Line) -> Data:
+    """Take a line out of the measured displacement of all records."""
+    records = []
+    for record, amplitude in zip(data.records, line.amplitudes, strict=True):
+        hum = amplitude @ _basis(record.time, line.frequency)
+        records.append(replace(record, measured=record.measured - hum))
+    return replace(data, records=tuple(records))
+
+
+def regressed(data: Data, errors: Array, line: Line) -> Array:
+    """Errors (N,) with the line's frequency regressed out of each record [m]."""
+    out = []
+    for error, time in zip(data.split(errors), data.times, strict=True):
+        out.append(error - amplitudes(error, time, line.frequency) @ _basis(time, line.frequency))
+    return np.concatenate(out)

@@ -1,0 +1,128 @@
+"""Coordinates in which the posterior around a fit is nearly normal.
+
+In the logarithms of Eq. (2)'s parameters the ridge that one stiffness leaves is bent, and a
+thousand times longer than wide: points around the fit lie off it, and chains creep. In those of
+`Ridge` it is straight. Records under several stiffnesses leave no such ridge: for
+them the working coordinates serve.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from actuator_glue.diagnosis.data import Data, Model
+from actuator_glue.diagnosis.fit import Space
+from actuator_glue.inference.transforms.ridge import Ridge
+from actuator_glue.model.parameters import BASE
+from actuator_glue.records import Array
+
+_P = len(BASE)
+# A fit may lie on its bounds, which are rounded on the way to coordinates and back.
+_ROUNDING = 1e-9
+# How far from the fit the shares of a box can tell alpha_2, whose cube counts, or square and, too,
+# alpha_3 where no specimen makes it act: what the records leave open by more is not known.
+_HELD_REACH, _FREE_REACH = 2.5, 3.8  # logarithm
+
+
+def coordinates(space: Space, model: Model, data: Data, fit: Array) -> Working | Straight:
+    """Return what to sample in around the working coordinates (p,) of a fit."""
+    if len({record.known_stiffness() for record in data.records}) == 1:
+        straight = Straight(space, model, data, fit)
+        back, log_prior = straight.inverse(straight.forward(space.theta(fit)[None]))
+        # A fit in a corner of its bounds may have no place there.
+        if np.isfinite(log_prior[0]) and np.allclose(back[0], space.theta(fit), rtol=1e-3):
+            return straight
+    return Working(space)
+
+
+class Working:
+    """The working coordinates themselves, as a `Transform` of the physical parameters.
+
+    Attributes:
+        widest: spreads (p,) beyond which nothing is known.
+    """
+
+    def __init__(self, space: Space) -> None:
+        self._space = space
+        self.lower, self.upper = space.lower, space.upper
+        self.widest = space.upper - space.lower
+        self.widest[:_P] = 1.0
+
+    def forward(self, theta: Array) -> Array:
+        """Return the working coordinates (m, p) of physical parameters (m, p)."""
+        return self._space.z(theta)
+
+    def inverse(self, z: Array) -> tuple[Array, Array]:
+        """As `Straight.inverse`."""
+        inside = ((z >= self.lower) & (z <= self.upper)).all(axis=1)
+        return self._space.theta(z), np.where(inside, 0.0, -np.inf)
+
+    def slopes(self, phi: Array) -> Array:
+        """As `Straight.slopes`."""
+        return np.eye(len(phi))
+
+
+class Straight:
+    """Straight coordinates, as a `Transform` of the physical parameters.
+
+    Args:
+        space: the working coordinates; the prior is uniform within their bounds.
+        model: whose parameters they are.
+        data: records under one stiffness; the middle of the longest is used.
+        fit: working coordinates of the fit, (p,).
+
+    Attributes:
+        widest: spreads (p,) beyond which nothing is known.
+    """
+
+    def __init__(self, space: Space, model: Model, data: Data, fit: Array) -> None:
+        self._space = space
+        stiffness = data.records[0].known_stiffness()
+        middle = 0.5 * max(record.duration for record in data.records)
+        reach = np.full(len(fit), np.inf)
+        reach[2] = _HELD_REACH
+        if stiffness == 0.0:
+            reach[2:4] = _FREE_REACH
+        low = space.theta(np.maximum(space.lower, fit - reach))
+        high = space.theta(np.minimum(space.upper, fit + reach))
+        margin = _ROUNDING * np.where(np.arange(len(fit)) < _P, low, high - low)
+        low, high = low - margin, high + margin
+        names = [p.name for p in model.parameters]
+        self._ridge = Ridge(names, low, high, stiffness, middle)
+        # Logarithms and normal scores; what is known less well than this is not known.
+        self.widest = np.where(
+            np.arange(len(fit)) < _P, 1.0, self._ridge.upper - self._ridge.lower
+        )
+        if stiffness > 0.0:
+            self.widest[3] = self._ridge.upper[3]
+        # The bounds of the parameters are all there are.
+        self.lower, self.upper = np.full(len(fit), -np.inf), np.full(len(fit), np.inf)
+        self._ridge.lower, self._ridge.upper = self.lower, self.upper
+
+    def forward(self, theta: Array) -> Array:
+        """Return the straight coordinates (m, p) of physical parameters (m, p)."""
+        return self._ridge.forward(theta)
+
+    def inverse(self, phi: Array) -> tuple[Array, Array]:
+        """Physical parameters (m, p) and log prior density (m,) at straight coordinates (m, p).
+
+        The density is minus infinity outside the bounds, where the parameters mean nothing.
+        """
+        theta, log_prior = self._ridge.inverse(phi)
+        # The Jacobian is that of a prior uniform in theta; ours is in its logarithm.
+        inside = np.isfinite(log_prior)
+        log_prior[inside] -= np.log(theta[inside, :_P]).sum(axis=1)
+        return theta, log_prior
+
+    def slopes(self, phi: Array) -> Array:
+        """Derivatives dz_j/dphi_i (p, p) at phi (p,): towards the side that is inside."""
+        sizes = np.where(
+            np.arange(len(phi)) < _P, 1.0, np.maximum(np.abs(phi), 1e-3 * self.widest)
+        )
+        steps = np.diag(1e-6 * sizes)
+        moved, log_prior = self.inverse(np.concatenate([phi + steps, phi - steps]))
+        z = self._space.z(moved)
+        z[~np.isfinite(log_prior)] = self._space.z(self.inverse(phi[None])[0])
+        inside = np.isfinite(log_prior).reshape(2, -1).sum(axis=0)
+        found = z[: len(phi)] - z[len(phi) :]
+        return np.asarray(found / (np.diag(steps) * np.maximum(inside, 1))[:, None])

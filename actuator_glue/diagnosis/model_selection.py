@@ -1,0 +1,220 @@
+"""Name the missing effects: beam search over sets of effects, alternatives of each member."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
+from actuator_glue.diagnosis.search import Search, Trial
+from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.model.effects import CATALOGUE
+
+Progress = Callable[[str, float], None]
+# Rounds in which members may be swapped for better or simpler ones.
+_SWAPS = 4
+
+
+@dataclass(frozen=True)
+class Rival:
+    """An effect in the place of another, everything refitted: how far behind the best it is.
+
+    Attributes:
+        name: the effect.
+        nats: evidence of the best over it (0 for the best itself).
+        excess: rms error it leaves beyond the best [m].
+        tied: these data cannot tell it from the best.
+        probability: among all rivals.
+    """
+
+    name: str
+    nats: float
+    excess: float
+    tied: bool
+    probability: float
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What the fitting part says.
+
+    Attributes:
+        base: Eq. (2) refitted.
+        singles: every single effect refitted, best first.
+        final: the structure chosen.
+        rivals: per effect of `final`, the effects tried in its place, best first.
+        removed: per effect of `final`, rms error it removes given the others [m].
+        evidence: per effect of `final`, nats it gains given the others.
+        structure: rms structure of the base residual [m].
+        left: rms structure of the final residual [m].
+        noise: rms of what no structure explains [m].
+        material: materiality threshold [m].
+    """
+
+    base: Trial
+    singles: tuple[Trial, ...]
+    final: Trial
+    rivals: dict[str, tuple[Rival, ...]]
+    removed: dict[str, float]
+    evidence: dict[str, float]
+    structure: float
+    left: float
+    noise: float
+    material: float
+
+
+def removed(before: Trial, after: Trial) -> float:
+    """Rms error that a larger structure removes [m]."""
+    return float(np.sqrt(max(0.0, before.mean_square - after.mean_square)))
+
+
+class ModelSelection:
+    """Beam search over effect sets on one data set."""
+
+    def __init__(self, search: Search, settings: Thresholds, progress: Progress) -> None:
+        self.search, self.settings, self.progress = search, settings, progress
+        self.noise = self.first = self.material = 0.0
+
+    def renoise(self, error_of: Trial | None = None) -> None:
+        """Take the noise from the residual of a structure (first: of the base)."""
+        error = error_of.fit.error if error_of else self.search.base().error
+        parts = splits_of(self.search.data, error)
+        left, self.noise = pooled(self.search.data, parts)
+        self.first = self.first or left
+        self.search.scorer = Scorer.of(self.search.data, parts)
+        stroke = self.search.scale().stroke
+        s = self.settings
+        self.material = max(s.noise_share * self.noise, s.stroke_share * stroke)
+
+    def left(self, trial: Trial) -> float:
+        """Rms structure that remains in the residual of a structure [m]."""
+        return pooled(self.search.data, splits_of(self.search.data, trial.fit.error))[0]
+
+    def rescored(self, trials: Sequence[Trial]) -> list[Trial]:
+        """Score with the present noise, best first."""
+        out = [self.search.trial(t.effects, t.added) for t in trials]
+        return sorted(out, key=lambda t: -float(t.scores.sum()))
+
+    def better(self, larger: Trial, smaller: Trial, threshold: float) -> bool:
+        """Whether the larger structure is worth its parameters: significant and material."""
+        extra = len(larger.fit.theta) - len(smaller.fit.theta)
+        nats = evidence(larger.scores, smaller.scores) - extra
+        return removed(smaller, larger) >= threshold and nats >= self.settings.nats
+
+    def extend(self, beam: Sequence[Trial], stage: int) -> list[Trial]:
+        """Refit every structure of the beam with its most promising further effects."""
+        found: dict[tuple[str, ...], Trial] = {}
+        for i, current in enumerate(beam):
+            names = [n for n in self.search.names if n not in current.effects]
+            screened = self.search.screened(current, names)
+            self.progress(f'effect {stage}', i / len(beam))
+            for trial in self.search.additions(current, screened[: self.settings.tried]):
+                found.setdefault(trial.effects, trial)
+        return sorted(found.values(), key=lambda t: -float(t.scores.sum()))
+
+    def run(self) -> Selection:
+        """Add effects while each is worth it, then check each against its rivals."""
+        s = self.settings
+        self.renoise()
+        base = self.search.trial(())
+        singles = self.search.additions(base, None, lambda d: self.progress('effect 1', d))
+        self.renoise(singles[0])
+        base, singles = self.search.trial(()), self.rescored(singles)
+        current = base
+        ranked: list[Trial] = list(singles)
+        threshold = self.material
+        for stage in range(1, s.most + 1):
+            # Nats weigh the whitened error, materiality the plain one: the best by nats may be
+            # immaterial where another effect is neither.
+            worth = [t for t in ranked if self.better(t, current, threshold)]
+            if not worth:
+                break
+            current = worth[0]
+            self.renoise(current)
+            base, singles = self.search.trial(()), self.rescored(singles)
+            threshold = self.material
+            if self.left(current) < max(threshold, s.left_share * self.first):
+                # Most is explained: small change may only mend the form of what was found.
+                threshold = max(threshold, s.later_share * removed(base, current))
+            if self.left(current) < threshold or stage == s.most:
+                break
+            ranked = self.extend(self.rescored(ranked[: s.beam]), stage + 1)
+            current = self.search.trial(current.effects, current.added)
+        current = self.pruned(current)
+        current, rivals = self.settle(current)
+        gains, nats = {}, {}
+        for name in current.effects:
+            rest = self.search.without(current, name)
+            gains[name] = removed(rest, current)
+            nats[name] = evidence(current.scores, rest.scores)
+        return Selection(
+            base, tuple(singles), current, rivals, gains, nats,
+            self.first, self.left(current), self.noise, self.material,
+        )  # fmt: skip
+
+    def pruned(self, current: Trial) -> Trial:
+        """Take members away that are not worth their parameters beside the others."""
+        for name in current.effects if len(current.effects) > 1 else ():
+            rest = self.search.without(current, name)
+            if not self.better(current, rest, self.material):
+                return self.pruned(rest)
+        return current
+
+    def settle(self, current: Trial) -> tuple[Trial, dict[str, tuple[Rival, ...]]]:
+        """Swap members for better rivals until none is better; return rivals of each member."""
+        for attempt in range(_SWAPS):
+            rivals: dict[str, tuple[Rival, ...]] = {}
+            best = current
+            for name in current.effects:
+                rest = self.search.without(current, name)
+                names = [n for n in self.search.names if n not in current.effects]
+                if len(current.effects) > 1:
+                    names = self.search.screened(rest, names)[: self.settings.tried]
+                trials = self.search.additions(rest, names)
+                rivals[name] = self.compare(rest, current, name, trials)
+                if trials and trials[0].scores.sum() > best.scores.sum():
+                    best = trials[0]
+            if best is current:
+                best = self.simpler(current, rivals)
+            # The last members stay, so that the rivals told are theirs.
+            if best is current or attempt == _SWAPS - 1:
+                break
+            current = best
+        return current, rivals
+
+    def simpler(self, current: Trial, rivals: dict[str, tuple[Rival, ...]]) -> Trial:
+        """Take a rival of fewer parameters that these data cannot tell from a member."""
+        for name, row in rivals.items():
+            for rival in row:
+                effects = tuple(
+                    n for n in CATALOGUE if n == rival.name or (n in current.effects and n != name)
+                )
+                fewer = len(CATALOGUE[rival.name].parameters) < len(CATALOGUE[name].parameters)
+                if rival.tied and fewer and rival.nats < self.settings.tie_nats:
+                    return self.search.trial(effects, rival.name)
+        return current
+
+    def compare(
+        self, rest: Trial, best: Trial, name: str, trials: Sequence[Trial]
+    ) -> tuple[Rival, ...]:
+        """Say how far behind the best each rival is."""
+        s = self.settings
+        whole = removed(rest, best)
+        rows = [(name, 0.0, 0.0, True)]
+        for trial in trials:
+            nats = max(0.0, evidence(best.scores, trial.scores))
+            excess = removed(trial, best)
+            extra = len(trial.fit.theta) - len(best.fit.theta)
+            tied = (
+                removed(rest, trial) > 0.5 * whole
+                and (nats < s.tie_nats or excess < s.tie_share * whole)
+                # A richer form of the same that gains nothing is no alternative.
+                and not (extra > 0 and best.scores.sum() >= trial.scores.sum())
+            )
+            rows.append((trial.added, nats, excess, tied))
+        weights = np.array([np.exp(-min(nats, 700.0)) for _, nats, _, _ in rows])
+        weights /= weights.sum()
+        out = [Rival(*row, float(w)) for row, w in zip(rows, weights, strict=True)]
+        return tuple(sorted(out, key=lambda r: (r.nats, r.name != name)))

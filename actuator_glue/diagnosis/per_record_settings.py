@@ -1,0 +1,159 @@
+"""A channel set differently between tests: one record's own gain, bias, delay or clock.
+
+What is set by hand between tests is no property of the machine, so one size for all records
+cannot explain it. It is asked for only where no effect of common size explains the records:
+a setting in one stiffness alone looks like a specimen effect, and the specimen goes first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.fit import fit
+from actuator_glue.diagnosis.model_selection import Rival, Selection, removed
+from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
+from actuator_glue.diagnosis.search import Search, Trial
+from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.model.effects import CATALOGUE
+from actuator_glue.model.exact import Initial
+from actuator_glue.model.parameters import Parameter
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Array, Record
+
+SETTINGS = ('gain', 'bias', 'delay', 'clock-skew')
+
+
+class OneRecord:
+    """A structure one of whose effects acts in some records only.
+
+    Args:
+        effects: all effects.
+        own: the effect that acts in `records` only.
+        records: these records.
+    """
+
+    def __init__(self, effects: tuple[str, ...], own: str, records: tuple[Record, ...]) -> None:
+        self._inner = Structure(effects)
+        self.own, self.records = own, records
+        self._off = [float(p.neutral or 0.0) for p in CATALOGUE[own].parameters]
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Those of the structure, in its order."""
+        return self._inner.parameters
+
+    def simulate(self, theta: Array, record: Record, *, initial: Initial = 'rest') -> Array:
+        """Free-run sensor output, the effect at its neutral value in other records [m]."""
+        table = np.array(np.atleast_2d(theta))
+        if not any(record is r for r in self.records):
+            table[:, self._inner.columns(self.own)] = self._off
+        out = self._inner.simulate(table, record, initial=initial)
+        return out.reshape(*np.shape(theta)[:-1], len(record))
+
+
+def _members(data: Data, held: Sequence[Record], index: int) -> tuple[Record, ...]:
+    """The record and the held-out tests of its set-up.
+
+    Those of a stiffness that only it has, else its own held-out blocks.
+    """
+    own = data.records[index]
+    stiffness = own.known_stiffness()
+    if sum(r.known_stiffness() == stiffness for r in data.records) > 1:
+        return (own, *(r for r in held if np.array_equal(r.command, own.command)))
+    return (own, *(r for r in held if r.known_stiffness() == stiffness))
+
+
+def setting(
+    search: Search, found: Selection, limit: float, held: Sequence[Record], settings: Thresholds
+) -> Selection | None:
+    """Ask whether one record's own setting explains what common sizes do not.
+
+    The setting must leave at most `limit` of structure, remove a material error and gain the
+    evidence of any addition, less a nat per parameter and the logarithm of how many were tried.
+
+    Args:
+        search: the search that ended with `found`; its noise is taken anew from the answer.
+        found: what effects of common size explain.
+        limit: structure above which records count as unexplained [m].
+        held: held-out records, which share a setting through their stiffness.
+        settings: thresholds.
+
+    Returns:
+        The attribution with the setting added, or None.
+    """
+    data = search.data
+    if len(data.records) < 2 or search.scorer is None:
+        return None
+    for effects in sorted({(), found.final.effects}, key=len):
+        start = search.trial(effects)
+        names = [n for n in SETTINGS if n not in effects]
+        tried = [
+            _fitted(search, start, name, _members(data, held, i))
+            for name in names
+            for i in range(len(data.records))
+        ]
+        tried.sort(key=lambda t: -float(t.scores.sum()))
+        best = tried[0]
+        parts = splits_of(data, best.fit.error)
+        left, noise = pooled(data, parts)
+        if left > limit or removed(start, best) < found.material:
+            continue
+        search.scorer = Scorer.of(data, parts)
+        tried, start = [_rescored(search, t) for t in tried], search.trial(effects)
+        common = search.trial(found.final.effects)
+        cost = len(best.fit.theta) - len(start.fit.theta) + float(np.log(len(tried)))
+        gained = evidence(tried[0].scores, common.scores) - cost
+        if gained < settings.nats:
+            continue
+        return _attribution(search, found, start, tried, (left, noise))
+    return None
+
+
+def _fitted(search: Search, start: Trial, name: str, records: tuple[Record, ...]) -> Trial:
+    effects = tuple(n for n in CATALOGUE if n in start.effects or n == name)
+    model = OneRecord(effects, name, records)
+    thetas = search.screen(start, name)[1]
+    found = fit(search.data, model, thetas)
+    assert search.scorer is not None
+    return Trial(effects, name, found, search.scorer.block_scores(found), model)
+
+
+def _rescored(search: Search, trial: Trial) -> Trial:
+    assert search.scorer is not None
+    return replace(trial, scores=search.scorer.block_scores(trial.fit))
+
+
+def _attribution(
+    search: Search,
+    found: Selection,
+    start: Trial,
+    tried: Sequence[Trial],
+    parts: tuple[float, float],
+) -> Selection:
+    """What was found, with the best setting and its rivals in place of common sizes."""
+    best = tried[0]
+    gap = [max(0.0, evidence(best.scores, t.scores)) for t in tried]
+    weights = np.exp(-np.minimum(gap, 700.0))
+    weights /= weights.sum()
+    rows = zip(tried, gap, weights, strict=True)
+    rivals = [
+        Rival(t.added, nats, removed(t, best), nats < 4.0 and t.added != best.added, float(w))
+        for t, nats, w in rows
+        if t is best or t.added != best.added
+    ]
+    gained = evidence(best.scores, start.scores)
+    kept = {n: found.rivals[n] for n in start.effects}
+    return replace(
+        found,
+        base=search.trial(()),
+        final=best,
+        rivals=kept | {best.added: tuple(rivals)},
+        removed={n: found.removed[n] for n in start.effects} | {best.added: removed(start, best)},
+        evidence={n: found.evidence[n] for n in start.effects} | {best.added: gained},
+        left=parts[0],
+        noise=parts[1],
+    )

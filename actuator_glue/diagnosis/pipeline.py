@@ -1,0 +1,123 @@
+"""From prepared records to a verdict: search, measurement effects, surrogate, decision."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from actuator_glue.diagnosis import hum, per_record_settings, recorded, regression
+from actuator_glue.diagnosis.completeness import Decision, decide
+from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.decimate import decimated
+from actuator_glue.diagnosis.hum import Line
+from actuator_glue.diagnosis.measurement import Measured
+from actuator_glue.diagnosis.model_selection import ModelSelection, Selection
+from actuator_glue.diagnosis.preparation import Prepared
+from actuator_glue.diagnosis.regression import Surrogate
+from actuator_glue.diagnosis.score import Scorer, evidence
+from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.model.effects import CATALOGUE
+
+Progress = Callable[[str, float], None]
+
+
+def mean_effects() -> tuple[str, ...]:
+    """Return the effects with a mean response; measurement.py and hum.py find the others."""
+    return tuple(n for n in CATALOGUE.searched() if CATALOGUE[n].variance is None and n != 'hum')
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """What the fitting part of the records says.
+
+    Attributes:
+        prepared: the records, fitting part and held-out part.
+        data: the fitting part without hum.
+        scorer: noise and blocks of the final structure.
+        line: hum.
+        found: effects with a mean response.
+        seen: measurement effects.
+        generic: the regression beside them.
+        decision: the verdict.
+    """
+
+    prepared: Prepared
+    data: Data
+    scorer: Scorer
+    line: Line | None
+    found: Selection
+    seen: tuple[Measured, ...]
+    generic: Surrogate
+    decision: Decision
+
+
+def conclude(prepared: Prepared, settings: Thresholds, jobs: int, tell: Progress) -> Conclusion:
+    """Search for what the model lacks and decide; nothing looks at the held-out part."""
+    tell('base fit', 0.0)
+    search = Search(prepared.fit, mean_effects(), jobs)
+    line = hum.find(prepared.fit, search.base().error)
+    if line is not None:
+        search = Search(hum.without(prepared.fit, line), mean_effects(), jobs)
+    found = ModelSelection(search, settings, tell).run()
+    result = _conclusion(prepared, search, found, settings, line)
+    if result.decision.verdict != 'unexplained':
+        return result
+    tell('one record', 0.0)
+    limit = result.decision.limit
+    own = per_record_settings.setting(search, found, limit, prepared.held.records, settings)
+    return result if own is None else _conclusion(prepared, search, own, settings, line)
+
+
+def _conclusion(
+    prepared: Prepared,
+    search: Search,
+    found: Selection,
+    settings: Thresholds,
+    line: Line | None,
+) -> Conclusion:
+    assert search.scorer is not None
+    data = search.data
+    seen = recorded.find(data, found, settings, line)
+    chosen = found.final if found.final.effects else found.singles[0]
+    generic = regression.compare(data, search.scorer, found.base, chosen)
+    decision = decide(found, seen, data, settings, generic)
+    return Conclusion(prepared, data, search.scorer, line, found, seen, generic, decision)
+
+
+def with_the_right_hold(
+    first: Conclusion, settings: Thresholds, jobs: int, tell: Progress
+) -> Conclusion:
+    """Ask whether the command ran linearly between its samples instead of being held.
+
+    The wrong hold is a lead of half a sample: no effect of the catalogue, but something will be
+    found for it (a gain that drifts, say). The other hold is taken where Eq. (2) alone explains
+    materially more with it, and what is found with it explains more, beyond chance. Held
+    commands taken for linear ones are a delay, which is in the catalogue.
+    """
+    prepared = first.prepared
+    if first.decision.verdict == 'none' or not any(r.hold == 'zoh' for r in prepared.fit.recorded):
+        return first
+    other = replace(prepared, fit=_linear(prepared.fit), held=_linear(prepared.held))
+    base = Search(other.fit, ()).base()
+    before = first.found.base.mean_square + (first.line.rms**2 if first.line else 0.0)
+    if before - base.rms**2 < first.found.material**2:
+        return first
+    tell('other hold', 0.0)
+    second = conclude(other, settings, jobs, tell)
+    a, b = first.found.final.fit, second.found.final.fit
+    scorer = second.scorer
+    gained = evidence(scorer.block_scores(b), scorer.block_scores(a)) - len(b.theta) + len(a.theta)
+    if gained < settings.nats:
+        return first
+    note = (
+        'the command is taken to run linearly between its samples (as --hold linear): Eq. (2) '
+        f'alone then leaves {1e6 * base.rms:.1f} um instead of {1e6 * before**0.5:.1f} um'
+    )
+    return replace(second, prepared=replace(other, notes=(*other.notes, note)))
+
+
+def _linear(data: Data) -> Data:
+    whole = tuple(replace(r, hold='linear') for r in data.recorded)
+    pairs = zip(whole, data.factors, strict=True)
+    return replace(data, records=tuple(decimated(r, n) for r, n in pairs), recorded=whole)

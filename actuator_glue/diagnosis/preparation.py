@@ -1,0 +1,169 @@
+"""Check and zero records before any look at them, and set the held-out part aside."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import ndimage
+
+from actuator_glue.diagnosis import decimate
+from actuator_glue.diagnosis.checks import check, refuse_repeats, where
+from actuator_glue.diagnosis.data import Data, Mask
+from actuator_glue.errors import InputError
+from actuator_glue.model.exact import Initial
+from actuator_glue.records import Record
+
+SETTLE = 1.0  # s in which an unknown initial state is forgotten
+_SHORTEST = 5.0  # s
+_MOVED = 2e-3  # of its largest excursion: a command within it has not begun
+_HEAD = 0.5  # s that show where it rests and how noisy its channel is
+_SMOOTH = 0.03  # s
+_REST = 1.5  # s of constant command that define the zero of both channels
+# Share of its range that a channel may be away from zero, or move within a moment, at rest.
+_STILL = 0.05
+_MOMENT = 0.02  # s
+_FOLD = 4  # every fourth block is held out where no record is
+_FOLD_LENGTH = 3.0  # s
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """Data to fit and data set aside.
+
+    Attributes:
+        fit: what every decision is made on.
+        held: what is looked at once, after all decisions.
+        notes: what was done to the records, for people.
+    """
+
+    fit: Data
+    held: Data
+    notes: tuple[str, ...]
+
+
+def rest_samples(record: Record) -> int:
+    """Samples at the beginning in which the command does not move.
+
+    The command is smoothed over a few hundredths of a second: one that was recorded by a noisy
+    channel does not move with every sample.
+    """
+    head = record.command[: max(2, round(_HEAD / record.period))]
+    width = max(1, round(_SMOOTH / record.period))
+    centre = float(np.median(head))
+    noise = 1.4826 * float(np.median(np.abs(head - centre))) / np.sqrt(width)
+    off = np.abs(ndimage.uniform_filter1d(record.command, width, mode='nearest') - centre)
+    moving = off > max(_MOVED * float(off.max()), 6.0 * noise)
+    return int(np.argmax(moving)) if noise < _MOVED * float(off.max()) else 0
+
+
+def zeroed(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
+    """Remove each channel's rest offset where every record begins at rest.
+
+    The zero of a transducer is a setting of the day, not a property of the actuator; it is
+    removed only where all records show it, so that they stay comparable.
+    """
+    rests = [rest_samples(r) for r in records]
+    if any(rest * r.period < _REST for rest, r in zip(rests, records, strict=True)):
+        return list(records), []
+    out, notes = [], []
+    for i, (rest, record) in enumerate(zip(rests, records, strict=True)):
+        command = float(np.median(record.command[:rest]))
+        measured = float(np.median(record.measured[:rest]))
+        out.append(
+            replace(record, command=record.command - command, measured=record.measured - measured)
+        )
+        notes.append(
+            f'{where(record, i + 1)}: rest offsets removed, command {1e6 * command:.1f} um, '
+            f'measured {1e6 * measured:.1f} um'
+        )
+    return out, notes
+
+
+def initial_state(record: Record) -> Initial:
+    """Return where a record starts: at rest at zero, or in a state only its samples show.
+
+    The command tells whether it is zero, for the measured displacement has an offset of its own;
+    that neither channel moves tells rest from a zero crossing at speed.
+    """
+    head = slice(0, min(len(record), 1 + max(1, round(_MOMENT / record.period))))
+    stroke = float(np.abs(record.command - np.median(record.command)).max())
+    if float(np.abs(record.command[head]).max()) > _STILL * stroke:
+        return 'measured'
+    for channel in (record.command, record.measured):
+        if abs(float(channel[head][-1] - channel[0])) > _STILL * float(np.ptp(channel)):
+            return 'measured'
+    return 'rest'
+
+
+def clean(
+    records: Sequence[Record], holdout: Sequence[Record] = ()
+) -> tuple[list[Record], list[str]]:
+    """Check records, and zero them where all of them show their zero.
+
+    Returns:
+        The records in the order given, held-out ones last, and what was done, for people.
+
+    Raises:
+        InputError: a record that cannot be fitted, given twice, or fitted and held out.
+    """
+    every = [*records, *holdout]
+    for i, record in enumerate(every):
+        check(record, i + 1)
+    refuse_repeats(records, holdout)
+    return zeroed(every)
+
+
+def _folds(record: Record) -> Mask:
+    """Blocks held out of one record, spread over time and so over a sweep's frequency."""
+    length = min(_FOLD_LENGTH, record.duration / 12.0)
+    block = np.floor(record.time / length).astype(np.int64)
+    return np.asarray(block % _FOLD == _FOLD - 1)
+
+
+def prepare(records: Sequence[Record], holdout: Sequence[Record]) -> Prepared:
+    """Check, zero, decimate and split records into a fitting and a held-out part.
+
+    Raises:
+        InputError: see `clean`; no record, or one that is too short.
+    """
+    if not records:
+        raise InputError('no record to diagnose')
+    for i, record in enumerate((*records, *holdout)):
+        if record.duration < _SHORTEST or len(record) < 500:
+            raise InputError(
+                f'{where(record, i + 1)}: {record.duration:.3g} s ({len(record)} samples) are too '
+                f'short for a diagnosis; give at least {_SHORTEST:g} s and 500 samples'
+            )
+    every, notes = clean(records, holdout)
+    initials = tuple(initial_state(r) for r in every)
+    recorded, every = tuple(every), []
+    for i, record in enumerate(recorded):
+        count = decimate.factor(record)
+        every.append(decimate.decimated(record, count))
+        if count > 1:
+            notes.append(
+                f'{where(record, i + 1)}: {record.rate:g} Hz are more than what moves in it needs '
+                f'(command up to {decimate.command_bandwidth(record):.3g} Hz): means over '
+                f'{count} samples are fitted, at {every[-1].rate:.4g} Hz; errors and noise are '
+                'theirs'
+            )
+    masks = []
+    for record, initial in zip(every, initials, strict=True):
+        mask = np.ones(len(record), dtype=np.bool_)
+        if initial == 'measured':
+            mask[: round(SETTLE / record.period)] = False
+        masks.append(mask)
+    n = len(records)
+    if holdout:
+        fit = Data(tuple(every[:n]), tuple(masks[:n]), initials[:n], recorded[:n])
+        held = Data(tuple(every[n:]), tuple(masks[n:]), initials[n:], recorded[n:])
+        return Prepared(fit, held, tuple(notes))
+    notes.append('every fourth block of each record held out')
+    both = [
+        tuple(m & side(_folds(r)) for m, r in zip(masks, every, strict=True))
+        for side in (np.logical_not, np.asarray)
+    ]
+    fit, held = (Data(tuple(every), side, initials, recorded) for side in both)
+    return Prepared(fit, held, tuple(notes))

@@ -1,0 +1,74 @@
+"""Effects of the measurement, judged at the rate the records were sampled with.
+
+Grid and jitter live in single samples: means over many of them hide both.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from actuator_glue.diagnosis import decimate, hum, measurement
+from actuator_glue.diagnosis.data import Data, Model
+from actuator_glue.diagnosis.hum import Line
+from actuator_glue.diagnosis.measurement import Measured
+from actuator_glue.diagnosis.model_selection import Selection
+from actuator_glue.diagnosis.per_record_settings import OneRecord
+from actuator_glue.diagnosis.search import Trial
+from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.records import Array
+
+
+def find(
+    data: Data, found: Selection, settings: Thresholds, line: Line | None
+) -> tuple[Measured, ...]:
+    """Return the measurement effects that are significant and material.
+
+    An effect is material where it is so in the samples as recorded; its rms is that of what it
+    leaves in the samples that are fitted.
+
+    Args:
+        data: counted samples.
+        found: the effects of the motion, fitted to them.
+        settings: thresholds.
+        line: hum that was taken out of the data before.
+    """
+    line = line or hum.find(data, found.final.fit.error)
+    if max(data.factors) == 1:
+        return measurement.find(data, found.final.fit.error, found.material, line)
+    whole = data.as_recorded
+    errors = whole.target - whole.simulate(_model(data, found.final), found.final.fit.theta)[0]
+    if line is not None:
+        errors = hum.regressed(whole, errors, line)
+    noise = float(np.sqrt(max(np.mean(errors**2) - found.left**2, found.noise**2)))
+    material = max(settings.noise_share * noise, found.material)
+    seen = measurement.find(whole, errors, material, line)
+    return tuple(
+        m if m.name == 'hum' else replace(m, rms=_left(m, data, whole.target - errors))
+        for m in seen
+    )
+
+
+def _model(data: Data, final: Trial) -> Model:
+    """Return what simulates the records as recorded."""
+    if not isinstance(final.own, OneRecord):
+        return final.model
+    own = final.own
+    pairs = zip(data.records, data.recorded, strict=True)
+    records = tuple(whole for r, whole in pairs if any(r is o for o in own.records))
+    return OneRecord(final.effects, own.own, records)
+
+
+def _left(effect: Measured, data: Data, simulated: Array) -> float:
+    """Rms of what an effect leaves in means over samples [m]."""
+    squares, total = 0.0, 0.0
+    for part, count in zip(data.as_recorded.split(simulated), data.factors, strict=True):
+        if effect.name == 'quantisation':
+            step = effect.values[0]
+            tooth = step * (np.round(part / step) - part / step)
+            mean_square = float(np.mean(decimate.means(tooth, count) ** 2))
+        else:  # independent from sample to sample
+            mean_square = effect.rms**2 * float(np.sum(decimate.window(count) ** 2))
+        squares, total = squares + len(part) / count * mean_square, total + len(part) / count
+    return float(np.sqrt(squares / total))

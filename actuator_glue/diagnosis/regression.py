@@ -1,0 +1,167 @@
+"""A generic surrogate as flexible as a structure: what the catalogue must not do worse than."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.estimate import Json, number
+from actuator_glue.diagnosis.fit import Fit
+from actuator_glue.diagnosis.score import Scorer, evidence
+from actuator_glue.diagnosis.search import Trial
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Array, Record
+
+_TELLING = 0.3  # share of the squared error a surrogate must remove to point at a place
+
+
+@dataclass(frozen=True)
+class Surrogate:
+    """Regression of the residual of Eq. (2) on generic features of its own motion.
+
+    Attributes:
+        features: the features chosen, best first.
+        structure: effects of the structure compared with.
+        error: error left on blocks that were left out of the fit, rms [m].
+        structure_error: the same for the structure [m].
+        explained: share of the squared error of Eq. (2) that the surrogate removes.
+        nats: evidence of the surrogate over the structure, out of sample.
+        tried: how many features were there to choose from.
+    """
+
+    features: tuple[str, ...]
+    structure: tuple[str, ...]
+    error: float
+    structure_error: float
+    explained: float
+    nats: float
+    tried: int
+
+    @property
+    def place(self) -> str:
+        """Where in the loop the strongest feature acts; empty where it explains little."""
+        if not self.features or self.explained < _TELLING:
+            return ''
+        if self.features[0].startswith('d/dt'):
+            return 'flow or force'
+        return 'command' if self.features[0].startswith('loop') else 'sensor'
+
+    def beats(self, material: float, nats: float) -> bool:
+        """Whether the surrogate explains more, beyond chance: each feature was the best of many.
+
+        Nats weigh the whitened error; one that is materially worse in plain error is no rival.
+        """
+        worse = max(0.0, self.error**2 - self.structure_error**2) > material**2
+        return not worse and self.nats > nats + len(self.features) * math.log(self.tried)
+
+    def to_json(self) -> Json:
+        """Return the JSON object of the surrogate."""
+        return {
+            'unit': 'm',
+            'parameters': len(self.features),
+            'features': list(self.features),
+            'error': number(self.error),
+            'structure': list(self.structure),
+            'structure_error': number(self.structure_error),
+            'nats': number(self.nats),
+            'explained': self.explained,
+            'place': self.place,
+        }
+
+
+def _motions(x: Array, command: Array, period: float, stiffness: float) -> dict[str, Array]:
+    """Polynomials of displacement, velocity, servo error and time, of order one each."""
+    t = np.linspace(-1.0, 1.0, len(x))
+    v = np.gradient(x, period)
+    e = command - x
+    x, v, e = (c / max(float(np.abs(c).max()), 1e-12) for c in (x, v, e))
+    out = {'1': np.ones_like(x), 't': t}
+    for name, c in (('x', x), ('v', v), ('e', e)):
+        out |= {
+            name: c, f'|{name}|': np.abs(c), f'{name}^2': c**2, f'{name}|{name}|': c * np.abs(c),
+            f'{name}^3': c**3, f'sign {name}': np.tanh(50.0 * c), f't {name}': t * c,
+        }  # fmt: skip
+    out |= {'x v': x * v, 'x^2 v': x**2 * v, 'x v^2': x * v**2, 'x e': x * e}
+    if stiffness > 0.0:
+        out |= {'k x': x, 'k x^2': x**2, 'k x^3': x**3, 'k sign v': np.tanh(50.0 * v)}
+    else:
+        out |= {name: np.zeros_like(x) for name in ('k x', 'k x^2', 'k x^3', 'k sign v')}
+    return out
+
+
+def library(data: Data, theta: Array) -> dict[str, Array]:
+    """Features of the motion that Eq. (2) simulates, counted samples of all records joined (N,).
+
+    Each is taken as it is (a sensor's place), passed through the closed loop (a command's
+    place) and as the derivative of that (a flow's or a force's place).
+    """
+    model = Structure(())
+    parts: dict[str, list[Array]] = {}
+    for record, mask in zip(data.records, data.masks, strict=True):
+        x = np.asarray(model.simulate(theta, record)).reshape(-1)
+        stroke = float(np.abs(record.command).max()) or 1.0
+        motions = _motions(x, record.command, record.period, record.known_stiffness())
+        for name, raw in motions.items():
+            passed = _passed(model, theta, record, stroke * raw)
+            rate = np.gradient(passed, record.period)
+            for text, c in ((name, stroke * raw), (f'loop({name})', passed),
+                            (f'd/dt loop({name})', rate)):  # fmt: skip
+                parts.setdefault(text, []).append(np.asarray(c)[mask])
+    return {name: np.concatenate(parts.pop(name)) for name in list(parts)}
+
+
+def _passed(model: Structure, theta: Array, record: Record, command: Array) -> Array:
+    if not command.any():
+        return np.zeros_like(command)
+    return np.asarray(model.simulate(theta, replace(record, command=command))).reshape(-1)
+
+
+def compare(data: Data, scorer: Scorer, base: Trial, structure: Trial) -> Surrogate:
+    """Choose as many features as the structure has parameters beyond Eq. (2), and score both.
+
+    Forward selection on the whitened residual with the base Jacobian projected out (orthogonal
+    least squares, Chen, Billings and Luo 1989); base and weights are then refitted together
+    and scored on the same left-out blocks as any structure. The choice itself sees all blocks,
+    which favours the surrogate by little: tens of features against thousands of samples.
+    """
+    count = len(structure.fit.theta) - len(base.fit.theta)
+    features = library(data, base.fit.theta)
+    names = list(features)
+    rows = np.stack([features.pop(n) for n in names])
+    error = scorer.whiten(base.fit.error)
+    own, free = scorer.whiten(base.fit.jacobian), scorer.whiten(rows)
+    start = np.einsum('pn,pn->p', free, free)
+    q = np.linalg.qr(own.T)[0]
+    for row in free:  # one by one: a table of a long record's features is large
+        row -= q @ (row @ q)
+    chosen: list[int] = []
+    for _ in range(count):
+        power = np.einsum('pn,pn->p', free, free)
+        usable = power > 1e-6 * np.maximum(start, 1e-300)
+        merit = np.where(usable, (free @ error) ** 2 / np.maximum(power, 1e-300), -1.0)
+        best = int(np.argmax(merit))
+        if merit[best] <= 0.0:
+            break
+        chosen.append(best)
+        unit = free[best] / np.sqrt(power[best])
+        for row in free:
+            row -= (row @ unit) * unit
+    raw = np.concatenate([base.fit.jacobian, rows[chosen]])
+    white = np.concatenate([own, scorer.whiten(rows[chosen])])
+    scale = np.sqrt(np.einsum('pn,pn->p', white, white))
+    scale = np.where(scale > 0.0, scale, 1.0)
+    weights, *_ = np.linalg.lstsq((white / scale[:, None]).T, error, rcond=1e-10)
+    fit = Fit(base.fit.theta, base.fit.error - (weights / scale) @ raw, raw, base.fit.z)
+    left, whole = scorer.left_out_error(fit), scorer.left_out_error(base.fit)
+    return Surrogate(
+        features=tuple(names[i] for i in chosen),
+        structure=structure.effects,
+        error=left,
+        structure_error=scorer.left_out_error(structure.fit),
+        explained=max(0.0, 1.0 - (left / whole) ** 2) if whole > 0.0 else 0.0,
+        nats=evidence(scorer.block_scores(fit), structure.scores),
+        tried=len(names),
+    )

@@ -1,0 +1,274 @@
+"""What a diagnosis says, and its JSON form `actuator_glue.diagnosis/1`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal, TypeAlias
+
+from actuator_glue.diagnosis.estimate import Estimate, Json, number
+from actuator_glue.diagnosis.headline import headline
+from actuator_glue.inference.at_bound import Pressed
+from actuator_glue.records import Array
+
+SCHEMA = 'actuator_glue.diagnosis/1'
+
+Verdict: TypeAlias = Literal['none', 'missing-effect', 'unexplained', 'undecided']
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One effect that the records show and the model lacks.
+
+    Attributes:
+        name: best name in the catalogue.
+        alternatives: names that these data cannot tell from it (without `name` itself).
+        probability: probability of `name` among all single candidates at its turn.
+        place: where in the loop it acts.
+        parameters: posterior of the effect's parameters.
+        error_without: fit error of the structure without any of the set [m].
+        error_with: fit error with `name` in it [m].
+        noise: rms of the noise that an effect of the measurement makes [m], which leaves the
+            simulated motion as it is and removes no error; None for all others.
+        evidence: out-of-sample log score gained, in nats of effectively independent samples.
+        plausible: its interval excludes the neutral value.
+        agrees_across_windows: its leading parameter is the same in all halves of the records
+            that fix it; None where fewer than two do (see diagnosis/homogeneity.py).
+        windows: the leading parameter in each of these halves [unit of the parameter].
+        records: sources of the records that alone have it; empty where all do.
+    """
+
+    name: str
+    alternatives: tuple[str, ...]
+    probability: float
+    place: str
+    parameters: dict[str, Estimate]
+    error_without: float
+    error_with: float
+    evidence: float
+    plausible: bool = True
+    agrees_across_windows: bool | None = None
+    windows: tuple[float, ...] = ()
+    records: tuple[str, ...] = ()
+    noise: float | None = None
+
+    def to_json(self) -> Json:
+        """Return the JSON object of one finding."""
+        return {
+            'name': self.name,
+            'alternatives': list(self.alternatives),
+            'probability': number(self.probability),
+            'place': self.place,
+            'parameters': {name: p.to_json() for name, p in self.parameters.items()},
+            'error_without': number(self.error_without),
+            'error_with': number(self.error_with),
+            'evidence': number(self.evidence),
+            'plausible': self.plausible,
+            'agrees_across_windows': self.agrees_across_windows,
+            'windows': [number(v) for v in self.windows],
+            'records': list(self.records),
+            'noise': self.noise,
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """One effect tried at the first turn (base + effect refitted together).
+
+    Attributes:
+        name: name in the catalogue.
+        score: out-of-sample log score against Eq. (2) alone, effective nats.
+        error: free-run rms error of base + effect, refitted [m].
+        probability: probability among the candidates.
+    """
+
+    name: str
+    score: float
+    error: float
+    probability: float
+
+    def to_json(self) -> Json:
+        """Return the JSON object of one candidate."""
+        values = {k: number(getattr(self, k)) for k in ('score', 'error', 'probability')}
+        return {'name': self.name, **values}
+
+
+@dataclass(frozen=True, slots=True)
+class HeldOutError:
+    """Free-run simulation error on data that decided nothing, one look [m].
+
+    Attributes:
+        before: rms error of Eq. (2), refitted to the fitting part.
+        before_ci: 95 % block-bootstrap interval of `before`.
+        after: rms error with the found effects, everything refitted.
+        after_ci: 95 % block-bootstrap interval of `after`.
+        noise_floor: rms of what no function of the command can explain.
+        removable_removed: share of (before^2 - floor^2) removed, 1 is all.
+        removed_ci: 95 % block-bootstrap interval of `removable_removed`.
+        sham: rms error with a sham effect of equal parameter count, as control.
+        records: rms error before and after of each held-out record.
+        after_without_hum: `after` with the hum that was found regressed out of the held-out part
+            (frequency known, phase not); None without hum.
+        split: 'held-out' where data were set aside.
+    """
+
+    before: float
+    before_ci: tuple[float, float]
+    after: float
+    after_ci: tuple[float, float]
+    noise_floor: float
+    removable_removed: float
+    removed_ci: tuple[float, float]
+    sham: float
+    records: tuple[tuple[str, float, float], ...] = ()
+    after_without_hum: float | None = None
+    split: str = 'held-out'
+
+    def to_json(self) -> Json:
+        """Return the JSON object of the held-out error."""
+        numbers = ('before', 'after', 'noise_floor', 'removable_removed', 'sham')
+        hum = self.after_without_hum
+        return {
+            'unit': 'm',
+            'split': self.split,
+            **{k: number(getattr(self, k)) for k in numbers},
+            'before_ci': [number(v) for v in self.before_ci],
+            'after_ci': [number(v) for v in self.after_ci],
+            'removed_ci': [number(v) for v in self.removed_ci],
+            'after_without_hum': None if hum is None else number(hum),
+            'records': [
+                {'source': s, 'before': number(b), 'after': number(a)} for s, b, a in self.records
+            ],
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Alarm:
+    """Why (or why not) the model of Eq. (2) is not enough.
+
+    Attributes:
+        raised: significant and material.
+        structured: rms of the part of the residual that is a function of the command [m].
+        threshold: materiality threshold for it [m].
+        noise: rms of the rest [m].
+        p_value: of the structure under the fitted base model with its own coloured noise.
+        tests: further statistics shown to people (whiteness, harmonics, drift, ...).
+    """
+
+    raised: bool
+    structured: float
+    threshold: float
+    noise: float
+    p_value: float
+    tests: dict[str, float] = field(default_factory=dict)
+
+    def to_json(self) -> Json:
+        """Return the JSON object of the alarm."""
+        numbers = ('structured', 'threshold', 'noise', 'p_value')
+        return {
+            'raised': self.raised,
+            **{k: number(getattr(self, k)) for k in numbers},
+            'tests': {k: number(v) for k, v in self.tests.items()},
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """Curves of one record for pictures: time [s], command, measurement, simulations (n,) [m].
+
+    `lower_*` and `upper_*` are the 95 % predictive band before and after.
+    """
+
+    source: str
+    held_out: bool
+    time: Array
+    stiffness: float
+    command: Array
+    measured: Array
+    before: Array
+    after: Array
+    lower_before: Array
+    upper_before: Array
+    lower_after: Array
+    upper_after: Array
+
+
+@dataclass(frozen=True, slots=True)
+class DiagnosisData:
+    """Verdict, evidence and the augmented model.
+
+    Attributes:
+        verdict: 'none' (the model is enough), 'missing-effect' (what was added is all),
+            'unexplained' (material structure remains) or 'undecided' (the held-out part does not
+            bear out what the fitting part says).
+        effects: additions that are supported, in the order of what they remove; whatever remains
+            beside them they are part of the model, less probable the more of it does.
+        error: held-out error before and after.
+        candidates: all effects tried first, best first.
+        coverage: share of held-out samples in the 95 % band, before and after.
+        alarm: detection statistics.
+        advice: what to do next, for people.
+        base: posterior of the base parameters in the augmented model.
+        structure: effect names of the augmented model (input of `Structure`).
+        names: parameter names of the columns of `posterior`.
+        posterior: draws of base and effect parameters, shape (m, p).
+        rhat: largest R-hat of the draws; NaN where they are of the Laplace approximation.
+        best: best-fit parameters, shape (p,).
+        traces: curves for the report.
+        surrogate: a generic regression of equal flexibility and what it leaves out of sample.
+        remaining: where in loop, frequency, amplitude and time the unexplained rest sits.
+        seconds: wall time.
+        at_bound: parameters that their bounds hold.
+        sampling: per record its source, its rate as recorded and as fitted [Hz].
+    """
+
+    verdict: Verdict
+    effects: tuple[Finding, ...]
+    error: HeldOutError
+    candidates: tuple[Candidate, ...]
+    coverage: tuple[float, float]
+    alarm: Alarm
+    advice: tuple[str, ...]
+    base: dict[str, Estimate]
+    structure: tuple[str, ...]
+    names: tuple[str, ...]
+    posterior: Array
+    rhat: float
+    best: Array
+    traces: tuple[Trace, ...]
+    surrogate: Json
+    remaining: Json
+    seconds: float
+    at_bound: tuple[Pressed, ...] = ()
+    sampling: tuple[Json, ...] = ()
+
+    def to_json(self) -> Json:
+        """Return the object of schema `actuator_glue.diagnosis/1` (curves and draws left out)."""
+        return {
+            'schema': SCHEMA,
+            'verdict': self.verdict,
+            'summary': self.summary(),
+            'complete': self.complete,
+            'effects': [e.to_json() for e in self.effects],
+            'error': self.error.to_json(),
+            'candidates': [c.to_json() for c in self.candidates],
+            'coverage': {'before': number(self.coverage[0]), 'after': number(self.coverage[1])},
+            'alarm': self.alarm.to_json(),
+            'base': {name: p.to_json() for name, p in self.base.items()},
+            'rhat': number(self.rhat),
+            'sampling': list(self.sampling),
+            'at_bound': [p.to_json() for p in self.at_bound],
+            'structure': list(self.structure),
+            'surrogate': self.surrogate,
+            'remaining': self.remaining,
+            'advice': list(self.advice),
+            'seconds': number(self.seconds),
+        }
+
+    @property
+    def complete(self) -> bool:
+        """Whether nothing material remains, on the fitting and on the held-out part."""
+        return self.verdict in ('none', 'missing-effect')
+
+    def summary(self) -> str:
+        """Return the verdict in one line."""
+        return headline(self)

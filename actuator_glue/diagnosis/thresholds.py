@@ -1,0 +1,42 @@
+"""Thresholds of a diagnosis: what counts as material, as decisive, as explained."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Thresholds:
+    """Thresholds, calibrated on benchmark seeds that are not reported (docs/diagnosis.md).
+
+    Attributes:
+        noise_share: an effect is material where it removes more than this share of the noise rms,
+        stroke_share: and more than this share of the command's amplitude.
+        later_share: where most is explained, a further effect must remove this share of it.
+        nats: smallest out-of-sample evidence for any addition.
+        tie_nats: two effects cannot be told apart below this evidence,
+        tie_share: or where they differ by less than this share of what the better one removes.
+        left_noise: the model is unexplained where structure above this share of the noise
+        left_share: and above this share of the structure found at first remains;
+        beaten_noise, beaten_share: as left_noise and left_share, where a generic surrogate
+            explains more than the names do (0.28 of the noise is found in noise alone).
+        most: most effects added.
+        beam: structures carried on from one size to the next.
+        evaluations: likelihood evaluations of the posterior; 0 takes the Laplace approximation.
+        tried: refits per structure after the first stage, best screened first.
+    """
+
+    noise_share: float = 0.5
+    stroke_share: float = 1e-3
+    later_share: float = 0.08
+    nats: float = 10.0
+    tie_nats: float = 4.0
+    tie_share: float = 0.1
+    left_noise: float = 0.6
+    left_share: float = 0.3
+    beaten_noise: float = 0.3
+    beaten_share: float = 0.15
+    most: int = 6
+    beam: int = 3
+    tried: int = 5
+    evaluations: int = 4000

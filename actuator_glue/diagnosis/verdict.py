@@ -1,0 +1,40 @@
+"""The final verdict: what the fitting part says, held against the part that decided nothing."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from actuator_glue.diagnosis.result import HeldOutError, Verdict
+
+# Held-out errors beyond this many times the noise say that the fitting records lack something.
+_BEYOND = 2.0
+# Share of the removable error that is printed as 0.0 %.
+_NOTHING = 5e-4
+
+
+def misses(error: HeldOutError, material: float) -> bool:
+    """Whether the held-out part shows more than noise, by what counts as material [m]."""
+    floor = error.noise_floor
+    return error.after > _BEYOND * floor and error.after**2 - floor**2 > material**2
+
+
+def conclude(verdict: Verdict, moved: bool, error: HeldOutError, material: float) -> Verdict:
+    """Return the verdict of both parts.
+
+    Additions were chosen on the fitting part alone and stay in the model. Where they take nothing
+    away in the held-out part, the records contradict each other. Where that part shows much more
+    than noise, no answer is complete: additions that took error away there beyond chance are a
+    part of it (`unexplained`), without any the records contradict each other.
+
+    Args:
+        verdict: what the fitting part says.
+        moved: whether an effect on the motion was added to Eq. (2).
+        error: held-out error before and after.
+        material: smallest error that matters [m].
+    """
+    if moved and error.removable_removed < _NOTHING:
+        return 'undecided'
+    if verdict == 'unexplained' or not misses(error, material):
+        return verdict
+    return 'unexplained' if moved and error.removed_ci[0] > 0.0 else 'undecided'

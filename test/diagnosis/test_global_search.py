@@ -1,0 +1,73 @@
+"""Dry friction that holds the piston for a good part of a test: many minima, one of them right."""
+
+import numpy as np
+import pytest
+
+from actuator_glue.diagnosis import global_search
+from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.diagnose import diagnose
+from actuator_glue.diagnosis.fit import Fit, fit
+from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.model import commands
+from actuator_glue.model.effects import scale
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Record
+
+RATE = 128.0
+COULOMB = Structure(('coulomb-friction',))
+THETA = np.array([134.0, 1.1e9, 2.5e5, 0.5, 150.0])  # friction holds it for 0.6 mm of 2
+
+
+def held_up(seed: int, stiffnesses: tuple[float, ...] = (0.0, 250e3)) -> list[Record]:
+    """Random commands of 2 mm at most, 10 um of noise."""
+    rng = np.random.default_rng(seed)
+    records = []
+    for k in stiffnesses:
+        command = commands.noise(RATE, 24.0, 0.5, 8.0, seed=int(rng.integers(1 << 31)))
+        command *= 2e-3 / np.abs(command).max()
+        silent = Record(command, command, 1 / RATE, stiffness=k)
+        measured = COULOMB.simulate(THETA, silent) + 1e-5 * rng.standard_normal(len(command))
+        records.append(Record(command, measured, 1 / RATE, stiffness=k))
+    return records
+
+
+def slopes_alone(data: Data) -> Fit:
+    """What Gauss and Newton find from the usual starts."""
+    base = Search(data, ()).base()
+    starts = COULOMB.starts(base.theta, scale(data.records, base.theta))
+    return fit(data, COULOMB, starts, iterations=8)
+
+
+def test_the_lowest_minimum_is_found(rng_seed: int) -> None:
+    """Slopes alone leave 10 to 59 um (median 22) where 10 are noise, the population 9.8 to 11.6.
+
+    False failures: 0 of 200 seeds (95 % interval 0 to 1.8 %); with slopes alone 91 % fail.
+    """
+    data = Data.whole(held_up(rng_seed))
+    slopes = slopes_alone(data)
+    found = global_search.refit(data, COULOMB, slopes, 8, 1e-4)
+    assert found.rms < 1.2e-5
+    assert found.theta[4] == pytest.approx(150.0, rel=0.04)
+    again = global_search.refit(data, COULOMB, slopes, 8, 1e-4)
+    np.testing.assert_array_equal(again.theta, found.theta)
+
+
+def test_what_is_found_is_never_worse_than_what_was_there() -> None:
+    """No friction at all: the fit stays what it is, or becomes better."""
+    record = held_up(3)[1]
+    silent = Record(record.command, record.command, record.period, stiffness=250e3)
+    measured = COULOMB.simulate(np.array([*THETA[:4], 0.0]), silent)
+    data = Data.whole([Record(record.command, measured, record.period, stiffness=250e3)])
+    before = slopes_alone(data)
+    assert global_search.refit(data, COULOMB, before, 8, 1e-4).rms <= before.rms
+
+
+def test_the_diagnosis_names_it_with_its_size() -> None:
+    """With slopes alone it was Coulomb friction of 139 N and a lag of the valve beside it."""
+    *records, held = held_up(5, (0.0, 250e3, 250e3))
+    found = diagnose(records, held, settings=Thresholds(evaluations=0))
+    assert [e.name for e in found.effects] == ['coulomb-friction']
+    size = found.effects[0].parameters['coulomb_force']
+    assert size.mean == pytest.approx(150.0, rel=0.02)
+    assert found.error.after == pytest.approx(1e-5, rel=0.1)

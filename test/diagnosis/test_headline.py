@@ -1,0 +1,112 @@
+"""A headline says no more than the held-out part bears out, in text, JSON and exit code."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuator_glue.api import diagnosis as module
+from actuator_glue.cli.main import main
+from actuator_glue.diagnosis.result import Alarm, DiagnosisData, Finding, HeldOutError, Verdict
+from actuator_glue.diagnosis.verdict import conclude
+
+NONE = np.empty((0, 4))
+
+
+def finding(name: str, noise: float | None = None) -> Finding:
+    """A finding of no further interest."""
+    return Finding(name, (), 1.0, 'sensor', {}, 1e-5, 1e-5, 50.0, noise=noise)
+
+
+def diagnosis(
+    verdict: Verdict, before: float, after: float, *effects: Finding, noise: float = 10e-6
+) -> DiagnosisData:
+    """A diagnosis with held-out errors before and after [m]."""
+    removed = (before**2 - after**2) / max(before**2 - noise**2, 1e-12)
+    about = (removed - 0.1, removed + 0.1)
+    error = HeldOutError(before, (0, 1), after, (0, 1), noise, removed, about, before)
+    alarm = Alarm(verdict != 'none', 1e-5, 5e-6, noise, 0.01)
+    judged = conclude(verdict, any(e.noise is None for e in effects), error, alarm.threshold)
+    return module.Diagnosis(
+        judged, effects, error, (), (0.9, 0.9), alarm, (), {}, (), (), NONE, 1.0, NONE, (),
+        {}, {'left': 12e-6}, 1.0,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ('found', 'says', 'complete'),
+    [
+        (
+            diagnosis('none', 10.2e-6, 10.2e-6),
+            'the model is enough: held-out error 10.2 um, noise 10.0 um',
+            True,
+        ),
+        (
+            diagnosis('none', 198e-6, 198e-6),
+            'undecided: the fitting records ask for nothing; held-out error 198.0 um, 19.8 times '
+            'the noise of 10.0 um',
+            False,
+        ),
+        (
+            diagnosis('missing-effect', 80e-6, 10.1e-6, finding('backlash')),
+            'missing: backlash; held-out error 80.0 -> 10.1 um, noise 10.0 um',
+            True,
+        ),
+        (
+            diagnosis('missing-effect', 80e-6, 40e-6, finding('backlash')),
+            'added, but not the whole story: backlash; held-out error 80.0 -> 40.0 um, 4.0 times '
+            'the noise of 10.0 um; 12.0 um of structure in the fitting records remain',
+            False,
+        ),
+        (
+            diagnosis('missing-effect', 10.1e-6, 10.1e-6, finding('backlash')),
+            'undecided: the fitting records ask for backlash, the held-out part does not; '
+            'held-out error 10.1 -> 10.1 um, noise 10.0 um',
+            False,
+        ),
+        (
+            diagnosis('missing-effect', 80e-6, 79e-6, finding('backlash')),
+            'undecided: the fitting records ask for backlash, the held-out part does not; '
+            'held-out error 80.0 -> 79.0 um, 7.9 times the noise of 10.0 um',
+            False,
+        ),
+        (
+            diagnosis('missing-effect', 10.1e-6, 10.1e-6, finding('timing-jitter', noise=7e-6)),
+            'the model is enough: held-out error 10.1 um, noise 10.0 um (7.0 um by timing-jitter)',
+            True,
+        ),
+        (
+            diagnosis('unexplained', 80e-6, 30e-6, finding('gain')),
+            'added, but not the whole story: gain; held-out error 80.0 -> 30.0 um, 3.0 times the '
+            'noise of 10.0 um; 12.0 um of structure in the fitting records remain',
+            False,
+        ),
+        (
+            diagnosis('unexplained', 80e-6, 80e-6),
+            'the model is not enough and no addition is supported: held-out error 80.0 um, 8.0 '
+            'times the noise of 10.0 um; 12.0 um of structure in the fitting records remain',
+            False,
+        ),
+    ],
+)
+def test_the_headline_follows_the_held_out_part(
+    found: DiagnosisData,
+    says: str,
+    complete: bool,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """First line, JSON and exit code of the command say the same."""
+    record, out = tmp_path / 'r.csv', tmp_path / 'd.json'
+    t = np.arange(0.0, 10.0, 0.01)
+    rows = np.column_stack([t, np.sin(t), 0.9 * np.sin(t - 0.1)])
+    np.savetxt(record, rows, delimiter=',', header='time_s,command_mm,measured_mm', comments='')
+    monkeypatch.setattr(module, 'diagnose', lambda *_, **__: found)
+    code = main(['diagnose', str(record), '--stiffness', '0', '--json', str(out)])
+    assert capsys.readouterr().out.splitlines()[0] == says
+    content = json.loads(out.read_text())
+    assert (content['summary'], content['verdict']) == (says, found.verdict)
+    assert code == (0 if complete else 1)
+    assert content['complete'] is complete

@@ -1,0 +1,52 @@
+"""Noise and structure of a residual, told apart without a model."""
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from actuator_glue.diagnosis.noise import split, whiten, whitener
+
+RATE = 256.0
+N = 15360
+
+
+def noise(rng: np.random.Generator, colour: float, corner: float) -> np.ndarray:
+    """White plus first-order noise of unit variance."""
+    pole = np.exp(-2 * np.pi * corner / RATE)
+    slow = signal.lfilter([np.sqrt(1 - pole**2)], [1, -pole], rng.standard_normal(N + 2000))
+    return np.sqrt(1 - colour) * rng.standard_normal(N) + np.sqrt(colour) * slow[2000:]
+
+
+@pytest.mark.parametrize(('colour', 'corner'), [(0.0, 1.0), (0.5, 5.0), (0.6, 20.0)])
+def test_stationary_noise_is_all_noise(colour: float, corner: float) -> None:
+    """Mean of 12 records: its scatter is below 0.02, so 0.08 fails less than once in 10^4."""
+    rng = np.random.default_rng([3, int(10 * corner)])
+    parts = [(split(e, 1 / RATE), e) for e in (noise(rng, colour, corner) for _ in range(12))]
+    share = np.mean([s.noise**2 / np.mean(e**2) for s, e in parts])
+    assert abs(share - 1.0) < 0.08
+
+
+def test_whitened_noise_is_white() -> None:
+    """Unit variance and no correlation; 0.04 is five standard errors."""
+    e = noise(np.random.default_rng(5), 0.6, 3.0)
+    w = whiten(e, whitener([split(e, 1 / RATE)]))
+    assert abs(w.var() - 1.0) < 0.05
+    assert abs(np.corrcoef(w[1:], w[:-1])[0, 1]) < 0.04
+    assert abs(np.corrcoef(e[1:], e[:-1])[0, 1]) > 0.3
+
+
+@pytest.mark.parametrize('size', [0.7, 3.0])
+def test_what_follows_a_sweep_is_structure(size: float) -> None:
+    """A third harmonic along a sweep is found with its size."""
+    t = np.arange(N) / RATE
+    harmonic = np.sqrt(2) * size * np.sin(3 * np.pi / 6 * t**2)
+    s = split(harmonic + noise(np.random.default_rng(7), 0.3, 5.0), 1 / RATE)
+    assert s.structure == pytest.approx(size, rel=0.25)
+    assert s.noise == pytest.approx(1.0, abs=0.15)
+
+
+def test_offset_and_trend_are_structure() -> None:
+    """Noise has neither mean nor trend."""
+    t = np.linspace(-1, 1, N)
+    s = split(2.0 + t + noise(np.random.default_rng(8), 0.0, 1.0), 1 / RATE)
+    assert s.structure == pytest.approx(np.sqrt(4 + 1 / 3), rel=0.05)

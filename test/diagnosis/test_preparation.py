@@ -1,0 +1,137 @@
+"""Records are checked, zeroed and split before any look."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from actuator_glue.diagnosis.checks import check
+from actuator_glue.diagnosis.preparation import initial_state, prepare
+from actuator_glue.errors import InputError
+from actuator_glue.records import Record
+
+T = np.arange(0, 20, 1 / 256)
+U = 2e-3 * np.sin(np.pi / 4 * T**2)
+GOOD = Record(U, 0.9 * U, 1 / 256, stiffness=0.0, source='good')
+
+
+@pytest.mark.parametrize(
+    ('record', 'says'),
+    [
+        (replace(GOOD, stiffness=None), 'stiffness'),
+        (GOOD.slice(0, 600), 'too short'),
+        (replace(GOOD, command=0 * U), 'command is constant'),
+        (replace(GOOD, measured=0 * U + 1e-3), 'channel is connected'),
+        (replace(GOOD, measured=900 * U), 'units'),
+        (replace(GOOD, command=1e3 * U, measured=900 * U), 'm/s; check the units'),
+        (replace(GOOD, command=1e-3 * U, measured=9e-4 * U), 'check the units'),
+        (replace(GOOD, measured=-0.9 * U), 'change the sign'),
+        (replace(GOOD, measured=np.append(U[8:], np.zeros(8))), 'leads the command by 31 ms'),
+    ],
+)
+def test_unusable_records_say_why(record: Record, says: str) -> None:
+    """One error that names the record and the fault."""
+    with pytest.raises(InputError, match=says) as error:
+        prepare([record], [])
+    assert 'good' in str(error.value)
+
+
+def test_a_periodic_command_has_no_lag_to_judge() -> None:
+    """A sine that lags by 200 degrees looks as if it led by 160: nothing is refused for it."""
+    u = 2e-3 * np.sin(2 * np.pi * 4.0 * T)
+    y = 1e-3 * np.sin(2 * np.pi * 4.0 * T - np.deg2rad(200.0))
+    prepare([Record(u, y, 1 / 256, stiffness=0.0)], [])
+
+
+def test_no_record_is_an_error() -> None:
+    """Nothing to diagnose."""
+    with pytest.raises(InputError, match='no record'):
+        prepare([], [])
+
+
+def test_rest_offsets_go_only_where_all_records_rest() -> None:
+    """The zero of the day is removed from all records or from none."""
+    rest = np.zeros(2 * 256)
+    resting = Record(
+        np.concatenate([rest, U]) + 1e-4,
+        np.concatenate([rest, 0.9 * U]) + 3e-4,
+        1 / 256,
+        stiffness=0.0,
+    )
+    again = replace(resting, measured=1.01 * resting.measured)
+    both = prepare([resting], [again])
+    assert both.fit.records[0].measured[:100] == pytest.approx(0.0, abs=1e-12)
+    assert both.held.records[0].command[:100] == pytest.approx(0.0, abs=1e-12)
+    assert len(both.notes) == 2
+    one = prepare([resting], [GOOD])
+    assert one.fit.records[0].measured[0] == pytest.approx(3e-4)
+
+
+def test_without_a_held_out_record_blocks_are_set_aside() -> None:
+    """Fitting and held-out samples share none and cover all."""
+    prepared = prepare([GOOD], [])
+    fit, held = prepared.fit.masks[0], prepared.held.masks[0]
+    assert not (fit & held).any()
+    assert (fit | held).all()
+    assert 0.2 < held.mean() < 0.3
+
+
+def test_a_record_that_begins_in_motion_starts_from_its_samples() -> None:
+    """The first second then only lets the state be forgotten."""
+    data = prepare([GOOD.slice(1000, 5000)], [GOOD]).fit
+    assert data.initials == ('measured',)
+    assert not data.masks[0][:256].any()
+
+
+def test_an_offset_of_the_transducer_leaves_the_start_at_rest() -> None:
+    """0.3 mm between two zeros, more than a twentieth of the range, say nothing of motion."""
+    assert initial_state(replace(GOOD, measured=GOOD.measured + 3e-4)) == 'rest'
+
+
+def test_a_zero_crossing_at_speed_is_no_rest() -> None:
+    """Command and displacement near zero, and both on their way."""
+    t = T[: 10 * 256]
+    u = 2e-3 * np.sin(2 * np.pi * 3.0 * t)
+    assert initial_state(Record(u, 0.9 * u, 1 / 256)) == 'measured'
+
+
+@pytest.mark.parametrize(
+    ('records', 'held', 'says'),
+    [
+        ([GOOD, replace(GOOD, source='copy', stiffness=250e3)], [], 'copy holds the same samples'),
+        ([GOOD], [replace(GOOD, source='copy')], 'copy, held out, .* would judge itself'),
+    ],
+)
+def test_records_given_twice_are_refused(
+    records: list[Record], held: list[Record], says: str
+) -> None:
+    """The samples decide, whatever the records are called."""
+    with pytest.raises(InputError, match=says):
+        prepare(records, held)
+
+
+def pushed(stiffness: float, mass: float = 0.0, **changes: object) -> Record:
+    """A specimen and a mass under a sweep, the force as a load cell shows it."""
+    y = np.asarray(GOOD.measured)
+    force = stiffness * y + mass * np.gradient(np.gradient(y, 1 / 256), 1 / 256)
+    force = force + 20.0 * np.random.default_rng(1).standard_normal(len(y)) + 150.0
+    return replace(GOOD, stiffness=stiffness, force=force, **changes)
+
+
+@pytest.mark.parametrize('wrong', [250.0, 250e6, 0.0])
+def test_a_stiffness_that_the_force_contradicts_is_refused(wrong: float) -> None:
+    """250 kN/m by force over displacement, whatever the sign of the load cell."""
+    record = pushed(250e3, 50.0)
+    for sign in (1.0, -1.0):
+        check(replace(record, force=sign * np.asarray(record.force)))
+        with pytest.raises(InputError, match=r'force over displacement is 2\.[45]\d*e\+05 N/m'):
+            check(replace(record, force=sign * np.asarray(record.force), stiffness=wrong))
+
+
+def test_a_force_that_says_nothing_stops_nobody() -> None:
+    """Inertia of a free actuator, noise, a channel that is not connected."""
+    check(pushed(0.0, 500.0))
+    check(pushed(0.0))
+    check(replace(pushed(250e3), force=np.full(len(T), 150.0)))
+    noise = 1e3 * np.random.default_rng(2).standard_normal(len(T))
+    check(replace(GOOD, stiffness=250e3, force=noise))
