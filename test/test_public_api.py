@@ -141,3 +141,25 @@ def test_unknown_options_are_refused(record: ag.Record) -> None:
         ag.replay(record, hops=1.0)
     with pytest.raises(ag.InputError, match='seed'):
         ag.diagnose(record, seed=-1)
+
+
+def test_the_script_of_the_readme_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """As it stands there, on files that the command line made."""
+    text = (Path(__file__).parents[1] / 'README.md').read_text(encoding='utf-8')
+    script = text.split('```python\n')[1].split('```')[0]
+    monkeypatch.chdir(tmp_path)
+    shape = ('--rate', '200', '--duration', '20')
+    for name, k, more in (
+        ('free', '0', shape),
+        ('clamped', '250e3', shape),
+        ('earthquake', '250e3', (*shape, '--command', 'earthquake')),
+    ):
+        assert main(['simulate', f'{name}.csv', '--stiffness', k, *more]) == 0
+    exec(compile(script, 'README.md', 'exec'), {})
+    said = capsys.readouterr().out
+    assert '[]' in said or '()' in said
+    assert 'held-out error' in said
+    assert (tmp_path / 'posterior.png').stat().st_size > 10_000
+    assert 'Diagnosis' in (tmp_path / 'diagnosis.html').read_text()

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from actuator_glue.diagnosis.result import (
     Alarm,
     Candidate,
-    Diagnosis,
+    DiagnosisData,
     Estimate,
     Finding,
     HeldOutError,
@@ -42,7 +42,7 @@ def trace(name: str, held_out: bool, play: float) -> Trace:
     )  # fmt: skip
 
 
-def diagnosis(play: float, records: int = 2) -> Diagnosis:
+def diagnosis(play: float, records: int = 2) -> DiagnosisData:
     """Return a diagnosis that found play, or nothing where there is none."""
     names = (LONG, 'spring.csv')[:records]
     size = Estimate(play, 1e-7, 0.9 * play, 1.1 * play, 'm', 0.0)
@@ -59,7 +59,7 @@ def diagnosis(play: float, records: int = 2) -> Diagnosis:
         'share_at_large_displacement': 0.5,
     }  # fmt: skip
     after = 1e-5 if play else 3e-5
-    return Diagnosis(
+    return DiagnosisData(
         verdict='missing-effect' if play else 'none',
         effects=effects,
         error=HeldOutError(3e-5, (3e-5, 3e-5), after, (after, after), 1e-5, 1.0, (0.9, 1.0), 3e-5,
@@ -82,9 +82,9 @@ def diagnosis(play: float, records: int = 2) -> Diagnosis:
     )  # fmt: skip
 
 
-def drawn(name: str, found: Diagnosis) -> Figure:
+def drawn(name: str, found: DiagnosisData) -> Figure:
     """Return one of the report's figures."""
-    draw: Callable[[Diagnosis], Figure] = getattr(figures, name)
+    draw: Callable[[DiagnosisData], Figure] = getattr(figures, name)
     return draw(found)
 
 

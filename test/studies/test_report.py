@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from actuator_glue.cli._compilation import compilation
 
+from actuator_glue.api.compilation import compilation
 from studies.chen import __main__ as command
 from studies.chen import published
 from studies.chen.figures import FIGURES
