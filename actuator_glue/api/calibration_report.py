@@ -16,7 +16,7 @@ from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record, source_name
 from actuator_glue.report import html
-from actuator_glue.report.timeseries import band_at_zooms, even_zooms
+from actuator_glue.report.timeseries import Bands, band_at_zooms, even_zooms
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -49,10 +49,8 @@ def bands_figure(found: Calibration, record: Record) -> tuple[Figure, float]:
     inside = (record.measured >= total.lower[0]) & (record.measured <= total.upper[0])
     figure = band_at_zooms(
         record,
-        band(simulated, (LEVEL,)),
+        Bands(band(simulated, (LEVEL,)), total, level=LEVEL),
         even_zooms(record),
-        level=LEVEL,
-        total=total,
         title=source_name(record.source),
     )
     return figure, float(inside.mean())

@@ -39,14 +39,9 @@ class Chains:
         """Draws after burn-in, (steps - burn, chains, p)."""
         return self.draws[self.burn :]
 
-    def posterior(self, burn: int | None = None) -> Array:
-        """Draws (m, p) of all chains after `burn` steps (default: the adaptation)."""
-        kept = self.draws[self.burn if burn is None else burn :]
-        return kept.reshape(-1, kept.shape[2])
-
-    def posterior_log_density(self, burn: int | None = None) -> Array:
-        """Log likelihoods (m,) of `posterior(burn)`."""
-        return self.log_density[self.burn if burn is None else burn :].reshape(-1)
+    def posterior(self) -> Array:
+        """Draws (m, p) of all chains after burn-in."""
+        return self.kept.reshape(-1, self.draws.shape[2])
 
     def evaluations_at(self, step: int) -> int:
         """Likelihood evaluations made when the given step (from 0) was complete."""

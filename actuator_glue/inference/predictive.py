@@ -63,9 +63,7 @@ class ResidualModel:
         return mean, self.sd * scale
 
 
-def fit_residual(
-    residual: Array | Sequence[Array], *, parameters: int = 0, constant: bool = True
-) -> ResidualModel:
+def fit_residual(residual: Array | Sequence[Array], *, parameters: int = 0) -> ResidualModel:
     """Estimate the residual model from residuals measured - simulated.
 
     phi is the lag-one autocorrelation (Yule-Walker) pooled over records.
@@ -73,7 +71,6 @@ def fit_residual(
     Args:
         residual: one residual (n,) or one per record [m].
         parameters: number of calibrated parameters, taken off the degrees of freedom of sd.
-        constant: whether the residual has a mean (True for Eq. (4)'s variance likelihood).
 
     Raises:
         InputError: fewer than eight samples more than parameters, or values not finite.
@@ -82,7 +79,7 @@ def fit_residual(
     count = sum(len(r) for r in parts)
     if count < parameters + 8:
         raise InputError(f'{count} residual samples are too few for a residual model')
-    mean = sum(float(r.sum()) for r in parts) / count if constant else 0.0
+    mean = sum(float(r.sum()) for r in parts) / count
     power = lagged = 0.0
     for part in parts:
         squares, products = _second_moments(np.ascontiguousarray(part), mean)
@@ -91,7 +88,7 @@ def fit_residual(
     if not np.isfinite(power):
         raise InputError('the residual has NaN or infinite samples')
     phi = float(np.clip(lagged / power, -0.9999, 0.9999)) if power > 0 else 0.0
-    sd = float(np.sqrt(power / (count - parameters - constant)))
+    sd = float(np.sqrt(power / (count - parameters - 1)))
     return ResidualModel(mean=mean, sd=sd, phi=phi, samples=count - parameters)
 
 

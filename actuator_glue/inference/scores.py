@@ -8,7 +8,6 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import norm
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference.bands import COLUMNS_AT_ONCE, Band, check_draws
@@ -86,24 +85,6 @@ def _crps(observed: Array, draws: Array, weight: Array) -> Array:
     return np.asarray(distance - spread)
 
 
-def crps_gaussian(observed: Array, mean: Array | float, sd: Array | float) -> Array:
-    """Return the CRPS of Gaussian predictions, shape (n,) (Gneiting & Raftery 2007, Eq. 20).
-
-    Args:
-        observed: observations, shape (n,).
-        mean: predicted mean, shape (n,) or one number.
-        sd: predicted standard deviation > 0, shape (n,) or one number.
-
-    Raises:
-        InputError: a standard deviation that is not positive.
-    """
-    if not (np.asarray(sd) > 0).all():
-        raise InputError('the standard deviation of a Gaussian prediction must be positive')
-    z = (np.asarray(observed, dtype=np.float64) - mean) / sd
-    closed = z * (2.0 * norm.cdf(z) - 1.0) + 2.0 * norm.pdf(z) - 1.0 / np.sqrt(np.pi)
-    return np.asarray(sd * closed)
-
-
 @dataclass(frozen=True, slots=True)
 class Scores:
     """Scores of one band, over one range of frequency.
@@ -143,7 +124,7 @@ def score(
         observed: observations, shape (n,).
         band: band with this level, n samples.
         level: which level of the band to score.
-        crps: CRPS of each sample, shape (n,), from `crps_ensemble` or `crps_gaussian`.
+        crps: CRPS of each sample, shape (n,), from `crps_ensemble`.
         frequency_hz: instantaneous frequency of each sample, shape (n,) [Hz].
         edges_hz: ascending edges of the frequency ranges; empty ranges are left out.
 

@@ -174,4 +174,4 @@ def write_report(found: DiagnosisData, path: Path) -> Path:
         OSError: the file cannot be written.
     """
     sections = [_error(found), _effects(found), _residual(found), _records(found)]
-    return write(path, 'DiagnosisData', found.summary(), sections)
+    return write(path, 'Diagnosis', found.summary(), sections)

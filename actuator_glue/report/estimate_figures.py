@@ -15,6 +15,8 @@ from actuator_glue.records import Array, Record
 from actuator_glue.report import style
 from actuator_glue.report.bag_content import Content
 from actuator_glue.report.timeseries import (
+    Bands,
+    Course,
     band_at_zooms,
     even_zooms,
     frequency_zooms,
@@ -38,10 +40,8 @@ def bands(content: Content, path: Path) -> Path:
     zooms, titles = _zooms(content.record, int(known[0]), int(known[-1]) + 1)
     figure = band_at_zooms(
         content.record,
-        parameter,
+        Bands(parameter, total, level=float(total.levels[-1])),
         zooms,
-        level=float(total.levels[-1]),
-        total=total,
         zoom_titles=titles,
         title='Forecast: each band was fixed before its samples were measured',
     )
@@ -77,10 +77,13 @@ def parameters(content: Content, path: Path, truth: Array | None = None) -> Path
     # No parameter of Eq. (2) is negative.
     least = [0.0 if name in NAMES else -np.inf for name in last.parameter_names]
     figure = parameters_against_time(
-        np.array(end),
-        mean,
-        np.maximum(mean - 2 * spread, least),
-        mean + 2 * spread,
+        Course(
+            np.array(end),
+            mean,
+            np.maximum(mean - 2 * spread, least),
+            mean + 2 * spread,
+            'mean +- 2 standard deviations',
+        ),
         columns,
         truth=truth,
         # Told by the last windows: the first ones are short of samples.
@@ -89,7 +92,6 @@ def parameters(content: Content, path: Path, truth: Array | None = None) -> Path
         )
         > 0.5,
         title='Posterior of each window against the time of its last sample',
-        band_name='mean +- 2 standard deviations',
     )
     return style.save(figure, path)
 

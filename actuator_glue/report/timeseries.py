@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import matplotlib.colors
@@ -19,6 +20,7 @@ from actuator_glue.report import style
 
 Zoom = tuple[float, float]
 MM = 1e3
+PARAMETER_LOOK: dict[str, Any] = {'color': style.BAND, 'alpha': 0.45, 'lw': 0}
 # Either band may be the wider one: the total one is drawn by its edges.
 TOTAL_LOOK: dict[str, Any] = {
     'facecolor': matplotlib.colors.to_rgba(style.TOTAL, 0.15),
@@ -64,149 +66,165 @@ def even_zooms(record: Record, cycles: float = 4.0) -> list[Zoom]:
     return spans
 
 
-@style.styled
-def band_over_measured(
-    record: Record,
-    limits: Band,
-    *,
-    level: float = 0.95,
-    total: Band | None = None,
-    deterministic: Array | None = None,
-    zooms: Sequence[Zoom] | None = None,
-    zoom_titles: Sequence[str] | None = None,
-    title: str = '',
-    band_name: str = 'GLUE band',
-) -> Figure:
-    """Draw bands over the measured displacement: the whole record, then zooms side by side.
+@dataclass(frozen=True, slots=True, eq=False)
+class Bands:
+    """Bands over a record of n samples, as they are drawn.
 
-    Args:
-        record: command and measured displacement, n samples.
-        limits: parameter (GLUE) band [m], n samples.
-        level: which level of the bands to draw.
-        total: total predictive band [m], drawn lighter behind.
+    Attributes:
+        parameter: band of the parameters alone (GLUE) [m].
+        total: total predictive band [m], drawn lighter.
         deterministic: response of one parameter set, shape (n,) [m].
-        zooms: time spans [s]; three even ones where not given.
-        zoom_titles: one title per zoom.
-        title: title of the figure.
-        band_name: what the narrow band is called in the legend.
-
-    Raises:
-        InputError: a band or response of another length, or without this level.
+        level: which level of the bands to draw.
+        name: what the parameters' band is called in the legend.
     """
-    _same_length(record, limits, total, deterministic)
-    spans = list(zooms) if zooms is not None else even_zooms(record)
-    figure = style.new_figure(5.0)
-    grid = figure.add_gridspec(2, len(spans), height_ratios=(1.0, 1.35))
-    whole = figure.add_subplot(grid[0, :])
-    panels = [figure.add_subplot(grid[1, i]) for i in range(len(spans))]
-    # Hundreds of cycles: only the envelopes can be read, so thin lines and no dashes.
-    whole.plot(record.time, MM * record.command, color=style.COMMAND, lw=0.4, alpha=0.5)
-    whole.plot(record.time, MM * record.measured, color=style.MEASURED, lw=0.5)
-    for axes in panels:
-        _draw(axes, record, limits, level, total, deterministic, band_name)
-    whole.set(xlim=(0, record.duration), ylabel='displacement [mm]', xlabel='time [s]')
-    for i, (axes, (start, stop)) in enumerate(zip(panels, spans, strict=True)):
-        _zoom(axes, record, start, stop)
-        axes.set_xlabel('time [s]')
-        if zoom_titles is not None:
-            axes.set_title(zoom_titles[i])
-    panels[0].set_ylabel('displacement [mm]')
-    handles, names = panels[0].get_legend_handles_labels()
-    figure.legend(handles, names, loc='outside lower center', ncols=3)
-    if title:
-        figure.suptitle(style.fit(title, style.WIDTH, size=10))
-    return figure
+
+    parameter: Band
+    total: Band | None = None
+    deterministic: Array | None = None
+    level: float = 0.95
+    name: str = 'GLUE band'
+
+    def check(self, count: int) -> None:
+        """Refuse bands of another length than a record of `count` samples.
+
+        Raises:
+            InputError: the lengths differ.
+        """
+        columns = {'band': self.parameter, 'total band': self.total}
+        for name, column in (columns | {'response': self.deterministic}).items():
+            if column is not None and len(column) != count:
+                raise InputError(f'the {name} has {len(column)} samples, the record has {count}')
+
+    def part(self, part: slice) -> Bands:
+        """Return the bands of some of the samples."""
+        return replace(
+            self,
+            parameter=self.parameter.slice(part.start, part.stop),
+            total=None if self.total is None else self.total.slice(part.start, part.stop),
+            deterministic=None if self.deterministic is None else self.deterministic[part],
+        )
+
+    def draw(self, axes: Axes, time: Array, middle: Array | float, zorder: int) -> None:
+        """Draw response and bands less `middle` [m] over time [s]."""
+        if self.deterministic is not None:
+            line = MM * (self.deterministic - middle)
+            axes.plot(time, line, '--', color=style.DETERMINISTIC, label='deterministic')
+        looks: list[tuple[Band | None, str, dict[str, Any]]] = [
+            (self.parameter, self.name, PARAMETER_LOOK),
+            (self.total, 'total predictive band', TOTAL_LOOK),
+        ]
+        for limits, name, look in looks:
+            if limits is not None:
+                lower, upper = (MM * (edge - middle) for edge in limits.at(self.level))
+                label = f'{100 * self.level:g} % {name}'
+                axes.fill_between(time, lower, upper, label=label, zorder=zorder, **look)
 
 
 @style.styled
 def band_at_zooms(
     record: Record,
-    limits: Band,
+    bands: Bands,
     zooms: Sequence[Zoom],
     *,
-    level: float = 0.95,
-    total: Band | None = None,
-    deterministic: Array | None = None,
     zoom_titles: Sequence[str] | None = None,
     title: str = '',
-    band_name: str = 'GLUE band',
 ) -> Figure:
-    """Draw bands over the measured displacement at zooms only, one row of panels.
+    """Draw bands over the measured displacement at zooms, one row of panels.
 
     Below each panel the same relative to the median of the (total) band, so that a band much
-    narrower than the motion is seen. Arguments and errors as `band_over_measured`.
+    narrower than the motion is seen.
+
+    Args:
+        record: command and measured displacement.
+        bands: what is drawn over it.
+        zooms: time spans [s].
+        zoom_titles: one title per zoom.
+        title: title of the figure.
+
+    Raises:
+        InputError: a band or response of another length, or without this level.
     """
-    _same_length(record, limits, total, deterministic)
+    bands.check(len(record))
     figure = style.new_figure(4.6)
     rows = figure.subplots(2, len(zooms), sharex='col', squeeze=False, height_ratios=(1.4, 1.0))
     time = record.time
+    middle = (bands.parameter if bands.total is None else bands.total).median
     for i, (start, stop) in enumerate(zooms):
         upper, lower = rows[0, i], rows[1, i]
-        _draw(upper, record, limits, level, total, deterministic, band_name)
+        upper.plot(time, MM * record.command, ':', color=style.COMMAND, label='command')
+        upper.plot(time, MM * record.measured, color=style.MEASURED, lw=0.9, label='measured')
+        bands.draw(upper, time, 0.0, 3)
         _zoom(upper, record, start, stop)
         part = slice(*np.searchsorted(time, (start, stop)))
-        middle = (limits if total is None else total).median[part]
-        low, high = (MM * (edge[part] - middle) for edge in limits.at(level))
-        lower.fill_between(time[part], low, high, color=style.BAND, alpha=0.4, lw=0)
-        if total is not None:
-            low, high = (MM * (edge[part] - middle) for edge in total.at(level))
-            lower.fill_between(time[part], low, high, **TOTAL_LOOK)
-        if deterministic is not None:
-            off = MM * (deterministic[part] - middle)
-            lower.plot(time[part], off, '--', color=style.DETERMINISTIC)
-        off = MM * (record.measured[part] - middle)
+        bands.part(part).draw(lower, time[part], middle[part], 1)
+        off = MM * (record.measured[part] - middle[part])
         lower.plot(time[part], off, color=style.MEASURED, lw=0.6)
         lower.set_xlabel('time [s]')
         if zoom_titles is not None:
             upper.set_title(zoom_titles[i])
     rows[0, 0].set_ylabel('displacement [mm]')
     rows[1, 0].set_ylabel('less median [mm]')
-    handles, names = rows[0, 0].get_legend_handles_labels()
-    figure.legend(handles, names, loc='outside lower center', ncols=3)
-    if title:
-        figure.suptitle(style.fit(title, style.WIDTH, size=10))
+    _caption(figure, rows[0, 0], title)
     return figure
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Course:
+    """Posterior means and intervals of p parameters at w times, SI units.
+
+    Attributes:
+        time_s: time of each estimate, shape (w,) [s].
+        mean: posterior means, shape (w, p).
+        lower: lower limits, shape (w, p).
+        upper: upper limits, shape (w, p).
+        name: what the interval is called in the legend.
+    """
+
+    time_s: Array
+    mean: Array
+    lower: Array
+    upper: Array
+    name: str = '95 % GLUE interval'
+
+    def check(self, count: int) -> None:
+        """Refuse shapes that do not agree with one another and `count` parameters.
+
+        Raises:
+            InputError: they do not.
+        """
+        shapes = [a.shape for a in (self.mean, self.lower, self.upper)]
+        if any(shape != (len(self.time_s), count) for shape in shapes):
+            raise InputError(
+                f'parameters against time: {len(self.time_s)} times and {count} parameters, but '
+                f'mean, lower, upper have shapes {", ".join(map(str, shapes))}'
+            )
 
 
 @style.styled
 def parameters_against_time(
-    time_s: Array,
-    mean: Array,
-    lower: Array,
-    upper: Array,
+    course: Course,
     parameters: Sequence[Parameter],
     *,
     truth: Array | None = None,
-    reference: Array | None = None,
     prior_dominated: Array | None = None,
     title: str = '',
-    band_name: str = '95 % GLUE interval',
 ) -> Figure:
     """Draw each parameter's posterior mean and interval against time, one panel each.
 
     Args:
-        time_s: time of each estimate, shape (w,) [s].
-        mean: posterior means, shape (w, p), SI units.
-        lower: lower limits, shape (w, p).
-        upper: upper limits, shape (w, p).
+        course: the posterior against time.
         parameters: name and unit of each column, length p.
         truth: true values where known (simulated plant), shape (p,) or (w, p).
-        reference: values to compare with, such as the deterministic ones, shape (p,).
         prior_dominated: parameters of which the data say little more than the prior, shape (p,);
             drawn in grey.
         title: title of the figure.
-        band_name: what the interval is called in the legend.
 
     Raises:
         InputError: shapes that do not agree.
     """
     count = len(parameters)
-    time_s, mean, lower, upper = (np.asarray(a, float) for a in (time_s, mean, lower, upper))
-    if not mean.shape == lower.shape == upper.shape == (len(time_s), count):
-        raise InputError(
-            f'parameters against time: {len(time_s)} times and {count} parameters, but mean, '
-            f'lower, upper have shapes {mean.shape}, {lower.shape}, {upper.shape}'
-        )
+    course.check(count)
+    time_s, mean, lower, upper = course.time_s, course.mean, course.lower, course.upper
     columns = 2 if count > 1 else 1
     rows = -(-count // columns)
     figure = style.new_figure(0.7 + 1.7 * rows)
@@ -219,60 +237,26 @@ def parameters_against_time(
         exponent = style.engineering(mean[:, i], lower[:, i], upper[:, i])
         scale = 10.0**-exponent
         low, high = scale * lower[:, i], scale * upper[:, i]
-        axes.fill_between(time_s, low, high, color=colour, alpha=0.3, lw=0, label=band_name)
+        axes.fill_between(time_s, low, high, color=colour, alpha=0.3, lw=0, label=course.name)
         axes.plot(time_s, scale * mean[:, i], '-o', color=colour, label='posterior mean')
         if truth is not None:
             column = scale * np.broadcast_to(np.asarray(truth, float), mean.shape)[:, i]
             axes.plot(time_s, column, '--', color=style.TRUTH, label='true value')
-        if reference is not None:
-            at = scale * float(reference[i])
-            axes.axhline(at, ls=':', color=style.DETERMINISTIC, label='deterministic')
         note = ', little more than the prior' if dominated else ''
         axes.set_title(style.label(parameter.name, parameter.unit, exponent) + note)
         axes.tick_params(labelbottom=i >= count - columns)
     for axes in panels[max(0, count - columns) : count]:
         axes.set_xlabel('time [s]')
-    handles, names = panels[0].get_legend_handles_labels()
-    figure.legend(handles, names, loc='outside lower center', ncols=3)
-    if title:
-        figure.suptitle(style.fit(title, style.WIDTH, size=10))
+    _caption(figure, panels[0], title)
     return figure
 
 
-def _same_length(
-    record: Record, limits: Band, total: Band | None, deterministic: Array | None
-) -> None:
-    for name, column in (('band', limits), ('total band', total), ('response', deterministic)):
-        if column is not None and len(column) != len(record):
-            raise InputError(f'the {name} has {len(column)} samples, the record has {len(record)}')
-
-
-def _draw(
-    axes: Axes,
-    record: Record,
-    limits: Band,
-    level: float,
-    total: Band | None,
-    deterministic: Array | None,
-    band_name: str,
-) -> None:
-    time = record.time
-    percent = f'{100 * level:g} %'
-    axes.plot(time, MM * record.command, ':', color=style.COMMAND, label='command')
-    axes.plot(time, MM * record.measured, color=style.MEASURED, lw=0.9, label='measured')
-    if deterministic is not None:
-        axes.plot(time, MM * deterministic, '--', color=style.DETERMINISTIC, label='deterministic')
-    lower, upper = limits.at(level)
-    axes.fill_between(
-        time, MM * lower, MM * upper, color=style.BAND, alpha=0.45, lw=0, zorder=3,
-        label=f'{percent} {band_name}',
-    )  # fmt: skip
-    if total is not None:
-        lower, upper = total.at(level)
-        axes.fill_between(
-            time, MM * lower, MM * upper, zorder=3, label=f'{percent} total predictive band',
-            **TOTAL_LOOK,
-        )  # fmt: skip
+def _caption(figure: Figure, axes: Axes, title: str) -> None:
+    """Put the legend of a panel below all of them, and a title above."""
+    handles, names = axes.get_legend_handles_labels()
+    figure.legend(handles, names, loc='outside lower center', ncols=3)
+    if title:
+        figure.suptitle(style.fit(title, style.WIDTH, size=10))
 
 
 def _zoom(axes: Axes, record: Record, start: float, stop: float) -> None:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import os
 import signal
 import subprocess
-import time
 from collections.abc import Mapping
 from pathlib import Path
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import Any, Self
 
 import yaml
@@ -53,19 +52,12 @@ class Node:
         name: executable name.
         parameters: ROS parameters, by name.
         folder: where its parameter file and its log go.
-        remap: topics and names to remap, from -> to.
 
     Raises:
         InputError: the node is not installed.
     """
 
-    def __init__(
-        self,
-        name: str,
-        parameters: Mapping[str, Any],
-        folder: Path,
-        remap: Mapping[str, str] | None = None,
-    ) -> None:
+    def __init__(self, name: str, parameters: Mapping[str, Any], folder: Path) -> None:
         self.name = name
         self.log = folder / f'{name}.log'
         file = folder / f'{name}.yaml'
@@ -73,8 +65,6 @@ class Node:
             yaml.safe_dump({'/**': {'ros__parameters': dict(parameters)}}), encoding='utf-8'
         )
         command = [str(executable(name)), '--ros-args', '--params-file', str(file)]
-        for source, target in (remap or {}).items():
-            command += ['-r', f'{source}:={target}']
         with self.log.open('wb') as log:
             # A session of its own: Ctrl-C reaches us only, and we stop the nodes in order.
             self.process = subprocess.Popen(
@@ -112,24 +102,13 @@ class Nodes:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: object, error: object, trace: object) -> None:
         for node in reversed(self._nodes):
             node.stop()
 
-    def start(
-        self,
-        name: str,
-        parameters: Mapping[str, Any],
-        folder: Path,
-        remap: Mapping[str, str] | None = None,
-    ) -> Node:
+    def start(self, name: str, parameters: Mapping[str, Any], folder: Path) -> Node:
         """Start a node; arguments as `Node`."""
-        node = Node(name, parameters, folder, remap)
+        node = Node(name, parameters, folder)
         self._nodes.append(node)
         return node
 
@@ -146,10 +125,3 @@ class Nodes:
                     f'{node.name} ended with status {status}; its log {node.log} ends with:\n'
                     f'{node.last_words()}'
                 )
-
-    def wait_for_end(self, node: Node, seconds: float) -> bool:
-        """Wait for a node that ends by itself; return whether it did."""
-        end = time.monotonic() + seconds
-        while node.running and time.monotonic() < end:
-            time.sleep(0.1)
-        return not node.running

@@ -105,7 +105,7 @@ def test_banana(rng_seed: int) -> None:
     for run in runs:
         # The first draws know the middle better than the tips: E[x_1^2] is 0.85 in the first
         # eighth of 1.6 million evaluations and 0.98 +- 0.03 in the last half.
-        draws = run.posterior(burn=len(run.draws) // 2)
+        draws = run.draws[len(run.draws) // 2 :].reshape(-1, run.draws.shape[2])
         straight = draws / np.where(np.arange(draws.shape[1]) == 0, 10.0, 1.0)
         straight[:, 1] = draws[:, 1] + twist * (draws[:, 0] ** 2 - 100.0)
         mass = (draws[:, 1] < tip).mean() / beyond

@@ -5,7 +5,6 @@ import itertools
 import numpy as np
 import pytest
 import scoringrules
-from scipy import integrate
 from scipy.stats import norm
 
 from actuator_glue.errors import InputError
@@ -13,7 +12,6 @@ from actuator_glue.inference.bands import Band, band
 from actuator_glue.inference.scores import (
     coverage,
     crps_ensemble,
-    crps_gaussian,
     instantaneous_frequency,
     interval_score,
     mean_width,
@@ -46,13 +44,6 @@ def test_crps_is_the_integral_of_its_definition() -> None:
         cdf = (draws[:, 0] <= low).mean()
         expected += (cdf - (low >= observed)) ** 2 * (high - low)
     assert crps_ensemble(np.array([observed]), draws)[0] == pytest.approx(expected)
-
-
-@pytest.mark.parametrize(('y', 'mean', 'sd'), [(0.0, 0.0, 1.0), (2.5, 1.0, 0.4), (-1.0, 3.0, 2.0)])
-def test_gaussian_crps_is_the_integral_of_its_definition(y: float, mean: float, sd: float) -> None:
-    left = integrate.quad(lambda x: norm.cdf(x, mean, sd) ** 2, mean - 40 * sd, y)[0]
-    right = integrate.quad(lambda x: norm.sf(x, mean, sd) ** 2, y, mean + 40 * sd)[0]
-    assert crps_gaussian(np.array([y]), mean, sd)[0] == pytest.approx(left + right, rel=1e-6)
 
 
 def test_interval_score_agrees_with_scoringrules(rng_seed: int) -> None:
@@ -121,8 +112,6 @@ def test_unusable_input_says_what_is_wrong() -> None:
     three = np.zeros(3)
     with pytest.raises(InputError, match='equally long'):
         coverage(three, three, np.zeros(4))
-    with pytest.raises(InputError, match='positive'):
-        crps_gaussian(three, 0.0, 0.0)
     with pytest.raises(InputError, match='observed'):
         crps_ensemble(three, np.zeros((4, 2)))
     with pytest.raises(InputError, match='level'):

@@ -140,6 +140,7 @@ def test_paths_stand_in_one_table(tmp_path: Path) -> None:
     assert FOLDER not in found.summary()
     page = write_report(found, tmp_path / 'report.html').read_text()
     text = re.sub(r'data:image/png;base64,[^"]*', '', page)
+    assert '<title>Diagnosis</title>' in text
     assert text.count(FOLDER) == len(found.traces)
     assert text.index(FOLDER) > text.index('What was read')
     same = replace(found, effects=(), structure=(), verdict='none')

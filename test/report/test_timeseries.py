@@ -13,8 +13,10 @@ from actuator_glue.model.parameters import BASE, TABLE_2
 from actuator_glue.records import Record
 from actuator_glue.report import style
 from actuator_glue.report.timeseries import (
+    Bands,
+    Course,
     band_at_zooms,
-    band_over_measured,
+    even_zooms,
     frequency_zooms,
     parameters_against_time,
 )
@@ -40,53 +42,49 @@ def test_zooms_sit_where_the_command_has_that_frequency(sweep: Record) -> None:
         assert stop - start == pytest.approx(2 / wanted)
 
 
-def test_band_over_measured_shows_millimetres_and_its_zooms(
+def test_band_at_zooms_shows_millimetres_and_its_zooms(
     sweep, limits, overlapping_texts, tmp_path: Path
 ) -> None:
     zooms = frequency_zooms(sweep)
-    figure = band_over_measured(sweep, limits, total=limits, zooms=zooms, title='A')
-    whole, *panels = figure.axes
-    np.testing.assert_allclose([p.get_xlim() for p in panels], zooms)
-    assert whole.get_ylim()[1] == pytest.approx(2.0, rel=0.2)
-    assert 'mm' in whole.get_ylabel()
+    drawn = Bands(limits, total=limits, deterministic=sweep.measured)
+    figure = band_at_zooms(sweep, drawn, zooms, title='A')
+    upper, lower = figure.axes[:3], figure.axes[3:]
+    np.testing.assert_allclose([p.get_xlim() for p in upper + lower], 2 * zooms)
+    assert upper[0].get_ylim()[1] == pytest.approx(1.24 * 2.0, rel=0.01)  # and the margin
+    assert 'mm' in upper[0].get_ylabel()
     assert not overlapping_texts(figure)
     with Image.open(style.save(figure, tmp_path / 'new' / 'figure.png')) as image:
         assert image.width == pytest.approx(style.WIDTH * 160, abs=2)
 
 
-def test_zoom_figure_and_default_zooms_draw(sweep, limits, overlapping_texts) -> None:
-    figure = band_at_zooms(
-        sweep, limits, frequency_zooms(sweep), deterministic=sweep.measured, title='B'
-    )
-    assert len(figure.axes) == 6
-    assert not overlapping_texts(figure)
+def test_a_record_that_hardly_moves_draws() -> None:
     flat = Record(np.linspace(0, 1e-3, 50), np.zeros(50), 0.01)
-    figure = band_over_measured(flat, band(np.zeros((3, 50))))
-    assert len(figure.axes) == 4
+    figure = band_at_zooms(flat, Bands(band(np.zeros((3, 50)))), even_zooms(flat))
+    assert len(figure.axes) == 6
 
 
 def test_parameters_against_time(overlapping_texts) -> None:
     time = np.arange(5.0)
     mean = np.tile(TABLE_2, (5, 1))
-    figure = parameters_against_time(
-        time, mean, 0.9 * mean, 1.1 * mean, BASE, truth=TABLE_2, reference=TABLE_2
-    )
+    course = Course(time, mean, 0.9 * mean, 1.1 * mean)
+    figure = parameters_against_time(course, BASE, truth=TABLE_2)
     assert len([a for a in figure.axes if a.get_visible()]) == 4
     assert not overlapping_texts(figure)
-    figure = parameters_against_time(time, mean[:, :1], mean[:, :1], mean[:, :1], BASE[:1])
-    assert len(figure.axes) == 1
+    one = Course(time, mean[:, :1], mean[:, :1], mean[:, :1])
+    assert len(parameters_against_time(one, BASE[:1]).axes) == 1
 
 
 def test_shapes_that_do_not_agree_are_refused(sweep, limits) -> None:
     with pytest.raises(InputError, match='samples'):
-        band_over_measured(sweep, limits.slice(0, 7))
+        band_at_zooms(sweep, Bands(limits.slice(0, 7)), even_zooms(sweep))
     with pytest.raises(InputError, match='shapes'):
-        parameters_against_time(np.arange(3.0), np.zeros((2, 4)), np.zeros((2, 4)), 0, BASE)
+        wrong = np.zeros((2, 4))
+        parameters_against_time(Course(np.arange(3.0), wrong, wrong, wrong), BASE)
     with pytest.raises(InputError, match=r'not 0\.5'):
-        band_over_measured(sweep, limits, level=0.5)
+        band_at_zooms(sweep, Bands(limits, level=0.5), even_zooms(sweep))
 
 
 def test_drawing_leaves_global_style_alone(sweep, limits) -> None:
     before = dict(mpl.rcParams)
-    style.data_uri(band_over_measured(sweep, limits))
+    style.data_uri(band_at_zooms(sweep, Bands(limits), even_zooms(sweep)))
     assert dict(mpl.rcParams) == before

@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from actuator_glue.report import style
-from actuator_glue.report.timeseries import band_at_zooms
+from actuator_glue.report.timeseries import Bands, band_at_zooms
 from studies.chen.experiment import stiffness_name, zooms
 from studies.chen.figures.look import REFERENCE, legend_below
 from studies.chen.library import TABLE_2
@@ -50,12 +50,14 @@ def frequency_response(results: Results) -> Figure:
 def displacement(results: Results, test: int) -> Figure:
     """Draw Fig. 8 or 9: bands over measured displacement near 1, 5 and 10 Hz."""
     record = results.records[test]
-    return band_at_zooms(
-        record, results.time['matched'][test].limits, zooms(), level=LEVEL,
-        total=results.time['total'][test].limits,
-        deterministic=simulate(TABLE_2[None], record)[0],
-        zoom_titles=[f'{f:g} Hz' for f in CLOSE_UPS], band_name='GLUE band, matched residual',
-    )  # fmt: skip
+    shown = Bands(
+        results.time['matched'][test].limits,
+        results.time['total'][test].limits,
+        simulate(TABLE_2[None], record)[0],
+        LEVEL,
+        'GLUE band, matched residual',
+    )
+    return band_at_zooms(record, shown, zooms(), zoom_titles=[f'{f:g} Hz' for f in CLOSE_UPS])
 
 
 @style.styled
