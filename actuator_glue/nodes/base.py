@@ -52,6 +52,7 @@ class SuiteNode(LifecycleNode):
         change = self._service_change_state
         change.callback = answered(
             change.callback,
+            lambda: self._state_machine.available_transitions,
             lambda asked: self.complain('transition', f'{asked} is impossible: {self.state}'),
         )
         self.parameters = Parameters(self, (*COMMON, *specs), self.check, self.changed)

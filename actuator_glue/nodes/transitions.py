@@ -1,11 +1,9 @@
-"""Lifecycle transitions: where they lead, and an answer to those that are not possible."""
+"""Lifecycle transitions: where they lead, and a word on those that are not possible."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any
-
-from rclpy._rclpy_pybind11 import RCLError
 
 REACHED = {
     'configure': 'inactive',
@@ -17,21 +15,27 @@ REACHED = {
 
 
 def answered(
-    change: Callable[[Any, Any], Any], refused: Callable[[str], None]
+    change: Callable[[Any, Any], Any],
+    possible: Callable[[], Iterable[tuple[Any, ...]]],
+    refused: Callable[[str], None],
 ) -> Callable[[Any, Any], Any]:
-    """Return the callback of a change_state service that answers what rclpy only raises.
+    """Return the callback of a change_state service that answers and tells what is impossible.
+
+    rclpy refuses an impossible label without a word and leaves an impossible number unanswered.
 
     Args:
         change: rclpy's callback.
-        refused: told which transition is not possible in the node's state.
+        possible: number and label, first, of each transition that the node's state has.
+        refused: told which transition it has not.
     """
 
     def call(request: Any, response: Any) -> Any:
-        try:
+        number, label = request.transition.id, request.transition.label
+        # As rclpy has it: the label counts where there is one.
+        if any(label == has[1] if label else number == has[0] for has in possible()):
             return change(request, response)
-        except RCLError:
-            refused(request.transition.label or f'number {request.transition.id}')
-            response.success = False
-            return response
+        refused(label or f'number {number}')
+        response.success = False
+        return response
 
     return call

@@ -125,7 +125,8 @@ def test_a_transition_that_is_impossible_now_is_answered(start, probe):
     ):
         asked = ChangeState.Request(transition=transition)
         assert not probe.call(ChangeState, 'actuator_sim/change_state', asked).success
-    probe.until(lambda: 'configure is impossible: active' in process.text, 10)
+    for asked in 'configure', 'number 2', 'no-such':
+        probe.until(lambda a=asked: f'{a} is impossible: active' in process.text, 10)
     assert probe.state('actuator_sim') == 'active'
     assert probe.transition('actuator_sim', 'deactivate')
     assert 'Traceback' not in process.text and process.end() == 0
