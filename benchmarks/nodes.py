@@ -22,11 +22,10 @@ from actuator_glue.io.bag_reader import messages
 from actuator_glue.io.messages import deserialize
 from actuator_glue.online import wire
 from benchmarks.stalls import awake, watched, withheld
+from examples.demonstration.domain import free_domain
 from examples.demonstration.processes import Node, Nodes
 from examples.demonstration.watch import BAND, HEALTH, POSTERIOR, SAMPLES, Watch
 
-# Nodes of a benchmark see each other and nobody else.
-_DOMAIN = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'ROS_DOMAIN_ID': '97'}
 _READY_SECONDS = 120.0
 _TICK = float(os.sysconf('SC_CLK_TCK'))
 _DEADLINE = 0.05  # s from a window's last sample to its band, 20 times a second
@@ -66,8 +65,10 @@ def chain(
             grants that, and everything else the others; what `taskset` and `chrt` do.
     """
     folder = Path(tempfile.mkdtemp(prefix='actuator_glue_bench_'))
-    before = {name: os.environ.get(name) for name in _DOMAIN}
-    os.environ.update(_DOMAIN)
+    # Nodes of a benchmark see each other and nobody else.
+    domain = {'ROS_AUTOMATIC_DISCOVERY_RANGE': 'LOCALHOST', 'ROS_DOMAIN_ID': str(free_domain())}
+    before = {name: os.environ.get(name) for name in domain}
+    os.environ.update(domain)
     try:
         with Nodes() as nodes:
             run = _stream(nodes, folder, rate, seconds, block, estimator, pin)

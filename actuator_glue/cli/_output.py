@@ -1,18 +1,14 @@
-"""What commands write: tables and progress for people, JSON for machines."""
+"""What commands write for people: lines, tables, progress."""
 
 from __future__ import annotations
 
 import argparse
-import json
-import math
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from pathlib import Path
-from typing import Any
 
-from actuator_glue.cli._parser import Output, add_force
-from actuator_glue.errors import InputError, printable
+from actuator_glue.arguments import Output, add_force
+from actuator_glue.errors import printable
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:
@@ -61,44 +57,6 @@ def table(
     # A number that is cut off is worse than a line that the terminal folds.
     needed = console.measure(shown, options=console.options.update(max_width=500)).maximum
     Console(file=file, highlight=False, width=max(console.width, needed)).print(shown)
-
-
-def clean(value: Any) -> Any:
-    """Return a value JSON can hold: numpy numbers as numbers, NaN and infinity as null."""
-    if isinstance(value, dict):
-        return {str(k): clean(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [clean(v) for v in value]
-    if hasattr(value, 'tolist'):
-        return clean(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
-
-
-def write_json(content: dict[str, Any], out: str | None) -> None:
-    """Write JSON to a file in one step, or to standard output; nothing where `out` is None.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
-    if out is None:
-        return
-    text = json.dumps(clean(content), indent=2, allow_nan=False) + '\n'
-    if out == '-':
-        sys.stdout.write(text)
-        return
-    path = Path(out)
-    temporary = path.with_name(path.name + '.tmp')
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        if path.exists() and not path.is_file():  # a device or pipe stays what it is
-            path.write_text(text, 'utf-8')
-            return
-        temporary.write_text(text, 'utf-8')
-        temporary.replace(path)
-    except OSError as error:
-        raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error
 
 
 @contextmanager

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import argparse
-import math
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any, NoReturn
 
+from actuator_glue.arguments import is_number, number
 from actuator_glue.errors import InputError
 
 EPILOG = (
@@ -65,63 +64,3 @@ class Parser(argparse.ArgumentParser):
         usage = [f'{p}...' if m else p for p, m in zip(places, many, strict=True)]
         text = InputError(f'{message} ({self.prog} --help tells more)')
         self.exit(2, f'usage: {" ".join([self.prog, *usage])} [options]\nactuator-glue: {text}\n')
-
-
-def is_number(text: str) -> bool:
-    """Whether a text is a number."""
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return True
-
-
-def number(text: str) -> float:
-    """Return a finite number."""
-    if not is_number(text):
-        raise argparse.ArgumentTypeError(f'{text!r} is not a number')
-    if not math.isfinite(float(text)):
-        raise argparse.ArgumentTypeError(f'{text!r} is not finite')
-    return float(text)
-
-
-class Output(str):
-    """A file or bag that a command writes; `-` is standard output."""
-
-
-class Folder(Output):
-    """A folder that a command fills."""
-
-
-def add_force(parser: argparse.ArgumentParser) -> None:
-    """Add `--force`."""
-    parser.add_argument(
-        '--force', action='store_true', help='write over what is there already'
-    )  # fmt: skip
-
-
-def claim(path: Path | str, args: argparse.Namespace) -> Path:
-    """Return a path that may be written: nothing is there, or it may be overwritten.
-
-    Raises:
-        InputError: something is there and `--force` was not given.
-    """
-    out = Path(path)
-    if isinstance(path, Folder):
-        taken = out.is_file() or (out.is_dir() and any(out.iterdir()))
-    else:
-        taken = str(path) != '-' and (out.is_file() or out.is_dir())  # a device is written to
-    if taken and not args.force:
-        raise InputError(f'{out} exists already; choose another name, or add --force')
-    return out
-
-
-def claim_outputs(args: argparse.Namespace) -> None:
-    """Refuse what would be overwritten, before any long work is done for it.
-
-    Raises:
-        InputError: as `claim`.
-    """
-    for value in vars(args).values():
-        if isinstance(value, Output):
-            claim(value, args)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import argparse
 
+from actuator_glue.arguments import number
 from actuator_glue.cli._output import note
-from actuator_glue.cli._parser import number
 from actuator_glue.io.formats import formats
 from actuator_glue.records import Record
 

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from actuator_glue.arguments import Output, add_force, claim
 from actuator_glue.cli._output import progress, say
-from actuator_glue.cli._parser import Output, add_force, claim
 from actuator_glue.errors import InputError
 from actuator_glue.io.formats import formats
 from actuator_glue.records import Record

@@ -10,11 +10,12 @@ import argparse
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+from actuator_glue.arguments import Output, number
 from actuator_glue.cli._effects_file import add_effects_file, load_effects
-from actuator_glue.cli._output import add_json, note, progress, say, table, write_json
-from actuator_glue.cli._parser import Output, number
+from actuator_glue.cli._output import add_json, note, progress, say, table
 from actuator_glue.cli._records import add_records, load
 from actuator_glue.errors import InputError
+from actuator_glue.io.json_file import write_json
 
 if TYPE_CHECKING:
     from actuator_glue.api.posterior import Calibration

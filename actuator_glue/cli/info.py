@@ -7,9 +7,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from actuator_glue.cli._output import add_json, note, say, table, write_json
+from actuator_glue.cli._output import add_json, note, say, table
 from actuator_glue.cli._records import add_records
 from actuator_glue.errors import InputError
+from actuator_glue.io.json_file import write_json
 from actuator_glue.records import Record
 
 

@@ -15,7 +15,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from actuator_glue import cli
-from actuator_glue.cli._parser import Parser, claim_outputs
+from actuator_glue.arguments import claim_outputs
+from actuator_glue.cli._parser import Parser
 from actuator_glue.errors import InputError
 
 

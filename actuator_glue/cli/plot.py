@@ -6,8 +6,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from actuator_glue.arguments import add_force, claim
 from actuator_glue.cli._output import note, say
-from actuator_glue.cli._parser import add_force, claim
 from actuator_glue.cli._records import add_records, load
 from actuator_glue.errors import InputError
 from actuator_glue.records import Record

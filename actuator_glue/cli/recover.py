@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from actuator_glue.cli._output import add_json, say, write_json
+from actuator_glue.cli._output import add_json, say
+from actuator_glue.io.json_file import write_json
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

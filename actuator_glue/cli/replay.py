@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from actuator_glue.cli._output import add_json, note, progress, say, table, write_json
-from actuator_glue.cli._parser import number
+from actuator_glue.arguments import number
+from actuator_glue.cli._output import add_json, note, progress, say, table
 from actuator_glue.cli._records import add_reading, load
+from actuator_glue.io.json_file import write_json
 
 if TYPE_CHECKING:
     from actuator_glue.api.replay_result import Replay

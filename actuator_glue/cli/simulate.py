@@ -7,11 +7,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from actuator_glue.arguments import claim, number
 from actuator_glue.cli._effects_file import add_effects_file, load_effects
-from actuator_glue.cli._output import note, progress, write_json
-from actuator_glue.cli._parser import claim, number
+from actuator_glue.cli._output import note, progress
 from actuator_glue.cli._save import add_out, check_out, save
 from actuator_glue.errors import InputError
+from actuator_glue.io.json_file import write_json
 from actuator_glue.records import Record
 
 if TYPE_CHECKING:

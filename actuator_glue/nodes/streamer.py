@@ -17,6 +17,8 @@ from actuator_glue.nodes.parameters import Spec
 # of a dead one after its lease of 20 s, so that more is never needed. Workers compile before their
 # nodes subscribe: that takes minutes, and is waited for without limit.
 PATIENCE_SECONDS = 30.0
+# How often a stream that waits says so [s].
+REMINDER_SECONDS = 5.0
 
 
 def specs(*, exit_at_end: bool) -> tuple[Spec, ...]:
@@ -51,6 +53,7 @@ class Streamer(base.SuiteNode):
         self.samples = Rate()
         self.pacer: Pacer | None = None
         self._waited_for: str | None = None
+        self._told = 0.0
 
     def stream(self) -> Iterator[Step]:
         """Yield what is published, and when; runs in the pacer's thread."""
@@ -81,8 +84,9 @@ class Streamer(base.SuiteNode):
         elif self.stamps_now and self.get_clock().now().nanoseconds == 0:
             # Simulated time is 0 until the first /clock: such stamps would jump with it.
             missing = 'the first /clock'
-        if missing != self._waited_for:
-            self._waited_for = missing
+        now = time.monotonic()
+        if missing != self._waited_for or (missing and now - self._told > REMINDER_SECONDS):
+            self._waited_for, self._told = missing, now
             self.get_logger().info(f'waiting for {missing}' if missing else 'the stream begins')
         return not missing
 

@@ -11,11 +11,12 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from actuator_glue.cli._output import write_json
-from actuator_glue.cli._parser import Folder, add_force, claim_outputs, number
+from actuator_glue.arguments import Folder, add_force, claim_outputs, number
 from actuator_glue.errors import InputError
+from actuator_glue.io.json_file import write_json
 from examples.demonstration import run as demonstration
 from examples.demonstration import sources
+from examples.demonstration.domain import own_domain
 from examples.demonstration.processes import end_in_order
 from examples.demonstration.progress import Display
 
@@ -71,7 +72,7 @@ def run(args: argparse.Namespace) -> int:
     source = _source(args, folder)
     end_in_order()
     demonstration.prepare(folder)
-    demonstration.own_domain()
+    own_domain()
     settings = {'window': args.window, 'hop': args.hop, 'seed': args.seed}
     settings['time_budget'] = min(0.5, args.hop)
     diagnose = not args.no_diagnosis

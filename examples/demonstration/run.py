@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 import shutil
 import time
@@ -177,13 +176,6 @@ def _sent(source: Source, folder: Path) -> int:
     log = (folder / 'nodes' / f'{source.node}.log').read_text(encoding='utf-8', errors='replace')
     found = re.findall(r'stream ended after (\d+) samples', log)
     return int(found[-1]) if found else 0
-
-
-def own_domain() -> None:
-    """Keep the nodes to this machine, in a domain of their own unless the user has set one."""
-    # Linux: up to 101 domains leave the ephemeral ports alone.
-    os.environ.setdefault('ROS_DOMAIN_ID', str(1 + os.getpid() % 101))
-    os.environ.setdefault('ROS_AUTOMATIC_DISCOVERY_RANGE', 'LOCALHOST')
 
 
 def terminal() -> Console:

@@ -14,9 +14,9 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
 
 from actuator_glue import __version__
-from actuator_glue.cli._output import note, write_json
-from actuator_glue.cli._parser import Folder, claim_outputs
+from actuator_glue.arguments import Folder, claim_outputs
 from actuator_glue.errors import InputError
+from actuator_glue.io.json_file import write_json
 from studies.chen import published, report
 from studies.chen.curves import curves
 from studies.chen.library import NOISE
@@ -100,7 +100,7 @@ def run(args: argparse.Namespace) -> None:
         tell('figures and files', 0.9)
         files = write(results, out, made)
         tell('done', 1.0)
-    note(f'{time.monotonic() - started:.0f} s')
+    print(f'{time.monotonic() - started:.0f} s', file=sys.stderr)
     print(f'report    {out / "report.html"}')
     print(f'numbers   {out / "results.json"}')
     print(f'CSV       {out / "tables"}, {out / "curves"} ({files} files)')
@@ -129,7 +129,7 @@ def progress() -> Iterator[Callable[[str, float], None]]:
             nonlocal last
             bar.update(task, description=stage, completed=share)
             if stage != last and not console.is_terminal:
-                note(f'{100 * share:.0f} % {stage}')
+                print(f'{100 * share:.0f} % {stage}', file=sys.stderr)
             last = stage
 
         yield tell

@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 from pathlib import Path
@@ -14,6 +15,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.io.messages import header, message
 from examples.demonstration import __main__ as command
+from examples.demonstration import domain
 from examples.demonstration.processes import Nodes, executable
 from examples.demonstration.run import prepare
 from examples.demonstration.watch import Watch
@@ -89,6 +91,43 @@ def test_results_are_not_overwritten_unasked(
     assert (tmp_path / 'summary.json').read_text() == 'precious'
 
 
+def test_two_processes_never_share_a_domain(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Nor is one taken where a participant of somebody else listens."""
+    two = range(1, 3)
+    monkeypatch.setattr(domain, 'DOMAINS', two)
+    monkeypatch.setattr(domain, '_inhabited', lambda number: False)
+    text = (
+        'import sys\nfrom examples.demonstration import domain\n'
+        'domain.DOMAINS = range(1, 3)\ndomain._inhabited = lambda number: False\n'
+        'print(domain.free_domain(), flush=True)\nsys.stdin.read()\n'
+    )
+    held = len(domain._held)
+    with subprocess.Popen(
+        [sys.executable, '-c', text], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as other:
+        assert other.stdout is not None and other.stdin is not None
+        theirs = int(other.stdout.readline())
+        assert {theirs, domain.free_domain()} == set(two)
+        with pytest.raises(InputError, match='all in use'):
+            domain.free_domain()
+        other.stdin.close()
+        assert other.wait(20.0) == 0
+    assert domain.free_domain() == theirs
+    for lock in domain._held[held:]:
+        lock.close()
+    del domain._held[held:]
+
+
+def test_a_domain_with_a_participant_is_not_free() -> None:
+    """Whoever that is: its first participant listens at a port of its own."""
+    free = domain.free_domain()
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as participant:
+        participant.bind(('127.0.0.1', 7410 + 250 * free))
+        assert domain._inhabited(free)
+    assert not domain._inhabited(free)
+    domain._held.pop().close()
+
+
 @pytest.mark.ros
 def test_a_dying_node_is_reported(tmp_path: Path) -> None:
     """The end of its log is in the message, and the others are stopped."""
@@ -103,6 +142,7 @@ def test_a_dying_node_is_reported(tmp_path: Path) -> None:
 _HOLDER = """
 import sys, time
 from pathlib import Path
+from examples.demonstration import domain
 from examples.demonstration.processes import Nodes, end_in_order
 end_in_order()
 with Nodes() as nodes:

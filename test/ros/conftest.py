@@ -4,9 +4,11 @@ import os
 
 import pytest
 
+from examples.demonstration.domain import free_domain
+
 # Before anything of DDS starts; the domain differs between test processes.
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
-os.environ['ROS_DOMAIN_ID'] = str(1 + os.getpid() % 100)
+os.environ['ROS_DOMAIN_ID'] = str(free_domain())
 
 rclpy = pytest.importorskip('rclpy', reason='ROS 2 is not installed: run `make setup`')
 pytest.importorskip(

@@ -38,7 +38,8 @@ def test_samples_are_listened_to_once_the_worker_is_ready(make, probe):
 
 def test_a_stream_says_for_whom_it_waits(start, probe):
     simulator = start('actuator_sim', wait_for=2)
-    probe.until(lambda: 'waiting for 2 subscribers of samples, 0 are there' in simulator.text)
+    waits = 'waiting for 2 subscribers of samples, 0 are there'
+    probe.until(lambda: simulator.text.count(waits) >= 2, 20, 'said, and said again')
     start('estimator', **QUICK)
     probe.until(lambda: '2 subscribers of samples, 1 is there' in simulator.text, 120)
     assert 'the stream begins' not in simulator.text

@@ -1,0 +1,49 @@
+"""Results as JSON, to a file or to standard output."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from pathlib import Path
+from typing import Any
+
+from actuator_glue.errors import InputError
+
+
+def clean(value: Any) -> Any:
+    """Return a value JSON can hold: numpy numbers as numbers, NaN and infinity as null."""
+    if isinstance(value, dict):
+        return {str(k): clean(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [clean(v) for v in value]
+    if hasattr(value, 'tolist'):
+        return clean(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value
+
+
+def write_json(content: dict[str, Any], out: str | None) -> None:
+    """Write JSON to a file in one step, or to standard output; nothing where `out` is None.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    if out is None:
+        return
+    text = json.dumps(clean(content), indent=2, allow_nan=False) + '\n'
+    if out == '-':
+        sys.stdout.write(text)
+        return
+    path = Path(out)
+    temporary = path.with_name(path.name + '.tmp')
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.exists() and not path.is_file():  # a device or pipe stays what it is
+            path.write_text(text, 'utf-8')
+            return
+        temporary.write_text(text, 'utf-8')
+        temporary.replace(path)
+    except OSError as error:
+        raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error
