@@ -6,6 +6,7 @@ import fcntl
 import os
 import socket
 import tempfile
+from itertools import chain
 from pathlib import Path
 from typing import IO
 
@@ -32,7 +33,7 @@ def free_domain() -> int:
     """
     # Where others begin elsewhere, few look at the same domain.
     begin = os.getpid() % len(DOMAINS)
-    for domain in (*DOMAINS[begin:], *DOMAINS[:begin]):
+    for domain in chain(DOMAINS[begin:], DOMAINS[:begin]):
         if _locked(domain):
             if not _inhabited(domain):
                 return domain
