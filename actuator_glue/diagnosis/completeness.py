@@ -95,7 +95,10 @@ def _certainty(found: Selection, left: float, surrogate: Surrogate) -> float:
     what they leave: a smooth function of the motion that does much better says that the names
     stand for it.
     """
-    explained = 1.0 - min(1.0, left / found.structure) ** 2 if found.structure > 0.0 else 0.0
+    # Not of the structure found at first: under a stationary command most of it passes for noise
+    # until something explains it.
+    gained = max(0.0, found.base.mean_square - found.final.mean_square)
+    explained = gained / (gained + left**2) if gained > 0.0 else 0.0
     theirs = surrogate.structure_error**2 - found.noise**2
     generic = max(0.0, surrogate.error**2 - found.noise**2)
     return explained * (min(1.0, generic / theirs) if theirs > 0.0 else 1.0)
