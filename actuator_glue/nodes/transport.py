@@ -1,7 +1,8 @@
 """How DDS carries messages where the user has not chosen: a killed node is soon replaced.
 
 Fast DDS's shared memory goes on writing into what a killed process left behind, and a node that
-is started in its place hears nothing for 3 to 12 s; over UDP it hears within 2 s (docs/dds.md).
+is started in its place hears nothing for 3 to 12 s; over UDP it hears within half a second as a
+rule (docs/dds.md).
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ RANGE = 'ROS_AUTOMATIC_DISCOVERY_RANGE'
 
 
 def choose(environment: MutableMapping[str, str] = os.environ) -> None:
-    """Choose UDP and quick repeats, before rclpy is initialised.
+    """Choose UDP, quick repeats and announcements, before rclpy is initialised.
 
     Args:
         environment: what rclpy and Fast DDS will read.
