@@ -23,9 +23,9 @@ __path__ = [_realpath(folder) for folder in __path__]
 if TYPE_CHECKING:
     from actuator_glue import effects as effects
     from actuator_glue.api.calibration import calibrate as calibrate
+    from actuator_glue.api.calibration_result import Calibration as Calibration
     from actuator_glue.api.diagnosis import Diagnosis as Diagnosis
     from actuator_glue.api.diagnosis import diagnose as diagnose
-    from actuator_glue.api.posterior import Calibration as Calibration
     from actuator_glue.api.replay_result import Replay as Replay
     from actuator_glue.api.replaying import replay as replay
     from actuator_glue.api.simulation import Command as Command
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
 
 # Public name: the module that holds it, and its name there ('' for the module itself).
 _PUBLIC = {
-    'Calibration': ('api.posterior', 'Calibration'),
+    'Calibration': ('api.calibration_result', 'Calibration'),
     'Command': ('api.simulation', 'Command'),
     'Diagnosis': ('api.diagnosis', 'Diagnosis'),
     'InputError': ('errors', 'InputError'),

@@ -17,7 +17,7 @@ from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.model import commands, linear
 from actuator_glue.online import job as window_job
 from actuator_glue.online.estimator import Estimator
-from actuator_glue.online.replay import at_once, items, replay, stream
+from actuator_glue.online.playback import at_once, items, replay, stream
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Preview, StreamSetup
 from actuator_glue.records import Record

@@ -10,8 +10,14 @@ from typing import Any, Literal
 import numpy as np
 
 from actuator_glue.api import judgement
+from actuator_glue.api.calibration_result import (
+    CalibratedRecord,
+    Calibration,
+    FitError,
+    Marginal,
+    RecordError,
+)
 from actuator_glue.api.compilation import compilation
-from actuator_glue.api.posterior import Calibration, FitError, Marginal, RecordError, Source
 from actuator_glue.diagnosis.preparation import SETTLE, clean, initial_state
 from actuator_glue.errors import InputError
 from actuator_glue.inference.at_bound import pressed
@@ -151,7 +157,7 @@ def calibrate(
         evaluations=chains.evaluations,
         seconds=seconds,
         compile_seconds=sum(compiled),
-        sources=tuple(Source.of(r) for r in cleaned),
+        sources=tuple(CalibratedRecord.of(r) for r in cleaned),
         records=tuple(cleaned),
     )
 

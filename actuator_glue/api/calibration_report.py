@@ -21,7 +21,7 @@ from actuator_glue.report.timeseries import Bands, band_at_zooms, even_zooms
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from actuator_glue.api.posterior import Calibration
+    from actuator_glue.api.calibration_result import Calibration
 
 ENSEMBLE = 200  # draws that are simulated for a band
 LEVEL = 0.95

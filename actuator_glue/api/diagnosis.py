@@ -78,7 +78,7 @@ class Diagnosis(DiagnosisData):
         Raises:
             InputError: the file cannot be written.
         """
-        from actuator_glue.report.diagnosis import write_report
+        from actuator_glue.report.diagnosis_report import write_report
 
         try:
             return write_report(self, Path(path))

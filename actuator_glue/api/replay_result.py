@@ -46,7 +46,7 @@ class ScoredBand:
 
 
 @dataclass(frozen=True, slots=True)
-class Window:
+class WindowEstimate:
     """What was estimated in one window.
 
     Attributes:
@@ -107,7 +107,7 @@ class Replay:
     bag: str
     settings: dict[str, float]
     effects: tuple[str, ...]
-    windows: tuple[Window, ...]
+    windows: tuple[WindowEstimate, ...]
     events: tuple[str, ...]
     identical: bool | None
     compared: Compared | None

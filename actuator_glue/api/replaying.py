@@ -12,17 +12,17 @@ from actuator_glue.api.replay_result import (
     Compared,
     Replay,
     ScoredBand,
-    Window,
     WindowError,
+    WindowEstimate,
     WindowParameter,
 )
 from actuator_glue.errors import InputError
 from actuator_glue.io.bag_reader import Summary, decoded, is_bag, summarise
 from actuator_glue.io.load import load_records
 from actuator_glue.online.job import WindowResult
+from actuator_glue.online.playback import Item, items, stream
+from actuator_glue.online.playback import replay as run
 from actuator_glue.online.published import Comparison, Published, compare, published
-from actuator_glue.online.replay import Item, items, stream
-from actuator_glue.online.replay import replay as run
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Block, Rejected, check_block
 from actuator_glue.records import Record
@@ -44,7 +44,7 @@ class _Run:
     total: int = 0
     live: Published | None = None
     notes: list[str] = field(default_factory=list)
-    windows: list[Window] = field(default_factory=list)
+    windows: list[WindowEstimate] = field(default_factory=list)
     events: list[str] = field(default_factory=list)
     effects: tuple[str, ...] = ()
     data_seconds: float = 0.0
@@ -204,11 +204,11 @@ def _usable_seconds(block: Block) -> float:
         return 0.0  # told by the estimator
 
 
-def _window(r: WindowResult) -> Window:
+def _window(r: WindowResult) -> WindowEstimate:
     assert r.moments is not None and r.rhat is not None and r.ess is not None
     record, m = r.window.record, r.moments
     columns = (m.mean, m.stddev, m.skewness, m.cov, r.rhat, r.ess)
-    return Window(
+    return WindowEstimate(
         window=r.window.number,
         index=record.first_index,
         samples=len(record),

@@ -18,7 +18,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
 
 if TYPE_CHECKING:
-    from actuator_glue.api.posterior import Calibration
+    from actuator_glue.api.calibration_result import Calibration
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -13,7 +13,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.records import Record
 
 if TYPE_CHECKING:
-    from actuator_glue.api.posterior import Calibration
+    from actuator_glue.api.calibration_result import Calibration
     from actuator_glue.report.bag_content import Content
 
 
@@ -50,7 +50,7 @@ def run(args: argparse.Namespace) -> int:
     records = load(args)
     posterior = None
     if args.draws is not None:
-        from actuator_glue.api.posterior import Calibration
+        from actuator_glue.api.calibration_result import Calibration
 
         posterior = Calibration.load(args.draws)
         _draw_posterior(posterior, folder / f'{Path(args.draws).stem}.{args.format}', args)

@@ -80,7 +80,7 @@ def qos_profiles(text: str) -> list[dict[str, Any]]:
 
 
 @dataclass(slots=True)
-class Topic:
+class BagTopic:
     """One topic of a bag."""
 
     name: str
@@ -110,7 +110,7 @@ class Part:
 class Metadata:
     """What metadata.yaml says."""
 
-    topics: list[Topic] = field(default_factory=list)
+    topics: list[BagTopic] = field(default_factory=list)
     parts: list[Part] = field(default_factory=list)
     custom: dict[str, str] = field(default_factory=dict)
     ros_distro: str = 'jazzy'

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, NoReturn
 
 from actuator_glue.errors import InputError
 from actuator_glue.io import bag_metadata
-from actuator_glue.io.bag_metadata import Part, Topic
+from actuator_glue.io.bag_metadata import BagTopic, Part
 from actuator_glue.io.mcap_scan import Scan
 from actuator_glue.io.messages import deserialize, full_name
 
@@ -45,7 +45,7 @@ class Summary:
         damage: one line per damage.
     """
 
-    topics: dict[str, Topic] = field(default_factory=dict)
+    topics: dict[str, BagTopic] = field(default_factory=dict)
     definitions: dict[str, str] = field(default_factory=dict)
     parts: list[Part] = field(default_factory=list)
     finished: bool = True
@@ -148,7 +148,7 @@ def messages(
         for schema, channel, message in scan.messages():
             if summary is not None:
                 if channel.topic not in summary.topics:
-                    summary.topics[channel.topic] = Topic(
+                    summary.topics[channel.topic] = BagTopic(
                         channel.topic,
                         schema.name,
                         channel.metadata.get('topic_type_hash', ''),

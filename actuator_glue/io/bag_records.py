@@ -21,7 +21,7 @@ from actuator_glue.io.bag_reader import (
     summarise,
     warn_caller,
 )
-from actuator_glue.io.bag_samples import SAMPLE_BLOCK, Samples, Setup
+from actuator_glue.io.bag_samples import SAMPLE_BLOCK, BagBlock, BagSetup
 from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.io.messages import header, message
 from actuator_glue.records import Record
@@ -35,8 +35,8 @@ BLOCK = 64  # samples per message where nobody says otherwise
 class _Segment:
     """Blocks that follow each other without a gap, under one set-up."""
 
-    first: Samples
-    setup: Setup | None
+    first: BagBlock
+    setup: BagSetup | None
     command: array[float] = field(default_factory=lambda: array('d'))
     measured: array[float] = field(default_factory=lambda: array('d'))
     force: array[float] = field(default_factory=lambda: array('d'))
@@ -46,14 +46,14 @@ class _Segment:
     def next_index(self) -> int:
         return self.first.index + len(self.command)
 
-    def append(self, block: Samples) -> None:
+    def append(self, block: BagBlock) -> None:
         self.next_stamp = block.stamp_ns + round(len(block.command) * block.period * 1e9)
         self.command.frombytes(block.command.tobytes())
         self.measured.frombytes(block.measured.tobytes())
         if block.force is not None:
             self.force.frombytes(block.force.tobytes())
 
-    def fault_before(self, block: Samples) -> str:
+    def fault_before(self, block: BagBlock) -> str:
         """Return what went wrong between this segment and a block, empty where nothing did."""
         at = f'at sample {block.index}'
         if block.index > self.next_index:
@@ -69,7 +69,7 @@ class _Segment:
             return f'the clock jumps by {jump:.3g} s {at}'
         return ''
 
-    def same_test(self, block: Samples, setup: Setup | None) -> bool:
+    def same_test(self, block: BagBlock, setup: BagSetup | None) -> bool:
         """Whether a block belongs to the same test: it goes on under the same set-up."""
         return (
             block.index == self.next_index
@@ -94,7 +94,7 @@ class _Segment:
         )
 
 
-def _test(setup: Setup | None) -> tuple[object, ...]:
+def _test(setup: BagSetup | None) -> tuple[object, ...]:
     return (setup.stiffness, setup.hold, setup.actuator) if setup else ()
 
 
@@ -165,12 +165,12 @@ def _nothing(path: Path | str) -> str:
     )
 
 
-def _setups(path: Path | str, note: Note, warn: Note) -> list[tuple[int, Setup]]:
+def _setups(path: Path | str, note: Note, warn: Note) -> list[tuple[int, BagSetup]]:
     """Return the usable set-ups with their place among all messages; checks the whole bag.
 
     A set-up that cannot be used is left out, as a live node leaves it out.
     """
-    found: list[tuple[int, Setup]] = []
+    found: list[tuple[int, BagSetup]] = []
     for position, raw in enumerate(messages(path, types=TYPES, note=note), start=1):
         if raw.type == TEST_SETUP:
             try:
@@ -180,7 +180,9 @@ def _setups(path: Path | str, note: Note, warn: Note) -> list[tuple[int, Setup]]
     return found
 
 
-def _setup_of(block: Samples, setups: list[tuple[int, Setup]], position: int) -> Setup | None:
+def _setup_of(
+    block: BagBlock, setups: list[tuple[int, BagSetup]], position: int
+) -> BagSetup | None:
     """Return the set-up that holds for a block.
 
     Set-ups and blocks are topics of their own, so a set-up may be recorded a little after the
@@ -189,7 +191,7 @@ def _setup_of(block: Samples, setups: list[tuple[int, Setup]], position: int) ->
     namespace = block.topic.rpartition('/')[0]
     near = [s for s in setups if s[1].topic.rpartition('/')[0] == namespace] or setups
     tolerance = round(block.period * 5e8)
-    chosen: Setup | None = None
+    chosen: BagSetup | None = None
     for place, setup in near:
         begins = setup.stamp_ns <= block.stamp_ns + tolerance
         if place < position:

@@ -17,7 +17,7 @@ SAMPLE_BLOCK = full_name('SampleBlock')
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Samples:
+class BagBlock:
     """One SampleBlock: SI units, arrays of shape (n,)."""
 
     topic: str
@@ -31,7 +31,7 @@ class Samples:
 
 
 @dataclass(frozen=True, slots=True)
-class Setup:
+class BagSetup:
     """One TestSetup; `stiffness` [N/m] is None where the message says NaN."""
 
     topic: str
@@ -50,7 +50,7 @@ def _content(found: BagMessage, where: str) -> Any:
         ) from error
 
 
-def samples(found: BagMessage, path: Path | str) -> Samples:
+def samples(found: BagMessage, path: Path | str) -> BagBlock:
     """Return a SampleBlock of a bag.
 
     Raises:
@@ -66,7 +66,7 @@ def samples(found: BagMessage, path: Path | str) -> Samples:
         lengths.add(len(content.force))
     if len(lengths) != 1:
         raise InputError(f'{block} has channels of different lengths')
-    return Samples(
+    return BagBlock(
         found.topic,
         content.header.frame_id,
         stamp_ns(content.header),
@@ -78,7 +78,7 @@ def samples(found: BagMessage, path: Path | str) -> Samples:
     )
 
 
-def setup(found: BagMessage, path: Path | str) -> Setup:
+def setup(found: BagMessage, path: Path | str) -> BagSetup:
     """Return a TestSetup of a bag.
 
     Raises:
@@ -90,7 +90,7 @@ def setup(found: BagMessage, path: Path | str) -> Setup:
     if not (np.isfinite(rate) and rate > 0.0):
         raise InputError(f'{where}: rate {rate:g} Hz is not positive')
     check_period(1.0 / rate, where)
-    return Setup(
+    return BagSetup(
         found.topic,
         content.actuator or content.header.frame_id,
         stamp_ns(content.header),

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from actuator_glue.errors import InputError
-from actuator_glue.io.bag_metadata import Metadata, Qos, Topic
+from actuator_glue.io.bag_metadata import BagTopic, Metadata, Qos
 from actuator_glue.io.mcap_file import McapFile, disk_error
 from actuator_glue.io.messages import PACKAGE, message_type, serialize, trimmed
 
@@ -52,7 +52,7 @@ class BagWriter:
         self.metadata = Metadata(custom=dict(custom or {}))
         self._flush_period = flush_period
         self._max_file_bytes = max_file_bytes
-        self._topics: dict[str, Topic] = {}
+        self._topics: dict[str, BagTopic] = {}
         self._definitions: dict[str, str] = {}
         self._last_time = -1
         self._closed = False
@@ -102,7 +102,7 @@ class BagWriter:
                     f'it cannot also be {type_name}'
                 )
             return
-        topic = Topic(name, type_name, rihs01, [q.as_dict() for q in qos])
+        topic = BagTopic(name, type_name, rihs01, [q.as_dict() for q in qos])
         self._file.add_topic(topic, definition)
         self._topics[name] = topic
         self._definitions[type_name] = definition
@@ -137,14 +137,16 @@ class BagWriter:
         declared = self._declared(topic)
         self._write(declared, serialize(declared.type, content), log_time, None)
 
-    def _declared(self, topic: str) -> Topic:
+    def _declared(self, topic: str) -> BagTopic:
         if self._closed:
             raise InputError(f'{self.path}: the bag is closed')
         if topic not in self._topics:
             raise InputError(f'{self.path}: topic {topic} was not declared with add_topic')
         return self._topics[topic]
 
-    def _write(self, topic: Topic, data: bytes, log_time: int, publish_time: int | None) -> None:
+    def _write(
+        self, topic: BagTopic, data: bytes, log_time: int, publish_time: int | None
+    ) -> None:
         log_time = max(int(log_time), self._last_time + 1, 0)
         self._last_time = log_time
         published = log_time if publish_time is None else max(int(publish_time), 0)

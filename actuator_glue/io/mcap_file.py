@@ -14,7 +14,7 @@ import yaml
 from mcap.writer import CompressionType, Writer
 
 from actuator_glue.errors import InputError
-from actuator_glue.io.bag_metadata import Part, Topic
+from actuator_glue.io.bag_metadata import BagTopic, Part
 
 CHUNK_BYTES = 64 * 1024
 
@@ -54,7 +54,7 @@ class McapFile:
             )
             self._writer.start(profile='ros2', library='actuator_glue')
 
-    def add_topic(self, topic: Topic, definition: str) -> None:
+    def add_topic(self, topic: BagTopic, definition: str) -> None:
         """Declare a topic once, with the ros2msg text of its type.
 
         Raises:
@@ -75,7 +75,7 @@ class McapFile:
                 },
             )
 
-    def write(self, topic: Topic, data: bytes, log_time: int, publish_time: int) -> None:
+    def write(self, topic: BagTopic, data: bytes, log_time: int, publish_time: int) -> None:
         """Write one serialized message of a declared topic; times in ns.
 
         Raises:

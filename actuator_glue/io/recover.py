@@ -9,7 +9,7 @@ from pathlib import Path
 
 from actuator_glue.errors import InputError
 from actuator_glue.io import bag_metadata
-from actuator_glue.io.bag_metadata import Metadata, Topic
+from actuator_glue.io.bag_metadata import BagTopic, Metadata
 from actuator_glue.io.bag_reader import Summary, bag_files, messages
 from actuator_glue.io.mcap_file import McapFile, disk_error, in_use
 
@@ -51,7 +51,7 @@ def recover(path: Path | str) -> Recovery:
             raise InputError(f'{file} is being recorded; stop the recorder first')
     recovery = Recovery()
     metadata = Metadata()
-    topics: dict[str, Topic] = {}
+    topics: dict[str, BagTopic] = {}
     for file in bag_files(path, recovery.notes.append):
         _mend(file, path, recovery, metadata, topics)
     metadata.topics = list(topics.values())
@@ -73,7 +73,7 @@ def recover(path: Path | str) -> Recovery:
 
 
 def _mend(
-    file: Path, bag: Path, recovery: Recovery, metadata: Metadata, topics: dict[str, Topic]
+    file: Path, bag: Path, recovery: Recovery, metadata: Metadata, topics: dict[str, BagTopic]
 ) -> None:
     summary = Summary()
     damage: list[str] = []
@@ -83,7 +83,7 @@ def _mend(
     part = summary.parts[0]
     for topic in summary.topics.values():
         known = topics.setdefault(
-            topic.name, Topic(topic.name, topic.type, topic.rihs01, topic.qos)
+            topic.name, BagTopic(topic.name, topic.type, topic.rihs01, topic.qos)
         )
         known.count += topic.count
     if part.count:
@@ -101,7 +101,7 @@ def _rewrite(file: Path, bag: Path, summary: Summary, own: Metadata) -> None:
         temporary.unlink()
     serialized = own.serialized()
     new = McapFile(temporary, bag)
-    topics = {t.name: Topic(t.name, t.type, t.rihs01, t.qos) for t in own.topics}
+    topics = {t.name: BagTopic(t.name, t.type, t.rihs01, t.qos) for t in own.topics}
     for topic in topics.values():
         new.add_topic(topic, summary.definitions[topic.type])
     for found in messages(file, note=lambda _: None):

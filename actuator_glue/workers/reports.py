@@ -11,7 +11,7 @@ from dataclasses import fields, replace
 from typing import Any
 
 from actuator_glue.online.job import WindowResult, report
-from actuator_glue.online.replay import Sampled, told
+from actuator_glue.online.playback import Sampled, told
 from actuator_glue.online.sampling import Job, WindowFit
 from actuator_glue.online.stream import Event
 from actuator_glue.workers.warm import warm_windows

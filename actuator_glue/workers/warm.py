@@ -10,7 +10,7 @@ import numpy as np
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.job import WindowResult, run
-from actuator_glue.online.replay import stream
+from actuator_glue.online.playback import stream
 from actuator_glue.online.sampling import Job
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Block, Preview, StreamSetup

@@ -26,7 +26,7 @@ def _runner(method: Any) -> Any:
     ) -> Array:
         np.random.seed(seed)  # noqa: NPY002 - pints has no other way
 
-        class Posterior(pints.LogPDF):
+        class PintsPosterior(pints.LogPDF):
             def n_parameters(self) -> int:
                 return 4
 
@@ -36,7 +36,7 @@ def _runner(method: Any) -> Any:
         if start is None:
             start = np.random.default_rng(seed).uniform(LOWER, UPPER, (CHAINS, 4))
         controller = pints.MCMCController(
-            Posterior(),
+            PintsPosterior(),
             CHAINS,
             list(start),
             method=method,

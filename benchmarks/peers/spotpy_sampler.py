@@ -21,7 +21,7 @@ def run(
     """DREAM of spotpy; acceptance rule 2 is Metropolis on the log likelihood."""
     np.random.seed(seed)  # noqa: NPY002 - spotpy has no other way
 
-    class Setup:
+    class SpotpySetup:
         def __init__(self) -> None:
             self.params = [spotpy.parameter.Uniform(f'p{j}', LOWER[j], UPPER[j]) for j in range(4)]
 
@@ -41,7 +41,7 @@ def run(
 
     with Path(os.devnull).open('w') as nowhere, contextlib.redirect_stdout(nowhere):
         sampler = spotpy.algorithms.dream(
-            Setup(), dbname='none', dbformat='ram', save_sim=False, random_state=seed
+            SpotpySetup(), dbname='none', dbformat='ram', save_sim=False, random_state=seed
         )
         if start is not None:
             sampler.get_regular_startingpoint = lambda _: start

@@ -14,7 +14,7 @@ from pathlib import Path
 from actuator_glue.arguments import Folder, add_force, claim_outputs, number
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
-from examples.demonstration import run as demonstration
+from examples.demonstration import session as demonstration
 from examples.demonstration import sources
 from examples.demonstration.domain import own_domain
 from examples.demonstration.processes import end_in_order

@@ -13,8 +13,8 @@ from rich.table import Table
 from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.io.bag_reader import decoded
 from actuator_glue.online.job import WindowResult
+from actuator_glue.online.playback import items, replay
 from actuator_glue.online.published import Comparison, compare, published
-from actuator_glue.online.replay import items, replay
 from actuator_glue.report.bag_content import Content
 from actuator_glue.workers.reports import Reports
 
@@ -50,7 +50,7 @@ def replay_bag(bag: Path) -> Comparison:
 
 
 @dataclass(slots=True)
-class Outcome:
+class SessionOutcome:
     """A finished run.
 
     Attributes:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import lfilter
 
+from studies.chen.laboratory import Laboratory
 from studies.chen.library import (
     RATE,
     STIFFNESS,
@@ -21,7 +22,6 @@ from studies.chen.library import (
     linear,
     total_band,
 )
-from studies.chen.posterior import Laboratory
 from studies.chen.published import CHOSEN
 from studies.chen.responses import LEVEL, simulate
 

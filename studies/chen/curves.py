@@ -8,7 +8,7 @@ from studies.chen.library import BASE, NAMES, STIFFNESS, Array, Chains
 from studies.chen.misfit import by_frequency
 from studies.chen.published import CLOSE_UPS, SHOWN
 from studies.chen.responses import CLOSE, GRID, LEVEL, QUANTITIES, UNITS
-from studies.chen.shaping import Shaped, Trace
+from studies.chen.shaping import ConvergenceTrace, Shaped
 from studies.chen.study import Results
 
 CHAIN_ROWS = 2000
@@ -102,7 +102,7 @@ def _shaping(label: str, entry: Shaped) -> dict[str, Curve]:
     return found
 
 
-def _rhat(trace: Trace) -> Curve:
+def _rhat(trace: ConvergenceTrace) -> Curve:
     columns = {n: trace.rhat[:, i] for i, n in enumerate(NAMES)}
     return {'evaluations': trace.evaluations} | columns
 

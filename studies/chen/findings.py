@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.chen.identify import implied
+from studies.chen.laboratory import Posterior
 from studies.chen.library import BASE, EQUATION_3, TABLE_2, Array
 from studies.chen.misfit import removed
-from studies.chen.posterior import Posterior
 from studies.chen.published import CLOSE_UPS, TABLE_3, TABLE_4
 from studies.chen.responses import CLOSE, GRID, LEVEL
 from studies.chen.study import NOISE_FREE, Results

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.stats import norm
 
 from studies.chen.experiment import blocks
+from studies.chen.laboratory import AS_PUBLISHED, Laboratory, Posterior
 from studies.chen.library import Array, ExactErrors, Record, band, coverage, gelman_rubin
-from studies.chen.posterior import AS_PUBLISHED, Laboratory, Posterior
 from studies.chen.published import THRESHOLD
 from studies.chen.responses import LEVEL, simulate
 
@@ -21,7 +21,7 @@ STRICT = 1.05  # rank-normalised R-hat of the runs that carry results
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Trace:
+class ConvergenceTrace:
     """R-hat of one run against its likelihood evaluations.
 
     Attributes:
@@ -33,7 +33,7 @@ class Trace:
     rhat: Array
 
     @classmethod
-    def of(cls, posterior: Posterior, points: int = 60) -> Trace:
+    def of(cls, posterior: Posterior, points: int = 60) -> ConvergenceTrace:
         """Return R-hat at lengths of a run that grow by equal factors."""
         draws = posterior.chains.draws
         lengths = np.unique(np.geomspace(min(20, len(draws)), len(draws), points).astype(int))
@@ -65,9 +65,9 @@ class Shaped:
 
     shaping_factor: float
     published: Posterior
-    published_trace: Trace
+    published_trace: ConvergenceTrace
     ours: Posterior
-    ours_trace: Trace
+    ours_trace: ConvergenceTrace
     held_out: float
     width: float
 
@@ -137,7 +137,15 @@ def study(
         part = laboratory.run((52, i, word), kept, factor, evaluations[0], added_rms=added_rms)
         inside, width = _held_out(part.thinned(draws), records, added_rms)
         found.append(
-            Shaped(factor, published, Trace.of(published), ours, Trace.of(ours), inside, width)
+            Shaped(
+                factor,
+                published,
+                ConvergenceTrace.of(published),
+                ours,
+                ConvergenceTrace.of(ours),
+                inside,
+                width,
+            )
         )
     return found
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from studies.chen.laboratory import Laboratory, Posterior
 from studies.chen.library import Array, ExactErrors, Record
-from studies.chen.posterior import Laboratory, Posterior
 from studies.chen.published import CHOSEN, TABLE_4
 
 MM = 1e-3

@@ -15,8 +15,8 @@ from studies.chen.identify import (
     fit_physical,
     fit_transfer_function,
 )
+from studies.chen.laboratory import Laboratory, Posterior, Progress
 from studies.chen.library import DiagnosisData, ExactErrors, Record, diagnose, reconstructed_tests
-from studies.chen.posterior import Laboratory, Posterior, Progress
 from studies.chen.published import CHOSEN, SHAPING_FACTORS, SHOWN
 
 

@@ -20,7 +20,7 @@ SHOWN = {'m': ('µm', 1e6, 3), 's': ('ms', 1e3, 3), 'rad': ('deg', 180.0 / math.
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class StudyTable:
     """Rows of raw values: text, numbers, answers, None where there is none.
 
     Attributes:

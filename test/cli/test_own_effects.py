@@ -23,7 +23,7 @@ from actuator_glue.model.structure import Structure
 from actuator_glue.online import wire
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.records import Record
-from actuator_glue.report.diagnosis import write_report
+from actuator_glue.report.diagnosis_report import write_report
 from actuator_glue.workers.worker import DONE, Answer, Worker
 
 CUBIC = """\

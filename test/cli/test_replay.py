@@ -13,7 +13,7 @@ from actuator_glue.io.bag_records import read_records, write_record
 from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.online import wire
 from actuator_glue.online.job import WindowResult
-from actuator_glue.online.replay import replay, stream
+from actuator_glue.online.playback import replay, stream
 from actuator_glue.online.settings import EstimatorSettings
 
 SETTINGS = EstimatorSettings(window=4.0, hop=2.0, evaluations=6000, start_evaluations=12_000)

@@ -17,7 +17,7 @@ from actuator_glue.io.messages import header, message
 from examples.demonstration import __main__ as command
 from examples.demonstration import domain
 from examples.demonstration.processes import Nodes, executable
-from examples.demonstration.run import prepare
+from examples.demonstration.session import prepare
 from examples.demonstration.watch import Watch
 
 

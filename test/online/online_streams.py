@@ -4,7 +4,7 @@ import numpy as np
 
 from actuator_glue.model import linear
 from actuator_glue.model.commands import noise
-from actuator_glue.online.replay import stream
+from actuator_glue.online.playback import stream
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Block, StreamSetup
 from actuator_glue.records import Record

@@ -12,8 +12,8 @@ from actuator_glue.inference.choice import choose_model
 from actuator_glue.online import wire
 from actuator_glue.online.estimator import Ahead, Estimator, Schedule
 from actuator_glue.online.job import WindowResult, run
+from actuator_glue.online.playback import replay, stream
 from actuator_glue.online.published import differences
-from actuator_glue.online.replay import replay, stream
 from actuator_glue.online.stream import Block, Dropped, Failed, Preview, StreamSetup
 
 

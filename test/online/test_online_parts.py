@@ -15,7 +15,7 @@ from actuator_glue.online.alarm import CoverageAlarm
 from actuator_glue.online.collect import PIECE, Collector
 from actuator_glue.online.forecast import sensor_noise
 from actuator_glue.online.mixture import mixture_band
-from actuator_glue.online.replay import stream
+from actuator_glue.online.playback import stream
 from actuator_glue.online.response import response_band
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import StreamSetup

@@ -19,7 +19,7 @@ from actuator_glue.diagnosis.result import (
     Trace,
 )
 from actuator_glue.report import diagnosis_figures as figures
-from actuator_glue.report.diagnosis import write_report
+from actuator_glue.report.diagnosis_report import write_report
 
 RATE = 100.0
 FOLDER = '/laboratory/2026/campaign'

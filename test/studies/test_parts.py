@@ -12,7 +12,7 @@ from actuator_glue.model.exact import ExactErrors
 from actuator_glue.model.parameters import TABLE_2
 from studies.chen import misfit, shaping, spread
 from studies.chen.calibration import simulated_case
-from studies.chen.posterior import AddedResidual, Laboratory
+from studies.chen.laboratory import AddedResidual, Laboratory
 from studies.chen.published import CHOSEN, TABLE_4
 from studies.chen.words import listed, num, percent, power_of_two
 
@@ -95,9 +95,9 @@ def test_shaping_factor_is_scored_on_samples_that_hold_the_residual(rng_seed: in
 
 def test_trace_says_when_r_hat_stays_below() -> None:
     rhat = np.array([[3.0, 1.1], [1.1, 1.1], [1.3, 1.0], [1.1, 1.1], [1.0, 1.0]])
-    trace = shaping.Trace(np.arange(5) * 100.0, rhat)
+    trace = shaping.ConvergenceTrace(np.arange(5) * 100.0, rhat)
     assert trace.converged_at() == 300.0
-    assert shaping.Trace(trace.evaluations, rhat + 1).converged_at() == np.inf
+    assert shaping.ConvergenceTrace(trace.evaluations, rhat + 1).converged_at() == np.inf
 
 
 def test_gain_with_the_specimen_removes_the_papers_residual() -> None:

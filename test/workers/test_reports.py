@@ -9,7 +9,7 @@ import pytest
 
 from actuator_glue.model import commands, linear
 from actuator_glue.online.job import WindowResult
-from actuator_glue.online.replay import replay, stream
+from actuator_glue.online.playback import replay, stream
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.records import Record
 from actuator_glue.workers.reports import Reports

@@ -17,7 +17,7 @@ from actuator_glue.records import Array
 
 
 @dataclass(frozen=True, slots=True)
-class Table:
+class FileTable:
     """What a file holds.
 
     Attributes:
@@ -42,7 +42,7 @@ class Format:
     """
 
     suffix: str
-    read: Callable[[Path, ChannelMap | None], Table]
+    read: Callable[[Path, ChannelMap | None], FileTable]
     write: Callable[[Path, Mapping[str, Array], Mapping[str, str | float]], None]
 
 

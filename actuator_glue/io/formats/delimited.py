@@ -13,7 +13,7 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
-from actuator_glue.io.formats import Format, Table
+from actuator_glue.io.formats import FileTable, Format
 from actuator_glue.io.signature import text_encoding
 from actuator_glue.io.units import EXAMPLE, recognise
 from actuator_glue.records import Array
@@ -24,7 +24,7 @@ _DELIMITERS = (';', '\t', ',')
 
 
 @dataclass(frozen=True, slots=True)
-class Head:
+class TextHead:
     """What the lines before the samples say.
 
     Attributes:
@@ -44,7 +44,9 @@ class Head:
     encoding: str = 'utf-8-sig'
 
 
-def read_head(path: Path, header_lines: int | None = None, delimiter: str | None = None) -> Head:
+def read_head(
+    path: Path, header_lines: int | None = None, delimiter: str | None = None
+) -> TextHead:
     """Return the head of a file.
 
     Args:
@@ -82,7 +84,7 @@ def read_head(path: Path, header_lines: int | None = None, delimiter: str | None
     # With both signs in a line the comma can only part thousands, which nobody can read safely.
     comma = any(',' in field for field in _fields(sample, delimiter))
     decimal = ',' if comma and '.' not in sample else '.'
-    return Head(_fields(line, delimiter), header_lines, delimiter, notes, decimal, encoding)
+    return TextHead(_fields(line, delimiter), header_lines, delimiter, notes, decimal, encoding)
 
 
 def _fields(line: str, delimiter: str | None) -> list[str]:
@@ -98,7 +100,7 @@ def _fields(line: str, delimiter: str | None) -> list[str]:
 
 
 def read_columns(
-    path: Path, head: Head, positions: list[int], decimal: str | None = None
+    path: Path, head: TextHead, positions: list[int], decimal: str | None = None
 ) -> Array:
     """Return columns of numbers, shape (n, number of columns).
 
@@ -146,7 +148,7 @@ def read_columns(
     return columns
 
 
-def _read(path: Path, channels: ChannelMap | None) -> Table:
+def _read(path: Path, channels: ChannelMap | None) -> FileTable:
     if channels is None:
         head, decimal = read_head(path), None
         if not any(recognise(name) for name in head.names) and _numeric(head.names):
@@ -157,7 +159,9 @@ def _read(path: Path, channels: ChannelMap | None) -> Table:
     else:
         head = read_head(path, channels.header_lines, channels.delimiter)
         decimal = channels.decimal
-    return Table(head.names, head.notes, lambda at: list(read_columns(path, head, at, decimal).T))
+    return FileTable(
+        head.names, head.notes, lambda at: list(read_columns(path, head, at, decimal).T)
+    )
 
 
 def _numeric(names: list[str]) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
-from actuator_glue.io.formats import Format, Table
+from actuator_glue.io.formats import FileTable, Format
 from actuator_glue.io.signature import refuse_foreign
 from actuator_glue.records import Array
 
@@ -61,7 +61,7 @@ def _collect(name: str, value: Any, vectors: dict[str, Array], texts: dict[str, 
         vectors[name] = np.atleast_1d(array).astype(np.float64)
 
 
-def _read(path: Path, channels: ChannelMap | None) -> Table:
+def _read(path: Path, channels: ChannelMap | None) -> FileTable:
     vectors, texts = read_variables(path)
     names = list(vectors)
     # `test.command_mm` is command_mm of the struct `test`; a map names it in full.
@@ -70,7 +70,7 @@ def _read(path: Path, channels: ChannelMap | None) -> Table:
     for name, vector in vectors.items():
         if _last(name) == 'stiffness_N_per_m' and len(vector) == 1:
             notes['stiffness_N_per_m'] = repr(float(vector[0]))
-    return Table(shown, notes, lambda places: [vectors[names[at]] for at in places])
+    return FileTable(shown, notes, lambda places: [vectors[names[at]] for at in places])
 
 
 def _last(name: str) -> str:

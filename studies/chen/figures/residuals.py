@@ -6,7 +6,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from actuator_glue.report import style
-from actuator_glue.report.posterior import posterior_figure
+from actuator_glue.report.posterior_figure import posterior_figure
 from studies.chen import misfit
 from studies.chen.experiment import stiffness_name
 from studies.chen.figures.look import REFERENCE, legend_below

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from functools import partial
 
 from studies.chen.study import Results
-from studies.chen.table import Table
+from studies.chen.table import StudyTable
 from studies.chen.tables import deterministic, predictions, statistics
 
-TABLES: dict[str, Callable[[Results], Table]] = {
+TABLES: dict[str, Callable[[Results], StudyTable]] = {
     'readings': deterministic.readings,
     'transfer_functions': deterministic.transfer_functions,
     'joint_fit': deterministic.joint_fit,

@@ -8,13 +8,13 @@ from studies.chen.experiment import stiffness_name
 from studies.chen.identify import implied
 from studies.chen.library import EQUATION_3, NAMES, TABLE_2
 from studies.chen.study import NOISY, Results
-from studies.chen.table import Table
+from studies.chen.table import StudyTable
 from studies.chen.words import named_parameters
 
 TESTS = (0, 1)
 
 
-def readings(results: Results) -> Table:
+def readings(results: Results) -> StudyTable:
     """Return amplitude and phase read off the sweeps."""
     keys = (
         'test', 'f [Hz]', 'amplitude ratio', 'expected', 'decay [1]', 'phase [rad]',
@@ -28,10 +28,10 @@ def readings(results: Results) -> Table:
         for test in TESTS
         for r in results.readings[test]
     ]  # fmt: skip
-    return Table(keys, rows)
+    return StudyTable(keys, rows)
 
 
-def transfer_functions(results: Results) -> Table:
+def transfer_functions(results: Results) -> StudyTable:
     """Return Eqs. (3a) and (3b) beside what was fitted, without and with noise."""
     keys = (
         'test', 'coefficient', 'published', 'ours', 'off [1]', '95 % from', 'to', 'inside',
@@ -49,18 +49,18 @@ def transfer_functions(results: Results) -> Table:
                 limits = (low[i], high[i], inside[i]) if kind == NOISY else (None, None, None)
                 values = (published[i], ours[i], ours[i] / published[i] - 1.0, *limits)
                 rows.append((f'{stiffness_name(test)}, {kind}', name, *values))
-    return Table(keys, rows)
+    return StudyTable(keys, rows)
 
 
-def joint_fit(results: Results) -> Table:
+def joint_fit(results: Results) -> StudyTable:
     """Return Table 2 beside the joint fit of Eq. (2)."""
     fit = results.physical
     keys = ('parameter', 'Table 2', 'joint fit', 'standard error', 'at its bound', 'off [1]')
     columns = (TABLE_2, fit.theta, fit.stddev, fit.at_bound, fit.theta / TABLE_2 - 1.0)
-    return Table(keys, list(zip(named_parameters(), *columns, strict=True)))
+    return StudyTable(keys, list(zip(named_parameters(), *columns, strict=True)))
 
 
-def coefficients(results: Results) -> Table:
+def coefficients(results: Results) -> StudyTable:
     """Return the identified coefficients of Eq. (2b) beside what parameters give for them."""
     keys = (
         'coefficient', 'identified', 'from Table 2', 'off with Table 2 [1]',
@@ -70,20 +70,20 @@ def coefficients(results: Results) -> Table:
     table_2, fitted = implied(TABLE_2), implied(results.physical.theta)
     off = table_2 / EQUATION_3 - 1.0, fitted / EQUATION_3 - 1.0
     columns = (EQUATION_3, table_2, off[0], fitted, off[1])
-    return Table(keys, list(zip(names, *(c.ravel() for c in columns), strict=True)))
+    return StudyTable(keys, list(zip(names, *(c.ravel() for c in columns), strict=True)))
 
 
-def rms(results: Results) -> Table:
+def rms(results: Results) -> StudyTable:
     """Return the simulation errors of Table 2 and of the fits."""
     rows = [('Table 2', *results.physical.table_2_rms), ('joint fit', *results.physical.rms)]
     rows += [
         (f'Eqs. (3a), (3b) fitted, {kind}', *(f.rms for f in fits))
         for kind, fits in results.identified.items()
     ]
-    return Table(('model', *(f'{stiffness_name(t)} [m]' for t in TESTS)), rows)
+    return StudyTable(('model', *(f'{stiffness_name(t)} [m]' for t in TESTS)), rows)
 
 
-def refits(results: Results) -> Table:
+def refits(results: Results) -> StudyTable:
     """Return structures refitted with and without a static gain."""
     keys = (
         'structure', 'gain', 'fitted, k = 0 [m]', 'fitted, spring [m]', 'held out, k = 0 [m]',
@@ -98,10 +98,10 @@ def refits(results: Results) -> Table:
         )
         for r in results.refits.values()
     ]
-    return Table(keys, rows)
+    return StudyTable(keys, rows)
 
 
-def diagnoses(results: Results) -> Table:
+def diagnoses(results: Results) -> StudyTable:
     """Return what the diagnosis says of the records."""
     rows = []
     for name, d in results.diagnoses.items():
@@ -122,4 +122,4 @@ def diagnoses(results: Results) -> Table:
             )
         )
     keys = ('records', 'verdict', 'effects (95 %)', 'before [m]', 'after [m]', 'noise [m]')
-    return Table(keys, rows)
+    return StudyTable(keys, rows)

@@ -8,11 +8,11 @@ from studies.chen.experiment import stiffness_name
 from studies.chen.published import CLOSE_UPS
 from studies.chen.responses import CLOSE, QUANTITIES, UNITS, quantity
 from studies.chen.study import Results
-from studies.chen.table import Table
+from studies.chen.table import StudyTable
 from studies.chen.words import BANDS
 
 
-def frequency_coverage(results: Results) -> Table:
+def frequency_coverage(results: Results) -> StudyTable:
     """Return how much of the experimental response the bands cover."""
     keys = [f'{q} in {b} [1]' for q in QUANTITIES for b in ('95 %', 'all draws')]
     rows = []
@@ -24,20 +24,22 @@ def frequency_coverage(results: Results) -> Table:
                 for inside in (band[q].inside, band[q].inside_all)
             ]
             rows.append((f'{stiffness_name(test)}, {BANDS[kind]}', *shares))
-    return Table(('test, band', *keys), rows)
+    return StudyTable(('test, band', *keys), rows)
 
 
-def displacement_coverage(results: Results) -> Table:
+def displacement_coverage(results: Results) -> StudyTable:
     """Return how many measured samples the bands cover near 1, 5 and 10 Hz."""
     rows = [
         (f'{stiffness_name(test)}, {BANDS[kind]}', *band.near, band.scores[0].coverage)
         for kind, bands in results.time.items()
         for test, band in enumerate(bands)
     ]
-    return Table(('test, band', *(f'{f:g} ± 0.5 Hz [1]' for f in CLOSE_UPS), 'whole [1]'), rows)
+    return StudyTable(
+        ('test, band', *(f'{f:g} ± 0.5 Hz [1]' for f in CLOSE_UPS), 'whole [1]'), rows
+    )
 
 
-def histograms(results: Results) -> Table:
+def histograms(results: Results) -> StudyTable:
     """Return the distributions of amplitude and phase at 1, 5 and 10 Hz, matched residual."""
     keys = (
         'quantity', 'all draws, from', 'all draws, to', '95 %, from', '95 %, to', 'experiment',
@@ -57,10 +59,10 @@ def histograms(results: Results) -> Table:
                         float(np.mean(draws[:, at] <= lines[0][at])),
                     )
                 )
-    return Table(keys, rows)
+    return StudyTable(keys, rows)
 
 
-def scores(results: Results) -> Table:
+def scores(results: Results) -> StudyTable:
     """Return the scores of every displacement band by frequency."""
     keys = (
         'test, band', 'from [Hz]', 'to [Hz]', 'samples', 'coverage (PICP) [1]', 'mean width [m]',
@@ -75,10 +77,10 @@ def scores(results: Results) -> Table:
         for test, band in enumerate(bands)
         for s in band.scores
     ]  # fmt: skip
-    return Table(keys, rows)
+    return StudyTable(keys, rows)
 
 
-def simulated_coverage(results: Results) -> Table:
+def simulated_coverage(results: Results) -> StudyTable:
     """Return the coverage of both bands on each simulated test."""
     rows = [(c.glue, c.total, c.phi, c.noise) for c in results.covered]
-    return Table(('GLUE band [1]', 'total band [1]', 'phi', 'noise [m]'), rows)
+    return StudyTable(('GLUE band [1]', 'total band [1]', 'phi', 'noise [m]'), rows)

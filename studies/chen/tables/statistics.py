@@ -5,20 +5,20 @@ from __future__ import annotations
 from studies.chen.library import BASE, NAMES, TABLE_2
 from studies.chen.published import CHANGE, TABLE_3, TABLE_4
 from studies.chen.study import Results
-from studies.chen.table import Table
+from studies.chen.table import StudyTable
 from studies.chen.words import KINDS, SYMBOLS, named_parameters, shaping_factor
 
 
-def priors(results: Results) -> Table:
+def priors(results: Results) -> StudyTable:
     """Return Table 3 beside the bounds used."""
     rows = [
         (name, *published, p.lower, p.upper)
         for name, published, p in zip(named_parameters(), TABLE_3, BASE, strict=True)
     ]
-    return Table(('parameter', 'lower', 'upper', 'lower, used', 'upper, used'), rows)
+    return StudyTable(('parameter', 'lower', 'upper', 'lower, used', 'upper, used'), rows)
 
 
-def shaping_factors(results: Results, kind: str) -> Table:
+def shaping_factors(results: Results, kind: str) -> StudyTable:
     """Return what each shaping factor leads to with one kind of residual."""
     keys = (
         'G', 'R-hat < 1.2 after, from the prior', 'ours', 'R-hat, ours',
@@ -33,19 +33,19 @@ def shaping_factors(results: Results, kind: str) -> Table:
         )
         for s in results.shaped[kind]
     ]  # fmt: skip
-    return Table(keys, rows)
+    return StudyTable(keys, rows)
 
 
-def choices(results: Results) -> Table:
+def choices(results: Results) -> StudyTable:
     """Return the shaping factors chosen automatically."""
     rows = [
         (KINDS[kind], shaping_factor(c.shaping_factor), c.held_out, c.usable, c.covers)
         for kind, c in results.choices.items()
     ]
-    return Table(('residual', 'chosen', 'held-out inside [1]', 'candidates', 'covers'), rows)
+    return StudyTable(('residual', 'chosen', 'held-out inside [1]', 'candidates', 'covers'), rows)
 
 
-def table_4(results: Results) -> Table:
+def table_4(results: Results) -> StudyTable:
     """Return Table 4 of the paper and of both posteriors."""
     keys = (
         'parameter', 'posterior', 'mean', 'standard deviation', 'skewness', 'COV',
@@ -59,10 +59,10 @@ def table_4(results: Results) -> Table:
             m = p.moments
             off = m.cov[i] / TABLE_4['cov'][i] - 1.0, m.mean[i] / TABLE_2[i] - 1.0
             rows.append((name, KINDS[kind], m.mean[i], m.stddev[i], m.skewness[i], m.cov[i], *off))
-    return Table(keys, rows)
+    return StudyTable(keys, rows)
 
 
-def shapes(results: Results) -> Table:
+def shapes(results: Results) -> StudyTable:
     """Return posteriors with residuals of several shapes against Table 4."""
     keys = [f'off in {m} {s} [1]' for m in ('mean', 'COV') for s in SYMBOLS]
     matched = results.table_4.matched
@@ -74,20 +74,20 @@ def shapes(results: Results) -> Table:
         )
         for name, p in named.items()
     ]  # fmt: skip
-    return Table(('residual', 'rms at best fit [m]', *keys), rows)
+    return StudyTable(('residual', 'rms at best fit [m]', *keys), rows)
 
 
-def matches(results: Results) -> Table:
+def matches(results: Results) -> StudyTable:
     """Return the residual at which each moment of the first three is nearest to Table 4."""
     found = results.table_4
     rows = [
         ('COV', found.matched.best_rms), ('mean', found.mean_rms),
         ('skewness', found.skewness_rms),
     ]  # fmt: skip
-    return Table(('moment', 'residual rms [m]'), rows)
+    return StudyTable(('moment', 'residual rms [m]'), rows)
 
 
-def posteriors(results: Results) -> Table:
+def posteriors(results: Results) -> StudyTable:
     """Return moments and convergence of every posterior sampled."""
     runs = {f'G_6, {KINDS[kind]}': p for kind, p in results.posteriors.items()}
     runs |= {'equivalent shaping factor': results.table_4.literal} | results.shapes
@@ -106,4 +106,4 @@ def posteriors(results: Results) -> Table:
             (name, parameter, p.shaping_factor, p.best_rms, p.added_rms, chains.evaluations, *of)
             for parameter, *of in zip(NAMES, *columns, strict=True)
         ]
-    return Table(keys, rows)
+    return StudyTable(keys, rows)

@@ -80,7 +80,7 @@ class FitError:
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class CalibratedRecord:
     """A record that was calibrated with."""
 
     source: str
@@ -90,7 +90,7 @@ class Source:
     hold: str
 
     @classmethod
-    def of(cls, record: Record) -> Source:
+    def of(cls, record: Record) -> CalibratedRecord:
         """Describe a record."""
         return cls(record.source, len(record), record.rate, record.stiffness, record.hold)
 
@@ -140,7 +140,7 @@ class Calibration:
     evaluations: int
     seconds: float
     compile_seconds: float
-    sources: tuple[Source, ...]
+    sources: tuple[CalibratedRecord, ...]
     records: tuple[Record, ...] = ()
 
     @property
@@ -224,7 +224,7 @@ class Calibration:
 
     def plot(self) -> Figure:
         """Return a figure of every parameter's distribution and every pair of them."""
-        from actuator_glue.report.posterior import posterior_figure
+        from actuator_glue.report.posterior_figure import posterior_figure
 
         units = [p.unit for p in self.parameters.values()]
         return posterior_figure(self.posterior, self.names, units)

@@ -14,7 +14,7 @@ from actuator_glue.diagnosis.diagnose import diagnose as diagnose_records
 from actuator_glue.errors import InputError
 from actuator_glue.report import bag_content, estimate_figures
 from examples.demonstration import pictures
-from examples.demonstration.outcome import Outcome, replay_bag
+from examples.demonstration.outcome import SessionOutcome, replay_bag
 from examples.demonstration.processes import Node, Nodes
 from examples.demonstration.progress import Display
 from examples.demonstration.sources import Source
@@ -124,7 +124,7 @@ def _wait_until_drained(nodes: Nodes, watch: Watch) -> None:
 
 def finish(
     source: Source, folder: Path, display: Display, seed: int, *, diagnose: bool
-) -> Outcome:
+) -> SessionOutcome:
     """Read the bag, replay it, draw the pictures, diagnose what was recorded.
 
     Args:
@@ -148,13 +148,13 @@ def finish(
     display.advance(stage, 2)
     pictures.live(content, folder / 'live.png')
     display.advance(stage, 3)
-    outcome = Outcome(source.title, _sent(source, folder), content, comparison)
+    outcome = SessionOutcome(source.title, _sent(source, folder), content, comparison)
     if diagnose:
         _diagnose(outcome, folder, display, seed)
     return outcome
 
 
-def _diagnose(outcome: Outcome, folder: Path, display: Display, seed: int) -> None:
+def _diagnose(outcome: SessionOutcome, folder: Path, display: Display, seed: int) -> None:
     stage = display.stage('diagnosing', total=STAGES)
     seen: list[str] = []
 

@@ -1,4 +1,4 @@
-"""Blind benchmark of the diagnosis: `python benchmarks/blind/run.py --cases 60 --jobs 1`.
+"""Blind benchmark of the diagnosis: `python benchmarks/blind/campaign.py --cases 60 --jobs 1`.
 
 Every case is built from its seed, diagnosed without its truth, cached in the output folder and
 scored at the end; an interrupted run goes on where it stopped. Seeds 0-999 are for calibration,

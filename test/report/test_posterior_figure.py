@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from actuator_glue.errors import InputError
-from actuator_glue.report.posterior import posterior_figure
+from actuator_glue.report.posterior_figure import posterior_figure
 
 NAMES = ('beta_1', 'alpha_1_beta_0', 'alpha_2', 'alpha_3')
 UNITS = ('1/s', 'N/(m s^2)', 'N/m', '1/s')
