@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuator_glue.model.structure import Structure
-from actuator_glue.report.timeseries import Course, parameters_against_time
+from actuator_glue.report.timeseries import ParameterCourse, parameters_against_time
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -26,5 +26,7 @@ def parameters_figure(found: Replay) -> Figure:
     mean = np.array([[w.parameters[n].mean for n in names] for w in windows])
     spread = 2.0 * np.array([[w.parameters[n].stddev for n in names] for w in windows])
     time_s = np.array([w.end_s for w in windows])
-    course = Course(time_s, mean, mean - spread, mean + spread, 'mean and two standard deviations')
+    course = ParameterCourse(
+        time_s, mean, mean - spread, mean + spread, 'mean and two standard deviations'
+    )
     return parameters_against_time(course, [known[n] for n in names])

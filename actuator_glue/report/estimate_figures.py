@@ -16,7 +16,7 @@ from actuator_glue.report import style
 from actuator_glue.report.bag_content import Content
 from actuator_glue.report.timeseries import (
     Bands,
-    Course,
+    ParameterCourse,
     band_at_zooms,
     even_zooms,
     frequency_zooms,
@@ -77,7 +77,7 @@ def parameters(content: Content, path: Path, truth: Array | None = None) -> Path
     # No parameter of Eq. (2) is negative.
     least = [0.0 if name in NAMES else -np.inf for name in last.parameter_names]
     figure = parameters_against_time(
-        Course(
+        ParameterCourse(
             np.array(end),
             mean,
             np.maximum(mean - 2 * spread, least),

@@ -169,7 +169,7 @@ def band_at_zooms(
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Course:
+class ParameterCourse:
     """Posterior means and intervals of p parameters at w times, SI units.
 
     Attributes:
@@ -202,7 +202,7 @@ class Course:
 
 @style.styled
 def parameters_against_time(
-    course: Course,
+    course: ParameterCourse,
     parameters: Sequence[Parameter],
     *,
     truth: Array | None = None,

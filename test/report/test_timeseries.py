@@ -14,7 +14,7 @@ from actuator_glue.records import Record
 from actuator_glue.report import style
 from actuator_glue.report.timeseries import (
     Bands,
-    Course,
+    ParameterCourse,
     band_at_zooms,
     even_zooms,
     frequency_zooms,
@@ -66,11 +66,11 @@ def test_a_record_that_hardly_moves_draws() -> None:
 def test_parameters_against_time(overlapping_texts) -> None:
     time = np.arange(5.0)
     mean = np.tile(TABLE_2, (5, 1))
-    course = Course(time, mean, 0.9 * mean, 1.1 * mean)
+    course = ParameterCourse(time, mean, 0.9 * mean, 1.1 * mean)
     figure = parameters_against_time(course, BASE, truth=TABLE_2)
     assert len([a for a in figure.axes if a.get_visible()]) == 4
     assert not overlapping_texts(figure)
-    one = Course(time, mean[:, :1], mean[:, :1], mean[:, :1])
+    one = ParameterCourse(time, mean[:, :1], mean[:, :1], mean[:, :1])
     assert len(parameters_against_time(one, BASE[:1]).axes) == 1
 
 
@@ -79,7 +79,7 @@ def test_shapes_that_do_not_agree_are_refused(sweep, limits) -> None:
         band_at_zooms(sweep, Bands(limits.slice(0, 7)), even_zooms(sweep))
     with pytest.raises(InputError, match='shapes'):
         wrong = np.zeros((2, 4))
-        parameters_against_time(Course(np.arange(3.0), wrong, wrong, wrong), BASE)
+        parameters_against_time(ParameterCourse(np.arange(3.0), wrong, wrong, wrong), BASE)
     with pytest.raises(InputError, match=r'not 0\.5'):
         band_at_zooms(sweep, Bands(limits, level=0.5), even_zooms(sweep))
 
