@@ -6,6 +6,7 @@ Equations, and each departure from the paper with its reason: docs/dream.md.
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -36,7 +37,7 @@ _PATIENCE, _MOST = 200, 2000
 # Shares of the steps after which a run may have drawn enough.
 _LOOKS = tuple(k / 16.0 for k in range(5, 16))
 
-__all__ = ['Chains', 'Info', 'SamplerSettings', 'State', 'init', 'sample', 'step']
+__all__ = ['Chains', 'Info', 'SamplerSettings', 'State', 'Watch', 'init', 'sample', 'step']
 
 
 def init(
@@ -188,6 +189,22 @@ def _burn_in(settings: SamplerSettings, steps: int) -> int:
     return min(max(settings.adaptation, int(settings.burn_in * steps)), steps)
 
 
+class Watch(NamedTuple):
+    """What is asked whether a run goes on, and told how far it has come.
+
+    Attributes:
+        stop: asked after every step, or about every 200 evaluations where the likelihood has a
+            compiled form, always at the same ones; True ends the run.
+        enough: asked at every sixteenth of the run from the fifth on whether its draws will do;
+            True ends it.
+        progress: called now and then with (evaluations made, evaluations at most).
+    """
+
+    stop: Callable[[State], bool] | None = None
+    enough: Callable[[Chains], bool] | None = None
+    progress: Callable[[int, int], None] | None = None
+
+
 def sample(
     rng: np.random.Generator,
     log_density: LogDensity,
@@ -197,14 +214,12 @@ def sample(
     evaluations: int,
     settings: SamplerSettings | None = None,
     archive: ArrayLike | None = None,
-    stop: Callable[[State], bool] | None = None,
-    enough: Callable[[Chains], bool] | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    watch: Watch | None = None,
 ) -> Chains:
     """Draw from the posterior of a uniform prior and a log likelihood.
 
     The draws do not depend on `evaluations` except for their number: a shorter run is the
-    beginning of a longer one, so a run that `stop` ended is repeated by asking for as many
+    beginning of a longer one, so a run that `watch.stop` ended is repeated by asking for as many
     evaluations as it made.
 
     Args:
@@ -216,17 +231,14 @@ def sample(
         evaluations: likelihood evaluations at most, the search for the start included.
         settings: see `SamplerSettings`.
         archive: points (m, p) of an earlier run (`Chains.archive`) for a warm start.
-        stop: asked after every step, or about every 200 evaluations where the likelihood
-            has a compiled form, always at the same ones; True ends the run.
-        enough: asked at every sixteenth of the run from the fifth on whether its draws will do;
-            True ends it.
-        progress: called now and then with (evaluations made, evaluations at most).
+        watch: what is asked whether to go on, and told how far the run has come.
 
     Raises:
         InputError: bounds, archive, settings or log density cannot be used, or `evaluations` does
             not even suffice for the start.
     """
     settings = settings or SamplerSettings()
+    stop, enough, progress = watch or Watch()
     # Whatever the start costs, some steps remain to be seen.
     limit = evaluations - 4 * settings.chains
     state = init(rng, log_density, lower, upper, settings, archive, limit)

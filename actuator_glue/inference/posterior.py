@@ -151,9 +151,7 @@ def sample(
         evaluations=evaluations,
         settings=settings,
         archive=archive,
-        stop=stop,
-        enough=enough,
-        progress=progress,
+        watch=dream.Watch(stop, enough, progress),
     )
     if len(chains.kept) < _FEWEST:
         raise InputError(

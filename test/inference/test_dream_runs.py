@@ -15,7 +15,7 @@ from scipy import stats
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference.adaptation import rescue
-from actuator_glue.inference.dream import Chains, SamplerSettings, init, sample, step
+from actuator_glue.inference.dream import Chains, SamplerSettings, Watch, init, sample, step
 from actuator_glue.inference.moves import SNOOKER
 from actuator_glue.inference.posterior import Target
 from actuator_glue.inference.posterior import sample as sample_posterior
@@ -198,10 +198,16 @@ def test_stop_and_progress() -> None:
 
     def run(evaluations: int, stop_at: int) -> Chains:
         return sample(
-            np.random.default_rng(1), target.log_density, target.lower, target.upper,
-            evaluations=evaluations, stop=lambda state: state.evaluations >= stop_at,
-            progress=lambda done, most: seen.append((done, most)),
-        )  # fmt: skip
+            np.random.default_rng(1),
+            target.log_density,
+            target.lower,
+            target.upper,
+            evaluations=evaluations,
+            watch=Watch(
+                stop=lambda state: state.evaluations >= stop_at,
+                progress=lambda done, most: seen.append((done, most)),
+            ),
+        )
 
     stopped = run(20_000, 12_000)
     assert 12_000 <= stopped.evaluations < 12_000 + SamplerSettings().chains
@@ -218,9 +224,13 @@ def test_a_run_ends_where_its_draws_will_do_and_is_the_beginning_of_the_whole_on
 
     def run(answer: Callable[[Chains], bool] | None, evaluations: int = 20_000) -> Chains:
         return sample(
-            np.random.default_rng(1), target.log_density, target.lower, target.upper,
-            evaluations=evaluations, enough=answer,
-        )  # fmt: skip
+            np.random.default_rng(1),
+            target.log_density,
+            target.lower,
+            target.upper,
+            evaluations=evaluations,
+            watch=Watch(enough=answer),
+        )
 
     def asks(chains: Chains) -> bool:
         asked.append(len(chains.draws))

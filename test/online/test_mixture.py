@@ -6,7 +6,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 from scipy.special import ndtr, ndtri
 
-from actuator_glue.online import mixture
+from actuator_glue.online import mixture, series
 from actuator_glue.online.mixture import mixture_band
 
 LEVELS = np.array([0.5, 0.95])
@@ -82,16 +82,16 @@ def test_usual_windows_are_done_by_the_series_and_its_bound_holds():
 def test_the_bound_of_the_terms_left_out_is_one(offset, excess):
     """Worst components: as far off and as wide as the bound is told, in one direction."""
     wanted = 1e-5
-    terms = mixture._terms(offset, excess, wanted)
+    terms = series.terms_needed(offset, excess, wanted)
     assert terms > 0
-    a = np.zeros(mixture._SIZE)
+    a = np.zeros(series.SIZE)
     variance, spare = np.array([1.0 - excess]), np.empty((2, 1))
-    mixture._coefficients(np.array([offset]), variance, 1.0, terms, spare, a)
+    series.coefficients(np.array([offset]), variance, 1.0, terms, spare, a)
     a[0], a[1], a[2] = 1.0, offset, 0.5 * (offset**2 - excess)
     u = np.linspace(-4, 4, 81)
-    he = np.empty((len(u), mixture._MOST + 2))
+    he = np.empty((len(u), series.MOST + 2))
     for row, at in zip(he, u, strict=True):
-        mixture._hermite(at, row)
+        series.hermite(at, row)
     phi = np.exp(-0.5 * u**2) / np.sqrt(2 * np.pi)
     series = ndtr(u) - phi * (he[:, :terms] @ a[1 : terms + 1])
     truth = ndtr((u - offset) / np.sqrt(1 - excess))
@@ -101,5 +101,5 @@ def test_the_bound_of_the_terms_left_out_is_one(offset, excess):
 
 
 def test_components_beyond_all_bounds_are_summed():
-    assert mixture._terms(0.1, 1.0, 1e-5) == 0
-    assert mixture._terms(5.0, 0.1, 1e-5) == 0
+    assert series.terms_needed(0.1, 1.0, 1e-5) == 0
+    assert series.terms_needed(5.0, 0.1, 1e-5) == 0
