@@ -37,7 +37,7 @@ _PATIENCE, _MOST = 200, 2000
 # Shares of the steps after which a run may have drawn enough.
 _LOOKS = tuple(k / 16.0 for k in range(5, 16))
 
-__all__ = ['Chains', 'Info', 'SamplerSettings', 'State', 'Watch', 'init', 'sample', 'step']
+__all__ = ['Chains', 'Info', 'SamplerSettings', 'State', 'Watchers', 'init', 'sample', 'step']
 
 
 def init(
@@ -189,7 +189,7 @@ def _burn_in(settings: SamplerSettings, steps: int) -> int:
     return min(max(settings.adaptation, int(settings.burn_in * steps)), steps)
 
 
-class Watch(NamedTuple):
+class Watchers(NamedTuple):
     """What is asked whether a run goes on, and told how far it has come.
 
     Attributes:
@@ -214,7 +214,7 @@ def sample(
     evaluations: int,
     settings: SamplerSettings | None = None,
     archive: ArrayLike | None = None,
-    watch: Watch | None = None,
+    watch: Watchers | None = None,
 ) -> Chains:
     """Draw from the posterior of a uniform prior and a log likelihood.
 
@@ -238,7 +238,7 @@ def sample(
             not even suffice for the start.
     """
     settings = settings or SamplerSettings()
-    stop, enough, progress = watch or Watch()
+    stop, enough, progress = watch or Watchers()
     # Whatever the start costs, some steps remain to be seen.
     limit = evaluations - 4 * settings.chains
     state = init(rng, log_density, lower, upper, settings, archive, limit)

@@ -151,7 +151,7 @@ def sample(
         evaluations=evaluations,
         settings=settings,
         archive=archive,
-        watch=dream.Watch(stop, enough, progress),
+        watch=dream.Watchers(stop, enough, progress),
     )
     if len(chains.kept) < _FEWEST:
         raise InputError(

@@ -8,7 +8,7 @@ import pytest
 from actuator_glue.errors import InputError
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.inference.compiled import compiled, log_densities, scratch
-from actuator_glue.inference.dream import State, Watch, init, sample, step, stretch
+from actuator_glue.inference.dream import State, Watchers, init, sample, step, stretch
 from actuator_glue.inference.likelihood import GaussianLikelihood, GlueLikelihood
 from actuator_glue.inference.moves import PUBLISHED
 from actuator_glue.inference.posterior import Problem, _Density
@@ -123,7 +123,7 @@ def test_a_stopped_run_is_repeated_by_stopping_there(rng_seed: int) -> None:
             LOWER,
             UPPER,
             evaluations=30_000,
-            watch=Watch(stop),
+            watch=Watchers(stop),
         )
 
     stopped = run(lambda _: next(asked) >= 20)

@@ -15,7 +15,7 @@ from scipy import stats
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference.adaptation import rescue
-from actuator_glue.inference.dream import Chains, SamplerSettings, Watch, init, sample, step
+from actuator_glue.inference.dream import Chains, SamplerSettings, Watchers, init, sample, step
 from actuator_glue.inference.moves import SNOOKER
 from actuator_glue.inference.posterior import Target
 from actuator_glue.inference.posterior import sample as sample_posterior
@@ -203,7 +203,7 @@ def test_stop_and_progress() -> None:
             target.lower,
             target.upper,
             evaluations=evaluations,
-            watch=Watch(
+            watch=Watchers(
                 stop=lambda state: state.evaluations >= stop_at,
                 progress=lambda done, most: seen.append((done, most)),
             ),
@@ -229,7 +229,7 @@ def test_a_run_ends_where_its_draws_will_do_and_is_the_beginning_of_the_whole_on
             target.lower,
             target.upper,
             evaluations=evaluations,
-            watch=Watch(enough=answer),
+            watch=Watchers(enough=answer),
         )
 
     def asks(chains: Chains) -> bool:

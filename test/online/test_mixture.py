@@ -93,11 +93,11 @@ def test_the_bound_of_the_terms_left_out_is_one(offset, excess):
     for row, at in zip(he, u, strict=True):
         series.hermite(at, row)
     phi = np.exp(-0.5 * u**2) / np.sqrt(2 * np.pi)
-    series = ndtr(u) - phi * (he[:, :terms] @ a[1 : terms + 1])
+    found = ndtr(u) - phi * (he[:, :terms] @ a[1 : terms + 1])
     truth = ndtr((u - offset) / np.sqrt(1 - excess))
     bound = wanted * mixture._CRAMER / np.sqrt(2 * np.pi) * np.exp(-0.25 * u**2)
-    assert (np.abs(series - truth) <= bound + 1e-15).all()
-    assert np.abs(series - truth).max() > 1e-12  # something was left out
+    assert (np.abs(found - truth) <= bound + 1e-15).all()
+    assert np.abs(found - truth).max() > 1e-12  # something was left out
 
 
 def test_components_beyond_all_bounds_are_summed():
