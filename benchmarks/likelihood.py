@@ -84,8 +84,10 @@ def run(repeats: int = 25) -> dict[str, Any]:
         repeats,
     )
     check = draws(2000, 1)
-    errors = [np.abs(log_likelihood(f, check) - log_likelihood(f.exact, check)) for f in
-              (fast, fast_long)]  # fmt: skip
+    errors = [
+        np.abs(log_likelihood(f, check) - log_likelihood(f.exact, check))
+        for f in (fast, fast_long)
+    ]
     shares = {}
     upper = np.array([4e2, 2e10, 1e7, 1e2])
     for name, thetas in (('posterior', check), ('prior', upper * _uniform(2000))):

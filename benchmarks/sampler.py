@@ -69,9 +69,12 @@ def run(repeats: int = 5, seeds: int = 20) -> dict[str, Any]:
     def per_second(settings: SamplerSettings, seed: int) -> float:
         began = time.process_time()
         chains = sample(
-            np.random.default_rng(seed), density, *bounds(), evaluations=1_000_000,
+            np.random.default_rng(seed),
+            density,
+            *bounds(),
+            evaluations=1_000_000,
             settings=settings,
-        )  # fmt: skip
+        )
         seconds = time.process_time() - began
         return float(chains.ess.min()) / seconds
 
@@ -79,11 +82,14 @@ def run(repeats: int = 5, seeds: int = 20) -> dict[str, Any]:
     default = [per_second(SamplerSettings(), seed) for seed in range(repeats)]
     warm = [
         sample(
-            np.random.default_rng(seed), density, *bounds(), evaluations=60_000,
+            np.random.default_rng(seed),
+            density,
+            *bounds(),
+            evaluations=60_000,
             archive=first.archive,
         )
         for seed in range(repeats)
-    ]  # fmt: skip
+    ]
     reached = [
         evaluations_to_rhat(
             sample(np.random.default_rng(seed), density, *bounds(), evaluations=40_000)

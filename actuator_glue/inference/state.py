@@ -54,9 +54,12 @@ class State(NamedTuple):
     def course(self) -> Course:
         """What the next steps depend on besides chains and archive."""
         return Course(
-            self.context, self.settings.moves, self.log_density, compiled(self.log_density),
+            self.context,
+            self.settings.moves,
+            self.log_density,
+            compiled(self.log_density),
             self.settings.thinning,
-        )  # fmt: skip
+        )
 
     @property
     def learning(self) -> Learning:

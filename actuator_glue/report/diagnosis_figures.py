@@ -225,9 +225,12 @@ def bands(found: DiagnosisData) -> Figure:
         middle = getattr(trace, side)[part]
         for axes, scale, less in ((upper, 1e3, 0.0 * middle), (lower, 1e6, middle)):
             axes.fill_between(
-                t, scale * (low - less), scale * (high - less), color=looks[side],
+                t,
+                scale * (low - less),
+                scale * (high - less),
+                color=looks[side],
                 label=f'95 % band, {_text(found, side)}',
-            )  # fmt: skip
+            )
             axes.plot(t, scale * (measured - less), color=MEASURED, lw=0.7, label='measured')
         upper.set_title(f'{_text(found, side)}: {100 * share:.1f} % inside')
         lower.set_xlabel('time [s]')

@@ -118,7 +118,9 @@ def _residual(found: DiagnosisData) -> Section:
     tests = [[name, f'{value:.3g}'] for name, value in a.tests.items()]
     rows = [
         [
-            source_name(r['source']), _um(r['structure']), _um(r['noise']),
+            source_name(r['source']),
+            _um(r['structure']),
+            _um(r['noise']),
             ' to '.join(f'{f:g}' for f in r['frequency_hz']),
             ' to '.join(f'{t:g}' for t in r['time_s']),
             ' to '.join(f'{1e3 * x:.2g}' for x in r['displacement']),
@@ -126,7 +128,7 @@ def _residual(found: DiagnosisData) -> Section:
             f'{100 * r["share_at_large_displacement"]:.0f}',
         ]
         for r in found.remaining['records']
-    ]  # fmt: skip
+    ]
     return Section(
         'The residual',
         [

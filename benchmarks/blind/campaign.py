@@ -42,9 +42,12 @@ def one(seed: int, cache: Path, generator: str) -> dict[str, Any]:
     records = [Record(u, y, 1.0 / case.rate, stiffness=k, source=s) for u, y, k, s in rows]
     start = time.perf_counter()
     found = diagnose(
-        records[:2], records[2], seed=seed, settings=Thresholds(evaluations=0),
+        records[:2],
+        records[2],
+        seed=seed,
+        settings=Thresholds(evaluations=0),
         clock=time.perf_counter,
-    )  # fmt: skip
+    )
     result = {
         'seed': seed,
         'kind': case.kind,

@@ -29,16 +29,21 @@ def parser() -> argparse.ArgumentParser:
     )
     add = found.add_argument
     add(
-        '--out', type=Folder, default='out/demo', metavar='DIR',
+        '--out',
+        type=Folder,
+        default='out/demo',
+        metavar='DIR',
         help='where everything lands (%(default)s)',
-    )  # fmt: skip
+    )
     add_force(found)
     add('--data', type=Path, metavar='FILE', help='stream this record, not the simulator')
     add('--channels', type=Path, metavar='MAP.yaml', help='channel map of FILE')
     add(
-        '--stiffness', type=number, metavar='N/m',
+        '--stiffness',
+        type=number,
+        metavar='N/m',
         help='specimen stiffness (simulator: 250e3; FILE: what the file says)',
-    )  # fmt: skip
+    )
     add('--hold', choices=('zoh', 'linear'), help='how the command runs between its samples')
     for name, value, unit, meaning in (
         ('--seconds', 60.0, 'S', 'length of the test'),
@@ -48,10 +53,12 @@ def parser() -> argparse.ArgumentParser:
     ):
         add(name, type=number, default=value, metavar=unit, help=f'{meaning} (%(default)g)')
     add(
-        '--effect', default='backlash', metavar='NAME',
+        '--effect',
+        default='backlash',
+        metavar='NAME',
         help='effect of the simulated actuator that no node is told of (%(default)s; none for '
         'none)',
-    )  # fmt: skip
+    )
     add('--seed', type=int, default=1, help='seed of noise and sampler (%(default)s)')
     add('--no-diagnosis', action='store_true', help='leave the diagnosis out')
     return found

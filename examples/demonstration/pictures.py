@@ -43,9 +43,12 @@ def live(content: Content, path: Path) -> Path:
         for axes in (upper, lower):
             axes.axvline((start - first) * period, ls='--', color=style.TRUTH)
         upper.annotate(
-            f' {name}', ((start - first) * period, 0.97), xycoords=('data', 'axes fraction'),
-            color=style.TRUTH, va='top',
-        )  # fmt: skip
+            f' {name}',
+            ((start - first) * period, 0.97),
+            xycoords=('data', 'axes fraction'),
+            color=style.TRUTH,
+            va='top',
+        )
     figure.suptitle('Forecasts before and after the model was augmented, live')
     return style.save(figure, path)
 

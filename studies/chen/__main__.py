@@ -33,10 +33,13 @@ def parser() -> argparse.ArgumentParser:
     """Return the command line."""
     found = argparse.ArgumentParser(prog='python -m studies.chen', description=__doc__)
     found.add_argument(
-        '--out', type=Folder, default='out/reproduce', metavar='DIR',
+        '--out',
+        type=Folder,
+        default='out/reproduce',
+        metavar='DIR',
         help='folder for report.html, results.json, tables/*.csv and curves/*.csv '
         '(default: %(default)s)',
-    )  # fmt: skip
+    )
     found.add_argument(
         '--force', action='store_true', help='replace the results of an earlier run'
     )

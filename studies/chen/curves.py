@@ -39,8 +39,10 @@ def curves(results: Results) -> dict[str, Curve]:
 def _displacement(results: Results, test: int) -> Curve:
     record = results.records[test]
     columns: Curve = {
-        'time [s]': record.time, 'command [m]': record.command, 'measured [m]': record.measured,
-    }  # fmt: skip
+        'time [s]': record.time,
+        'command [m]': record.command,
+        'measured [m]': record.measured,
+    }
     for kind, bands in results.time.items():
         lower, upper = bands[test].limits.at(LEVEL)
         columns |= {

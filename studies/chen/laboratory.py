@@ -139,9 +139,12 @@ class Laboratory:
 
         likelihood = GlueLikelihood(AddedResidual(errors, added_rms), shaping_factor)
         chains = sample(
-            Target(likelihood, bounds()), (self.seed, *words), evaluations, settings=settings,
+            Target(likelihood, bounds()),
+            (self.seed, *words),
+            evaluations,
+            settings=settings,
             progress=tell,
-        )  # fmt: skip
+        )
         self.add(evaluations)
         best = float(np.exp(-0.5 * chains.log_density.max() / shaping_factor))
         found = moments(chains.posterior(), *bounds())

@@ -27,7 +27,6 @@ __all__ = [
     'EQUATION_3',
     'NAMES',
     'NOISE',
-
     'RATE',
     'STIFFNESS',
     'TABLE_2',
@@ -60,4 +59,4 @@ __all__ = [
     'sample',
     'score',
     'total_band',
-]  # fmt: skip
+]

@@ -43,9 +43,12 @@ QUANTITIES = tuple(UNITS)
 def simulate(theta: Array, record: Record) -> Array:
     """Return responses of theta (m, 4) to a record's command, shape (m, n) [m]."""
     return linear.simulate(
-        theta, record.command, stiffness=record.known_stiffness(),
-        period=record.period, hold=record.hold,
-    )  # fmt: skip
+        theta,
+        record.command,
+        stiffness=record.known_stiffness(),
+        period=record.period,
+        hold=record.hold,
+    )
 
 
 def quantity(name: str, response: Complex) -> Array:

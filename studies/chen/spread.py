@@ -66,9 +66,7 @@ def against_residual(
         values = np.array([getattr(p.moments, moment) for p in posteriors])
         return MM * match(np.asarray(added_mm), values, TABLE_4[moment], near)
 
-    matched = laboratory.run(
-        (41,), errors, CHOSEN, final_evaluations, added_rms=matching('cov')
-    )  # fmt: skip
+    matched = laboratory.run((41,), errors, CHOSEN, final_evaluations, added_rms=matching('cov'))
     small = equivalent_shaping_factor(matched.best_rms, bare)
     return Spread(
         posteriors,

@@ -49,9 +49,12 @@ class Effort:
         """Evaluations of the whole study, or work worth as many."""
         runs = len(self.added_mm) + 1 + 7 + 4 * len(self.shaping_factors)
         return (
-            2 * self.evaluations + runs * self.short + self.diagnosis
-            + 2 * len(self.shaping_factors) * self.published + self.seeds * EVALUATIONS
-        )  # fmt: skip
+            2 * self.evaluations
+            + runs * self.short
+            + self.diagnosis
+            + 2 * len(self.shaping_factors) * self.published
+            + self.seeds * EVALUATIONS
+        )
 
 
 FULL = Effort(
@@ -183,9 +186,7 @@ def study(seed: int = 1, *, quick: bool = False, progress: Progress | None = Non
     }
     time = {n: tuple(responses.time_band(t, r) for r in records) for n, t in thetas.items()}
     rng = np.random.default_rng([seed, 1])
-    time['total'] = tuple(
-        responses.total_time_band(rng, thetas['sensor'], r) for r in records
-    )  # fmt: skip
+    time['total'] = tuple(responses.total_time_band(rng, thetas['sensor'], r) for r in records)
 
     laboratory.enter('static gain')
     refits = misfit.study(records)

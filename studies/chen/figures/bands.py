@@ -71,9 +71,12 @@ def histograms(results: Results, test: int) -> Figure:
         for column, (frequency, at) in enumerate(zip(CLOSE_UPS, CLOSE, strict=True)):
             axes = panels[row, column]
             axes.hist(
-                unit * draws[:, at], bins=30, color=style.LIGHT_BAND, density=True,
+                unit * draws[:, at],
+                bins=30,
+                color=style.LIGHT_BAND,
+                density=True,
                 label='matched posterior',
-            )  # fmt: skip
+            )
             measured, table_2 = (
                 unit * quantity(name, results.curves[test][k])[at]
                 for k in ('experiment', 'Table 2')

@@ -56,9 +56,12 @@ def convergence(results: Results) -> Figure:
         ):
             for i, parameter in enumerate(BASE):
                 axes.plot(
-                    trace.evaluations, trace.rhat[:, i], DASHES[i], color=COLOURS[i],
+                    trace.evaluations,
+                    trace.rhat[:, i],
+                    DASHES[i],
+                    color=COLOURS[i],
                     label=style.SYMBOL[parameter.name],
-                )  # fmt: skip
+                )
             axes.axhline(THRESHOLD, color='black', lw=0.8, ls=REFERENCE, label=f'{THRESHOLD:g}')
             axes.set(ylim=(0.95, 3.0), xlabel='evaluations', xscale='log')
             axes.set_xlim(100, trace.evaluations[-1])

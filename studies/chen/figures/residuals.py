@@ -33,9 +33,12 @@ def spread(results: Results) -> Figure:
             matched = getattr(found.matched.moments, moment)[i]
             axes.axvline(at, color=style.TRUTH, lw=0.9, label='best agreement')
             axes.axvline(
-                MM * results.sensor.best_rms, color=style.COMMAND, lw=0.9, ls=':',
+                MM * results.sensor.best_rms,
+                color=style.COMMAND,
+                lw=0.9,
+                ls=':',
                 label='sensor noise',
-            )  # fmt: skip
+            )
             axes.axhline(published, color=style.PUBLISHED, lw=1.4, ls='--', label='Table 4')
             axes.plot(rms, values, '-o', color=style.BAND, ms=3, label='ours')
             axes.plot([at], [matched], 'D', color=style.TRUTH, ms=5, zorder=5)

@@ -69,11 +69,13 @@ def shapes(results: Results) -> StudyTable:
     named = {f'white noise, {1e3 * matched.best_rms:.2f} mm rms': matched} | results.shapes
     rows = [
         (
-            name, p.best_rms, *(p.moments.mean / TABLE_4['mean'] - 1.0),
+            name,
+            p.best_rms,
+            *(p.moments.mean / TABLE_4['mean'] - 1.0),
             *(p.moments.cov / TABLE_4['cov'] - 1.0),
         )
         for name, p in named.items()
-    ]  # fmt: skip
+    ]
     return StudyTable(('residual', 'rms at best fit [m]', *keys), rows)
 
 
@@ -81,9 +83,10 @@ def matches(results: Results) -> StudyTable:
     """Return the residual at which each moment of the first three is nearest to Table 4."""
     found = results.table_4
     rows = [
-        ('COV', found.matched.best_rms), ('mean', found.mean_rms),
+        ('COV', found.matched.best_rms),
+        ('mean', found.mean_rms),
         ('skewness', found.skewness_rms),
-    ]  # fmt: skip
+    ]
     return StudyTable(('moment', 'residual rms [m]'), rows)
 
 
