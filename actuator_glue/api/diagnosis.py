@@ -14,6 +14,7 @@ from actuator_glue.api.definitions import definitions
 from actuator_glue.diagnosis import diagnose as core
 from actuator_glue.diagnosis.estimate import Json
 from actuator_glue.diagnosis.result import SCHEMA, DiagnosisData
+from actuator_glue.effects import save_effects
 from actuator_glue.errors import InputError
 from actuator_glue.records import Record
 
@@ -29,7 +30,22 @@ class Diagnosis(DiagnosisData):
 
     def to_json(self) -> Json:
         """Return the object of schema `actuator_glue.diagnosis/1` (curves and draws left out)."""
-        return {**super().to_json(), **definitions(self.structure)}
+        own = definitions(self.structure).get('definitions', {})
+        own |= {term.name: term.definition for term in self.learned}
+        return {**super().to_json(), **({'definitions': own} if own else {})}
+
+    def save_effects(self, path: Path | str) -> Path:
+        """Write the learned terms as a file of effects and return its path.
+
+        `load_effects`, `--effects-file` and the nodes' parameter `effects_file` read it.
+
+        Raises:
+            InputError: no term was learned, or the file cannot be written.
+        """
+        if not self.learned:
+            raise InputError(f'{path}: no term was learned, there is nothing to write')
+        save_effects(path, (term.effect for term in self.learned))
+        return Path(path)
 
     def save(self, path: Path | str) -> Path:
         """Write everything, curves and draws included, to one .npz file; return its path.

@@ -32,6 +32,7 @@ _STAGES = {
     'effect 6': 0.7,
     'one record': 0.74,
     'other hold': 0.74,
+    'learned term': 0.745,
     'posterior before': 0.75,
     'posterior': 0.78,
     'held-out': 0.95,
@@ -53,6 +54,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_effects_file(parser)
     parser.add_argument(
         '--report', type=Output, metavar='OUT.html', help='also write a report, one HTML file'
+    )
+    parser.add_argument(
+        '--save-effects',
+        type=Output,
+        metavar='OUT.yaml',
+        help='also write learned terms, if there are any, as a file for --effects-file',
     )
     parser.add_argument('--seed', type=int, default=1, metavar='S', help='seed (default 1)')
     parser.add_argument(
@@ -86,6 +93,11 @@ def run(args: argparse.Namespace) -> int:
     write_json(found.to_json(), args.json)
     if args.report is not None:
         found.report(args.report)
+    if args.save_effects is not None:
+        if found.learned:
+            found.save_effects(args.save_effects)
+        else:
+            note(f'{args.save_effects}: not written, for no term was learned')
     return 0 if found.complete else 1
 
 

@@ -48,16 +48,17 @@ def of(
 ) -> tuple[str, ...]:
     """Advice for a decision."""
     out = []
+    entries = {e.name: e for e in decision.final.structure.entries}
     for name in decision.names:
         tied = [r.name for r in found.rivals[name] if r.tied and r.name != name]
         if tied:
-            group = CATALOGUE[name].group
+            group = entries[name].group
             same = all(CATALOGUE[t].group == group for t in tied)
             way = _EXPERIMENT.get(group, _OTHERWISE) if same else _OTHERWISE
             out.append(f'{name} cannot be told from {", ".join(tied)} here; record {way}')
         if stretches[name].agree is False:
             sizes = ', '.join(f'{v:.3g}' for v in stretches[name].values)
-            unit = CATALOGUE[name].parameters[0].unit
+            unit = entries[name].parameters[0].unit
             out.append(
                 f'{name} does not agree across the halves of the records ({sizes} {unit}): its '
                 'size changes with time, frequency or stiffness, or it stands for something else'

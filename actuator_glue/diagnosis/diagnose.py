@@ -9,7 +9,14 @@ from functools import partial
 
 import numpy as np
 
-from actuator_glue.diagnosis import advice, homogeneity, per_record_settings, posterior, verdict
+from actuator_glue.diagnosis import (
+    advice,
+    homogeneity,
+    learned_term,
+    per_record_settings,
+    posterior,
+    verdict,
+)
 from actuator_glue.diagnosis.completeness import Decision
 from actuator_glue.diagnosis.detect import alarm_of
 from actuator_glue.diagnosis.estimate import Estimate
@@ -17,7 +24,12 @@ from actuator_glue.diagnosis.fit import Space
 from actuator_glue.diagnosis.homogeneity import Homogeneity
 from actuator_glue.diagnosis.measurement import Measured
 from actuator_glue.diagnosis.model_selection import Selection
-from actuator_glue.diagnosis.pipeline import Progress, conclude, with_the_right_hold
+from actuator_glue.diagnosis.pipeline import (
+    Progress,
+    conclude,
+    with_learned_terms,
+    with_the_right_hold,
+)
 from actuator_glue.diagnosis.preparation import prepare
 from actuator_glue.diagnosis.result import Candidate, DiagnosisData, Finding
 from actuator_glue.diagnosis.search import Trial
@@ -62,7 +74,7 @@ def diagnose(
     held = [holdout] if isinstance(holdout, Record) else list(holdout or ())
     tell('check', 0.0)
     first = conclude(prepare(records, held), settings, jobs, tell)
-    result = with_the_right_hold(first, settings, jobs, tell)
+    result = with_learned_terms(with_the_right_hold(first, settings, jobs, tell))
     prepared, data, scorer = result.prepared, result.data, result.scorer
     found, decision = result.found, result.decision
     stretches = homogeneity.agreement(decision.final, scorer)
@@ -90,6 +102,7 @@ def diagnose(
     space = Space(after.model, max(r.duration for r in data.records))
     estimates, held_at = _estimates(space, after), _pressed(space, after)
     effects = _findings(decision, found, estimates, stretches)
+    learned = learned_term.described(decision.final, data, estimates)
     moved = any(e.noise is None for e in effects)
     judged = verdict.conclude(decision.verdict, moved, error, found.material)
     tell('done', 1.0)
@@ -102,6 +115,7 @@ def diagnose(
         alarm=alarm_of(found, result.seen, decision, data, seed),
         advice=(
             *advice.at_bound(held_at, estimates),
+            *(term.sentence() for term in learned),
             *advice.of(decision, found, result.generic, stretches),
             *advice.contradicted(error, found.material),
             *advice.unidentified(data, estimates),
@@ -110,6 +124,7 @@ def diagnose(
         ),
         base={p.name: estimates[p.name] for p in BASE},
         structure=decision.final.effects,
+        learned=learned,
         names=tuple(p.name for p in after.model.parameters),
         posterior=after.draws,
         rhat=rhat,
@@ -170,19 +185,22 @@ def _findings(
     stretches: dict[str, Homogeneity],
 ) -> tuple[Finding, ...]:
     out = []
+    entries = {e.name: e for e in decision.final.structure.entries}
     for name in decision.names:
         rivals = found.rivals[name]
         tied = [r for r in rivals if r.tied]
-        own = {p.name: estimates[p.name] for p in CATALOGUE[name].parameters}
+        own = {p.name: estimates[p.name] for p in entries[name].parameters}
         first = next(iter(own.values()))
         gained = found.removed[name]
         out.append(
             Finding(
                 name=name,
                 alternatives=tuple(r.name for r in tied if r.name != name),
-                probability=decision.certainty
-                * next(r.probability for r in rivals if r.name == name),
-                place=CATALOGUE[name].place,
+                # A learned term describes; there is no cause by its name that might be true.
+                probability=math.nan
+                if learned_term.is_learned(entries[name])
+                else decision.certainty * next(r.probability for r in rivals if r.name == name),
+                place=entries[name].place,
                 parameters=own,
                 error_without=float(np.sqrt(found.final.mean_square + gained**2)),
                 error_with=found.final.fit.rms,

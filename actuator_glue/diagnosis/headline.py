@@ -12,7 +12,10 @@ if TYPE_CHECKING:
     from actuator_glue.diagnosis.result import DiagnosisData, Finding
 
 
-def _named(effect: Finding) -> str:
+def _named(effect: Finding, found: DiagnosisData) -> str:
+    equations = [term.numbers for term in found.learned if term.name == effect.name]
+    if equations:
+        return f'a learned term {effect.name} ({equations[0]})'
     where = f' in {", ".join(map(source_name, effect.records))} only' if effect.records else ''
     others = f' (or {", ".join(effect.alternatives)})' if effect.alternatives else ''
     return effect.name + where + others
@@ -31,7 +34,7 @@ def _noise(found: DiagnosisData) -> str:
 
 def headline(found: DiagnosisData) -> str:
     """Return the verdict in one line, never more than the held-out part bears out."""
-    names = ', '.join(_named(e) for e in found.effects if e.noise is None)
+    names = ', '.join(_named(e, found) for e in found.effects if e.noise is None)
     before, after = 1e6 * found.error.before, 1e6 * found.error.after
     change = f'held-out error {before:.1f} -> {after:.1f} um' if names else (
         f'held-out error {after:.1f} um'

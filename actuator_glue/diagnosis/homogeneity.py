@@ -9,8 +9,6 @@ from scipy import stats
 
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.search import Trial
-from actuator_glue.model.effects import CATALOGUE
-from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 
 _STRETCHES = 2  # of every record
@@ -51,15 +49,16 @@ def agreement(trial: Trial, scorer: Scorer) -> dict[str, Homogeneity]:
         for part in scorer.data.parts
         for a, b in _halves(part)
     ]  # fmt: skip
-    model = Structure(trial.effects)
+    model = trial.structure
     out = {}
-    for name in trial.effects:
+    for effect in model.entries:
+        name = effect.name
         row = int(np.arange(len(trial.fit.theta))[model.columns(name)][0])
         split = np.zeros((len(edges), len(error)))
         for i, (a, b) in enumerate(edges):
             split[i, a:b] = jac[row, a:b]
         value = float(trial.fit.theta[row])
-        size = abs(value - (CATALOGUE[name].parameters[0].neutral or 0.0))
+        size = abs(value - (effect.parameters[0].neutral or 0.0))
         rows = np.concatenate([split, np.delete(jac, row, axis=0)])
         out[name] = _compare(rows, error, scorer.blocks, len(edges), value, size)
     return out

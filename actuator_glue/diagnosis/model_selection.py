@@ -10,7 +10,6 @@ import numpy as np
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.search import Search, Trial
 from actuator_glue.diagnosis.thresholds import Thresholds
-from actuator_glue.model.effects import CATALOGUE
 
 Progress = Callable[[str, float], None]
 # Rounds in which members may be swapped for better or simpler ones.
@@ -97,10 +96,17 @@ class ModelSelection:
         out = [self.search.trial(t.effects, t.added) for t in trials]
         return sorted(out, key=lambda t: -float(t.scores.sum()))
 
-    def better(self, larger: Trial, smaller: Trial, threshold: float) -> bool:
-        """Whether the larger structure is worth its parameters: significant and material."""
+    def better(self, larger: Trial, smaller: Trial, threshold: float, cost: float = 0.0) -> bool:
+        """Whether the larger structure is worth its parameters: significant and material.
+
+        Args:
+            larger: the structure that adds something.
+            smaller: the structure without it.
+            threshold: least rms error to be removed [m].
+            cost: nats to be gained beyond those of any addition.
+        """
         extra = len(larger.fit.theta) - len(smaller.fit.theta)
-        nats = evidence(larger.scores, smaller.scores) - extra
+        nats = evidence(larger.scores, smaller.scores) - extra - cost
         return removed(smaller, larger) >= threshold and nats >= self.settings.nats
 
     def extend(self, beam: Sequence[Trial], stage: int) -> list[Trial]:
@@ -142,6 +148,10 @@ class ModelSelection:
                 break
             ranked = self.extend(self.rescored(ranked[: s.beam]), stage + 1)
             current = self.search.trial(current.effects, current.added)
+        return self.concluded(current, base, singles)
+
+    def concluded(self, current: Trial, base: Trial, singles: Sequence[Trial]) -> Selection:
+        """Check each member against none and against its rivals, and say what it is worth."""
         current = self.pruned(current)
         current, rivals = self.settle(current)
         gains, nats = {}, {}
@@ -188,10 +198,9 @@ class ModelSelection:
         """Take a rival of fewer parameters that these data cannot tell from a member."""
         for name, row in rivals.items():
             for rival in row:
-                effects = tuple(
-                    n for n in CATALOGUE if n == rival.name or (n in current.effects and n != name)
-                )
-                fewer = len(CATALOGUE[rival.name].parameters) < len(CATALOGUE[name].parameters)
+                effects = (*(n for n in current.effects if n != name), rival.name)
+                entries = self.search.entries
+                fewer = len(entries[rival.name].parameters) < len(entries[name].parameters)
                 if rival.tied and fewer and rival.nats < self.settings.tie_nats:
                     return self.search.trial(effects, rival.name)
         return current

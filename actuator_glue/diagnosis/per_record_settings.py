@@ -119,7 +119,7 @@ def _fitted(search: Search, start: Trial, name: str, records: tuple[Record, ...]
     thetas = search.screen(start, name)[1]
     found = fit(search.data, model, thetas)
     assert search.scorer is not None
-    return Trial(effects, name, found, search.scorer.block_scores(found), model)
+    return Trial(Structure(effects), name, found, search.scorer.block_scores(found), model)
 
 
 def _rescored(search: Search, trial: Trial) -> Trial:

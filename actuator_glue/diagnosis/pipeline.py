@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from actuator_glue.diagnosis import hum, per_record_settings, recorded, regression
+from actuator_glue.diagnosis import hum, learning, per_record_settings, recorded, regression
 from actuator_glue.diagnosis.completeness import Decision, decide
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.decimate import decimated
@@ -40,6 +40,7 @@ class Conclusion:
         seen: measurement effects.
         generic: the regression beside them.
         decision: the verdict.
+        selection: what chose `found`, to go on from.
     """
 
     prepared: Prepared
@@ -50,6 +51,7 @@ class Conclusion:
     seen: tuple[Measured, ...]
     generic: Surrogate
     decision: Decision
+    selection: ModelSelection
 
 
 def conclude(prepared: Prepared, settings: Thresholds, jobs: int, tell: Progress) -> Conclusion:
@@ -59,30 +61,40 @@ def conclude(prepared: Prepared, settings: Thresholds, jobs: int, tell: Progress
     line = hum.find(prepared.fit, search.base().error)
     if line is not None:
         search = Search(hum.without(prepared.fit, line), mean_effects(), jobs)
-    found = ModelSelection(search, settings, tell).run()
-    result = _conclusion(prepared, search, found, settings, line)
+    selection = ModelSelection(search, settings, tell)
+    result = _conclusion(prepared, selection, selection.run(), line)
     if result.decision.verdict != 'unexplained':
         return result
     tell('one record', 0.0)
     limit = result.decision.limit
-    own = per_record_settings.setting(search, found, limit, prepared.held.records, settings)
-    return result if own is None else _conclusion(prepared, search, own, settings, line)
+    found, held = result.found, prepared.held.records
+    own = per_record_settings.setting(search, found, limit, held, settings)
+    return result if own is None else _conclusion(prepared, selection, own, line)
+
+
+def with_learned_terms(result: Conclusion) -> Conclusion:
+    """Describe by learned terms what the catalogue leaves unexplained."""
+    if result.decision.verdict != 'unexplained' or result.found.final.own is not None:
+        return result
+    found = learning.learned(result.selection, result.found, result.decision.limit)
+    if found is None:
+        return result
+    return _conclusion(result.prepared, result.selection, found, result.line)
 
 
 def _conclusion(
-    prepared: Prepared,
-    search: Search,
-    found: Selection,
-    settings: Thresholds,
-    line: Line | None,
+    prepared: Prepared, selection: ModelSelection, found: Selection, line: Line | None
 ) -> Conclusion:
+    search, settings = selection.search, selection.settings
     assert search.scorer is not None
     data = search.data
     seen = recorded.find(data, found, settings, line)
     chosen = found.final if found.final.effects else found.singles[0]
     generic = regression.compare(data, search.scorer, found.base, chosen)
     decision = decide(found, seen, data, settings, generic)
-    return Conclusion(prepared, data, search.scorer, line, found, seen, generic, decision)
+    return Conclusion(
+        prepared, data, search.scorer, line, found, seen, generic, decision, selection
+    )
 
 
 def with_the_right_hold(

@@ -7,7 +7,10 @@ from typing import Literal, TypeAlias
 
 from actuator_glue.diagnosis.estimate import Estimate, Json, number
 from actuator_glue.diagnosis.headline import headline
+from actuator_glue.diagnosis.learned_term import LearnedTerm
 from actuator_glue.inference.at_bound import Pressed
+from actuator_glue.model.effects import CATALOGUE, Effect
+from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 
 SCHEMA = 'actuator_glue.diagnosis/1'
@@ -22,7 +25,8 @@ class Finding:
     Attributes:
         name: best name in the catalogue.
         alternatives: names that these data cannot tell from it (without `name` itself).
-        probability: probability of `name` among all single candidates at its turn.
+        probability: probability of `name` among all single candidates at its turn; NaN for a
+            learned term, which is a description and no cause.
         place: where in the loop it acts.
         parameters: posterior of the effect's parameters.
         error_without: fit error of the structure without any of the set [m].
@@ -208,7 +212,7 @@ class DiagnosisData:
         alarm: detection statistics.
         advice: what to do next, for people.
         base: posterior of the base parameters in the augmented model.
-        structure: effect names of the augmented model (input of `Structure`).
+        structure: effect names of the augmented model.
         names: parameter names of the columns of `posterior`.
         posterior: draws of base and effect parameters, shape (m, p).
         rhat: largest R-hat of the draws; NaN where they are of the Laplace approximation.
@@ -219,6 +223,7 @@ class DiagnosisData:
         seconds: wall time.
         at_bound: parameters that their bounds hold.
         sampling: per record its source, its rate as recorded and as fitted [Hz].
+        learned: terms among the effects that were learned from these records.
     """
 
     verdict: Verdict
@@ -240,6 +245,7 @@ class DiagnosisData:
     seconds: float
     at_bound: tuple[Pressed, ...] = ()
     sampling: tuple[Json, ...] = ()
+    learned: tuple[LearnedTerm, ...] = ()
 
     def to_json(self) -> Json:
         """Return the object of schema `actuator_glue.diagnosis/1` (curves and draws left out)."""
@@ -258,11 +264,22 @@ class DiagnosisData:
             'sampling': list(self.sampling),
             'at_bound': [p.to_json() for p in self.at_bound],
             'structure': list(self.structure),
+            'learned': [term.to_json() for term in self.learned],
             'surrogate': self.surrogate,
             'remaining': self.remaining,
             'advice': list(self.advice),
             'seconds': number(self.seconds),
         }
+
+    def entry(self, name: str) -> Effect:
+        """Return what an effect of that name is here, learned or of the catalogue."""
+        own = {term.name: term.effect for term in self.learned}
+        return own[name] if name in own else CATALOGUE[name]
+
+    @property
+    def model(self) -> Structure:
+        """The augmented model, learned terms included."""
+        return Structure(self.entry(name) for name in self.structure)
 
     @property
     def complete(self) -> bool:

@@ -12,7 +12,7 @@ from actuator_glue.diagnosis import global_search
 from actuator_glue.diagnosis.data import Data, Model
 from actuator_glue.diagnosis.fit import Fit, base_starts, fit, sum_of_squares
 from actuator_glue.diagnosis.score import Scorer
-from actuator_glue.model.effects import CATALOGUE, Scale, scale
+from actuator_glue.model.effects import CATALOGUE, Effect, Scale, scale
 from actuator_glue.model.parameters import BASE
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
@@ -30,23 +30,28 @@ class Trial:
     """One refitted structure.
 
     Attributes:
-        effects: names in the catalogue's order, which is the order of the parameters.
+        structure: its effects stand in the catalogue's order, learned terms last.
         added: the effect that was added last.
         fit: base and effects refitted together.
         scores: out-of-sample log density of every block (B,) [nats].
-        own: the model where it is not `Structure(effects)` (see diagnosis/per_record_settings.py).
+        own: the model where it is not `structure` (see diagnosis/per_record_settings.py).
     """
 
-    effects: tuple[str, ...]
+    structure: Structure
     added: str
     fit: Fit
     scores: Array
     own: Model | None = None
 
     @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of its effects."""
+        return self.structure.effects
+
+    @property
     def model(self) -> Model:
         """What simulates it."""
-        return self.own or Structure(self.effects)
+        return self.own or self.structure
 
     @property
     def mean_square(self) -> float:
@@ -65,6 +70,8 @@ class Search:
     Attributes:
         data: the counted samples.
         scorer: noise and blocks; set once the base is fitted.
+        entries: all effects there are, in the order in which they stand in a structure; those
+            of the catalogue, and learned terms that nothing else knows.
         names: effects that act on the mean response.
         jobs: threads (the kernels release the interpreter lock).
     """
@@ -73,6 +80,7 @@ class Search:
     names: tuple[str, ...]
     jobs: int = 1
     scorer: Scorer | None = None
+    entries: dict[str, Effect] = field(default_factory=lambda: dict(CATALOGUE))
     _tried: dict[frozenset[str], Fit] = field(default_factory=dict)
     _signatures: dict[str, tuple[Array, Array]] = field(default_factory=dict)
     _polished: set[frozenset[str]] = field(default_factory=set)
@@ -91,31 +99,34 @@ class Search:
         """Sizes of this test at the fitted base."""
         return scale(self.data.records, self._tried[frozenset()].theta)
 
+    def structure(self, *effects: str) -> Structure:
+        """Return the structure of these effects, in their order."""
+        return Structure(e for name, e in self.entries.items() if name in effects)
+
     def trial(self, effects: tuple[str, ...], added: str = '') -> Trial:
         """Score an already refitted structure with the current noise."""
         assert self.scorer is not None
         found = self._tried[frozenset(effects)]
-        return Trial(effects, added, found, self.scorer.block_scores(found))
+        return Trial(self.structure(*effects), added, found, self.scorer.block_scores(found))
 
     def add(self, current: Trial, name: str) -> Trial:
         """Refit `current` with one more effect."""
-        effects = tuple(n for n in CATALOGUE if n in current.effects or n == name)
-        key = frozenset(effects)
+        model = self.structure(*current.effects, name)
+        key = frozenset(model.effects)
         if key not in self._tried:
             starts = self.screen(current, name)[1]
-            model = Structure(effects)
             coarse = fit(self.data, model, starts, iterations=_COARSE, tolerance=_TOLERANCE)
-            friction = not current.effects and CATALOGUE[name].group == 'friction'
+            friction = not current.effects and self.entries[name].group == 'friction'
             if friction and coarse.rms < _PROMISING * current.fit.rms:
                 coarse = global_search.refit(self.data, model, coarse, _COARSE, _TOLERANCE)
             self._tried[key] = coarse
-        return self.trial(effects, name)
+        return self.trial(model.effects, name)
 
     def polish(self, trial: Trial) -> Trial:
         """Finish the refit of a trial that is in the running."""
         key = frozenset(trial.effects)
         if key not in self._polished:
-            again = fit(self.data, Structure(trial.effects), self._tried[key].theta)
+            again = fit(self.data, trial.structure, self._tried[key].theta)
             self._tried[key] = again
             self._polished.add(key)
         return self.trial(trial.effects, trial.added)
@@ -124,7 +135,7 @@ class Search:
         """Starting sizes of an effect (s, k) and what each adds to Eq. (2) as fitted (s, N)."""
         if name not in self._signatures:
             base = self._tried[frozenset()]
-            model = Structure((name,))
+            model = self.structure(name)
             thetas = model.starts(base.theta, self.scale())
             output = self.data.simulate(model, thetas)
             signature = output - (self.data.target - base.error)
@@ -138,7 +149,7 @@ class Search:
             The largest share of the squared error that one of the effect's starting sizes can
             remove, and the starting parameters that promise most (s, p).
         """
-        effect = CATALOGUE[name]
+        effect = self.entries[name]
         neutral = np.array(
             [p.neutral if p.neutral is not None else 0.0 for p in effect.parameters]
         )
@@ -146,7 +157,7 @@ class Search:
         lower = np.array([p.lower for p in effect.parameters])
         upper = np.array([p.upper for p in effect.parameters])
         names = [p.name for p in effect.parameters]
-        model = Structure(tuple(n for n in CATALOGUE if n in current.effects or n == name))
+        model = self.structure(*current.effects, name)
         is_new = np.array([p.name in names for p in model.parameters])
 
         def join(values: Array) -> Array:
@@ -225,12 +236,11 @@ class Search:
         key = frozenset(effects)
         if (key, current.effects) not in self._descended:
             self._descended.add((key, current.effects))
-            model = Structure(current.effects)
-            names = {p.name for p in CATALOGUE[name].parameters}
-            keep = np.array([p.name not in names for p in model.parameters])
+            names = {p.name for p in self.entries[name].parameters}
+            keep = np.array([p.name not in names for p in current.structure.parameters])
             start = np.stack([current.fit.theta[keep], current.fit.theta[keep]])
             start[1, :_P] = self._tried[frozenset()].theta
-            again = fit(self.data, Structure(effects), start)
+            again = fit(self.data, self.structure(*effects), start)
             known = self._tried.get(key)
             if known is None or again.rms < known.rms:
                 self._tried[key] = again

@@ -18,11 +18,22 @@ from actuator_glue.model.structure_errors import StructureErrors
 from actuator_glue.records import Array, Record
 
 
+def _entry(effect: str | Effect) -> Effect:
+    if isinstance(effect, Effect):
+        return effect
+    if effect not in CATALOGUE:
+        raise InputError(
+            f'effect {effect!r} is not in the catalogue; known: {", ".join(CATALOGUE)}'
+        )
+    return CATALOGUE[effect]
+
+
 class Structure:
     """Eq. (2) with a set of effects switched on.
 
     Args:
-        effects: names from the catalogue; their order is that of their parameters.
+        effects: names from the catalogue, or effects that need not be registered; their order is
+            that of their parameters.
 
     Attributes:
         effects: names of the effects.
@@ -34,16 +45,11 @@ class Structure:
         InputError: unknown or repeated effect.
     """
 
-    def __init__(self, effects: Iterable[str] = ()) -> None:
-        self.effects = tuple(effects)
-        for name in self.effects:
-            if name not in CATALOGUE:
-                raise InputError(
-                    f'effect {name!r} is not in the catalogue; known: {", ".join(CATALOGUE)}'
-                )
+    def __init__(self, effects: Iterable[str | Effect] = ()) -> None:
+        self.entries: tuple[Effect, ...] = tuple(_entry(effect) for effect in effects)
+        self.effects: tuple[str, ...] = tuple(effect.name for effect in self.entries)
         if len(set(self.effects)) != len(self.effects):
             raise InputError(f'an effect is named twice in {", ".join(self.effects)}')
-        self.entries: tuple[Effect, ...] = tuple(CATALOGUE[name] for name in self.effects)
         self.parameters: tuple[Parameter, ...] = BASE + tuple(
             p for effect in self.entries for p in effect.parameters
         )

@@ -141,7 +141,7 @@ def warm_up() -> None:
 
 def augmented(diagnosis: Diagnosis) -> Any:
     """Return the SetModel request that has an estimator start from what was found."""
-    known = {p.name: p for p in Structure(diagnosis.structure).parameters}
+    known = {p.name: p for p in diagnosis.model.parameters}
     found = {
         known[name]: float(posterior.mean)
         for effect in diagnosis.effects

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 from actuator_glue.diagnosis.result import DiagnosisData
-from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.records import source_name
 from actuator_glue.report import diagnosis_figures as figures
 from actuator_glue.report.html import Block, Note, Picture, Section, Table, Text, write
@@ -56,7 +55,7 @@ def _effects(found: DiagnosisData) -> Section:
             [
                 e.name,
                 ', '.join(e.alternatives) or '-',
-                CATALOGUE[e.name].equation,
+                found.entry(e.name).equation,
                 e.place,
                 _um(e.error_without),
                 _um(e.error_with),

@@ -1,0 +1,125 @@
+"""A learned term as people and files have it: equation, numbers, intervals, range of validity."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.estimate import Estimate, Json
+from actuator_glue.diagnosis.learned_forms import LEARNED
+from actuator_glue.diagnosis.search import Trial
+from actuator_glue.model.effects import Effect
+from actuator_glue.model.effects.terms.definition import entries, mapping
+from actuator_glue.records import Array
+
+_UNITS = {'u': 'm', 'e': 'm', 'x': 'm', 'y': 'm', 'v': 'm/s', 'q': 'N/s', 'f': 'N'}
+
+
+@dataclass(frozen=True, slots=True)
+class LearnedTerm:
+    """A description of what the catalogue has no name for.
+
+    Attributes:
+        name: name of the effect.
+        place: where in the loop it acts.
+        equation: what it makes of the signal there.
+        numbers: the equation with its parameters' means.
+        parameters: posterior of its parameters.
+        excited: range of everything in the equation that moved, about [unit of the symbol].
+        definition: the effect as files of effects have it.
+    """
+
+    name: str
+    place: str
+    equation: str
+    numbers: str
+    parameters: dict[str, Estimate]
+    excited: dict[str, tuple[float, float]]
+    definition: Json
+
+    @property
+    def effect(self) -> Effect:
+        """The effect, which no catalogue has."""
+        return entries({self.name: self.definition})[0]
+
+    def sentence(self) -> str:
+        """Return equation, intervals and range in one sentence."""
+        sizes = ', '.join(
+            f'{n} = {p.mean:.4g} {p.unit} (95 % {p.lower:.4g} to {p.upper:.4g})'
+            for n, p in self.parameters.items()
+        )
+        ranges = ', '.join(
+            f'{s} from {low:.3g} to {high:.3g} {_UNITS[s]}'
+            for s, (low, high) in self.excited.items()
+        )
+        return (
+            f'{self.name} was learned from these records, at the {self.place}: {self.equation} '
+            f'with {sizes}; a description and no cause, not valid beyond {ranges}'
+        )
+
+    def to_json(self) -> Json:
+        """Return the JSON object of the term."""
+        return {
+            'name': self.name,
+            'place': self.place,
+            'equation': self.equation,
+            'expression': self.numbers,
+            'parameters': {name: p.to_json() for name, p in self.parameters.items()},
+            'excited': {
+                s: {'lower': low, 'upper': high, 'unit': _UNITS[s]}
+                for s, (low, high) in self.excited.items()
+            },
+        }
+
+
+def is_learned(effect: Effect) -> bool:
+    """Whether an effect is a term that a diagnosis learned, now or before."""
+    return effect.source == LEARNED
+
+
+def described(
+    trial: Trial, data: Data, estimates: Mapping[str, Estimate]
+) -> tuple[LearnedTerm, ...]:
+    """Return the learned terms of a structure."""
+    out = []
+    for effect in trial.structure.entries:
+        if is_learned(effect):
+            own = {p.name: estimates[p.name] for p in effect.parameters}
+            words = set(re.findall(r'[a-z_0-9]+', effect.equation))
+            excited = {
+                s: (float(z.min()), float(z.max()))
+                for s, z in _motion(trial, data).items()
+                if s in words
+            }
+            out.append(
+                LearnedTerm(
+                    effect.name, effect.place, effect.equation, _numbers(effect.equation, own),
+                    own, excited, mapping([effect])[effect.name],
+                )
+            )  # fmt: skip
+    return tuple(out)
+
+
+def _numbers(equation: str, parameters: Mapping[str, Estimate]) -> str:
+    for name, estimate in parameters.items():
+        equation = re.sub(rf'\b{name}\b', f'{estimate.mean:.4g}', equation)
+    return equation.replace('+ -', '- ')
+
+
+def _motion(trial: Trial, data: Data) -> dict[str, Array]:
+    """Return what moved in the fitting records, about: the valve and the oil at rest [SI]."""
+    parts = []
+    beta_1, into = trial.fit.theta[0], trial.fit.theta[1]
+    outputs = data.split(data.target - trial.fit.error)
+    for record, mask, x, period in zip(
+        data.records, data.masks, outputs, data.periods, strict=True
+    ):
+        u = record.command[mask]
+        v, e = np.gradient(x, period), u - x
+        row = {'u': u, 'e': e, 'x': x, 'y': x, 'v': v, 'q': into / beta_1 * e}
+        parts.append({**row, 'f': record.known_stiffness() * x})
+    return {s: np.concatenate([p[s] for p in parts]) for s in _UNITS}

@@ -1,0 +1,71 @@
+"""Learn terms that no catalogue names, where material structure remains beside what it does.
+
+Sparse regression inside of the loop: forms at every place are screened by their signatures, the
+most promising are refitted together with Eq. (2) and what was found, in the free-run simulation,
+and one is kept if it gains out of sample what any addition must, and the price of having been
+chosen among many. A catalogue effect that does as well in its place takes it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from actuator_glue.diagnosis.learned_forms import forms
+from actuator_glue.diagnosis.model_selection import ModelSelection, Selection
+from actuator_glue.diagnosis.search import Trial
+
+_MOST = 2  # learned terms
+_REFITS = 4  # per structure and turn
+
+
+def learned(selection: ModelSelection, found: Selection, limit: float) -> Selection | None:
+    """Go on from a selection with learned terms.
+
+    Args:
+        selection: the model selection that ended with `found`.
+        found: what the catalogue explains.
+        limit: structure that may remain [m].
+
+    Returns:
+        The selection with learned terms, or None where none is worth it.
+    """
+    search = selection.search
+    offered = forms(search.scale(), search.entries)
+    search.entries |= {effect.name: effect for effect in offered}
+    names = [effect.name for effect in offered]
+    best = found.final
+    for turn in range(_MOST):
+        selection.progress('learned term', turn / _MOST)
+        # A wrong name of the catalogue may stand where the term belongs: Eq. (2) starts, too.
+        starts = [best] if turn or not best.effects else [best, search.trial(())]
+        better = _additions(selection, starts, best, names)
+        if better is None:
+            break
+        best = better
+        selection.renoise(best)
+        best = search.trial(best.effects, best.added)
+        if selection.left(best) < limit:
+            break
+    if best is found.final:
+        return None
+    singles = selection.rescored(found.singles)
+    return selection.concluded(best, search.trial(()), singles)
+
+
+def _additions(
+    selection: ModelSelection, starts: Sequence[Trial], best: Trial, names: Sequence[str]
+) -> Trial | None:
+    """Return the best structure with one more term, where it is worth more than the present."""
+    search, worth = selection.search, []
+    for start in starts:
+        new = [n for n in names if n not in start.effects]
+        for trial in search.additions(start, search.screened(start, new)[:_REFITS]):
+            if selection.better(trial, best, selection.material, math.log(len(names))):
+                worth.append(trial)
+    return max(worth, key=_merit) if worth else None
+
+
+def _merit(trial: Trial) -> float:
+    """Out-of-sample score less a nat per parameter."""
+    return float(trial.scores.sum()) - len(trial.fit.theta)
