@@ -11,6 +11,7 @@ from actuator_glue.model.effects import CATALOGUE
 
 Json = dict[str, Any]
 _BINS = ((0.0, 0.5), (0.5, 1.0), (1.0, 2.0), (2.0, 4.0), (4.0, np.inf))
+_NEAR = 1.2  # held-out error over noise below which an effect counts as described
 _CLEAR = 2.0  # post-refit residual over noise from which the bars hold
 
 
@@ -24,8 +25,23 @@ def share(hits: list[bool]) -> Json:
 
 
 def _named(result: Json) -> list[list[str]]:
+    """Names of causes, which learned terms are not."""
     d = result['diagnosis']
-    return [[e['name'], *e['alternatives']] for e in d['effects']]
+    described = {term['name'] for term in d.get('learned', ())}
+    rows = [e for e in d['effects'] if e['name'] not in described]
+    return [[e['name'], *e['alternatives']] for e in rows]
+
+
+def _told(result: Json) -> bool:
+    """Whether it is said that the answer is not complete."""
+    return result['diagnosis']['verdict'] in ('unexplained', 'undecided')
+
+
+def _described(result: Json) -> bool:
+    """Whether a learned term, and no wrong name, leaves next to noise on the held-out record."""
+    d = result['diagnosis']
+    near = d['error']['after'] <= _NEAR * result['clean_floor']
+    return bool(d.get('learned')) and not _named(result) and near
 
 
 def _groups(names: list[str]) -> set[str]:
@@ -68,16 +84,10 @@ def scores(results: list[Json]) -> Json:
         'clear_wrong_confident': share([_wrong(r) for r in clear]),
         'all_wrong_confident': share([_wrong(r) for r in results]),
         'clear_extra_effects': share([len(_named(r)) > 1 for r in clear]),
-        'unknown_unexplained': share(
-            [r['diagnosis']['verdict'] == 'unexplained' for r in by['unknown']]
-        ),
-        'unknown_unexplained_clear': share(
-            [
-                r['diagnosis']['verdict'] == 'unexplained'
-                for r in by['unknown']
-                if r['ratio'] >= _CLEAR
-            ]
-        ),
+        'unknown_told': share([_told(r) for r in by['unknown']]),
+        'unknown_told_clear': share([_told(r) for r in by['unknown'] if r['ratio'] >= _CLEAR]),
+        'unknown_described': share([_described(r) for r in by['unknown']]),
+        'unknown_told_or_described': share([_told(r) or _described(r) for r in by['unknown']]),
         'pair_both': share([_both(r) for r in by['pair']]),
         'pair_both_clear': share([_both(r) for r in clear_pairs]),
         'after_over_true_structure': _quantiles(against),
