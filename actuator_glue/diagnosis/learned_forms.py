@@ -22,7 +22,7 @@ _PRODUCTS: Final = {
     'valve': ('e |e|', 'e e e', 'e e', 'e |x|'),
     'flow': (
         'q x', 'q x x', 'q |x|', 'q |q|', 'q q q', 'q f', 'q f f',
-        'f |f|', 'f f f', 'f f', 'f |x|',
+        'f |f|', 'f f f', 'f f',
     ),
     'force': ('v |v|', 'v v v', 'v v', '|v|', 'v x x', 'v |x|', 'x |x|', 'x x'),
     'specimen': ('k x |x|', 'k x x', 'k v', 'k v |v|'),
