@@ -12,7 +12,7 @@ import numpy as np
 
 from actuator_glue.inference import student
 from actuator_glue.inference.archive import newest
-from actuator_glue.inference.moves import UNTEMPERED, ProposalContext, Tuning
+from actuator_glue.inference.moves import UNTEMPERED, Knobs, ProposalContext, Tuning
 from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.inference.transforms.log import Log
 from actuator_glue.jit import njit
@@ -53,10 +53,7 @@ def tuned(points: Array, counts: Array, settings: SamplerSettings, box: Log) -> 
         tempering=UNTEMPERED,
         fixed=np.array([-1.0 if move.share is None else move.share for move in moves]),
         most=np.array([move.most for move in moves]),
-        pairs=settings.pairs,
-        unit_jump=settings.unit_jump,
-        jitter=settings.jitter,
-        noise=settings.noise,
+        knobs=Knobs(settings.pairs, settings.unit_jump, settings.jitter, settings.noise),
     )  # fmt: skip
     _fit(points, counts, context, True)
     return context

@@ -35,11 +35,12 @@ def propose(
     candidate: Array, x: Array, workspace: Workspace,
 ) -> None:  # fmt: skip
     """Write a candidate of every chain, (n, p), x the same in physical units, and `workspace`."""
+    tuning, knobs, scratch = context.tuning, context.knobs, workspace.scratch
     for i in range(z.shape[0]):
         row = uniforms[i]
-        move = choose(row[U_MOVE], context.tuning.move_cdf)
+        move = choose(row[U_MOVE], tuning.move_cdf)
         correction, crossover = _propose_by(
-            move, z[i], row, rows, size, context, workspace, candidate[i]
+            move, z[i], row, rows, size, tuning, knobs, scratch, candidate[i]
         )
         workspace.correction[i] = correction
         workspace.label[i, 0] = move

@@ -87,7 +87,7 @@ def one(
         The chains, whether each has moved (n,), and the labels of the moves made (n, 2).
     """
     z, x, target = np.empty_like(now.z), np.empty_like(now.x), np.empty_like(now.log_target)
-    space = workspace(len(z), z.shape[1], context.pairs)
+    space = workspace(len(z), z.shape[1], context.knobs.pairs)
     kernels(moves).propose(
         now.z, uniforms, archive.capacity_rows, archive.size, context, z, x, space
     )
@@ -239,7 +239,7 @@ def _advance(
     total, fitted = learning.total, learning.fitted
     # Made here: to hand over many small arrays takes longer than a step.
     n, d = z.shape
-    space, scratch = workspace(n, d, context.pairs), compiled.scratch(len(density.rows), n)
+    space, scratch = workspace(n, d, context.knobs.pairs), compiled.scratch(len(density.rows), n)
     while done < len(uniforms):
         new_z, new_x, new_values = path_z[done], path_x[done], path_values[done]
         here, there = target[done % 2], target[(done + 1) % 2]

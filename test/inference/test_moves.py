@@ -51,9 +51,11 @@ def _tuned(context: ProposalContext, **parts: Array) -> ProposalContext:
 
 
 def _propose(rng, z, rows, context):
-    uniforms = rng.random((len(z), moves.uniforms_per_chain(MOVES, z.shape[1], context.pairs)))
+    uniforms = rng.random(
+        (len(z), moves.uniforms_per_chain(MOVES, z.shape[1], context.knobs.pairs))
+    )
     candidate, x = np.empty_like(z), np.empty_like(z)
-    space = workspace(*z.shape, context.pairs)
+    space = workspace(*z.shape, context.knobs.pairs)
     metropolis.propose(z, uniforms, rows, len(rows), context, candidate, x, space)
     return candidate, space
 
@@ -258,11 +260,11 @@ def test_an_independent_draw_knows_how_far_from_the_centre_it_is(dimension, rng_
 
 
 @njit(cache=False)
-def _uniform_step(z, uniforms, rows, size, context, workspace, candidate):
+def _uniform_step(z, uniforms, rows, size, tuning, knobs, scratch, candidate):
     """A walk of one coordinate, a standard deviation either way; no archive, no correction."""
     at = min(int(uniforms[U_FREE] * z.size), z.size - 1)
     candidate[:] = z
-    candidate[at] += context.tuning.scale[at] * 2.0 * (2.0 * uniforms[U_FREE + 1] - 1.0)
+    candidate[at] += tuning.scale[at] * 2.0 * (2.0 * uniforms[U_FREE + 1] - 1.0)
     return 0.0, NO_CLASS
 
 

@@ -14,6 +14,7 @@ from actuator_glue.inference.moves.move import (
     U_FREE,
     U_MOVE,
     UNTEMPERED,
+    Knobs,
     Move,
     ProposalContext,
     Tempering,
@@ -32,6 +33,6 @@ MOVES: Final[tuple[Move, ...]] = (*PUBLISHED, INDEPENDENCE)
 
 __all__ = [
     'INDEPENDENCE', 'MOVES', 'NO_CLASS', 'PARALLEL', 'PUBLISHED', 'SNOOKER', 'UNTEMPERED',
-    'U_ACCEPT', 'U_FREE', 'U_MOVE', 'Move', 'ProposalContext', 'Tempering', 'Tuning', 'Workspace',
-    'dispatch', 'uniforms_per_chain', 'workspace',
+    'U_ACCEPT', 'U_FREE', 'U_MOVE', 'Knobs', 'Move', 'ProposalContext', 'Tempering', 'Tuning',
+    'Workspace', 'dispatch', 'uniforms_per_chain', 'workspace',
 ]  # fmt: skip

@@ -13,9 +13,10 @@ from actuator_glue.inference import student
 from actuator_glue.inference.moves.move import (
     NO_CLASS,
     U_FREE,
+    Knobs,
     Move,
-    ProposalContext,
-    Workspace,
+    Scratch,
+    Tuning,
 )
 from actuator_glue.jit import njit
 from actuator_glue.records import Array
@@ -23,13 +24,13 @@ from actuator_glue.records import Array
 
 @njit
 def propose(
-    z: Array, uniforms: Array, rows: Array, size: int, context: ProposalContext,
-    workspace: Workspace, candidate: Array,
+    z: Array, uniforms: Array, rows: Array, size: int, tuning: Tuning, knobs: Knobs,
+    scratch: Scratch, candidate: Array,
 ) -> tuple[float, int]:  # fmt: skip
     """Write a candidate that does not depend on z: a `Move.propose`."""
-    centre, factor = context.tuning.centre, context.tuning.factor
+    centre, factor = tuning.centre, tuning.factor
     there = student.DEGREES + student.draw(uniforms, U_FREE, centre, factor, candidate)
-    here = student.DEGREES + student.distance2(z, centre, factor, workspace.residual)
+    here = student.DEGREES + student.distance2(z, centre, factor, scratch.residual)
     return 0.5 * (student.DEGREES + z.size) * math.log(there / here), NO_CLASS
 
 

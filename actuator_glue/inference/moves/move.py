@@ -56,6 +56,29 @@ class Tempering(NamedTuple):
 UNTEMPERED = Tempering(1.0, np.empty(0), np.empty((0, 0)))
 
 
+class Knobs(NamedTuple):
+    """Numbers that the settings give to moves.
+
+    Attributes:
+        pairs: largest number of archive pairs in a parallel-direction move.
+        unit_jump: probability that such a move is a unit jump.
+        jitter: half width of the factor that stretches its jumps.
+        noise: half width of what is added to them, in standard deviations.
+    """
+
+    pairs: int
+    unit_jump: float
+    jitter: float
+    noise: float
+
+
+class Scratch(NamedTuple):
+    """Arrays that moves may write to: indices (3, max(2 pairs, 3)) and residual (p,)."""
+
+    indices: NDArray[np.int64]
+    residual: Array
+
+
 class ProposalContext(NamedTuple):
     """What a step depends on besides the chains and the archive.
 
@@ -66,10 +89,7 @@ class ProposalContext(NamedTuple):
         tempering: the target; `UNTEMPERED` for the posterior itself.
         fixed: probability of each move, (M,); negative where it follows what the move achieves.
         most: largest share among those of each move, (M,).
-        pairs: largest number of archive pairs in a parallel-direction move.
-        unit_jump: probability that such a move is a unit jump.
-        jitter: half width of the factor that stretches its jumps.
-        noise: half width of what is added to them, in standard deviations.
+        knobs: numbers of the moves.
     """
 
     lower: Array
@@ -78,10 +98,7 @@ class ProposalContext(NamedTuple):
     tempering: Tempering
     fixed: Array
     most: Array
-    pairs: int
-    unit_jump: float
-    jitter: float
-    noise: float
+    knobs: Knobs
 
 
 class Workspace(NamedTuple):
@@ -95,8 +112,7 @@ class Workspace(NamedTuple):
         log_uniform: what the log acceptance ratio must exceed, (n,).
         floor: log likelihood below which the candidate is rejected, (n,).
         accepted: whether the chain moves there, (n,).
-        indices: scratch of the moves, (3, max(2 pairs, 3)).
-        residual: scratch of the moves, (p,).
+        scratch: of the moves.
     """
 
     log_jacobian: Array
@@ -106,8 +122,7 @@ class Workspace(NamedTuple):
     log_uniform: Array
     floor: Array
     accepted: NDArray[np.bool_]
-    indices: NDArray[np.int64]
-    residual: Array
+    scratch: Scratch
 
 
 @njit
@@ -121,8 +136,7 @@ def workspace(chains: int, dimension: int, pairs: int) -> Workspace:
         np.empty(chains),
         np.empty(chains),
         np.empty(chains, np.bool_),
-        np.empty((3, max(2 * pairs, 3)), np.int64),
-        np.empty(dimension),
+        Scratch(np.empty((3, max(2 * pairs, 3)), np.int64), np.empty(dimension)),
     )
 
 
@@ -132,7 +146,7 @@ class Move:
 
     Attributes:
         name: for people.
-        propose: compiled function of (z, uniforms, rows, size, context, workspace, candidate)
+        propose: compiled function of (z, uniforms, rows, size, tuning, knobs, scratch, candidate)
             that writes the candidate of one chain at z (p,) and returns the log of
             q(candidate -> z)/q(z -> candidate), and the crossover class or `NO_CLASS`. Its random
             numbers are uniforms[U_FREE:]; rows[:size] is the archive.
@@ -164,11 +178,11 @@ def dispatch(moves: Sequence[Move]) -> Callable[..., tuple[float, int]]:
     # Not kept in files, where a closure would not be found again: what calls it is.
     @njit(cache=False)
     def propose(
-        number: int, z: Array, uniforms: Array, rows: Array, size: int, context: ProposalContext,
-        workspace: Workspace, candidate: Array,
+        number: int, z: Array, uniforms: Array, rows: Array, size: int, tuning: Tuning,
+        knobs: Knobs, scratch: Scratch, candidate: Array,
     ) -> tuple[float, int]:  # fmt: skip
         if before is None or number == last:
-            return mine(z, uniforms, rows, size, context, workspace, candidate)
-        return before(number, z, uniforms, rows, size, context, workspace, candidate)
+            return mine(z, uniforms, rows, size, tuning, knobs, scratch, candidate)
+        return before(number, z, uniforms, rows, size, tuning, knobs, scratch, candidate)
 
     return propose

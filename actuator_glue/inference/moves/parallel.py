@@ -9,9 +9,10 @@ from actuator_glue.inference.moves.draw import choose, distinct
 from actuator_glue.inference.moves.move import (
     NO_CLASS,
     U_FREE,
+    Knobs,
     Move,
-    ProposalContext,
-    Workspace,
+    Scratch,
+    Tuning,
 )
 from actuator_glue.jit import njit
 from actuator_glue.records import Array
@@ -19,8 +20,8 @@ from actuator_glue.records import Array
 
 @njit
 def propose(
-    z: Array, uniforms: Array, rows: Array, size: int, context: ProposalContext,
-    workspace: Workspace, candidate: Array,
+    z: Array, uniforms: Array, rows: Array, size: int, tuning: Tuning, knobs: Knobs,
+    scratch: Scratch, candidate: Array,
 ) -> tuple[float, int]:  # fmt: skip
     """Write a candidate: a `Move.propose`, of no crossover class for unit jumps.
 
@@ -29,14 +30,14 @@ def propose(
     small. Symmetric: (a, b) and (b, a) are equally likely, and so are epsilon and -epsilon; the
     log Hastings correction is 0.
     """
-    scale, crossover_cdf = context.tuning.scale, context.tuning.crossover_cdf
-    pairs, indices = context.pairs, workspace.indices
+    scale, crossover_cdf = tuning.scale, tuning.crossover_cdf
+    pairs, indices = knobs.pairs, scratch.indices
     d = z.size
     at = U_FREE
     crossover = NO_CLASS
     delta = 1
     # A unit jump (gamma = 1) carries a chain from mode to mode: one pair, every coordinate.
-    if uniforms[at] >= context.unit_jump:
+    if uniforms[at] >= knobs.unit_jump:
         crossover = choose(uniforms[at + 1], crossover_cdf)
         delta = min(1 + int(uniforms[at + 2] * pairs), size // 2)
     lone = int(uniforms[at + 3] * d)
@@ -56,8 +57,8 @@ def propose(
             direction = 0.0
             for k in range(delta):
                 direction += rows[indices[0, 2 * k], j] - rows[indices[0, 2 * k + 1], j]
-            stretch = 1.0 + context.jitter * (2.0 * uniforms[at + d + j] - 1.0)
-            small = context.noise * scale[j] * (2.0 * uniforms[at + 2 * d + j] - 1.0)
+            stretch = 1.0 + knobs.jitter * (2.0 * uniforms[at + d + j] - 1.0)
+            small = knobs.noise * scale[j] * (2.0 * uniforms[at + 2 * d + j] - 1.0)
             candidate[j] += stretch * gamma * direction + small
     return 0.0, crossover
 

@@ -9,9 +9,10 @@ from actuator_glue.inference.moves.draw import distinct
 from actuator_glue.inference.moves.move import (
     NO_CLASS,
     U_FREE,
+    Knobs,
     Move,
-    ProposalContext,
-    Workspace,
+    Scratch,
+    Tuning,
 )
 from actuator_glue.jit import njit
 from actuator_glue.records import Array
@@ -19,8 +20,8 @@ from actuator_glue.records import Array
 
 @njit
 def propose(
-    z: Array, uniforms: Array, rows: Array, size: int, context: ProposalContext,
-    workspace: Workspace, candidate: Array,
+    z: Array, uniforms: Array, rows: Array, size: int, tuning: Tuning, knobs: Knobs,
+    scratch: Scratch, candidate: Array,
 ) -> tuple[float, int]:  # fmt: skip
     """Write a candidate on the line from an archive point through z: a `Move.propose`.
 
@@ -29,7 +30,7 @@ def propose(
     correction is (|candidate - a| / |z - a|)^(d - 1). Lengths and projections are taken in
     coordinates divided by their standard deviation, so that no coordinate rules the others.
     """
-    scale, indices = context.tuning.scale, workspace.indices
+    scale, indices = tuning.scale, scratch.indices
     d = z.size
     distinct(uniforms, U_FREE, 3, size, indices)
     anchor = rows[indices[0, 0]]
