@@ -28,9 +28,13 @@ if TYPE_CHECKING:
     from actuator_glue.api.diagnosis import diagnose as diagnose
     from actuator_glue.api.replay_result import Replay as Replay
     from actuator_glue.api.replaying import replay as replay
+    from actuator_glue.api.rths import rths as rths
     from actuator_glue.api.simulation import Command as Command
     from actuator_glue.api.simulation import simulate as simulate
+    from actuator_glue.api.stability import StabilityResult as StabilityResult
     from actuator_glue.errors import InputError as InputError
+    from actuator_glue.hybrid.partition import Partition as Partition
+    from actuator_glue.hybrid.partition import Specimen as Specimen
     from actuator_glue.io.load import load as load
     from actuator_glue.io.load import load_records as load_records
     from actuator_glue.records import Record as Record
@@ -41,14 +45,18 @@ _PUBLIC = {
     'Command': ('api.simulation', 'Command'),
     'Diagnosis': ('api.diagnosis', 'Diagnosis'),
     'InputError': ('errors', 'InputError'),
+    'Partition': ('hybrid.partition', 'Partition'),
     'Record': ('records', 'Record'),
     'Replay': ('api.replay_result', 'Replay'),
+    'Specimen': ('hybrid.partition', 'Specimen'),
+    'StabilityResult': ('api.stability', 'StabilityResult'),
     'calibrate': ('api.calibration', 'calibrate'),
     'diagnose': ('api.diagnosis', 'diagnose'),
     'effects': ('effects', ''),
     'load': ('io.load', 'load'),
     'load_records': ('io.load', 'load_records'),
     'replay': ('api.replaying', 'replay'),
+    'rths': ('api.rths', 'rths'),
     'simulate': ('api.simulation', 'simulate'),
 }
 __all__ = sorted(_PUBLIC)

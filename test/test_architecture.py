@@ -18,10 +18,18 @@ BOTTOM = {'errors', 'records', 'jit', 'normal'}
 CORE = BOTTOM | {'model', 'inference'}
 EVERYTHING = CORE | {
     'online', 'diagnosis', 'report', 'io', 'interfaces', 'workers', 'effects',
+    'hybrid',
 }  # fmt: skip
 # Each folder or top module, and what it may import besides itself.
 ARROWS = {
-    '__init__': {'api', 'effects', 'errors', 'io', 'records'},  # names, imported when used
+    '__init__': {
+        'api',
+        'effects',
+        'errors',
+        'hybrid',
+        'io',
+        'records',
+    },  # names, imported when used
     'errors': set(),
     'records': {'errors'},
     'jit': set(),
@@ -32,15 +40,16 @@ ARROWS = {
     'inference': BOTTOM | {'model'},
     'online': CORE,
     'diagnosis': CORE,
+    'hybrid': CORE,
     'report': CORE | {'online', 'diagnosis', 'io'},
-    'io': {'records', 'errors', 'interfaces'},
+    'io': {'records', 'errors', 'interfaces', 'hybrid'},
     'workers': CORE | {'online'},
     'api': EVERYTHING,
     'nodes': EVERYTHING | {'api'},
     'cli': EVERYTHING | {'api', 'arguments'},
 }
 # All below io but jit, which keeps compiled code in files.
-PURE = ('errors', 'records', 'normal', 'model', 'inference', 'online', 'diagnosis')
+PURE = ('errors', 'records', 'normal', 'model', 'inference', 'online', 'diagnosis', 'hybrid')
 ROS = ('rclpy', 'launch', 'ament_index_python')
 HEAVY = ('numba', 'scipy', 'matplotlib', 'arviz', 'control', 'statsmodels', 'rosbags', 'rclpy')
 

@@ -12,8 +12,9 @@ import actuator_glue as ag
 from actuator_glue.cli.main import main
 
 NAMES = {
-    'Calibration', 'Command', 'Diagnosis', 'InputError', 'Record', 'Replay', 'calibrate',
-    'diagnose', 'effects', 'load', 'load_records', 'replay', 'simulate',
+    'Calibration', 'Command', 'Diagnosis', 'InputError', 'Partition', 'Record', 'Replay',
+    'Specimen', 'StabilityResult', 'calibrate', 'diagnose', 'effects', 'load', 'load_records',
+    'replay', 'rths', 'simulate',
 }  # fmt: skip
 
 

@@ -35,15 +35,22 @@ def test_wheel_holds_every_file_of_the_package(wheel: Path) -> None:
     """Modules, message texts, templates, style and the mark of a typed package."""
     package = ROOT / 'actuator_glue'
     # rglob follows no links, and the message texts lie behind one.
-    files = {
-        p.relative_to(ROOT).as_posix()
-        for folder in (package, package / 'interfaces/')
-        for pattern in LISTED
-        for p in folder.rglob(pattern)
-    } | {
-        f'actuator_glue/interfaces/{p.parent.name}/{p.name}'
-        for p in (ROOT / 'msg_defs').glob('*/*')
-    }
+    files = (
+        {
+            p.relative_to(ROOT).as_posix()
+            for folder in (package, package / 'interfaces/')
+            for pattern in LISTED
+            for p in folder.rglob(pattern)
+        }
+        | {
+            f'actuator_glue/interfaces/{p.parent.name}/{p.name}'
+            for p in (ROOT / 'msg_defs').glob('*/*')
+        }
+        | {
+            f'actuator_glue/partitions/{p.name}'
+            for p in (ROOT / 'config/partitions').glob('*.yaml')
+        }
+    )
     held = {n for n in zipfile.ZipFile(wheel).namelist() if n.startswith('actuator_glue/')}
     assert held == files
 

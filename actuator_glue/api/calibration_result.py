@@ -15,6 +15,7 @@ from actuator_glue.records import Array, Record
 
 if TYPE_CHECKING:
     import arviz
+    import control
     from matplotlib.figure import Figure
 
 SCHEMA = 'actuator_glue.calibration/1'
@@ -221,6 +222,28 @@ class Calibration:
             InputError: the file cannot be read, or holds no calibration.
         """
         return store.load(path, SCHEMA, cls)
+
+    def state_space(self, stiffness: float, draw: str | int = 'mean') -> control.StateSpace:
+        """Return x/u as a `control.StateSpace`; see `transfer_function`."""
+        from actuator_glue.api.transfer import state_space
+
+        return state_space(self, stiffness, draw)
+
+    def transfer_function(
+        self, stiffness: float, draw: str | int = 'mean'
+    ) -> control.TransferFunction:
+        """Return the closed-loop actuator x/u, Eq. (2a), as a `control.TransferFunction`.
+
+        Args:
+            stiffness: specimen stiffness k [N/m].
+            draw: 'mean' of the parameters, 'best' draw, or the number of one in `posterior`.
+
+        Raises:
+            InputError: no such draw, or effects that are no rational transfer function.
+        """
+        import control
+
+        return control.ss2tf(self.state_space(stiffness, draw))
 
     def plot(self) -> Figure:
         """Return a figure of every parameter's distribution and every pair of them."""

@@ -1,0 +1,182 @@
+"""The result of `rths`: how likely a hybrid test is unstable with a calibrated actuator."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from actuator_glue.api import store
+from actuator_glue.hybrid.margin import Margins, psi
+from actuator_glue.hybrid.stability import Share
+from actuator_glue.records import Array
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+SCHEMA = 'actuator_glue.rths/1'
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """Distribution of a number over the draws: mean, standard deviation, 95 % limits."""
+
+    mean: float
+    stddev: float
+    lower: float
+    median: float
+    upper: float
+
+
+@dataclass(frozen=True, slots=True)
+class AtFrequency:
+    """How the actuator follows a sine, before any compensation.
+
+    Attributes:
+        frequency_hz: of the sine.
+        delay_s: phase lag over angular frequency.
+        amplitude: measured over commanded.
+    """
+
+    frequency_hz: float
+    delay_s: Spread
+    amplitude: Spread
+
+
+@dataclass(frozen=True, slots=True)
+class DelayMargin:
+    """tau_c of the loop with a pure delay for an actuator [s]; infinite where none limits it.
+
+    Attributes:
+        pure_delay: in continuous time.
+        sampled: with the force held from sample to sample and the computation delay spent.
+    """
+
+    pure_delay: float
+    sampled: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class StabilityResult:
+    """Stability of a hybrid test over the draws of a posterior.
+
+    Attributes:
+        partition: its name.
+        natural_frequencies_hz: of the whole structure, ascending.
+        rate_hz: sample rate of the loop.
+        delay_margin: without an actuator, by its pure delay.
+        margins: gain and phase margin of the same loop, and with the mean actuator.
+        p_unstable: share of draws with a characteristic root in the right half plane.
+        margin_s: further delay that the draws can bear; negative for unstable ones, where it is
+            minus the smallest lead that reaches the stability limit; None where nothing limits.
+        growth_per_s: real part of the rightmost characteristic root of the sampled loop.
+        bandwidth_hz: where the actuator is 3 dB below its static gain.
+        tracking: delay and amplitude at the frequencies asked for.
+        sensitivity: rank correlation of the margin with each parameter.
+        most_sensitive: the parameter of the largest one; None where the margin does not vary.
+        compensator: 'none', or what it is.
+        draws: how many were used.
+        seconds: how long it took.
+        problems: why the posterior must not be used as it stands.
+        notes: what limits the answer.
+        margins_drawn, growth_drawn: of each draw, (draws,).
+    """
+
+    partition: str
+    natural_frequencies_hz: tuple[float, ...]
+    rate_hz: float
+    delay_margin: DelayMargin
+    margins: dict[str, Margins]
+    p_unstable: Share
+    margin_s: Spread | None
+    growth_per_s: Spread
+    bandwidth_hz: Spread
+    tracking: tuple[AtFrequency, ...]
+    sensitivity: dict[str, float]
+    most_sensitive: str | None
+    compensator: str
+    draws: int
+    seconds: float
+    problems: tuple[str, ...]
+    notes: tuple[str, ...]
+    margins_drawn: Array
+    growth_drawn: Array
+
+    def go(self, limit: float) -> bool:
+        """Whether P(unstable) is at most a limit up to its upper bound, by a usable posterior."""
+        return not self.problems and self.p_unstable.upper <= limit
+
+    def summary(self) -> str:
+        """Return P(unstable) with its interval in one line."""
+        p = self.p_unstable
+        return (
+            f'P(unstable) = {p.value:.4g} ({100 * p.level:g} % interval {p.lower:.3g} to '
+            f'{p.upper:.3g}, {self.draws} draws worth {p.effective_draws:.0f} independent ones)'
+        )
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the object of schema `actuator_glue.rths/1`."""
+        margin = self.delay_margin
+        return {
+            'schema': SCHEMA,
+            'partition': self.partition,
+            'natural_frequencies_hz': list(self.natural_frequencies_hz),
+            'rate_hz': self.rate_hz,
+            'delay_margin_s': asdict(margin),
+            'psi': {'pure_delay': psi(margin.pure_delay), 'sampled': psi(margin.sampled)},
+            'margins': {name: asdict(m) for name, m in self.margins.items()},
+            'p_unstable': asdict(self.p_unstable),
+            'indicators': {
+                'margin_s': None if self.margin_s is None else asdict(self.margin_s),
+                'growth_per_s': asdict(self.growth_per_s),
+                'bandwidth_hz': asdict(self.bandwidth_hz),
+                'tracking': [asdict(t) for t in self.tracking],
+                'sensitivity': self.sensitivity,
+                'most_sensitive': self.most_sensitive,
+            },
+            'compensator': self.compensator,
+            'draws': self.draws,
+            'seconds': self.seconds,
+            'problems': list(self.problems),
+            'notes': list(self.notes),
+        }
+
+    def save(self, path: Path | str) -> Path:
+        """Write everything to one .npz file; return its path.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        return store.save(path, SCHEMA, self)
+
+    @classmethod
+    def load(cls, path: Path | str) -> StabilityResult:
+        """Return what `save` wrote.
+
+        Raises:
+            InputError: the file cannot be read, or holds something else.
+        """
+        return store.load(path, SCHEMA, cls)
+
+    def plot(self) -> Figure:
+        """Return a figure of the margins and the growth rates of the draws."""
+        from actuator_glue.api.stability_report import stability_figure
+
+        return stability_figure(self)
+
+    def report(self, path: Path | str) -> Path:
+        """Write a report, one HTML file, and return its path.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        from actuator_glue.api.stability_report import write_report
+
+        return write_report(self, Path(path))
+
+    def _repr_html_(self) -> str:
+        """Return problems and the summary, for notebooks."""
+        from html import escape
+
+        lines = [f'<p><b>{escape(line)}</b></p>' for line in self.problems]
+        return '\n'.join([*lines, f'<p>{escape(f"{self.partition}: {self.summary()}")}</p>'])

@@ -1,0 +1,49 @@
+"""A calibrated actuator as python-control objects."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from actuator_glue.errors import InputError
+from actuator_glue.hybrid.loop import actuator
+from actuator_glue.records import Array
+
+if TYPE_CHECKING:
+    from actuator_glue.api.posterior import Calibration
+
+
+def chosen_draw(found: Calibration, draw: str | int) -> Array:
+    """Return the parameters of the mean, the best, or a numbered draw, (p,).
+
+    Raises:
+        InputError: no such draw.
+    """
+    draws = found.posterior
+    if draw == 'mean':
+        return np.asarray(draws.mean(axis=0))
+    if draw == 'best':
+        return found.best
+    if isinstance(draw, int) and -len(draws) <= draw < len(draws):
+        return np.asarray(draws[draw])
+    raise InputError(f"draw {draw!r}: use 'mean', 'best', or a number below {len(draws)}")
+
+
+def state_space(found: Calibration, stiffness: float, draw: str | int) -> Any:
+    """Return x/u under a specimen stiffness [N/m] as `control.StateSpace`.
+
+    Raises:
+        InputError: no such draw, or effects that are no rational transfer function.
+    """
+    import control
+
+    row = chosen_draw(found, draw)[None]
+    model = actuator(row, found.names, found.effects, np.array([stiffness]))
+    if 'delay' in found.effects:
+        raise InputError(
+            f'the model has a delay of {1e3 * float(model.delay[0]):.3g} ms, which is no rational '
+            'function; calibrate without it, or build the delay on top with control.pade'
+        )
+    A, B, C, D = (part[0] for part in model.system)
+    return control.ss(A, B[:, None], C[None], [[D]], inputs='command', outputs='displacement')

@@ -1,0 +1,1 @@
+"""What an actuator's uncertainty means for a hybrid test: loop, delay margin, stability."""

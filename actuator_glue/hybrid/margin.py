@@ -1,0 +1,105 @@
+"""Delay margin of a hybrid test's loop: how late the specimen force may come."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuator_glue.hybrid.linear_system import Complex, System, bilinear, crossings, held
+from actuator_glue.hybrid.loop import substructures
+from actuator_glue.hybrid.partition import Partition
+from actuator_glue.records import Array
+
+
+@dataclass(frozen=True, slots=True)
+class Margins:
+    """Margins of one loop.
+
+    Attributes:
+        gain: factor that the loop gain bears; None where no factor or no single one limits it.
+        phase_deg: phase that it bears [deg]; None where the gain is nowhere 1.
+    """
+
+    gain: float | None
+    phase_deg: float | None
+
+
+def delay_margin(loop: System, delay: Array | float = 0.0) -> tuple[Array, Array]:
+    """Return the smallest further delay, and the smallest lead, that reach the stability limit.
+
+    Where |L(jw)| = 1 a delay tau puts a characteristic root on the imaginary axis if
+    arg L - w (delay + tau) = pi modulo 2 pi (docs/rths.md).
+
+    Args:
+        loop: continuous open loop L.
+        delay: what the loop has already, (m,) [s].
+
+    Returns:
+        tau_c and the lead, (m,) each [s]; infinite where the gain is nowhere 1. tau_c is 0 where
+        the gain does not fall below 1 at high frequencies: no delay is borne then.
+    """
+    w = crossings(loop)
+    at: Complex = (1j * np.nan_to_num(w, nan=1.0)).astype(np.complex128)
+    later, sooner = _nearest(w, loop.response(at), delay)
+    return np.where(np.abs(loop.D) >= 1.0, 0.0, later), sooner
+
+
+def sampled_delay_margin(
+    loop: System, period: float, delay: Array | float = 0.0
+) -> tuple[Array, Array]:
+    """Return `delay_margin` of the loop whose force is held from sample to sample.
+
+    Args:
+        loop: continuous open loop L.
+        period: sample period T [s].
+        delay: of computation and whatever else the loop has already, (m,) [s].
+    """
+    discrete = held(loop, period)
+    w = 2.0 * np.arctan(crossings(bilinear(discrete))) / period
+    z = np.exp(1j * np.nan_to_num(w, nan=1.0) * period)
+    later, sooner = _nearest(w, discrete.response(z), delay)
+    return np.where(np.abs(loop.D) >= 1.0, 0.0, later), sooner
+
+
+def _nearest(w: Array, gain: Complex, delay: Array | float) -> tuple[Array, Array]:
+    turn = 2.0 * np.pi
+    lag = np.broadcast_to(np.asarray(delay, dtype=np.float64), (len(w),))[:, None]
+    angle = np.angle(gain) - w * lag + np.pi
+    later = np.where(np.isnan(w), np.inf, (angle % turn) / w)
+    sooner = np.where(np.isnan(w), np.inf, (-angle % turn) / w)
+    return later.min(axis=1), sooner.min(axis=1)
+
+
+def pure_delay_margin(partition: Partition) -> tuple[float, float]:
+    """Return tau_c of the loop with a pure delay for an actuator: continuous, and sampled [s].
+
+    The sampled one is what is left for the actuator when the force is held over a period and the
+    partition's computation delay is spent; negative where they alone exceed what the loop bears.
+    """
+    loop = nominal(partition)
+    continuous = float(delay_margin(loop)[0][0])
+    sampled = float(sampled_delay_margin(loop, partition.period)[0][0])
+    return continuous, sampled - partition.computation_delay
+
+
+def nominal(partition: Partition) -> System:
+    """Return L(s) with the specimen's nominal values."""
+    return substructures(partition, partition.specimen.nominal)
+
+
+def psi(delay: float) -> float | None:
+    """Return the predictive stability indicator log10(tau_c [ms]) (Maghareh et al. 2014).
+
+    None where there is no positive and finite tau_c.
+    """
+    return float(np.log10(1e3 * delay)) if 0.0 < delay < np.inf else None
+
+
+def classical_margins(loop: System) -> Margins:
+    """Return gain and phase margin of the first row of a loop, by python-control."""
+    import control
+
+    row = control.ss(loop.A[0], loop.B[0][:, None], loop.C[0][None], [[loop.D[0]]])
+    gain, phase = control.stability_margins(row)[:2]
+    return Margins(*(float(v) if np.isfinite(v) else None for v in (gain, phase)))

@@ -1,0 +1,143 @@
+"""Delay margins held to closed forms, to the benchmark's reference values, and to simulation."""
+
+import numpy as np
+import pytest
+
+from actuator_glue.hybrid.linear_system import System, closed, crossings, held, rightmost, series
+from actuator_glue.hybrid.margin import (
+    classical_margins,
+    delay_margin,
+    nominal,
+    psi,
+    pure_delay_margin,
+    sampled_delay_margin,
+)
+from actuator_glue.hybrid.partition import Partition, Specimen
+from actuator_glue.io.partition import read_partition
+from actuator_glue.model.benchmark_plant import BenchmarkParameters
+
+# tau_c [ms], rightmost pole [1/s] with the uncompensated plant, natural frequencies [Hz].
+BENCHMARK = (
+    (14.642, 0.523, (3.612, 15.997, 38.086)),
+    (12.222, 0.656, (3.444, 15.252, 36.314)),
+    (9.921, 0.716, (3.168, 14.030, 33.404)),
+    (8.726, 0.955, (3.612, 15.997, 38.086)),
+)
+STATIC_GAIN = 1.0261  # of the benchmark's plant
+
+
+def sdof(damping: float, alpha: float, mass: float = 0.0, rate: float = 4096.0) -> Partition:
+    """A structure of period 1 s, alpha of its stiffness in the specimen."""
+    w = 2.0 * np.pi
+    return Partition(
+        mass=1000.0 - mass,
+        damping=2.0 * damping * w * 1000.0,
+        stiffness=(1.0 - alpha) * w**2 * 1000.0,
+        specimen=Specimen(mass, 0.0, alpha * w**2 * 1000.0),
+        rate=rate,
+    )
+
+
+def plant() -> System:
+    """The benchmark's transfer system without its sensors."""
+    p = BenchmarkParameters()
+    A = np.zeros((1, 5, 5))
+    A[0, 0, 1] = A[0, 2, 0] = A[0, 3, 4] = 1.0
+    A[0, 1, [0, 1, 3]] = -p.beta2, -p.beta1, -p.a1_beta0
+    A[0, 2, [2, 4]] = -p.a3, -p.a2
+    A[0, 4, [2, 3, 4]] = np.array([1.0, -p.stiffness, -p.damping]) / p.mass
+    B, C = np.zeros((1, 5)), np.zeros((1, 5))
+    B[0, 1], C[0, 3] = p.a1_beta0, STATIC_GAIN
+    return System(A, B, C, np.zeros(1))
+
+
+@pytest.mark.parametrize(
+    ('damping', 'alpha', 'ms'), [(0.05, 1.0, 15.942), (0.02, 1.0, 6.368), (0.05, 0.5, 32.045)]
+)
+def test_sdof(damping: float, alpha: float, ms: float) -> None:
+    """The table of reference values."""
+    assert 1e3 * pure_delay_margin(sdof(damping, alpha))[0] == pytest.approx(ms, rel=1e-4)
+
+
+@pytest.mark.parametrize('case', range(4))
+def test_benchmark(case: int) -> None:
+    """Silva et al. (2020): margins, frequencies, and the growth with its plant in the loop."""
+    tau, pole, frequencies = BENCHMARK[case]
+    partition = read_partition(f'benchmark_case_{case + 1}')
+    continuous, sampled = pure_delay_margin(partition)
+    assert 1e3 * continuous == pytest.approx(tau, rel=1e-3)
+    assert psi(continuous) == pytest.approx(np.log10(tau), abs=1e-3)
+    assert partition.natural_frequencies == pytest.approx(frequencies, abs=6e-4)
+    assert rightmost(series(nominal(partition), plant()))[0] == pytest.approx(pole, rel=1e-3)
+    # Half a sample for the force that is held.
+    assert continuous - sampled == pytest.approx(0.5 / 4096.0, rel=0.06)
+
+
+@pytest.mark.parametrize('seed', range(5))
+def test_a_delay_on_either_side_of_the_margin(seed: int) -> None:
+    """The sampled loop with whole samples of delay: stable below its margin, unstable above."""
+    rng = np.random.default_rng(seed)
+    rate = float(rng.uniform(200.0, 2000.0))
+    partition = sdof(rng.uniform(0.01, 0.1), rng.uniform(0.3, 1.0), rng.uniform(0.0, 300.0), rate)
+    loop = nominal(partition)
+    tau = float(sampled_delay_margin(loop, partition.period)[0][0])
+    discrete = held(loop, partition.period)
+    for samples, stable in ((int(tau * rate), True), (int(tau * rate) + 1, False)):
+        delayed = discrete
+        for _ in range(samples):
+            one = System(np.zeros((1, 1, 1)), np.ones((1, 1)), np.ones((1, 1)), np.zeros(1))
+            delayed = series(delayed, one)
+        radius = np.abs(np.linalg.eigvals(closed(delayed))).max()
+        assert (radius < 1.0) == stable
+
+
+def test_a_delay_of_a_part_of_a_sample() -> None:
+    """The modified z-transform: held input, 2.3 samples late, against steps of a tenth of one."""
+    rng = np.random.default_rng(3)
+    A = np.array([[[0.0, 1.0], [-400.0, -8.0]]])
+    system = System(A, np.array([[0.0, 1.0]]), np.array([[1.0, 0.0]]), np.zeros(1))
+    u = rng.standard_normal(40)
+    fine = held(system, 0.001)
+    late = np.concatenate([np.zeros(23), np.repeat(u, 10)])[:400]
+    x, slow = np.zeros(2), []
+    for i, value in enumerate(late):
+        if i % 10 == 0:
+            slow.append(x[0])
+        x = fine.A[0] @ x + fine.B[0] * value
+    coarse = held(system, 0.01, np.array([0.023]))
+    y, fast = np.zeros(len(coarse.B[0])), []
+    for value in u:
+        fast.append(coarse.C[0] @ y)
+        y = coarse.A[0] @ y + coarse.B[0] * value
+    np.testing.assert_allclose(fast, slow, atol=1e-12)
+
+
+def test_crossings_are_those_of_a_fine_grid() -> None:
+    """No sharp resonance is missed, and none invented."""
+    loop = nominal(read_partition('benchmark_case_4'))
+    w = np.linspace(0.5, 300.0, 300_001)
+    gain = np.abs(loop.response(1j * w[None]))[0]
+    seen = w[np.flatnonzero(np.diff(np.sign(gain - 1.0)))]
+    found = np.sort(crossings(loop)[0])
+    np.testing.assert_allclose(found[~np.isnan(found)], seen, atol=2e-3)
+
+
+def test_python_control_agrees() -> None:
+    """The delay margin of one crossing is its phase margin over its frequency."""
+    loop = nominal(read_partition('sdof'))
+    w = np.nanmax(crossings(loop))
+    phase = classical_margins(loop).phase_deg
+    assert phase is not None
+    assert np.radians(phase) / w == pytest.approx(delay_margin(loop)[0][0], rel=1e-6)
+
+
+def test_no_delay_is_borne_by_a_heavy_specimen() -> None:
+    """More experimental than numerical mass: unstable with any delay, sampled or not."""
+    partition = sdof(0.05, 0.5, mass=600.0)
+    assert pure_delay_margin(partition) == (0.0, 0.0)
+    assert psi(0.0) is None
+
+
+def test_a_soft_specimen_bears_every_delay() -> None:
+    """Where the gain is nowhere 1 nothing limits the delay."""
+    assert pure_delay_margin(sdof(0.3, 0.1))[0] == np.inf
