@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from actuator_glue.api.posterior import FitError, Marginal, Source
 from scipy import signal, stats
 
 import actuator_glue as ag
@@ -13,6 +14,7 @@ from actuator_glue.cli.main import main
 from actuator_glue.hybrid.stability import share
 from actuator_glue.model import linear
 from actuator_glue.model.parameters import BASE
+from actuator_glue.model.structure import Structure
 
 MEAN = np.array([133.65, 1.1005e9, 2.4927e5, 0.006])  # problem R
 # What Eq. (2) lags at low frequencies with these: about d1/d0.
@@ -23,9 +25,6 @@ def posterior(
     spread: float = 0.01, effects: tuple[str, ...] = (), seed: int = 0
 ) -> ag.Calibration:
     """A calibration with draws made here: independent, normal, no sampler involved."""
-    from actuator_glue.api.posterior import FitError, Marginal, Source
-    from actuator_glue.model.structure import Structure
-
     structure = Structure(effects)
     rng = np.random.default_rng(0)
     centre = structure.neutral(MEAN)
