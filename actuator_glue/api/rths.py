@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from actuator_glue.api.posterior import Calibration
+from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.api.stability import AtFrequency, DelayMargin, Spread, StabilityResult
 from actuator_glue.errors import InputError
 from actuator_glue.hybrid import stability

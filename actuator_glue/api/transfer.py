@@ -11,7 +11,7 @@ from actuator_glue.hybrid.loop import actuator
 from actuator_glue.records import Array
 
 if TYPE_CHECKING:
-    from actuator_glue.api.posterior import Calibration
+    from actuator_glue.api.calibration_result import Calibration
 
 
 def chosen_draw(found: Calibration, draw: str | int) -> Array:

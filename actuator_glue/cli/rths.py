@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import argparse
 
-from actuator_glue.cli._output import add_json, note, say, table, write_json
-from actuator_glue.cli._parser import Output, number
+from actuator_glue.arguments import Output, number
+from actuator_glue.cli._output import add_json, note, say, table
 from actuator_glue.errors import InputError
+from actuator_glue.io.json_file import write_json
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -75,7 +76,7 @@ def run(args: argparse.Namespace) -> int:
     if args.limit is not None and not 0.0 <= args.limit <= 1.0:
         raise InputError(f'--limit {args.limit:g}: a probability lies between 0 and 1')
 
-    from actuator_glue.api.posterior import Calibration
+    from actuator_glue.api.calibration_result import Calibration
     from actuator_glue.api.rths import FREQUENCIES, rths
     from actuator_glue.api.stability_report import HEADER, margin_line, rows, sensitivity_line
 

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from actuator_glue.api.posterior import FitError, Marginal, Source
 from scipy import signal, stats
 
 import actuator_glue as ag
+from actuator_glue.api.calibration_result import CalibratedRecord, FitError, Marginal
 from actuator_glue.cli.main import main
 from actuator_glue.hybrid.stability import share
 from actuator_glue.model import linear
@@ -40,7 +40,7 @@ def posterior(
         error=FitError(0.0, 0.0, ()), at_bound=(), problems=(), notes=(), converged=True,
         effects=effects, likelihood='glue', shaping_factor=256.0, seed=1, initial='rest',
         settle=0.0, evaluations=1, seconds=0.0, compile_seconds=0.0,
-        sources=(Source('test', 1, 200.0, 250e3, 'zoh'),),
+        sources=(CalibratedRecord('test', 1, 200.0, 250e3, 'zoh'),),
     )  # fmt: skip
 
 
