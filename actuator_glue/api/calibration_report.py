@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from actuator_glue.errors import InputError
 from actuator_glue.inference.bands import band
 from actuator_glue.inference.predictive import fit_residual, total_band
 from actuator_glue.model.exact import Initial
@@ -129,7 +128,4 @@ def write_report(found: Calibration, path: Path) -> Path:
         sections.append(html.Section('Bands over the records', pictures))
     lead = '; '.join(found.problems) or error_line(found)
     made = f'{found.evaluations} evaluations, seed {found.seed}'
-    try:
-        return html.write(path, 'Calibration', lead, sections, made=made)
-    except OSError as error:
-        raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error
+    return html.write(path, 'Calibration', lead, sections, made=made)

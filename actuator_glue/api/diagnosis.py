@@ -96,10 +96,7 @@ class Diagnosis(DiagnosisData):
         """
         from actuator_glue.report.diagnosis_report import write_report
 
-        try:
-            return write_report(self, Path(path))
-        except OSError as error:
-            raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error
+        return write_report(self, Path(path))
 
     def _repr_html_(self) -> str:
         """Return verdict, effects and advice, for notebooks."""

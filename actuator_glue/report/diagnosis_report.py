@@ -172,7 +172,7 @@ def write_report(found: DiagnosisData, path: Path) -> Path:
     """Write the report of a diagnosis and return its path.
 
     Raises:
-        OSError: the file cannot be written.
+        InputError: the file cannot be written.
     """
     sections = [_error(found), _effects(found), _residual(found), _records(found)]
     return write(path, 'Diagnosis', found.summary(), sections)

@@ -10,6 +10,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from actuator_glue import __version__
+from actuator_glue.errors import InputError
 from actuator_glue.report.style import data_uri
 
 TEMPLATES = Path(__file__).with_name('templates')
@@ -97,7 +98,15 @@ def render(title: str, lead: str, sections: Sequence[Section], *, made: str = ''
 def write(
     path: Path, title: str, lead: str, sections: Sequence[Section], *, made: str = ''
 ) -> Path:
-    """Write the page to a file and return its path; arguments and errors as `render`."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(render(title, lead, sections, made=made), encoding='utf-8')
+    """Write the page to a file and return its path; arguments and errors as `render`.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    page = render(title, lead, sections, made=made)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(page, encoding='utf-8')
+    except OSError as error:
+        raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error
     return path

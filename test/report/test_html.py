@@ -2,11 +2,13 @@
 
 import re
 from html.parser import HTMLParser
+from pathlib import Path
 
 import pytest
 from markupsafe import Markup
 from matplotlib.figure import Figure
 
+from actuator_glue.errors import InputError
 from actuator_glue.report.html import Note, Picture, Section, Table, Text, render, write
 
 
@@ -48,3 +50,9 @@ def test_page_is_whole_numbered_and_self_contained(tmp_path) -> None:
 def test_ragged_table_is_refused() -> None:
     with pytest.raises(ValueError, match='as long as the header'):
         render('T', 'L', [Section('S', [Table(('a', 'b'), [(1,)], 'c')])])
+
+
+def test_a_page_that_cannot_be_written_is_one_clear_error(tmp_path: Path) -> None:
+    (tmp_path / 'file').write_text('')
+    with pytest.raises(InputError, match='cannot be written'):
+        write(tmp_path / 'file' / 'page.html', 'T', 'L', [])
