@@ -1,0 +1,101 @@
+"""Tracking indicators of hybrid testing, from target and measured displacement."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.signal import correlate
+
+from actuator_glue.errors import InputError
+from actuator_glue.records import Array
+
+
+class FrequencyEvaluation(NamedTuple):
+    """The frequency evaluation index: amplitude, delay [s], equivalent frequency [Hz]."""
+
+    amplitude: float
+    delay: float
+    frequency: float
+
+
+class Criteria(NamedTuple):
+    """Tracking criteria of the benchmark (Silva et al. 2020).
+
+    Attributes:
+        j1: lag of the largest cross-correlation, whole samples [s].
+        j2: rms of the error over that of the target.
+        j3: peak of the error over that of the target.
+    """
+
+    j1: float
+    j2: float
+    j3: float
+
+
+def frequency_evaluation(target: Array, measured: Array, period: float) -> FrequencyEvaluation:
+    """Return the frequency evaluation index (Guo et al. 2014), its angle by atan2.
+
+    The gain measured over target at every frequency, weighted with the target's power.
+
+    Raises:
+        InputError: as `_checked`.
+    """
+    target, measured = _checked(target, measured)
+    x, y = np.fft.rfft(target)[1:], np.fft.rfft(measured)[1:]
+    power = np.abs(x) ** 2
+    index = (y * x.conj()).sum() / power.sum()
+    frequency = float(power @ np.fft.rfftfreq(len(target), period)[1:] / power.sum())
+    return FrequencyEvaluation(
+        float(abs(index)), float(-np.angle(index) / (2.0 * np.pi * frequency)), frequency
+    )
+
+
+def tracking_indicator(target: Array, measured: Array) -> Array:
+    """Return the tracking indicator at each sample, (n,) [m^2] (Mercan and Ricles 2009).
+
+    Half the difference of the areas under measured against target and target against measured:
+    the area enclosed so far; it grows where the measured displacement lags.
+
+    Raises:
+        InputError: as `_checked`.
+    """
+    target, measured = _checked(target, measured)
+    area = 0.5 * (target[1:] + target[:-1]) * np.diff(measured)
+    other = 0.5 * (measured[1:] + measured[:-1]) * np.diff(target)
+    return np.concatenate([[0.0], np.cumsum(0.5 * (area - other))])
+
+
+def criteria(target: Array, measured: Array, period: float) -> Criteria:
+    """Return J1 to J3.
+
+    Raises:
+        InputError: as `_checked`.
+    """
+    target, measured = _checked(target, measured)
+    lag = int(np.argmax(correlate(measured, target))) - (len(target) - 1)
+    error = measured - target
+    return Criteria(
+        lag * period,
+        float(np.sqrt(np.mean(error**2) / np.mean(target**2))),
+        float(np.abs(error).max() / np.abs(target).max()),
+    )
+
+
+def _checked(target: Array, measured: Array) -> tuple[Array, Array]:
+    """Return both as arrays.
+
+    Raises:
+        InputError: not two rows of one length, values that are not finite, a target at rest.
+    """
+    target, measured = np.asarray(target, np.float64), np.asarray(measured, np.float64)
+    if target.ndim != 1 or target.shape != measured.shape or len(target) < 4:
+        raise InputError(
+            f'target has shape {target.shape}, measured {measured.shape}; give two rows of one '
+            'length, four samples or more'
+        )
+    if not (np.isfinite(target).all() and np.isfinite(measured).all()):
+        raise InputError('target or measured displacement has NaN or infinite samples')
+    if np.ptp(target) == 0.0:
+        raise InputError('the target does not move: nothing to track')
+    return target, measured
