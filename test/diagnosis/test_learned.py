@@ -10,7 +10,9 @@ import pytest
 from smooth_machines import Array, piston
 
 from actuator_glue import effects
+from actuator_glue.api import diagnosis as module
 from actuator_glue.api.diagnosis import Diagnosis
+from actuator_glue.cli.main import main
 from actuator_glue.diagnosis import diagnose as core
 from actuator_glue.diagnosis.learned_forms import forms
 from actuator_glue.diagnosis.learned_term import LearnedTerm
@@ -167,3 +169,23 @@ def test_smooth_unknowns_are_predicted(kind: str, seed: int) -> None:
     assert found.verdict in ('missing-effect', 'unexplained')
     assert found.error.after < 1.2 * NOISE
     assert all(math.isnan(e.probability) for e in found.effects if e.name.startswith('learned'))
+
+
+def test_the_command_saves_what_was_learned(
+    found: Diagnosis, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """`--save-effects` writes a file of effects where a term was learned, else none."""
+    record = tmp_path / 'r.csv'
+    t = np.arange(0.0, 10.0, 0.01)
+    rows = np.column_stack([t, np.sin(t), 0.9 * np.sin(t - 0.1)])
+    np.savetxt(record, rows, delimiter=',', header='time_s,command_mm,measured_mm', comments='')
+    without = Diagnosis(
+        **{f.name: getattr(found, f.name) for f in fields(found)} | {'learned': (), 'effects': ()}
+    )
+    for answer, written in ((found, True), (without, False)):
+        monkeypatch.setattr(module, 'diagnose', lambda *_, answer=answer, **__: answer)
+        out = tmp_path / f'{written}.yaml'
+        main(['diagnose', str(record), '--stiffness', '0', '--save-effects', str(out)])
+        assert out.exists() is written
+    (effect,) = effects.read_effects(tmp_path / 'True.yaml')
+    assert effect.name == found.learned[0].name
