@@ -150,21 +150,18 @@ def test_a_sentence_names_no_cause() -> None:
 
 @pytest.mark.slow
 @pytest.mark.parametrize('seed', [1, 2, 3])
-@pytest.mark.parametrize('kind', ['sensor', 'saturation', 'damping', 'leakage'])
+@pytest.mark.parametrize('kind', ['saturation', 'damping'])
 def test_smooth_unknowns_are_predicted(kind: str, seed: int) -> None:
     """Held-out error within 1.2 of the noise, whatever the term is called."""
     rng = np.random.default_rng([seed, 5])
     theta = PLANTS[seed % 3] * np.exp(0.1 * rng.standard_normal(4))
     share = rng.uniform(0.0, 1.0)
-    error, force = theta[0] * (theta[2] + 125e3) / theta[1] * 0.125, 250e3 * 2e-3
+    error = theta[0] * (theta[2] + 125e3) / theta[1] * 0.125
     which, size = {
-        'sensor': (0, 1.0),
         'saturation': (1, (0.4 + 0.4 * share) * error),
         'damping': (3, (0.1 + 0.3 * share) * theta[2] * 2e-3 / 0.125**2),
-        'leakage': (4, (1.0 + 2.0 * share) * 1e-4 * theta[1] / theta[0] / force**2),
     }[kind]
-    cubic = (1.0 + 2.0 * share) * 1e-4 if kind == 'sensor' else 0.0
-    records = machine(which, size, cubic, theta, seed, 256.0, 40.0)
+    records = machine(which, size, 0.0, theta, seed, 256.0, 40.0)
     found = core.diagnose(records[:2], records[2], settings=QUICK)
     assert found.verdict in ('missing-effect', 'unexplained')
     assert found.error.after < 1.2 * NOISE
