@@ -17,10 +17,10 @@ from scipy.signal import lsim
 # records that tell more.
 COMMANDS = [
     'simulate {0}/made.csv --duration 6 --rate 200 --stiffness 250e3 --effect backlash',
-    'calibrate {0}/free.csv --stiffness 0 --evaluations 5000',
-    'calibrate {0}/free.csv {0}/clamped.csv --stiffness 0 250e3 --evaluations 5000',
+    'calibrate {0}/free.csv --stiffness 0 --evaluations 24000',
+    'calibrate {0}/free.csv {0}/clamped.csv --stiffness 0 250e3 --evaluations 24000',
     'diagnose {0}/free.csv {0}/clamped.csv --stiffness 0 250e3',
-    'calibrate {0}/clamped.csv --stiffness 250e3 --effect backlash --evaluations 5000',
+    'calibrate {0}/clamped.csv --stiffness 250e3 --effect backlash --evaluations 24000',
 ]
 
 
