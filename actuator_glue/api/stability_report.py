@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from actuator_glue.errors import InputError
 from actuator_glue.report import html, style
 
 if TYPE_CHECKING:
@@ -87,7 +86,4 @@ def write_report(found: StabilityResult, path: Path) -> Path:
     blocks += [html.Note(line) for line in found.notes]
     section = html.Section(f'Stability of {found.partition}', blocks)
     lead = '; '.join((*found.problems, found.summary()))
-    try:
-        return html.write(path, 'Hybrid test', lead, [section], made=f'{found.draws} draws')
-    except OSError as error:
-        raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error
+    return html.write(path, 'Hybrid test', lead, [section], made=f'{found.draws} draws')
