@@ -2,23 +2,18 @@
 
 from __future__ import annotations
 
-import difflib
 import re
-from collections.abc import Mapping
-from dataclasses import MISSING, dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 from reprlib import repr as brief
-from typing import Any, Literal
-
-import yaml
+from typing import Literal
 
 from actuator_glue.errors import InputError
-from actuator_glue.io.signature import text_encoding
 from actuator_glue.io.units import ROLES, factor
+from actuator_glue.io.yaml_file import mapping, number, parse, read_text, whole
 from actuator_glue.records import check_stiffness
 
 Column = str | int
-_LARGEST = 100_000  # bytes; a map is a page of text
 # Inside {...} YAML reads the [s] of `column: Time [s]` as a list.
 _BRACKETS = re.compile(r'column:\s*[^\'"\s][^\'",}]*\[')
 _QUOTES = "put quotes around names with brackets, as in column: 'Time [s]'"
@@ -87,23 +82,13 @@ def read_channel_map(path: Path | str) -> ChannelMap:
         InputError: no such file, no YAML, unknown or missing entries, wrong kinds or units.
     """
     path = Path(path)
-    try:
-        size = path.stat().st_size
-        if size > _LARGEST:
-            raise InputError(
-                f'{path}: {size / 1e3:.0f} kB are no channel map; --channels takes the YAML file '
-                'that describes the columns of a record, not the record'
-            )
-        text = path.read_text(text_encoding(path))
-        content = yaml.safe_load(text)
-    except OSError as error:
-        raise InputError(f'{path}: channel map cannot be read ({error.strerror})') from error
-    except UnicodeDecodeError as error:
-        raise InputError(f'{path}: channel map is not text in UTF-8') from error
-    except yaml.YAMLError as error:
-        detail = ' '.join(str(error).split())
-        hint = f'; {_QUOTES}' if _BRACKETS.search(text) else ''
-        raise InputError(f'{path}: channel map is not YAML ({detail}){hint}') from error
+    text = read_text(
+        path,
+        'channel map',
+        '--channels takes the YAML file that describes the columns of a record, not the record',
+    )
+    hint = f'; {_QUOTES}' if _BRACKETS.search(text) else ''
+    content = parse(text, f'{path}: channel map', hint)
     return parse_channel_map(content, str(path))
 
 
@@ -114,14 +99,14 @@ def parse_channel_map(content: object, source: str) -> ChannelMap:
         InputError: unknown or missing entries, wrong kinds or units.
     """
     where = f'{source}: channel map'
-    values = _mapping(content, ChannelMap, where, hidden=('source',))
+    values = mapping(content, ChannelMap, where, hidden=('source',))
     for role in ROLES:
         if values.get(role) is not None:
             values[role] = _channel(values[role], role, f'{where}: {role}')
-    _number(values, 'rate', where, lower=0.1, upper=1e6)
-    _number(values, 'stiffness', where)
+    number(values, 'rate', where, lower=0.1, upper=1e6)
+    number(values, 'stiffness', where)
     for name in ('header_lines', 'rest_samples'):
-        _whole(values, name, where)
+        whole(values, name, where)
     for name, allowed in (('decimal', ('.', ',')), ('hold', ('zoh', 'linear'))):
         if values.get(name) is not None and values[name] not in allowed:
             raise InputError(f'{where}: {name} is {values[name]!r}; use one of {allowed}')
@@ -142,33 +127,16 @@ def parse_channel_map(content: object, source: str) -> ChannelMap:
 
 
 def _channel(content: object, role: str, where: str) -> Channel:
-    values = _mapping(content, Channel, where)
+    values = mapping(content, Channel, where)
     _column(values['column'], where)
     if isinstance(values['unit'], list):
         raise InputError(f'{where}: unit is {brief(values["unit"])}; write it without brackets')
     factor(role, str(values['unit']) if values['unit'] else None, where)
-    _number(values, 'scale', where)
-    _number(values, 'offset', where)
+    number(values, 'scale', where)
+    number(values, 'offset', where)
     if not isinstance(values.get('remove_rest_offset', False), bool):
         raise InputError(f'{where}: remove_rest_offset must be true or false')
     return Channel(**values)
-
-
-def _mapping(
-    content: object, kind: type, where: str, hidden: tuple[str, ...] = ()
-) -> dict[str, Any]:
-    if not isinstance(content, Mapping):
-        raise InputError(f'{where} must be a mapping of names to values, not {brief(content)}')
-    known = [f.name for f in fields(kind) if f.name not in hidden]
-    for name in content:
-        if name not in known:
-            near = difflib.get_close_matches(str(name), known, 1)
-            hint = f'did you mean {near[0]}?' if near else f'known are {", ".join(known)}'
-            raise InputError(f'{where}: unknown entry {name!r}; {hint}')
-    for entry in fields(kind):
-        if entry.default is MISSING and content.get(entry.name) is None:
-            raise InputError(f'{where}: {entry.name} is missing')
-    return dict(content)
 
 
 def _column(value: object, where: str) -> None:
@@ -177,32 +145,3 @@ def _column(value: object, where: str) -> None:
         raise InputError(f'{where}: column must be a name or a number, not {brief(value)}{hint}')
     if isinstance(value, int) and value < 1:
         raise InputError(f'{where}: columns are counted from 1, got {value}')
-
-
-def _number(
-    values: dict[str, Any],
-    name: str,
-    where: str,
-    lower: float = -1e15,
-    upper: float = 1e15,
-) -> None:
-    value = values.get(name)
-    if value is None:
-        return
-    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
-        raise InputError(f'{where}: {name} must be a number, not {value!r}')
-    try:
-        # YAML 1.1 reads 1e6 without a point as text.
-        values[name] = float(value)
-    except ValueError as error:
-        raise InputError(f'{where}: {name} must be a number, not {value!r}') from error
-    if not lower <= values[name] <= upper:
-        raise InputError(f'{where}: {name} = {value} is outside [{lower:g}, {upper:g}]')
-
-
-def _whole(values: dict[str, Any], name: str, where: str) -> None:
-    value = values.get(name)
-    if value is None:
-        return
-    if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= 10**9:
-        raise InputError(f'{where}: {name} must be a whole number of at least 0, not {value!r}')

@@ -1,0 +1,130 @@
+"""YAML files that people write: read safely, every entry checked, with a hint where one errs."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Mapping
+from dataclasses import MISSING, fields
+from pathlib import Path
+from reprlib import repr as brief
+from typing import Any
+
+import yaml
+
+from actuator_glue.errors import InputError
+from actuator_glue.io.signature import text_encoding
+
+LARGEST = 100_000  # bytes; a map or layout is a page of text
+
+
+def read_text(path: Path, what: str, hint: str) -> str:
+    """Return the text of a YAML file.
+
+    Args:
+        path: the file.
+        what: what it is to be, for messages.
+        hint: said where it is far too large for that.
+
+    Raises:
+        InputError: no such file, too large, no text.
+    """
+    try:
+        size = path.stat().st_size
+        if size > LARGEST:
+            raise InputError(f'{path}: {size / 1e3:.0f} kB are no {what}; {hint}')
+        return path.read_text(text_encoding(path))
+    except OSError as error:
+        raise InputError(f'{path}: {what} cannot be read ({error.strerror})') from error
+    except UnicodeDecodeError as error:
+        raise InputError(f'{path}: {what} is not text in UTF-8') from error
+
+
+def parse(text: str, where: str, hint: str = '') -> object:
+    """Return what YAML text says; only plain data, no objects.
+
+    Args:
+        text: the text.
+        where: file and what it is to be, for messages.
+        hint: said behind the error.
+
+    Raises:
+        InputError: no YAML.
+    """
+    try:
+        return yaml.safe_load(text)
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        # ValueError: a date such as 2001-99-99; RecursionError: a thousand brackets.
+        detail = ' '.join(str(error).split())
+        raise InputError(f'{where} is not YAML ({detail}){hint}') from error
+
+
+def mapping(
+    content: object, kind: type, where: str, hidden: tuple[str, ...] = ()
+) -> dict[str, Any]:
+    """Return a mapping that has the fields of a dataclass, and only those.
+
+    Args:
+        content: what the YAML says.
+        kind: the dataclass; fields without a default are needed.
+        where: place in the file, for messages.
+        hidden: fields that no file may give.
+
+    Raises:
+        InputError: no mapping, an unknown or missing entry.
+    """
+    if not isinstance(content, Mapping):
+        raise InputError(f'{where} must be a mapping of names to values, not {brief(content)}')
+    known = [f.name for f in fields(kind) if f.name not in hidden]
+    for name in content:
+        if name not in known:
+            near = difflib.get_close_matches(str(name), known, 1)
+            hint = f'did you mean {near[0]}?' if near else f'known are {", ".join(known)}'
+            raise InputError(f'{where}: unknown entry {name!r}; {hint}')
+    for entry in fields(kind):
+        plain = entry.default is MISSING and entry.default_factory is MISSING
+        if plain and content.get(entry.name) is None:
+            raise InputError(f'{where}: {entry.name} is missing')
+    return dict(content)
+
+
+def number(
+    values: dict[str, Any],
+    name: str,
+    where: str,
+    lower: float = -1e15,
+    upper: float = 1e15,
+) -> None:
+    """Make an entry, where it is there, a number within limits.
+
+    Raises:
+        InputError: no number, or outside.
+    """
+    value = values.get(name)
+    if value is None:
+        return
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise InputError(f'{where}: {name} must be a number, not {brief(value)}')
+    try:
+        # YAML 1.1 reads 1e6 without a point as text.
+        values[name] = float(value)
+    except (ValueError, OverflowError) as error:
+        raise InputError(f'{where}: {name} must be a number, not {brief(value)}') from error
+    if not lower <= values[name] <= upper:
+        raise InputError(f'{where}: {name} = {value} is outside [{lower:g}, {upper:g}]')
+
+
+def whole(
+    values: dict[str, Any], name: str, where: str, lower: int = 0, upper: int = 10**9
+) -> None:
+    """Hold an entry, where it is there, to a whole number within limits.
+
+    Raises:
+        InputError: no whole number, or outside.
+    """
+    value = values.get(name)
+    if value is None:
+        return
+    if isinstance(value, bool) or not isinstance(value, int) or not lower <= value <= upper:
+        raise InputError(
+            f'{where}: {name} must be a whole number of at least {lower}, not {brief(value)}'
+        )
