@@ -3,10 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal, TypeAlias
 
 import numpy as np
 
 from actuator_glue.records import Array
+
+# Sampling coordinates of an effect's parameters (`ridge_effects`), in the order they are undone.
+Coordinate: TypeAlias = Literal[
+    'gain', 'damping', 'share', 'sliding-force', 'mass-damping', 'lost-share', 'flow', 'per-flow',
+    'log', 'line',
+]  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,6 +27,7 @@ class Parameter:
         upper: upper prior bound [unit].
         meaning: one line for people.
         neutral: value that switches an effect off; None for the base model.
+        coordinate: what it is sampled as under one stiffness; None for itself.
     """
 
     name: str
@@ -28,6 +36,7 @@ class Parameter:
     upper: float
     meaning: str
     neutral: float | None = None
+    coordinate: Coordinate | None = None
 
 
 # Table 3 of the paper; the unit of beta_1 is 1/s there by dimension (printed N/s^2).

@@ -4,15 +4,19 @@ One record tells how an effect acts beside the oil column, not its size in N: fo
 curvatures come as shares of alpha_2 + k. With k = 0 that is all it tells; otherwise nearly.
 Where an effect shares coefficients of the inverse response with Eq. (2a) (gain; damping and mass,
 whose s^2 adds to d2), the coefficient of both together is the coordinate, since it is what the
-record fixes:
+record fixes. Every parameter says which coordinate it has (`Parameter.coordinate`):
 
-    gain g:         d2/n0, d1/n0 and d0/n0, each divided by g
-    damping c:      d2 + c (beta_1 + s), and ln d1/d2 in place of c
-    mass m:         the same with c = m (mass_damping + alpha_3)
-    Stribeck:       the break-away force in place of the sliding force
-    flow:           velocities count as flow over alpha_2; the record shows flow over k + alpha_2
-    supply droop:   logarithm of its time constant
-    hum:            its phase in the middle of the record, not at the start of the test
+    gain            g: d2/n0, d1/n0 and d0/n0, each divided by g
+    damping         c: d2 + c (beta_1 + s), and ln d1/d2 in place of c
+    mass-damping    of the mass m before it: the same with c = m (mass_damping + alpha_3)
+    share           of alpha_2 + k
+    sliding-force   the break-away force, with the ratio behind it, as a share
+    lost-share      what is missing from one, as a share
+    flow            of a velocity: counts as flow over alpha_2, the record has it over k + alpha_2
+    per-flow        one over such a velocity
+    log             its logarithm
+    line            amplitudes of a cosine, a sine and their frequency, one after another: the
+                    phase in the middle of the record, not at the start of the test
 """
 
 from __future__ import annotations
@@ -20,28 +24,23 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import partial
-from typing import Any, Final
+from typing import Any, get_args
 
 import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.jit import njit
 from actuator_glue.model import ridge
+from actuator_glue.model.effects import CATALOGUE
+from actuator_glue.model.parameters import Coordinate
 from actuator_glue.records import Array
 
 _njit: Any = partial(njit, fastmath=False)
 
-# Parameters with a coordinate of their own; all others are their own coordinate.
-NAMES = (
-    'gain', 'damping', 'mass', 'mass_damping', 'coulomb_force', 'sliding_force', 'breakaway_ratio',
-    'hardening', 'post_yield_ratio', 'droop_time', 'droop', 'saturation_velocity',
-    'hum_cosine', 'hum_sine', 'hum_frequency',
-)  # fmt: skip
+# In the order in which they are undone.
 (
-    GAIN, DAMPING, MASS, MASS_DAMPING, COULOMB, SLIDING, BREAKAWAY, HARDENING, POST_YIELD,
-    DROOP_TIME, DROOP, SATURATION, COSINE, SINE, FREQUENCY,
-) = range(len(NAMES))  # fmt: skip
-_SHARES: Final = (DAMPING, MASS, COULOMB, SLIDING, HARDENING)
+    GAIN, DAMPING, SHARE, SLIDING, MASS_DAMPING, LOST_SHARE, FLOW, PER_FLOW, LOG, LINE,
+) = range(10)  # fmt: skip
 # No machine's d0/n0 is larger by more: it would lose ten parts in eleven of its static command.
 _STATIC = 10.0
 # No servo-valve is slower.
@@ -51,8 +50,11 @@ _LEAST_OIL = 100.0
 
 
 def columns(names: Sequence[str]) -> NDArray[np.int64]:
-    """Return where each of NAMES stands among a model's parameters, -1 where it does not."""
-    return np.array([names.index(n) if n in names else -1 for n in NAMES], dtype=np.int64)
+    """Return the parameters (c, 2) with a coordinate of their own: column, and which it is."""
+    kinds = {p.name: p.coordinate for e in CATALOGUE.values() for p in e.parameters}
+    order = get_args(Coordinate)
+    found = [(order.index(kind), j) for j, name in enumerate(names) if (kind := kinds.get(name))]
+    return np.array([(j, kind) for kind, j in sorted(found)], dtype=np.int64).reshape(-1, 2)
 
 
 def bounds(at: NDArray[np.int64], k: float, low: Array, high: Array) -> tuple[Array, Array]:
@@ -63,28 +65,25 @@ def bounds(at: NDArray[np.int64], k: float, low: Array, high: Array) -> tuple[Ar
     lower, upper = low.copy(), high.copy()
     lower[:4] = upper[:4] = np.nan
     least = max(k + low[2], 0.01 * (k + high[2]))
-    for part in _SHARES:
-        j = at[part]
-        if j >= 0:
+    for j, kind in at:
+        if kind in (SHARE, SLIDING):
             lower[j], upper[j] = low[j] / least, high[j] / least
-    if (j := at[SLIDING]) >= 0:
-        upper[j] *= high[at[BREAKAWAY]]
-    if (j := at[POST_YIELD]) >= 0:
-        lower[j], upper[j] = (1.0 - high[j]) / least, (1.0 - low[j]) / least
-    if (j := at[GAIN]) >= 0:
-        lower[j], upper[j] = 1.0 / high[j], 1.0 / low[j] + _STATIC
-    for part in (DAMPING, MASS_DAMPING):
-        if (j := at[part]) >= 0:
+        if kind == SLIDING:
+            upper[j] *= high[j + 1]
+        elif kind == LOST_SHARE:
+            lower[j], upper[j] = (1.0 - high[j]) / least, (1.0 - low[j]) / least
+        elif kind == GAIN:
+            lower[j], upper[j] = 1.0 / high[j], 1.0 / low[j] + _STATIC
+        elif kind in (DAMPING, MASS_DAMPING):
             lower[j], upper[j] = math.log(_SLOWEST), math.log(high[0] + high[3])
-    if (j := at[SATURATION]) >= 0:
-        lower[j] = 0.0
-    if (j := at[DROOP]) >= 0:
-        upper[j] *= _LEAST_OIL
-    for part in (COSINE, SINE):
-        if (j := at[part]) >= 0:  # corners of the box, turned
-            lower[j], upper[j] = 1.5 * low[j], 1.5 * high[j]
-    if (j := at[DROOP_TIME]) >= 0:
-        lower[j], upper[j] = math.log(low[j]), math.log(high[j])
+        elif kind == FLOW:
+            lower[j] = 0.0
+        elif kind == PER_FLOW:
+            upper[j] *= _LEAST_OIL
+        elif kind == LINE:  # corners of the box, turned
+            lower[j : j + 2], upper[j : j + 2] = 1.5 * low[j : j + 2], 1.5 * high[j : j + 2]
+        elif kind == LOG:
+            lower[j], upper[j] = math.log(low[j]), math.log(high[j])
     return lower, upper
 
 
@@ -102,12 +101,22 @@ def _split(rate: float, lag: float, inertia: float, s: float) -> tuple[float, fl
 
 
 @_njit
-def turn(row: Array, at: NDArray[np.int64], time: float) -> None:
+def turn(row: Array, j: int, time: float) -> None:
     """Turn a line's amplitudes, of a phase that counts from `time` [s], to one from 0."""
-    angle = 2.0 * math.pi * row[at[FREQUENCY]] * time
-    c, s = row[at[COSINE]], row[at[SINE]]
-    row[at[COSINE]] = c * math.cos(angle) - s * math.sin(angle)
-    row[at[SINE]] = c * math.sin(angle) + s * math.cos(angle)
+    angle = 2.0 * math.pi * row[j + 2] * time
+    c, s = row[j], row[j + 1]
+    row[j] = c * math.cos(angle) - s * math.sin(angle)
+    row[j + 1] = c * math.sin(angle) + s * math.cos(angle)
+
+
+@_njit
+def _factor(kind: int, theta: Array, oil: float) -> float:
+    """Return a parameter over its coordinate."""
+    if kind == FLOW:
+        return oil / theta[2]
+    if kind == PER_FLOW:
+        return theta[2] / oil
+    return oil
 
 
 @_njit
@@ -124,18 +133,16 @@ def physical(
         theta[j] = z[j]
     lag, inertia, s = math.exp(z[0]), math.exp(z[1]), z[3] if k > 0.0 else 0.0
     log_jacobian = 0.0
-    j = at[GAIN]
-    if j >= 0:
-        below = z[j] - (lag / inertia - s) * s * inertia
-        if not below > 0.0:
-            return -math.inf
-        theta[j] = 1.0 / below
-        lag, inertia = lag * theta[j], inertia * theta[j]
-        log_jacobian -= 2.0 * math.log(below)
-    viscous = 0.0
-    for part in (DAMPING, MASS_DAMPING):
-        j = at[part]
-        if j >= 0:
+    for i in range(len(at)):
+        j, kind = at[i, 0], at[i, 1]
+        if kind == GAIN:
+            below = z[j] - (lag / inertia - s) * s * inertia
+            if not below > 0.0:
+                return -math.inf
+            theta[j] = 1.0 / below
+            lag, inertia = lag * theta[j], inertia * theta[j]
+            log_jacobian -= 2.0 * math.log(below)
+        elif kind in (DAMPING, MASS_DAMPING):
             inertia, viscous, more = _split(z[j], lag, inertia, s)
             if not (viscous >= 0.0 and inertia > 0.0):
                 return -math.inf
@@ -146,39 +153,27 @@ def physical(
     if log_jacobian == -math.inf:
         return log_jacobian
     oil = theta[2] + k
-    for part in _SHARES:
-        j = at[part]
-        if j >= 0:
-            theta[j] *= oil
-            log_jacobian += math.log(oil)
-    j = at[SLIDING]
-    if j >= 0:
-        ratio = max(theta[at[BREAKAWAY]], 1e-3)
-        theta[j] /= ratio
-        log_jacobian -= math.log(ratio)
-    j = at[MASS_DAMPING]
-    if j >= 0:
-        mass = max(theta[at[MASS]], 1e-9)
-        theta[j] = theta[j] * oil / mass - theta[3]
-        log_jacobian += math.log(oil / mass)
-    j = at[POST_YIELD]
-    if j >= 0:
-        theta[j] = 1.0 - theta[j] * oil
-        log_jacobian += math.log(oil)
-    j = at[SATURATION]
-    if j >= 0:
-        theta[j] *= oil / theta[2]
-        log_jacobian += math.log(oil / theta[2])
-    j = at[DROOP]
-    if j >= 0:
-        theta[j] *= theta[2] / oil
-        log_jacobian += math.log(theta[2] / oil)
-    j = at[DROOP_TIME]
-    if j >= 0:
-        theta[j] = math.exp(z[j])
-        log_jacobian += z[j]
-    if at[COSINE] >= 0:
-        turn(theta, at, middle)
+    for i in range(len(at)):
+        j, kind = at[i, 0], at[i, 1]
+        if kind == LINE:
+            turn(theta, j, middle)
+        elif kind == LOG:
+            theta[j] = math.exp(z[j])
+            log_jacobian += z[j]
+        elif kind == MASS_DAMPING:
+            mass = max(theta[j - 1], 1e-9)
+            theta[j] = theta[j] * oil / mass - theta[3]
+            log_jacobian += math.log(oil / mass)
+        elif kind != GAIN:
+            factor = _factor(kind, theta, oil)
+            theta[j] *= factor
+            log_jacobian += math.log(factor)
+        if kind == SLIDING:
+            ratio = max(theta[j + 1], 1e-3)
+            theta[j] /= ratio
+            log_jacobian -= math.log(ratio)
+        elif kind == LOST_SHARE:
+            theta[j] = 1.0 - theta[j]
     for j in range(4, len(z)):
         if not low[j] <= theta[j] <= high[j]:
             return -math.inf
@@ -209,37 +204,31 @@ def coordinates_all(
     for i in range(len(theta)):
         oil = max(k + theta[i, 2], 1e-9)
         lag, inertia, s = math.exp(z[i, 0]), math.exp(z[i, 1]), z[i, 3] if k > 0.0 else 0.0
-        for part in _SHARES:
-            j = at[part]
-            if j >= 0:
+        for a in range(len(at)):
+            j, kind = at[a, 0], at[a, 1]
+            if kind == LINE:
+                turn(z[i], j, -middle)
+            elif kind == LOG:
+                z[i, j] = math.log(theta[i, j])
+            elif kind == LOST_SHARE:
+                z[i, j] = (1.0 - theta[i, j]) / oil
+            elif kind == FLOW:
+                z[i, j] *= theta[i, 2] / oil
+            elif kind == PER_FLOW:
+                z[i, j] *= oil / max(theta[i, 2], 1e-9)
+            elif kind != GAIN and kind != MASS_DAMPING:
                 z[i, j] = theta[i, j] / oil
-        j = at[SLIDING]
-        if j >= 0:
-            z[i, j] *= theta[i, at[BREAKAWAY]]
-        j = at[POST_YIELD]
-        if j >= 0:
-            z[i, j] = (1.0 - theta[i, j]) / oil
-        j = at[SATURATION]
-        if j >= 0:
-            z[i, j] *= theta[i, 2] / oil
-        j = at[DROOP]
-        if j >= 0:
-            z[i, j] *= oil / max(theta[i, 2], 1e-9)
-        j = at[DROOP_TIME]
-        if j >= 0:
-            z[i, j] = math.log(theta[i, j])
-        if at[COSINE] >= 0:
-            turn(z[i], at, -middle)
-        for part in (MASS_DAMPING, DAMPING):
-            j = at[part]
-            if j >= 0:
+            if kind == SLIDING:
+                z[i, j] *= theta[i, j + 1]
+        for a in range(len(at) - 1, -1, -1):
+            j, kind = at[a, 0], at[a, 1]
+            if kind == GAIN:
+                z[i, j] = 1.0 / theta[i, j] + (lag / inertia - s) * s * inertia / theta[i, j]
+                lag, inertia = lag / theta[i, j], inertia / theta[i, j]
+            elif kind in (DAMPING, MASS_DAMPING):
                 viscous = z[i, j]
-                if part == MASS_DAMPING:
-                    viscous = (theta[i, j] + theta[i, 3]) * theta[i, at[MASS]] / oil
+                if kind == MASS_DAMPING:
+                    viscous = (theta[i, j] + theta[i, 3]) * theta[i, j - 1] / oil
                 z[i, j] = math.log(lag / inertia)
                 inertia += viscous * (lag - s * inertia)
-        j = at[GAIN]
-        if j >= 0:
-            z[i, j] = 1.0 / theta[i, j] + (lag / inertia - s) * s * inertia / theta[i, j]
-            lag, inertia = lag / theta[i, j], inertia / theta[i, j]
         z[i, 0], z[i, 1] = math.log(max(lag, 1e-300)), math.log(max(inertia, 1e-300))

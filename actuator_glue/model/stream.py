@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from actuator_glue.errors import InputError
-from actuator_glue.model.effects import kernel, lti, rows, run
+from actuator_glue.model.effects import kernel, lti, lti_step, rows, run
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Hold, check_stiffness
 
@@ -121,7 +121,7 @@ class Stream:
         at = u, self._offset, self._begin
         if self.structure.linear:
             third, delayed = self.structure.exact
-            lti.advance(self._table, third, delayed, *at, out, force)
+            lti_step.advance(self._table, third, delayed, *at, out, force)
         else:
             kernel.advance(
                 self._table,

@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from actuator_glue.errors import InputError
 from actuator_glue.model import linear
-from actuator_glue.model.effects import CATALOGUE, Effect, Scale, lti, rows, run
+from actuator_glue.model.effects import CATALOGUE, Effect, Scale, lti_step, rows, run
+from actuator_glue.model.effects.effect import Onset
 from actuator_glue.model.effects.terms import machine
 from actuator_glue.model.effects.terms.program import Written, compiled
 from actuator_glue.model.exact import Initial
@@ -144,8 +145,8 @@ class Structure:
         table = self.table(theta)
         start = linear.initial_state(record) if initial == 'measured' else (0.0, 0.0)
         out = np.empty((len(table), len(record)))
-        before = self.before(record) if initial == 'measured' else None
-        for which, begin, part in self.parts(table, record, start, before, origin, rate):
+        onsets = self.onsets(record, initial)
+        for which, begin, part in self.parts(table, record, start, onsets, origin, rate):
             out[which, begin : begin + len(part)] = part.T
         return out.reshape(*np.shape(theta)[:-1], len(record))
 
@@ -163,56 +164,11 @@ class Structure:
         """
         return StructureErrors(self, records, settle, initial, origin)
 
-    def before(self, record: Record) -> run.Envelope | None:
-        """Return what is known of the motion before a record, where an effect remembers it."""
-        return run.Envelope(record) if 'supply-droop' in self._columns else None
-
-    def jacobian(
-        self,
-        theta: ArrayLike,
-        record: Record,
-        *,
-        scale: Scale,
-        initial: Initial = 'rest',
-    ) -> Array:
-        """Return d(displacement)/d(theta) by finite differences in one batch, shape (p, n).
-
-        Central differences inside the bounds, one-sided at a bound. Steps are 2 % of an effect's
-        smallest typical size and 0.1 % of a base parameter: not smaller, since the response to
-        nonsmooth effects has kinks.
-
-        Args:
-            theta: shape (p,).
-            record: the test.
-            scale: from effects.scale(records, theta[:4]).
-            initial: as in simulate.
-
-        Raises:
-            InputError: wrong shape of theta, or the specimen stiffness is not known.
-        """
-        at = self.table(theta)[0]
-        lower, upper = self.bounds()
-        step = self.steps(at, scale)
-        high = np.minimum(at + step, np.maximum(upper, at))
-        low = np.maximum(at - step, np.minimum(lower, at))
-        batch = np.repeat(at[np.newaxis], 2 * len(at), axis=0)
-        np.fill_diagonal(batch[: len(at)], high)
-        np.fill_diagonal(batch[len(at) :], low)
-        y = self.simulate(batch, record, initial=initial)
-        return np.asarray((y[: len(at)] - y[len(at) :]) / (high - low)[:, np.newaxis])
-
-    def steps(self, theta: Array, scale: Scale) -> Array:
-        """Return the parameter changes that count as small for derivatives, shape (p,)."""
-        step = np.maximum(1e-3 * np.abs(theta), 1e-6)
-        step[3] = max(step[3], 1e-3)  # leakage lies at or near zero
-        for effect in self.entries:
-            columns = self._columns[effect.name]
-            off = np.array([float(p.neutral or 0.0) for p in effect.parameters])
-            sizes = np.abs(np.array(effect.starts(scale)) - off)
-            typical = np.where(sizes > 0.0, sizes, np.inf).min(axis=0)
-            typical = np.where(np.isfinite(typical), typical, np.abs(off) + 1e-9)
-            step[columns] = np.maximum(0.02 * typical, 1e-3 * np.abs(theta[columns]))
-        return step
+    def onsets(self, record: Record, initial: Initial) -> tuple[Onset, ...]:
+        """Return what depends on where a record begins, effect by effect."""
+        moving = record if initial == 'measured' else None
+        found = (e.onset(moving) for e in self.entries if e.onset is not None)
+        return tuple(onset for onset in found if onset is not None)
 
     def variance(self, theta: ArrayLike, record: Record, displacement: Array) -> Array:
         """Return the variance that noise-like effects add to the measurement, (m, n) [m^2].
@@ -245,7 +201,7 @@ class Structure:
     @property
     def exact(self) -> tuple[int, bool]:
         """States beside x and q, and whether there is a delay, for a linear structure's steps."""
-        return lti.third(e.exact for e in self.entries), 'delay' in self._columns
+        return lti_step.third(e.exact for e in self.entries), bool(self._on[rows.ON_LAG])
 
     @property
     def switches(self) -> NDArray[np.bool_]:
@@ -281,36 +237,32 @@ class Structure:
         table: Array,
         record: Record,
         start: tuple[float, float],
-        before: run.Envelope | None,
+        onsets: Sequence[Onset],
         origin: float,
         rate: int = 1,
     ) -> Iterator[tuple[NDArray[np.intp], int, Array]]:
         """Yield which parameter sets (c,), from which sample, and what they record (n, c)."""
-        time = record.time + origin
-        if self.linear and not self._plain:
-            for which, begin, x in run.exact_blocks(
-                self.values(table), *self.exact, record, start
-            ):
-                now = time[begin : begin + len(x)]
-                yield which, begin, self.sensed(table[which], now, x)
+        if self._plain:
+            x = linear.simulate(
+                table[:, : len(BASE)],
+                record.command,
+                stiffness=record.known_stiffness(),
+                period=record.period,
+                hold=record.hold,
+                initial=start,
+            )
+            yield np.arange(len(table)), 0, x.T
             return
-        if not self._plain:
-            values = self.values(table)
+        values = self.values(table)
+        if self.linear:
+            blocks = run.exact_blocks(values, *self.exact, record, start)
+        else:
             with np.errstate(all='ignore'):  # absurd parameters
-                values['delay'] = values['delay'] + values['clock_skew'] * origin
-            if before is not None:
-                values['envelope'] = before(values['droop_time'])
+                for onset in onsets:
+                    values |= onset(values, origin)
             values['origin'] = np.full(len(table), origin)
-            for which, begin, x in run.blocks(values, self._on, self.program, record, start, rate):
-                now = time[begin : begin + len(x)]
-                yield which, begin, self.sensed(table[which], now, x)
-            return
-        x = linear.simulate(
-            table[:, : len(BASE)],
-            record.command,
-            stiffness=record.known_stiffness(),
-            period=record.period,
-            hold=record.hold,
-            initial=start,
-        )
-        yield np.arange(len(table)), 0, x.T
+            blocks = run.blocks(values, self._on, self.program, record, start, rate)
+        time = record.time + origin
+        for which, begin, x in blocks:
+            now = time[begin : begin + len(x)]
+            yield which, begin, self.sensed(table[which], now, x)

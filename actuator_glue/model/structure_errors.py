@@ -44,9 +44,7 @@ class StructureErrors:
         self.settle = settle_samples(self.records, settle)
         self.initial = initial
         self.origin = origin
-        self._before = [
-            structure.before(r) if initial == 'measured' else None for r in self.records
-        ]
+        self._onsets = [structure.onsets(r, initial) for r in self.records]
         self._starts = tuple((float(x), float(v)) for x, v in self._exact.starts)
 
     @property
@@ -68,7 +66,7 @@ class StructureErrors:
         out = np.zeros((len(table), len(self.records), 2))
         for r, record in enumerate(self.records):
             parts = self.structure.parts(
-                table, record, self._starts[r], self._before[r], self.origin
+                table, record, self._starts[r], self._onsets[r], self.origin
             )
             for which, begin, y in parts:
                 first = max(begin, self.settle[r])

@@ -155,30 +155,23 @@ def test_measured_start_needs_no_settling() -> None:
         assert np.abs(late[-200:]).max() < 1e-9
 
 
-def test_jacobian_against_what_is_known() -> None:
-    """Columns that are known exactly, and smooth ones against a finer difference."""
-    names = ('gain', 'bias', 'drift', 'valve-lag', 'flow-asymmetry')
-    r = record()
-    structure = Structure(names)
-    theta = typical(names, r)
-    size = scale([r], TABLE_2)
-    jacobian = structure.jacobian(theta, r, scale=size)
-    assert jacobian.shape == (len(theta), len(U))
-    column = {name: jacobian[i] for i, name in enumerate(structure.names)}
-    assert np.allclose(column['bias'], 1.0, atol=1e-9)
-    assert np.allclose(column['drift'], r.time, atol=1e-6)
-    for name in ('beta_1', 'alpha_1_beta_0', 'alpha_2', 'gain', 'valve_lag', 'asymmetry'):
-        i = structure.names.index(name)
-        h = 1e-4 * theta[i]
-        up, down = theta.copy(), theta.copy()
-        up[i] += h
-        down[i] -= h
-        fine = (structure.simulate(up, r) - structure.simulate(down, r)) / (2.0 * h)
-        assert np.abs(jacobian[i] - fine).max() < 2e-3 * np.abs(fine).max(), name
-    # At a bound the difference is one-sided and stays inside.
-    neutral = Structure(('backlash',)).neutral(TABLE_2)
-    one_sided = Structure(('backlash',)).jacobian(neutral, r, scale=size)
-    assert np.isfinite(one_sided).all() and np.abs(one_sided[-1]).max() > 0.5
+@pytest.mark.parametrize('name', EVERY)
+def test_every_parameter_of_an_entry_acts(name: str) -> None:
+    """An entry whose stage does not know one of its parameters would be ignored in silence."""
+    r = record(250e3)
+    structure = Structure((name,))
+    for which in range(2):  # some parameters of a shape act in some of the typical sizes only
+        theta = np.repeat(typical((name,), r, which)[np.newaxis], len(structure.names) + 1, axis=0)
+        for j in range(4, theta.shape[1]):
+            p = structure.parameters[j]
+            theta[j, j] += 0.05 * (p.upper - p.lower) * (1.0 if theta[j, j] < p.upper else -1.0)
+        y = structure.simulate(theta, r, origin=5.0)
+        changed = np.abs(y - y[-1]).max(axis=1)
+        variance = structure.variance(theta, r, y)
+        changed += np.sqrt(np.abs(variance - variance[-1]).max(axis=1))
+        if (changed[4:-1] > 1e-9).all():
+            return
+    raise AssertionError(dict(zip(structure.names[4:], changed[4:-1], strict=True)))
 
 
 def test_noise_like_effects_leave_the_mean_and_add_variance() -> None:

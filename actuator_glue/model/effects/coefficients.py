@@ -12,11 +12,12 @@ from typing import Any, Final
 import numpy as np
 
 from actuator_glue.jit import njit
+from actuator_glue.model.effects import catalogue
 from actuator_glue.model.effects import rows as r
+from actuator_glue.model.effects.catalogue.flow_saturation import NO_LIMIT
+from actuator_glue.model.parameters import NAMES as BASE
 from actuator_glue.records import Array
 
-# A limit at or above this velocity is no limit: the neutral value of flow-saturation.
-NO_LIMIT: Final = 2.0  # m/s
 # The rise of dry friction follows a change of velocity with this time constant (frictional
 # memory), or with MEMORY_MARGIN rise / ((k + alpha_2) v_s) where that is longer: the steepest
 # fall of the Stribeck curve is 0.86 rise / v_s, and a massless specimen has one velocity only
@@ -24,15 +25,12 @@ NO_LIMIT: Final = 2.0  # m/s
 FRICTION_MEMORY: Final = 2e-3  # s
 MEMORY_MARGIN: Final = 1.72
 
-# Parameters that the kernel takes. 'envelope' is the averaged speed before the first sample [m/s].
+# What the compiled step takes of each parameter set.
 NAMES: Final = (
-    'beta_1', 'alpha_1_beta_0', 'alpha_2', 'alpha_3', 'gain', 'delay', 'clock_skew',
-    'null_offset', 'deadband', 'valve_lag', 'saturation_velocity', 'asymmetry',
-    'inverse_stall_force', 'droop', 'droop_time', 'gain_drift', 'damping', 'mass', 'mass_damping',
-    'coulomb_force', 'sliding_force', 'breakaway_ratio', 'stribeck_velocity', 'gap', 'hardening',
-    'yield_displacement', 'post_yield_ratio', 'yield_sharpness', 'backlash', 'sensor_lag',
-    'envelope',
-)  # fmt: skip
+    *BASE,
+    *(p.name for e in catalogue.found() if e.staged for p in e.parameters),
+    *(state for e in catalogue.found() for state in e.states),
+)
 KIND: Final = np.dtype([(name, np.float64) for name in NAMES])
 
 _TERMS: Final = 14  # Taylor terms for arguments below 1/4: 0.25^14/14! is below rounding

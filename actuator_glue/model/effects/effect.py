@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
@@ -63,6 +63,9 @@ def scale(records: Sequence[Record], theta: Array) -> Scale:
 Starts: TypeAlias = Callable[[Scale], Sequence[Sequence[float]]]
 Output: TypeAlias = Callable[[Array, Array, Array], Array]
 Variance: TypeAlias = Callable[[Array, Array], Array]
+# From parameters by name, each (m,), and the time of a record's first sample since the test began
+# [s]: what of them is different there, or is known besides.
+Onset: TypeAlias = Callable[[Mapping[str, Array], float], Mapping[str, Array]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +85,8 @@ class Effect:
             one value per parameter.
         exact: states of the exact simulation it needs beside x and q (lti.py) where it is linear.
         switches: the kernel's stages it needs (rows.ON_...).
+        onset: what depends on where a record begins, given the record if it begins in motion.
+        states: what `onset` gives its stage beside parameters.
         output: post-step on the recorded displacement: (parameters (m, p), time (n, 1),
             displacement (n, m)) -> (n, m).
         variance: variance it adds to the measurement: (parameters (m, p), velocity of the
@@ -101,6 +106,8 @@ class Effect:
     starts: Starts
     exact: tuple[int, ...] | None = None
     switches: tuple[int, ...] = ()
+    onset: Callable[[Record | None], Onset | None] | None = None
+    states: tuple[str, ...] = ()
     output: Output | None = None
     variance: Variance | None = None
     expression: Expression | None = None
@@ -110,3 +117,8 @@ class Effect:
     def linear(self) -> bool:
         """Whether it leaves the loop linear, so that the exact simulation (lti.py) has it."""
         return self.exact is not None or self.output is not None or self.variance is not None
+
+    @property
+    def staged(self) -> bool:
+        """Whether the compiled step itself takes its parameters."""
+        return self.output is None and self.variance is None and self.expression is None

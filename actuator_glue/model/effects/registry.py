@@ -47,14 +47,13 @@ class Registry(dict[str, Effect]):
             )
         owner = {p.name: e.name for e in self.values() for p in e.parameters}
         owner.update(dict.fromkeys(BASE, 'Eq. (2)'))
-        acts = effect.output or effect.variance or effect.expression
         for p in effect.parameters:
             if p.name in owner:
                 raise InputError(
                     f'effect {effect.name!r}: parameter {p.name!r} belongs to {owner[p.name]} '
                     'already; names of parameters are unique, rename it'
                 )
-            if not acts and p.name not in coefficients.NAMES:
+            if effect.staged and p.name not in coefficients.NAMES:
                 raise InputError(
                     f'effect {effect.name!r}: nothing takes parameter {p.name!r}; it needs an '
                     'expression, an output or a variance'

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.jit import njit
-from actuator_glue.model.effects import coefficients, kernel, lti, rows
+from actuator_glue.model.effects import coefficients, kernel, lti, lti_step, rows
 from actuator_glue.model.effects.terms import machine
 from actuator_glue.model.effects.terms.program import Program
 from actuator_glue.records import Array, Record
@@ -36,32 +36,6 @@ def refinement(values: Mapping[str, Array], stiffness: float, step: float) -> Ar
     return np.asarray(np.clip(np.nan_to_num(factor, nan=1.0), 1.0, _MAX_REFINEMENT))
 
 
-class Envelope:
-    """Speed averaged over the time constant of a supply, at a record's first sample.
-
-    The motion before the record is unknown; what follows its beginning stands for it, seen
-    backwards. That is right where the motion changes little within a time constant.
-
-    Args:
-        record: measured displacement and period are used.
-    """
-
-    _TIMES = np.geomspace(1e-3, 1e3, 61)  # s
-
-    def __init__(self, record: Record) -> None:
-        # Over 20 ms: sensor noise must not pass for speed.
-        gap = min(max(1, round(0.02 / record.period)), len(record) - 1)
-        speed = np.abs(record.measured[gap:] - record.measured[:-gap]) / (gap * record.period)
-        weight = np.exp(-record.time[np.newaxis, : len(speed)] / self._TIMES[:, np.newaxis])
-        self._speeds = (weight @ speed) / weight.sum(axis=1)
-
-    def __call__(self, time_constant: Array) -> Array:
-        """Return the averaged speed [m/s] of each time constant [s], same shape."""
-        with np.errstate(all='ignore'):
-            at = np.log(time_constant)
-        return np.asarray(np.interp(at, np.log(self._TIMES), self._speeds))
-
-
 # Absurd parameters make NaN or infinite responses, seen by who asked for them, not warnings.
 @np.errstate(all='ignore')
 def tables(
@@ -77,7 +51,7 @@ def tables(
     The last block is filled up by repeating the last parameter set.
 
     Args:
-        values: parameters by name, each (m,), with all of coefficients.NAMES but 'envelope'; also
+        values: parameters by name, each (m,), those of coefficients.NAMES that are not zero; also
             'origin', the time of the first sample since the test began [s], where it is not 0.
         program: effects written as expressions.
         stiffness: specimen stiffness k [N/m].
@@ -175,7 +149,7 @@ def exact_blocks(
 ) -> Iterator[tuple[NDArray[np.intp], int, Array]]:
     """Simulate a record with linear effects only, as `blocks` does, but exactly and faster.
 
-    `third` and `delayed` as `lti.advance` takes them.
+    `third` and `delayed` as `lti_step.advance` takes them.
     """
     linear = record.hold == 'linear'
     before = record.command[:1] if start != (0.0, 0.0) else np.zeros(1)
@@ -188,7 +162,7 @@ def exact_blocks(
         lanes = np.arange(block * rows.LANES, min((block + 1) * rows.LANES, count))
         for begin in range(0, len(record), _CHUNK):
             part = out[: min(_CHUNK, len(record) - begin)]
-            lti.advance(table, third, delayed, command, -1, begin, part, nothing)
+            lti_step.advance(table, third, delayed, command, -1, begin, part, nothing)
             yield lanes, begin, part[:, : len(lanes)]
 
 

@@ -2,9 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from actuator_glue.model.effects import rows
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.parameters import Parameter
+from actuator_glue.records import Array
+
+
+def _behind(values: Mapping[str, Array], origin: float) -> dict[str, Array]:
+    return {'delay': values['delay'] + values['clock_skew'] * origin}
+
 
 EFFECT = Effect(
     name='clock-skew',
@@ -17,5 +25,6 @@ EFFECT = Effect(
     signature='lag grows with time',
     source='Mills 1991 (frequency error of clocks)',
     starts=lambda s: ((5e-5,), (-5e-5,), (3e-4,), (-3e-4,)),
+    onset=lambda record: _behind,
     switches=(rows.ON_LAG,),
 )

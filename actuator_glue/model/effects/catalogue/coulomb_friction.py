@@ -9,7 +9,9 @@ EFFECT = Effect(
     name='coulomb-friction',
     place='piston',
     equation='f = f_specimen + F_c sign(v), |.| <= F_c while v = 0',
-    parameters=(Parameter('coulomb_force', 'N', 0.0, 2e4, 'dry friction of the seals', 0.0),),
+    parameters=(
+        Parameter('coulomb_force', 'N', 0.0, 2e4, 'dry friction of the seals', 0.0, 'share'),
+    ),
     group='friction',
     signature='odd harmonics with the sign of the velocity; relative size falls as 1/A',
     source='Armstrong-Helouvry et al. 1994; return mapping: Simo & Hughes 1998',

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from actuator_glue.model.effects import rows
-from actuator_glue.model.effects.coefficients import NO_LIMIT
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.parameters import Parameter
+
+NO_LIMIT = 2.0  # m/s; at or above it nothing is limited
 
 EFFECT = Effect(
     name='flow-saturation',
@@ -19,6 +20,7 @@ EFFECT = Effect(
             NO_LIMIT,
             'free piston velocity at rated flow',
             NO_LIMIT,
+            'flow',
         ),
     ),
     group='saturation',

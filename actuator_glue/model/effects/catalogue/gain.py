@@ -9,7 +9,9 @@ EFFECT = Effect(
     name='gain',
     place='command',
     equation='u_c = g u',
-    parameters=(Parameter('gain', '1', 0.7, 1.3, 'static gain of the command channel', 1.0),),
+    parameters=(
+        Parameter('gain', '1', 0.7, 1.3, 'static gain of the command channel', 1.0, 'gain'),
+    ),
     group='gain',
     signature='linear; relative residual constant down to zero frequency',
     source='Jelali & Kroll 2003',

@@ -46,7 +46,7 @@ EFFECT = Effect(
     place='sensor',
     equation='y = x + a cos(2 pi f t) + b sin(2 pi f t)',
     parameters=(
-        Parameter('hum_cosine', 'm', -1e-3, 1e-3, 'cosine amplitude of the line', 0.0),
+        Parameter('hum_cosine', 'm', -1e-3, 1e-3, 'cosine amplitude of the line', 0.0, 'line'),
         Parameter('hum_sine', 'm', -1e-3, 1e-3, 'sine amplitude of the line', 0.0),
         Parameter('hum_frequency', 'Hz', 1.0, 1000.0, 'frequency of the line', 50.0),
     ),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from actuator_glue.model.effects import lti
+from actuator_glue.model.effects import lti_step
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.parameters import Parameter
 
@@ -13,8 +13,10 @@ EFFECT = Effect(
     place='specimen',
     equation="f = k x + m (v' + d v)",
     parameters=(
-        Parameter('mass', 'kg', 0.0, 2e4, 'moving mass', 0.0),
-        Parameter('mass_damping', '1/s', 0.0, 500.0, 'damping over moving mass', 20.0),
+        Parameter('mass', 'kg', 0.0, 2e4, 'moving mass', 0.0, 'share'),
+        Parameter(
+            'mass_damping', '1/s', 0.0, 500.0, 'damping over moving mass', 20.0, 'mass-damping'
+        ),
     ),
     group='inertia',
     signature='linear; resonance of the mass on the oil column',
@@ -24,5 +26,5 @@ EFFECT = Effect(
         for hz in (80.0, 40.0, 20.0)
         for ratio in (0.1, 0.4)
     ),
-    exact=lti.MASS,
+    exact=lti_step.MASS,
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from actuator_glue.model.effects import lti, rows
+from actuator_glue.model.effects import lti_step, rows
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.parameters import Parameter
 
@@ -18,5 +18,5 @@ EFFECT = Effect(
     source='Jelali & Kroll 2003 (transducers)',
     starts=lambda s: ((0.0005,), (0.002,), (0.008,)),
     switches=(rows.ON_TRANSDUCER,),
-    exact=lti.SENSOR,
+    exact=lti_step.SENSOR,
 )

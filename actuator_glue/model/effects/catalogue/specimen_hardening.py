@@ -11,7 +11,7 @@ EFFECT = Effect(
     place='specimen',
     equation='f = k x (1 + kappa x^2); past the peak of a softening curve the secant 2/3 stays',
     parameters=(
-        Parameter('hardening', '1/m^2', -3e5, 3e6, 'cubic stiffness over stiffness', 0.0),
+        Parameter('hardening', '1/m^2', -3e5, 3e6, 'cubic stiffness over stiffness', 0.0, 'share'),
     ),
     group='hardening',
     signature='odd harmonics; relative size grows as A^2',

@@ -12,7 +12,15 @@ EFFECT = Effect(
     equation='f = k (a x + (1 - a) z), dz/dx = 1 - |z/x_y|^n while loading, 1 while unloading, '
     'n = 2^sharpness (powers between 1, 2, 4, 8, 16 interpolated)',
     parameters=(
-        Parameter('post_yield_ratio', '1', 0.0, 1.0, 'stiffness after over before yield', 1.0),
+        Parameter(
+            'post_yield_ratio',
+            '1',
+            0.0,
+            1.0,
+            'stiffness after over before yield',
+            1.0,
+            'lost-share',
+        ),
         Parameter('yield_displacement', 'm', 1e-5, 0.05, 'yield displacement', 2e-3),
         Parameter('yield_sharpness', '1', 0.0, 4.0, 'log2 of the Bouc-Wen exponent', 1.0),
     ),

@@ -12,7 +12,9 @@ EFFECT = Effect(
     equation="f = f_specimen + F sign(v), T_m F' + F = F_c (1 + (r - 1) exp(-(v/v_s)^2)), "
     'T_m = max(2 ms, 1.72 (r - 1) F_c/((k + alpha_2) v_s))',
     parameters=(
-        Parameter('sliding_force', 'N', 0.0, 2e4, 'dry friction when sliding fast', 0.0),
+        Parameter(
+            'sliding_force', 'N', 0.0, 2e4, 'dry friction when sliding fast', 0.0, 'sliding-force'
+        ),
         Parameter('breakaway_ratio', '1', 1.0, 4.0, 'break-away over sliding friction', 1.5),
         Parameter('stribeck_velocity', 'm/s', 5e-4, 0.1, 'Stribeck velocity', 0.01),
     ),

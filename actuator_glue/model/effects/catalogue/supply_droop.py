@@ -2,17 +2,52 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+import numpy as np
+
 from actuator_glue.model.effects import rows
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.parameters import Parameter
+from actuator_glue.records import Array, Record
+
+
+class _Envelope:
+    """Speed averaged over the supply's time constant, at the first sample of a moving record.
+
+    The motion before the record is unknown; what follows its beginning stands for it, seen
+    backwards. That is right where the motion changes little within a time constant.
+
+    Args:
+        record: measured displacement and period are used.
+    """
+
+    _TIMES = np.geomspace(1e-3, 1e3, 61)  # s
+
+    def __init__(self, record: Record) -> None:
+        # Over 20 ms: sensor noise must not pass for speed.
+        gap = min(max(1, round(0.02 / record.period)), len(record) - 1)
+        speed = np.abs(record.measured[gap:] - record.measured[:-gap]) / (gap * record.period)
+        weight = np.exp(-record.time[np.newaxis, : len(speed)] / self._TIMES[:, np.newaxis])
+        self._speeds = (weight @ speed) / weight.sum(axis=1)
+
+    def __call__(self, values: Mapping[str, Array], origin: float) -> dict[str, Array]:
+        """Return the averaged speed [m/s] of each parameter set."""
+        at = np.log(values['droop_time'])
+        return {'envelope': np.interp(at, np.log(self._TIMES), self._speeds)}
+
 
 EFFECT = Effect(
     name='supply-droop',
     place='flow',
     equation="Q = q sqrt(max(1 - d w, 0)), T w' + w = |q|/alpha_2",
     parameters=(
-        Parameter('droop', 's/m', 0.0, 20.0, 'supply pressure lost per mean velocity', 0.0),
-        Parameter('droop_time', 's', 0.02, 20.0, 'time constant of accumulator and pump', 0.5),
+        Parameter(
+            'droop', 's/m', 0.0, 20.0, 'supply pressure lost per mean velocity', 0.0, 'per-flow'
+        ),
+        Parameter(
+            'droop_time', 's', 0.02, 20.0, 'time constant of accumulator and pump', 0.5, 'log'
+        ),
     ),
     group='flow-time',
     signature='gain follows the envelope of the flow',
@@ -20,5 +55,7 @@ EFFECT = Effect(
     starts=lambda s: tuple(
         (share / s.velocity, time) for share in (0.05, 0.25) for time in (0.2, 1.0, 5.0)
     ),
+    onset=lambda record: None if record is None else _Envelope(record),
+    states=('envelope',),
     switches=(rows.ON_FLOW, rows.ON_DROOP),
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from actuator_glue.model.effects import lti
+from actuator_glue.model.effects import lti_step
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.parameters import Parameter
 
@@ -15,5 +15,5 @@ EFFECT = Effect(
     signature='linear; residual grows with the square of frequency',
     source='Merritt 1967; Jelali & Kroll 2003',
     starts=lambda s: ((0.0005,), (0.002,), (0.006,)),
-    exact=lti.VALVE,
+    exact=lti_step.VALVE,
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from actuator_glue.model.effects import lti
+from actuator_glue.model.effects import lti_step
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.parameters import Parameter
 
@@ -10,12 +10,12 @@ EFFECT = Effect(
     name='viscous-damping',
     place='specimen',
     equation='f = k x + c v',
-    parameters=(Parameter('damping', 'N s/m', 0.0, 2e5, 'viscous damping', 0.0),),
+    parameters=(Parameter('damping', 'N s/m', 0.0, 2e5, 'viscous damping', 0.0, 'damping'),),
     group='gain',
     signature='linear; absorbed by the base parameters unless two stiffnesses are known',
     source='Dyke et al. 1995',
     starts=lambda s: tuple(
         (share * s.oil * s.stroke / s.velocity,) for share in (0.01, 0.05, 0.3)
     ),
-    exact=lti.VELOCITY,
+    exact=lti_step.VELOCITY,
 )
