@@ -110,7 +110,7 @@ def turn(row: Array, j: int, time: float) -> None:
 
 
 @_njit
-def _factor(kind: int, theta: Array, oil: float) -> float:
+def _factor(kind: int, theta: Array, oil: Any) -> Any:
     """Return a parameter over its coordinate."""
     if kind == FLOW:
         return oil / theta[2]
