@@ -41,8 +41,11 @@ LIBRARIES = {
     'markupsafe': Names('markupsafe', None),
     'matplotlib': Names('matplotlib', 'python3-matplotlib'),
     'mcap': Names('mcap', None),
+    'nptdms': Names('nptdms', None),
     'numba': Names('numba', 'python3-numba'),
     'numpy': Names('numpy', 'python3-numpy'),
+    'openpyxl': Names('openpyxl', 'python3-openpyxl'),
+    'pyarrow': Names('pyarrow', None),
     'pytest': Names('pytest', 'python3-pytest'),
     'pytest_timeout': Names('pytest-timeout', 'python3-pytest-timeout'),
     'rich': Names('rich', 'python3-rich'),
@@ -54,6 +57,8 @@ LIBRARIES = {
     'yaml': Names('pyyaml', 'python3-yaml'),
     'zstandard': Names('zstandard', None),
 }
+# Libraries of the extra `lab`, each asked for where a file needs it.
+OPTIONAL = {'h5py', 'nptdms', 'openpyxl', 'pyarrow'}
 # Options of pytest that pyproject.toml and Makefile use; nothing imports these plug-ins.
 PLUGINS = {'pytest_timeout', 'xdist'}
 
@@ -70,7 +75,7 @@ def imported(*folders: str) -> set[str]:
     return found - OURS - set(sys.stdlib_module_names)
 
 
-RUN = imported('actuator_glue', 'launch')
+RUN = imported('actuator_glue', 'launch') - OPTIONAL
 TEST = (imported('test') | PLUGINS) - RUN
 
 
@@ -104,8 +109,17 @@ def test_studies_and_examples_need_nothing_more() -> None:
 
 def test_pip_installs_what_the_tests_import() -> None:
     """The extra `test`: what is not needed at run time already."""
-    expected = {LIBRARIES[m].pip for m in TEST if m in LIBRARIES}
+    expected = {LIBRARIES[m].pip for m in TEST - OPTIONAL if m in LIBRARIES}
+    expected.add('actuator_glue')  # with its extra `lab`
     assert pip_names(PROJECT['optional-dependencies']['test']) == expected
+
+
+def test_the_extra_lab_is_what_single_files_need() -> None:
+    """Each of its libraries is named by a source, as an import or to `library`."""
+    sources = ' '.join(p.read_text('utf-8') for p in (ROOT / 'actuator_glue').rglob('*.py'))
+    assert all(f"'{module}'" in sources or f'import {module}' in sources for module in OPTIONAL)
+    expected = {LIBRARIES[m].pip for m in OPTIONAL}
+    assert pip_names(PROJECT['optional-dependencies']['lab']) == expected
 
 
 def test_rosdep_installs_what_the_package_imports() -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 from actuator_glue.arguments import Output, add_force, claim
 from actuator_glue.cli._output import progress, say
 from actuator_glue.errors import InputError
-from actuator_glue.io.formats import formats
+from actuator_glue.io.formats import writable
 from actuator_glue.records import Record
 
 
@@ -21,7 +21,7 @@ def add_out(parser: argparse.ArgumentParser) -> None:
         'out',
         type=Output,
         metavar='OUT',
-        help=f'{", ".join(formats())}, or a name without a suffix: the folder of a new bag',
+        help=f'{", ".join(writable())}, or a name without a suffix: the folder of a new bag',
     )
     add_force(parser)
     parser.add_argument(
@@ -31,7 +31,7 @@ def add_out(parser: argparse.ArgumentParser) -> None:
         '--unit',
         choices=('mm', 'm'),
         default='mm',
-        help='unit of displacements in .csv and .mat; m loses not one bit (default mm)',
+        help='unit of displacements in files; m loses not one bit (default mm)',
     )
 
 
@@ -47,14 +47,14 @@ def check_out(args: argparse.Namespace) -> Path:
     if out.suffix == '.mcap':
         raise InputError(f'{out}: bags are folders; give a name without .mcap')
     # A bag may be called test_2.5.
-    if out.suffix not in formats() and not out.suffix[1:].isdigit() and out.suffix:
+    if out.suffix not in writable() and not out.suffix[1:].isdigit() and out.suffix:
         raise InputError(
-            f'{out}: {out.suffix} cannot be written; use {", ".join(formats())}, or a name '
+            f'{out}: {out.suffix} cannot be written; use {", ".join(writable())}, or a name '
             'without a suffix for a bag'
         )
     if args.block < 1:
         raise InputError(f'--block {args.block}: a message holds at least one sample')
-    if out.exists() and out.is_dir() == (out.suffix in formats()):
+    if out.exists() and out.is_dir() == (out.suffix in writable()):
         raise InputError(
             f'{out} is {"a folder" if out.is_dir() else "a file"}; choose another name'
         )
@@ -71,7 +71,7 @@ def save(records: list[Record], args: argparse.Namespace) -> None:
     """
     out = check_out(args)
     written = [out]
-    if out.suffix in formats():
+    if out.suffix in writable():
         written = _files(records, out, args)
     else:
         with _replacing(out):

@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from actuator_glue.errors import InputError
-from actuator_glue.io.formats import format_of
+from actuator_glue.io.formats import formats, writable
 from actuator_glue.records import Array, Record
 
 
@@ -54,5 +54,8 @@ def write(path: Path | str, record: Record, *, unit: str = 'mm') -> None:
     notes: dict[str, str | float] = {'hold': record.hold, 'actuator': record.actuator}
     if record.stiffness is not None:
         notes = {'stiffness_N_per_m': record.stiffness, **notes}
+    chosen = formats().get(path.suffix.lower(), formats()['.csv'])
+    if chosen.write is None:
+        raise InputError(f'{path}: {chosen.name} is only read; use one of {", ".join(writable())}')
     with _whole(path) as temporary:
-        format_of(path).write(temporary, _columns(record, unit), notes)
+        chosen.write(temporary, _columns(record, unit), notes)

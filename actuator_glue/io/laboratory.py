@@ -1,4 +1,4 @@
-"""Laboratory files to records: CSV, MATLAB .mat, and any text through a channel map."""
+"""Laboratory files to records: by the names of their columns, or through a channel map."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import Channel, ChannelMap, read_channel_map
-from actuator_glue.io.formats import format_of
+from actuator_glue.io.formats import Column, format_of
 from actuator_glue.io.time_base import uniform_period
 from actuator_glue.io.units import choose, factor
 from actuator_glue.records import Array, Hold, Record
@@ -29,7 +29,7 @@ def read(
     """Return the record of a laboratory file.
 
     Args:
-        path: .mat, or delimited text of any other suffix.
+        path: a file of any format in `formats`; delimited text where its suffix is no other's.
         channels: channel map; None where the names of the columns (of the variables) say what
             they are, as in `time_s,command_mm,measured_mm,force_N`.
         stiffness: specimen stiffness [N/m]; None for what map or file say.
@@ -52,8 +52,7 @@ def read(
         notes = {'hold': channels.hold or 'zoh', 'actuator': channels.actuator}
         stiffness = channels.stiffness if stiffness is None else stiffness
     else:
-        values, notes = _by_name(path)
-        period = uniform_period(values['time'], str(path))
+        values, notes, period = _by_name(path)
         if stiffness is None:
             stiffness = _noted_stiffness(notes, path)
     first = float(values['time'][0]) if 'time' in values else 0.0
@@ -80,14 +79,18 @@ def _noted_stiffness(notes: dict[str, str], path: Path) -> float | None:
         raise InputError(f'{path}: stiffness_N_per_m = {text!r} is not a number') from error
 
 
-def _by_name(path: Path) -> tuple[dict[str, Array], dict[str, str]]:
-    """Return channels in SI units by the names of their columns, and what the file notes."""
+def _by_name(path: Path) -> tuple[dict[str, Array], dict[str, str], float]:
+    """Return channels in SI units by the names of their columns, what is noted, the period."""
     table = format_of(path).read(path, None)
-    columns = choose(table.names, str(path))
-    raw = table.columns([at for at, _ in columns.values()])
+    labels, units = [c.label for c in table.columns], [c.unit for c in table.columns]
+    columns = choose(labels, units, str(path), timed=table.period is not None)
+    raw = table.values([at for at, _ in columns.values()])
     scales = [scale for _, scale in columns.values()]
     values = {role: c * s for role, c, s in zip(columns, raw, scales, strict=True)}
-    return values, table.notes
+    if 'time' in values:
+        return values, table.notes, uniform_period(values['time'], str(path))
+    assert table.period is not None  # or `choose` had missed the times
+    return values, table.notes, table.period
 
 
 def _mapped(path: Path, channels: ChannelMap) -> tuple[dict[str, Array], float]:
@@ -120,12 +123,18 @@ def _raw(
     wanted: dict[str, str | int] = {role: channel.column for role, channel in roles.items()}
     if channels.sample_number is not None:
         wanted['sample_number'] = channels.sample_number
-    at = [position(c, table.names, f'{path}: {role}') for role, c in wanted.items()]
-    raw = dict(zip(wanted, table.columns(at), strict=True))
+    at = [position(c, table.columns, f'{path}: {role}') for role, c in wanted.items()]
+    try:
+        raw = dict(zip(wanted, table.values(at), strict=True))
+    except IndexError as error:
+        raise InputError(
+            f'{path}: there are {len(table.columns)} columns, the channel map asks for number '
+            f'{max(at) + 1}'
+        ) from error
     return raw, raw.get('sample_number')
 
 
-def position(column: str | int, names: list[str], where: str) -> int:
+def position(column: str | int, columns: list[Column], where: str) -> int:
     """Return the position from 0 of a column given by name or by number from 1.
 
     Raises:
@@ -133,10 +142,11 @@ def position(column: str | int, names: list[str], where: str) -> int:
     """
     if isinstance(column, int):
         return column - 1
-    hits = [i for i, name in enumerate(names) if name == column]
+    hits = [i for i, c in enumerate(columns) if c.name == column]
+    hits = hits or [i for i, c in enumerate(columns) if c.label == column]
     if len(hits) != 1:
         problem = 'no column is' if not hits else f'{len(hits)} columns are'
-        listed = ', '.join(repr(n) for n in names[:20]) or 'without names'
+        listed = ', '.join(repr(c.name) for c in columns[:20]) or 'without names'
         raise InputError(f'{where}: {problem} called {column!r}; the columns are {listed}')
     return hits[0]
 

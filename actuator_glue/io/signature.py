@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import codecs
 from pathlib import Path
 
 from actuator_glue.errors import InputError
 
-_LOOK = 4096  # bytes
+_LOOK = 65_536  # bytes
 _TABLE = 'save the table as .csv'
 _UNPACK = 'unpack it first'
 _BAG = 'give the folder of a bag in MCAP format'
@@ -18,7 +19,7 @@ _SIGNATURES: tuple[tuple[bytes, str, str], ...] = (
     (b'TDSm', 'a LabVIEW TDMS file', _TABLE),
     (b'ARROW1', 'an Arrow file', _TABLE),
     (b'\x93NUMPY', 'a NumPy array', _TABLE),
-    (b'\x89HDF\r\n\x1a\n', 'an HDF5 file', f"{_TABLE}, or in MATLAB with save(..., '-v7')"),
+    (b'\x89HDF\r\n\x1a\n', 'an HDF5 file', _TABLE),
     (b'SQLite format 3\0', 'an SQLite file', f'{_BAG}; `ros2 bag convert` makes one of a .db3'),
     (b'\x89MCAP0\r\n', 'an MCAP file', 'give it a name ending in .mcap, or the folder of the bag'),
     (b'#ROSBAG V', 'a ROS 1 bag', f'{_BAG}; `rosbags-convert` makes one'),
@@ -34,8 +35,8 @@ _SIGNATURES: tuple[tuple[bytes, str, str], ...] = (
 _ZIP = b'PK\x03\x04'
 # What a zip archive of that kind has in its first entries.
 _ZIPPED: tuple[tuple[bytes, str], ...] = (
-    (b'[Content_Types].xml', 'an Excel workbook (.xlsx)'),
-    (b'xl/', 'an Excel workbook (.xlsx)'),
+    (b'[Content_Types].xml', 'an Excel workbook (give it a name ending in .xlsx)'),
+    (b'xl/', 'an Excel workbook (give it a name ending in .xlsx)'),
     (b'opendocument', 'an OpenDocument table'),
     (b'.npy', 'a NumPy archive'),
 )
@@ -49,17 +50,26 @@ _MARKS = (
 )
 
 
+def beginning(path: Path) -> bytes:
+    """Return the first bytes of a file.
+
+    Raises:
+        InputError: it cannot be read.
+    """
+    try:
+        with path.open('rb') as file:
+            return file.read(_LOOK)
+    except OSError as error:
+        raise InputError(f'{path}: cannot be read ({error.strerror or error})') from error
+
+
 def refuse_foreign(path: Path, wanted: str) -> bytes:
     """Return the first bytes of a file that is not known to be something else.
 
     Raises:
         InputError: the file cannot be read, or is of a format that is not read; named by it.
     """
-    try:
-        with path.open('rb') as file:
-            start = file.read(_LOOK)
-    except OSError as error:
-        raise InputError(f'{path}: cannot be read ({error.strerror or error})') from error
+    start = beginning(path)
     what, remedy = _known(start)
     if what:
         raise InputError(f'{path}: this is {what}, not {wanted}; {remedy}')
@@ -67,7 +77,7 @@ def refuse_foreign(path: Path, wanted: str) -> bytes:
 
 
 def text_encoding(path: Path) -> str:
-    """Return how the text of a file is coded: UTF-8, or UTF-16 and UTF-32 by their marks.
+    """Return how the text of a file is coded: UTF-8, UTF-16, UTF-32 or Windows-1252.
 
     Raises:
         InputError: the file cannot be read, or is no text; the message names what it is.
@@ -87,6 +97,10 @@ def text_encoding(path: Path) -> str:
         raise InputError(
             f'{path}: this is binary data of a format that is not known, not text; {_TABLE}'
         )
+    try:
+        codecs.getincrementaldecoder('utf-8')().decode(start)
+    except UnicodeDecodeError:
+        return 'cp1252'  # of which a few bytes are no character: those are told where they are
     return 'utf-8-sig'
 
 

@@ -57,30 +57,53 @@ def recognise(name: str) -> tuple[str, str] | None:
     return match['role'].lower(), match['unit'] or ''
 
 
-def choose(names: list[str], where: str) -> dict[str, tuple[int, float]]:
+def units_line(entries: list[str]) -> list[str]:
+    """Return the units that a line below the names holds; nothing where it is no such line.
+
+    Each entry is a unit, in brackets or not, empty, or a dash; one is known here at least.
+    """
+    known = {unit for role in ROLES.values() for unit in role}
+    units = [entry.strip().strip('[]()').strip() for entry in entries]
+    short = all(len(u) <= 12 and not _is_number(u) for u in units)
+    return units if short and any(u in known for u in units) else []
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text.replace(',', '.'))
+    except ValueError:
+        return False
+    return True
+
+
+def choose(
+    names: list[str], units: list[str], where: str, *, timed: bool = False
+) -> dict[str, tuple[int, float]]:
     """Return position and factor to SI of every column that has a role.
 
     Args:
         names: column names, unit included.
+        units: what the file gives as the unit of each column; holds where the name has none.
         where: file, for messages.
+        timed: the file says its period, so that times may be missing.
 
     Raises:
         InputError: a unit is missing or unknown, a role is there twice or a needed one not.
     """
     found: dict[str, tuple[int, float]] = {}
-    for position, name in enumerate(names):
+    for position, (name, stated) in enumerate(zip(names, units, strict=True)):
         recognised = recognise(name)
         if recognised is None:
             continue
         role, unit = recognised
         if role in found:
             raise InputError(f'{where}: two columns are called {role}; keep one')
-        found[role] = (position, factor(role, unit, f'{where}: column {name.strip()!r}'))
+        found[role] = (position, factor(role, unit or stated, f'{where}: column {name.strip()!r}'))
     for role in ('time', 'command', 'measured'):
-        if role not in found:
+        if role not in found and not (timed and role == 'time'):
             raise InputError(
                 f'{where}: no column for {role}; the columns are '
                 f'{", ".join(n.strip() for n in names)}. Name them as in {EXAMPLE}, or describe '
-                'the file with --channels MAP.yaml'
+                'the file with --channels MAP.yaml, which `actuator-glue map` proposes'
             )
     return found

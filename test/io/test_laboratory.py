@@ -6,7 +6,6 @@ import re
 from dataclasses import fields, replace
 from pathlib import Path
 
-import h5py
 import numpy as np
 import pytest
 import yaml
@@ -180,24 +179,18 @@ def test_a_format_is_one_file(tmp_path: Path, record: Record) -> None:
     folder, parser = Path(formats.__path__[0]), argparse.ArgumentParser()
     add_out(parser)
     names = {file.stem for file in folder.glob('[a-z]*.py')}
-    assert len(formats.formats()) == len(names)
-    for suffix in formats.formats():
+    assert len(set(map(id, formats.formats().values()))) == len(names)
+    for suffix in formats.writable():
         write(tmp_path / f'a{suffix}', record, unit='m')
         assert read(tmp_path / f'a{suffix}').measured.tobytes() == record.measured.tobytes()
         assert suffix in parser.format_help()
 
 
-def test_matlab_structs_and_version_7_3(tmp_path: Path, record: Record) -> None:
-    """Fields of a struct are found; an HDF5 file and a damaged one are told."""
+def test_matlab_structs_and_damage(tmp_path: Path, record: Record) -> None:
+    """Fields of a struct are found; a damaged file is told."""
     test = {'time_s': record.time, 'command_mm': record.command * 1e3}
     savemat(tmp_path / 'a.mat', {'test': {**test, 'measured_mm': record.measured[:, None] * 1e3}})
     np.testing.assert_allclose(read(tmp_path / 'a.mat').measured, record.measured)
-    with h5py.File(tmp_path / 'b.mat', 'w', userblock_size=512) as file:
-        file['time_s'] = record.time
-    with (tmp_path / 'b.mat').open('r+b') as file:
-        file.write(b'MATLAB 7.3 MAT-file'.ljust(124) + b'\x00\x02IM')
-    with pytest.raises(InputError, match='-v7'):
-        read(tmp_path / 'b.mat')
     content = (tmp_path / 'a.mat').read_bytes()
     for cut in (0, 50, 128, 140, len(content) // 2):
         (tmp_path / 'c.mat').write_bytes(content[:cut])

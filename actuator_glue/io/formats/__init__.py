@@ -1,4 +1,4 @@
-"""Formats of laboratory files: each file of this folder is one, found by the suffix it names.
+"""Formats of laboratory files: each file of this folder is one, found by first bytes or suffix.
 
 A format is a module with `FORMAT`; reading, writing and the help of the commands follow from it.
 """
@@ -7,13 +7,37 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any
 
+from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
+from actuator_glue.io.signature import beginning
 from actuator_glue.records import Array
+
+# Bytes of numbers that one file may hold: a day and a half at 1 kHz with two channels.
+LARGEST = 2 << 30
+# Columns that one file may have; a matrix with more is no list of channels.
+MOST_COLUMNS = 10_000
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """Name of a column.
+
+    Attributes:
+        name: in full, as a channel map calls it, e.g. `test.command_mm`.
+        label: what it is called without the place where it lies, e.g. `command_mm`.
+        unit: what the file gives as its unit beside the name; empty where it says nothing.
+    """
+
+    name: str
+    label: str
+    unit: str = ''
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,14 +45,16 @@ class FileTable:
     """What a file holds.
 
     Attributes:
-        names: of its columns, in order.
+        columns: names, in order.
         notes: what it says besides: stiffness_N_per_m, hold, actuator.
-        columns: return the columns at positions from 0, each of shape (n,), unscaled.
+        values: return the columns at positions from 0, each of shape (n,), unscaled.
+        period: time between samples [s] where the file states one.
     """
 
-    names: list[str]
+    columns: list[Column]
     notes: dict[str, str]
-    columns: Callable[[list[int]], list[Array]]
+    values: Callable[[list[int]], list[Array]]
+    period: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,24 +62,104 @@ class Format:
     """One format of laboratory files; both functions raise `InputError`.
 
     Attributes:
-        suffix: of its files, lower case with the dot.
+        suffixes: of its files, lower case with the dot.
         read: table of a file; the channel map tells header lines, delimiter and decimal sign.
-        write: write columns and notes to a path.
+        write: write columns and notes to a path; None where such files are only read.
+        begins: first bytes by which it is known whatever its suffix; empty for text.
+        name: what such a file is called in messages.
     """
 
-    suffix: str
+    suffixes: tuple[str, ...]
     read: Callable[[Path, ChannelMap | None], FileTable]
-    write: Callable[[Path, Mapping[str, Array], Mapping[str, str | float]], None]
+    write: Callable[[Path, Mapping[str, Array], Mapping[str, str | float]], None] | None
+    begins: bytes = b''
+    name: str = 'delimited text'
 
 
 @cache
-def formats() -> dict[str, Format]:
-    """Return every format by its suffix."""
+def _formats() -> list[Format]:
     modules = sorted(module.name for module in pkgutil.iter_modules(__path__))
-    found = [importlib.import_module(f'{__name__}.{name}').FORMAT for name in modules]
-    return {entry.suffix: entry for entry in found}
+    return [importlib.import_module(f'{__name__}.{name}').FORMAT for name in modules]
+
+
+def formats() -> dict[str, Format]:
+    """Return every format by its suffixes."""
+    return {suffix: entry for entry in _formats() for suffix in entry.suffixes}
+
+
+def writable() -> list[str]:
+    """Return the suffixes of the formats that can be written."""
+    return [suffix for suffix, entry in formats().items() if entry.write is not None]
 
 
 def format_of(path: Path) -> Format:
-    """Return the format of a file; delimited text where its suffix is no other's."""
-    return formats().get(path.suffix.lower(), formats()['.csv'])
+    """Return the format of a file: by its first bytes, by its suffix, or else delimited text."""
+    named = formats().get(path.suffix.lower())
+    start = beginning(path) if path.is_file() else b''
+    # What begins as another does is that, whatever it is called; a .mat may be an HDF5 file.
+    found = [f for f in _formats() if f.begins and start.startswith(f.begins)]
+    return next((f for f in found if f is not named), None) or named or formats()['.csv']
+
+
+def library(name: str, path: Path) -> Any:
+    """Return an optional library that a file needs.
+
+    Raises:
+        InputError: it is not installed; the message says what to install.
+    """
+    try:
+        return importlib.import_module(name)
+    except ImportError as error:
+        raise InputError(
+            f'{path}: {name.partition(".")[0]} is needed to read this file; install it with '
+            "`pip install 'actuator_glue[lab]'`"
+        ) from error
+
+
+@contextmanager
+def reading(path: Path, what: str) -> Iterator[None]:
+    """Turn whatever a library raises over the bytes of a file into one clear message."""
+    try:
+        yield
+    except InputError:
+        raise
+    except OSError as error:
+        detail = error.strerror or error
+        raise InputError(f'{path}: {what} that cannot be read ({detail})') from error
+    except Exception as error:  # damage shows in any of them
+        raise InputError(f'{path}: damaged, or not {what} ({error})') from error
+
+
+def check_size(size: int, path: Path) -> None:
+    """Refuse numbers of more bytes than are read, before memory is taken for them.
+
+    Raises:
+        InputError: too many.
+    """
+    if size > LARGEST:
+        raise InputError(
+            f'{path}: {size / 1e9:.3g} GB of numbers, {LARGEST / 1e9:.3g} GB at most are read; '
+            'cut the record into parts'
+        )
+
+
+def matrix_columns(name: str, shape: tuple[int, ...], unit: str = '') -> list[Column]:
+    """Return the columns of a vector or matrix, as MATLAB calls them: `NAME(:,2)`, from 1.
+
+    The longer side of a matrix is time. Of anything else nothing is returned.
+    """
+    label = name.replace('/', '.').rpartition('.')[2]
+    if len(shape) == 1 or (len(shape) == 2 and min(shape) == 1):
+        return [Column(name, label, unit)]
+    if len(shape) != 2 or not all(shape) or min(shape) > MOST_COLUMNS:
+        return []
+    pattern = '({},:)' if shape[0] < shape[1] else '(:,{})'
+    places = [pattern.format(i + 1) for i in range(min(shape))]
+    return [Column(name + place, label + place, unit) for place in places]
+
+
+def matrix_column(matrix: Any, number: int) -> Any:
+    """Return column `number` from 0 of what `matrix_columns` named: array or HDF5 dataset."""
+    if len(matrix.shape) == 1:
+        return matrix[:]
+    return matrix[number, :] if matrix.shape[0] < matrix.shape[1] else matrix[:, number]

@@ -13,9 +13,9 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
-from actuator_glue.io.formats import FileTable, Format
+from actuator_glue.io.formats import Column, FileTable, Format
 from actuator_glue.io.signature import text_encoding
-from actuator_glue.io.units import EXAMPLE, recognise
+from actuator_glue.io.units import EXAMPLE, recognise, units_line
 from actuator_glue.records import Array
 
 _ROWS = 10_000  # rows formatted at a time
@@ -29,6 +29,7 @@ class TextHead:
 
     Attributes:
         names: column names; empty where there are none.
+        units: of the columns, where a line below the names holds them.
         lines: lines before the first sample.
         delimiter: text between columns, None for blanks.
         notes: `# name = value` lines.
@@ -42,6 +43,7 @@ class TextHead:
     notes: dict[str, str]
     decimal: str
     encoding: str = 'utf-8-sig'
+    units: tuple[str, ...] = ()
 
 
 def read_head(
@@ -61,7 +63,7 @@ def read_head(
     encoding = text_encoding(path)
     try:
         with path.open(encoding=encoding, errors='replace') as file:
-            top = [line.rstrip('\r\n') for line in islice(file, (header_lines or 100) + 1)]
+            top = [line.rstrip('\r\n') for line in islice(file, (header_lines or 100) + 2)]
     except OSError as error:
         raise InputError(f'{path}: cannot be read ({error.strerror})') from error
     if not any(line.strip() for line in top):
@@ -78,13 +80,23 @@ def read_head(
     if len(top) < header_lines:
         raise InputError(f'{path}: {len(top)} lines, but {header_lines} header lines expected')
     line = top[header_lines - 1] if header_lines else ''
+    units: list[str] = []
+    if header_lines and len(top) > header_lines:
+        parting = delimiter or _delimiter(top[header_lines])
+        units = units_line(_fields(top[header_lines], parting))
+    header_lines += bool(units)
     sample = top[header_lines] if len(top) > header_lines else line
     if delimiter is None:
-        delimiter = next((d for d in _DELIMITERS if d in sample), None)
+        delimiter = _delimiter(sample)
     # With both signs in a line the comma can only part thousands, which nobody can read safely.
     comma = any(',' in field for field in _fields(sample, delimiter))
     decimal = ',' if comma and '.' not in sample else '.'
-    return TextHead(_fields(line, delimiter), header_lines, delimiter, notes, decimal, encoding)
+    names = _fields(line, delimiter)
+    return TextHead(names, header_lines, delimiter, notes, decimal, encoding, tuple(units))
+
+
+def _delimiter(line: str) -> str | None:
+    return next((d for d in _DELIMITERS if d in line), None)
 
 
 def _fields(line: str, delimiter: str | None) -> list[str]:
@@ -135,7 +147,7 @@ def read_columns(
             )
     except UnicodeDecodeError as error:
         raise InputError(
-            f'{path}: not plain text in UTF-8 (byte {error.start}); save it as such'
+            f'{path}: not plain text in {head.encoding} (byte {error.start}); save it as UTF-8'
         ) from error
     except (ValueError, IndexError) as error:
         detail = ' '.join(str(error).split()).removesuffix('.')
@@ -159,8 +171,11 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
     else:
         head = read_head(path, channels.header_lines, channels.delimiter)
         decimal = channels.decimal
+    units = [*head.units, *[''] * len(head.names)]
     return FileTable(
-        head.names, head.notes, lambda at: list(read_columns(path, head, at, decimal).T)
+        [Column(name, name, unit) for name, unit in zip(head.names, units, strict=False)],
+        head.notes,
+        lambda at: list(read_columns(path, head, at, decimal).T),
     )
 
 
@@ -183,4 +198,4 @@ def _write(path: Path, columns: Mapping[str, Array], notes: Mapping[str, str | f
             file.writelines(','.join(map(repr, row)) + '\n' for row in rows)
 
 
-FORMAT = Format('.csv', _read, _write)
+FORMAT = Format(('.csv',), _read, _write)

@@ -1,7 +1,8 @@
-"""Variables out of MATLAB .mat files (up to version 7)."""
+"""Variables out of MATLAB .mat files."""
 
 from __future__ import annotations
 
+import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -10,71 +11,94 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
-from actuator_glue.io.formats import FileTable, Format
+from actuator_glue.io.formats import (
+    Column,
+    FileTable,
+    Format,
+    check_size,
+    matrix_column,
+    matrix_columns,
+    reading,
+)
+from actuator_glue.io.formats.hdf5 import OBJECTS, is_hdf5, read_tree
 from actuator_glue.io.signature import refuse_foreign
 from actuator_glue.records import Array
 
+_COMPRESSED, _STEP = 15, 1 << 20
 
-def read_variables(path: Path) -> tuple[dict[str, Array], dict[str, str]]:
-    """Return numeric vectors and texts of a file by name; fields of structs as `struct.field`.
 
-    Raises:
-        InputError: no MAT-file, version 7.3, or no vector in it.
-    """
+def _content(path: Path) -> dict[str, Any]:
+    """Return the variables of a file up to version 7."""
     from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
 
     refuse_foreign(path, 'a MATLAB .mat file')
-    try:
-        content = loadmat(path, squeeze_me=True, struct_as_record=False)
-    except NotImplementedError as error:
-        raise InputError(
-            f'{path}: MAT-file version 7.3 (HDF5) is not read; save it in MATLAB with '
-            "save('name.mat', ..., '-v7')"
-        ) from error
-    except OSError as error:
-        raise InputError(f'{path}: cannot be read ({error.strerror or error})') from error
-    except (MatReadError, ValueError, TypeError, KeyError, EOFError, IndexError) as error:
-        raise InputError(f'{path}: this is not a MATLAB .mat file ({error})') from error
-    except Exception as error:  # zlib.error and others, by the file's bytes
-        raise InputError(f'{path}: damaged MAT-file ({error})') from error
-    vectors: dict[str, Array] = {}
-    texts: dict[str, str] = {}
-    for name, value in content.items():
-        if not name.startswith('__'):
-            _collect(name, value, vectors, texts)
-    if not vectors:
-        raise InputError(f'{path}: no numeric vector in this file')
-    return vectors, texts
+    with reading(path, 'a MATLAB .mat file'):
+        _check_inflated(path)
+        content: dict[str, Any] = loadmat(path, squeeze_me=True, struct_as_record=False)
+    return content
 
 
-def _collect(name: str, value: Any, vectors: dict[str, Array], texts: dict[str, str]) -> None:
+def _check_inflated(path: Path) -> None:
+    """Refuse a version 7 file whose compressed variables are larger than what is read."""
+    total = 0
+    with path.open('rb') as file:
+        order = '<' if file.read(128)[126:128] == b'IM' else '>'
+        while len(head := file.read(8)) == 8:
+            kind, length = np.frombuffer(head, f'{order}u4').tolist()
+            if kind != _COMPRESSED:
+                file.seek(length, 1)
+                continue
+            inflate = zlib.decompressobj()
+            while length > 0 and (data := file.read(min(length, _STEP))):
+                length -= len(data)
+                while data:
+                    total += len(inflate.decompress(data, 16 * _STEP))
+                    check_size(total, path)
+                    data = inflate.unconsumed_tail
+
+
+def _collect(name: str, value: Any, arrays: dict[str, Any], texts: dict[str, str]) -> None:
     if hasattr(value, '_fieldnames'):
         for entry in value._fieldnames:
-            _collect(f'{name}.{entry}', getattr(value, entry), vectors, texts)
-        return
-    if isinstance(value, str):
+            _collect(f'{name}.{entry}', getattr(value, entry), arrays, texts)
+    elif isinstance(value, str):
         texts[name] = value
-        return
-    array = np.asarray(value)
-    if array.dtype.kind in 'fiu' and array.ndim <= 1:
-        vectors[name] = np.atleast_1d(array).astype(np.float64)
+    elif isinstance(value, np.ndarray) and value.dtype == object:
+        for i, entry in enumerate(value.flat, start=1):
+            if hasattr(entry, '_fieldnames'):  # an array of structs; cells are left alone
+                _collect(f'{name}({i})', entry, arrays, texts)
+    else:
+        array = np.atleast_1d(np.asarray(value))
+        if array.dtype.kind in 'fiu' and array.ndim <= 2:
+            arrays[name] = array
 
 
 def _read(path: Path, channels: ChannelMap | None) -> FileTable:
-    vectors, texts = read_variables(path)
-    names = list(vectors)
-    # `test.command_mm` is command_mm of the struct `test`; a map names it in full.
-    shown = names if channels is not None else [_last(name) for name in names]
-    notes = {_last(name): text for name, text in texts.items()}
-    for name, vector in vectors.items():
-        if _last(name) == 'stiffness_N_per_m' and len(vector) == 1:
-            notes['stiffness_N_per_m'] = repr(float(vector[0]))
-    return FileTable(shown, notes, lambda places: [vectors[names[at]] for at in places])
+    if is_hdf5(path):
+        return read_tree(path, matlab=True)
+    arrays: dict[str, Any] = {}
+    texts: dict[str, str] = {}
+    for name, value in _content(path).items():
+        if not name.startswith('__'):
+            _collect(name, value, arrays, texts)
+    columns: list[Column] = []
+    places: list[tuple[str, int]] = []
+    for name, array in arrays.items():
+        found = matrix_columns(name, array.shape)
+        columns += found
+        places += [(name, i) for i in range(len(found))]
+    if not columns:
+        raise InputError(f'{path}: no numeric vector or matrix in this file; {OBJECTS}')
+    notes = {name.rpartition('.')[2]: text for name, text in texts.items()}
+    for name, array in arrays.items():
+        if name.rpartition('.')[2] == 'stiffness_N_per_m' and array.size == 1:
+            notes['stiffness_N_per_m'] = repr(float(array.flat[0]))
 
+    def values(wanted: list[int]) -> list[Array]:
+        chosen = [places[at] for at in wanted]
+        return [matrix_column(arrays[n], i).astype(np.float64) for n, i in chosen]
 
-def _last(name: str) -> str:
-    return name.rpartition('.')[2]
+    return FileTable(columns, notes, values)
 
 
 def _write(path: Path, columns: Mapping[str, Array], notes: Mapping[str, str | float]) -> None:
@@ -83,4 +107,4 @@ def _write(path: Path, columns: Mapping[str, Array], notes: Mapping[str, str | f
     savemat(str(path), {**columns, **notes}, appendmat=False, do_compression=True)
 
 
-FORMAT = Format('.mat', _read, _write)
+FORMAT = Format(('.mat',), _read, _write, b'MATLAB ', 'a MATLAB file')

@@ -1,0 +1,115 @@
+"""Columns out of Excel workbooks (.xlsx), read only; needs openpyxl.
+
+The first sheet that holds numbers counts: names in one row, with units in the next one or not.
+Workbooks are no place for measured records (a million rows at most), so none is written.
+"""
+
+from __future__ import annotations
+
+import math
+import zipfile
+from array import array
+from collections.abc import Iterable
+from datetime import UTC, datetime
+from functools import partial
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from actuator_glue.errors import InputError
+from actuator_glue.io.channel_map import ChannelMap
+from actuator_glue.io.formats import Column, FileTable, Format, library, reading
+from actuator_glue.io.units import units_line
+from actuator_glue.records import Array
+
+_NAME = 'an Excel workbook (.xlsx)'
+_LARGEST = 1 << 30  # bytes of XML; a million rows of ten columns are a third of it
+_SHARED = 64 << 20  # bytes of texts, which are kept in memory
+_HEAD = 50  # rows in which the names must be
+
+
+def _read(path: Path, channels: ChannelMap | None) -> FileTable:
+    openpyxl = library('openpyxl', path)
+    with reading(path, _NAME):
+        _check(path)
+        book = openpyxl.load_workbook(path, read_only=True, data_only=True, keep_links=False)
+        try:
+            for sheet in book.worksheets:
+                sheet.reset_dimensions()  # what the file claims may be wrong
+                head = list(islice(sheet.iter_rows(values_only=True), _HEAD))
+                lines = channels.header_lines if channels is not None else None
+                first = _first_sample(head) if lines is None else lines
+                if first is None or not any(_is_number(v) for row in head[first:] for v in row):
+                    continue
+                columns, skip = _columns(head, first), first
+                rows = sheet.iter_rows(min_row=skip + 1, values_only=True)
+                table = _numbers(rows, len(columns), skip, path)
+                return FileTable(columns, {}, partial(_chosen, table))
+        finally:
+            book.close()
+    raise InputError(f'{path}: no sheet with named columns of numbers in this workbook')
+
+
+def _check(path: Path) -> None:
+    """Refuse a workbook that unpacks to more than is read."""
+    with zipfile.ZipFile(path) as archive:
+        for entry in archive.infolist():
+            limit = _LARGEST if 'worksheets/' in entry.filename else _SHARED
+            if entry.file_size > limit:
+                raise InputError(
+                    f'{path}: {entry.filename} unpacks to {entry.file_size / 1e6:.0f} MB; save '
+                    'the table as .csv'
+                )
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def _first_sample(head: list[tuple[Any, ...]]) -> int | None:
+    """Return the row from 0 of the first sample: most of its cells are numbers."""
+    for i, row in enumerate(head):
+        filled = [v for v in row if v is not None]
+        if len(filled) >= 2 and sum(map(_is_number, filled)) > len(filled) / 2:
+            return i
+    return None
+
+
+def _columns(head: list[tuple[Any, ...]], first: int) -> list[Column]:
+    """Return the names above the first sample, with the units between where there are some."""
+    texts = [[str(v).strip() if v is not None else '' for v in row] for row in head[:first]]
+    above = [row for row in texts if any(row)][-2:]
+    units: list[str] = []
+    if len(above) == 2 and (found := units_line(above[1])):
+        units, above = found, above[:1]
+    names = above[-1] if above else [str(i + 1) for i in range(len(head[first]))]
+    units += [''] * (len(names) - len(units))
+    return [Column(n, n, u) for n, u in zip(names, units, strict=False)]
+
+
+def _numbers(rows: Iterable[tuple[Any, ...]], width: int, skip: int, path: Path) -> Array:
+    """Return the cells below the head, shape (n, width); text and empty cells are NaN."""
+    read = array('d')
+    for row in rows:
+        cells = [_number(v) for v in row[:width]]
+        read.extend(cells + [math.nan] * (width - len(cells)))
+    table = np.frombuffer(read).reshape(-1, width)
+    (filled,) = np.nonzero((~np.isnan(table)).any(axis=1))
+    if not len(filled):
+        raise InputError(f'{path}: no samples after the {skip} header rows')
+    return table[: int(filled[-1]) + 1]  # formatted rows may follow
+
+
+def _chosen(table: Array, places: list[int]) -> list[Array]:
+    return [table[:, at] for at in places]
+
+
+def _number(value: Any) -> float:
+    if isinstance(value, datetime):
+        return value.replace(tzinfo=UTC).timestamp()
+    return float(value) if _is_number(value) else math.nan
+
+
+FORMAT = Format(('.xlsx',), _read, None, name=_NAME)
