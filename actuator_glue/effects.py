@@ -36,8 +36,7 @@ def load_effects(path: Path | str) -> tuple[Effect, ...]:
     """
     found = read_effects(path)
     try:
-        for effect in found:
-            register(effect, replace=True)
+        CATALOGUE.take(found)
     except InputError as error:
         raise InputError(f'{path}: {error}') from None
     return found

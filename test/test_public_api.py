@@ -1,5 +1,6 @@
 """The public API: what a notebook imports, and that the command line says the same."""
 
+import dataclasses
 import json
 import subprocess
 import sys
@@ -101,6 +102,29 @@ def test_a_diagnosis_is_kept_and_shown(record: ag.Record, tmp_path: Path) -> Non
     assert set(found.inference_data.posterior) == set(found.names)
     with pytest.raises(ag.InputError, match='holds'):
         ag.Calibration.load(tmp_path / 'diagnosis.npz')
+
+
+def test_a_replay_is_kept_and_shown(record: ag.Record, tmp_path: Path) -> None:
+    """The same for a replay, whose windows may be of a model with an effect of the user's own."""
+    effect = ag.effects.term(
+        'bent',
+        'sensor: y = y + bend*y**2',
+        (ag.effects.Parameter('bend', '1/m', -50.0, 50.0, 'bend', 0.0),),
+    )
+    ag.effects.register(effect)
+    try:
+        found = dataclasses.replace(ag.replay(record), effects=('bent',))
+        assert set(found.to_json()['definitions']) == {'bent'}
+        path = found.save(tmp_path / 'replay.npz')
+        assert 'nothing published live' in found._repr_html_()
+    finally:
+        ag.effects.unregister('bent')
+    again = ag.Replay.load(path)  # where nobody knows the effect
+    ag.effects.unregister('bent')
+    assert again.windows == found.windows
+    page = dataclasses.replace(again, effects=()).report(tmp_path / 'replay.html').read_text()
+    assert page.count('<img') == 1
+    assert f'<td>{found.windows[-1].end_s:.2f}</td>' in page
 
 
 def written(tmp_path: Path, *command: object) -> dict[str, object]:

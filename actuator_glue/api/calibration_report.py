@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from html import escape
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -89,33 +86,18 @@ def error_line(found: Calibration) -> str:
     )
 
 
-def moments_html(found: Calibration) -> str:
-    """Return problems, moments and error as a fragment of HTML."""
-
-    def row(cells: Sequence[str], tag: str) -> str:
-        return '<tr>' + ''.join(f'<{tag}>{escape(c)}</{tag}>' for c in cells) + '</tr>'
-
-    lines = [f'<p><b>{escape(line)}</b></p>' for line in found.problems]
-    lines += [f'<table><caption>{escape(moments_title(found))}</caption>', row(HEADER, 'th')]
-    lines += [row(cells, 'td') for cells in moment_rows(found)]
-    lines += ['</table>', f'<p>{escape(error_line(found))}</p>']
-    lines += [f'<p>{escape(line)}</p>' for line in found.notes]
-    return '\n'.join(lines)
+def brief(found: Calibration) -> list[html.Block]:
+    """Return problems, moments, error and notes."""
+    blocks: list[html.Block] = [html.Note(line) for line in found.problems]
+    blocks.append(html.Table(HEADER, moment_rows(found), moments_title(found)))
+    blocks.append(html.Text(error_line(found)))
+    return [*blocks, *(html.Note(line) for line in found.notes)]
 
 
-def write_report(found: Calibration, path: Path) -> Path:
-    """Write the report of a calibration, one HTML file, and return its path.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
-    blocks: list[html.Block] = [
-        html.Table(HEADER, moment_rows(found), moments_title(found)),
-        html.Text(error_line(found)),
-        html.Picture.of(found.plot(), 'Distribution of each parameter, and of each pair.'),
-    ]
-    blocks += [html.Note(line) for line in found.notes]
-    sections = [html.Section('Posterior', blocks)]
+def page(found: Calibration) -> html.Page:
+    """Return the report of a calibration."""
+    picture = html.Picture.of(found.plot(), 'Distribution of each parameter, and of each pair.')
+    sections = [html.Section('Posterior', [*brief(found), picture])]
     if found.records:
         pictures = []
         for record in found.records:
@@ -128,4 +110,4 @@ def write_report(found: Calibration, path: Path) -> Path:
         sections.append(html.Section('Bands over the records', pictures))
     lead = '; '.join(found.problems) or error_line(found)
     made = f'{found.evaluations} evaluations, seed {found.seed}'
-    return html.write(path, 'Calibration', lead, sections, made=made)
+    return html.Page('Calibration', lead, sections, made)

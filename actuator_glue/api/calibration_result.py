@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from actuator_glue.api import store
-from actuator_glue.api.definitions import definitions
+from actuator_glue.api.result import Result
 from actuator_glue.inference.at_bound import Pressed
+from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.records import Array, Record
 
 if TYPE_CHECKING:
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     import control
     from matplotlib.figure import Figure
 
-SCHEMA = 'actuator_glue.calibration/1'
+    from actuator_glue.report import html
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +98,7 @@ class CalibratedRecord:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Calibration:
+class Calibration(Result):
     """A joint posterior, and what forbids or limits its use.
 
     Attributes:
@@ -123,6 +124,8 @@ class Calibration:
         records: the records themselves as they were fitted; empty after `load`.
     """
 
+    schema: ClassVar[str] = 'actuator_glue.calibration/1'
+
     parameters: dict[str, Marginal]
     draws: Array
     log_density: Array
@@ -143,6 +146,11 @@ class Calibration:
     compile_seconds: float
     sources: tuple[CalibratedRecord, ...]
     records: tuple[Record, ...] = ()
+
+    @property
+    def model_effects(self) -> tuple[str, ...]:
+        """Effects of the model beyond Eq. (2)."""
+        return self.effects
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -176,7 +184,7 @@ class Calibration:
     def to_json(self) -> dict[str, Any]:
         """Return the object of schema `actuator_glue.calibration/1` (draws left out)."""
         return {
-            'schema': SCHEMA,
+            'schema': self.schema,
             'parameters': {n: asdict(p) for n, p in self.parameters.items()},
             'evaluations': self.evaluations,
             'seconds': self.seconds,
@@ -187,7 +195,7 @@ class Calibration:
             'notes': list(self.notes),
             'converged': self.converged,
             'effects': list(self.effects),
-            **definitions(self.effects),
+            **CATALOGUE.definitions(self.effects),
             'likelihood': self.likelihood,
             'shaping_factor': self.shaping_factor,
             'seed': self.seed,
@@ -206,22 +214,13 @@ class Calibration:
         """
         return store.save(
             path,
-            SCHEMA,
+            self.schema,
             replace(self, records=()),
             self.effects,
             draws=self.posterior,
             names=np.array(self.names),
             units=np.array([p.unit for p in self.parameters.values()]),
         )
-
-    @classmethod
-    def load(cls, path: Path | str) -> Calibration:
-        """Return what `save` wrote; the records themselves are not in it.
-
-        Raises:
-            InputError: the file cannot be read, or holds no calibration.
-        """
-        return store.load(path, SCHEMA, cls)
 
     def state_space(self, stiffness: float, draw: str | int = 'mean') -> control.StateSpace:
         """Return x/u as a `control.StateSpace`; see `transfer_function`."""
@@ -262,18 +261,14 @@ class Calibration:
 
         return bands_figure(self, record)[0]
 
-    def report(self, path: Path | str) -> Path:
-        """Write a report, one HTML file, and return its path.
+    def brief(self) -> list[html.Block]:
+        """Return problems, moments, error and notes."""
+        from actuator_glue.api.calibration_report import brief
 
-        Raises:
-            InputError: the file cannot be written.
-        """
-        from actuator_glue.api.calibration_report import write_report
+        return brief(self)
 
-        return write_report(self, Path(path))
+    def page(self) -> html.Page:
+        """Return the report: the posterior, and its bands over the records."""
+        from actuator_glue.api.calibration_report import page
 
-    def _repr_html_(self) -> str:
-        """Return the moments as a table, for notebooks."""
-        from actuator_glue.api.calibration_report import moments_html
-
-        return moments_html(self)
+        return page(self)

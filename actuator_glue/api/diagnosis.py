@@ -5,32 +5,35 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import fields
-from html import escape
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from actuator_glue.api import store
-from actuator_glue.api.definitions import definitions
+from actuator_glue.api.result import Result
 from actuator_glue.diagnosis import diagnose as core
 from actuator_glue.diagnosis.estimate import Json
 from actuator_glue.diagnosis.result import SCHEMA, DiagnosisData
 from actuator_glue.effects import save_effects
 from actuator_glue.errors import InputError
+from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.records import Record
 
 if TYPE_CHECKING:
     import arviz
     from matplotlib.figure import Figure
 
+    from actuator_glue.report import html
+
 Progress = Callable[[str, float], None]
 
 
-class Diagnosis(DiagnosisData):
+class Diagnosis(DiagnosisData, Result):
     """Verdict, evidence and the augmented model, with its files and pictures."""
+
+    schema = SCHEMA
 
     def to_json(self) -> Json:
         """Return the object of schema `actuator_glue.diagnosis/1` (curves and draws left out)."""
-        own = definitions(self.structure).get('definitions', {})
+        own = CATALOGUE.definitions(self.structure).get('definitions', {})
         own |= {term.name: term.definition for term in self.learned}
         return {**super().to_json(), **({'definitions': own} if own else {})}
 
@@ -47,22 +50,10 @@ class Diagnosis(DiagnosisData):
         save_effects(path, (term.effect for term in self.learned))
         return Path(path)
 
-    def save(self, path: Path | str) -> Path:
-        """Write everything, curves and draws included, to one .npz file; return its path.
-
-        Raises:
-            InputError: the file cannot be written.
-        """
-        return store.save(path, SCHEMA, self, self.structure)
-
-    @classmethod
-    def load(cls, path: Path | str) -> Diagnosis:
-        """Return what `save` wrote.
-
-        Raises:
-            InputError: the file cannot be read, or holds no diagnosis.
-        """
-        return store.load(path, SCHEMA, cls)
+    @property
+    def model_effects(self) -> tuple[str, ...]:
+        """Effects of the augmented model."""
+        return self.structure
 
     @property
     def inference_data(self) -> arviz.InferenceData:
@@ -88,26 +79,17 @@ class Diagnosis(DiagnosisData):
 
         return bands(self)
 
-    def report(self, path: Path | str) -> Path:
-        """Write a report, one HTML file, and return its path.
+    def brief(self) -> list[html.Block]:
+        """Return verdict, effects and advice."""
+        from actuator_glue.report.diagnosis_report import brief
 
-        Raises:
-            InputError: the file cannot be written.
-        """
-        from actuator_glue.report.diagnosis_report import write_report
+        return brief(self)
 
-        return write_report(self, Path(path))
+    def page(self) -> html.Page:
+        """Return the report."""
+        from actuator_glue.report.diagnosis_report import page
 
-    def _repr_html_(self) -> str:
-        """Return verdict, effects and advice, for notebooks."""
-        rows = ''.join(
-            f'<tr><td>{escape(e.name)}</td><td>{escape(n)}</td>'
-            f'<td>{p.mean:.4g} &plusmn; {p.stddev:.2g} {escape(p.unit)}</td></tr>'
-            for e in self.effects
-            for n, p in e.parameters.items()
-        )
-        notes = ''.join(f'<li>{escape(line)}</li>' for line in self.advice)
-        return f'<p><b>{escape(self.summary())}</b></p><table>{rows}</table><ul>{notes}</ul>'
+        return page(self)
 
 
 def diagnose(

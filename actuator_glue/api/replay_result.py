@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
-from actuator_glue.api import store
+from actuator_glue.api.result import Result
+from actuator_glue.model.effects import CATALOGUE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SCHEMA = 'actuator_glue.replay/1'
+    from actuator_glue.report import html
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +88,7 @@ class Compared:
 
 
 @dataclass(frozen=True, slots=True)
-class Replay:
+class Replay(Result):
     """All windows of a stream, and whether they are what was published live.
 
     Attributes:
@@ -104,6 +104,8 @@ class Replay:
         notes: what limits the answer.
     """
 
+    schema: ClassVar[str] = 'actuator_glue.replay/1'
+
     bag: str
     settings: dict[str, float]
     effects: tuple[str, ...]
@@ -116,6 +118,11 @@ class Replay:
     notes: tuple[str, ...] = ()
 
     @property
+    def model_effects(self) -> tuple[str, ...]:
+        """Effects of the last window's model."""
+        return self.effects
+
+    @property
     def times_real_time(self) -> float:
         """Seconds of data per second."""
         return self.data_seconds / self.seconds if self.seconds > 0.0 else 0.0
@@ -123,36 +130,32 @@ class Replay:
     def to_json(self) -> dict[str, Any]:
         """Return the object of schema `actuator_glue.replay/1`."""
         return {
-            'schema': SCHEMA,
+            'schema': self.schema,
             **asdict(self),
+            **CATALOGUE.definitions(self.effects),
             'times_real_time': self.times_real_time,
         }
 
-    def save(self, path: Path | str) -> Path:
-        """Write everything to one .npz file; return its path.
-
-        Raises:
-            InputError: the file cannot be written.
-        """
-        return store.save(path, SCHEMA, self)
-
-    @classmethod
-    def load(cls, path: Path | str) -> Replay:
-        """Return what `save` wrote.
-
-        Raises:
-            InputError: the file cannot be read, or holds no replay.
-        """
-        return store.load(path, SCHEMA, cls)
-
     def plot(self) -> Figure:
         """Return a figure of every parameter against time, with two standard deviations."""
-        from actuator_glue.api.replay_figure import parameters_figure
+        from actuator_glue.api.replay_report import parameters_figure
 
         return parameters_figure(self)
 
-    def _repr_html_(self) -> str:
-        """Return what came out, in one line, for notebooks."""
+    def summary(self) -> str:
+        """Return what came out in one line."""
         said = {None: 'nothing published live to compare with', True: 'identical to live'}
         verdict = said.get(self.identical, 'NOT identical to live')
-        return f'<p>{len(self.windows)} windows over {self.data_seconds:.1f} s: {verdict}</p>'
+        return f'{len(self.windows)} windows over {self.data_seconds:.1f} s: {verdict}'
+
+    def brief(self) -> list[html.Block]:
+        """Return the summary, the windows, what differs and what limits the answer."""
+        from actuator_glue.api.replay_report import brief
+
+        return brief(self)
+
+    def page(self) -> html.Page:
+        """Return the report: the windows, and their parameters against time."""
+        from actuator_glue.api.replay_report import page
+
+        return page(self)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
-from actuator_glue.api import store
+from actuator_glue.api.result import Result
 from actuator_glue.hybrid.margin import Margins, psi
 from actuator_glue.hybrid.stability import Share
 from actuator_glue.records import Array
@@ -14,7 +13,7 @@ from actuator_glue.records import Array
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SCHEMA = 'actuator_glue.rths/1'
+    from actuator_glue.report import html
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +56,7 @@ class DelayMargin:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class StabilityResult:
+class StabilityResult(Result):
     """Stability of a hybrid test over the draws of a posterior.
 
     Attributes:
@@ -81,6 +80,8 @@ class StabilityResult:
         notes: what limits the answer.
         margins_drawn, growth_drawn: of each draw, (draws,).
     """
+
+    schema: ClassVar[str] = 'actuator_glue.rths/1'
 
     partition: str
     natural_frequencies_hz: tuple[float, ...]
@@ -118,7 +119,7 @@ class StabilityResult:
         """Return the object of schema `actuator_glue.rths/1`."""
         margin = self.delay_margin
         return {
-            'schema': SCHEMA,
+            'schema': self.schema,
             'partition': self.partition,
             'natural_frequencies_hz': list(self.natural_frequencies_hz),
             'rate_hz': self.rate_hz,
@@ -141,42 +142,20 @@ class StabilityResult:
             'notes': list(self.notes),
         }
 
-    def save(self, path: Path | str) -> Path:
-        """Write everything to one .npz file; return its path.
-
-        Raises:
-            InputError: the file cannot be written.
-        """
-        return store.save(path, SCHEMA, self)
-
-    @classmethod
-    def load(cls, path: Path | str) -> StabilityResult:
-        """Return what `save` wrote.
-
-        Raises:
-            InputError: the file cannot be read, or holds something else.
-        """
-        return store.load(path, SCHEMA, cls)
-
     def plot(self) -> Figure:
         """Return a figure of the margins and the growth rates of the draws."""
         from actuator_glue.api.stability_report import stability_figure
 
         return stability_figure(self)
 
-    def report(self, path: Path | str) -> Path:
-        """Write a report, one HTML file, and return its path.
+    def brief(self) -> list[html.Block]:
+        """Return problems, summary, the distributions over the draws and notes."""
+        from actuator_glue.api.stability_report import brief
 
-        Raises:
-            InputError: the file cannot be written.
-        """
-        from actuator_glue.api.stability_report import write_report
+        return brief(self)
 
-        return write_report(self, Path(path))
+    def page(self) -> html.Page:
+        """Return the report."""
+        from actuator_glue.api.stability_report import page
 
-    def _repr_html_(self) -> str:
-        """Return problems and the summary, for notebooks."""
-        from html import escape
-
-        lines = [f'<p><b>{escape(line)}</b></p>' for line in self.problems]
-        return '\n'.join([*lines, f'<p>{escape(f"{self.partition}: {self.summary()}")}</p>'])
+        return page(self)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -70,20 +69,21 @@ def sensitivity_line(found: StabilityResult) -> str:
     return f'the margin follows {found.most_sensitive} most (rank correlation {rho:+.2f})'
 
 
-def write_report(found: StabilityResult, path: Path) -> Path:
-    """Write the report, one HTML file, and return its path.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
-    blocks: list[html.Block] = [html.Note(line) for line in found.problems]
-    blocks += [
+def brief(found: StabilityResult) -> list[html.Block]:
+    """Return problems, summary, the distributions over the draws and notes."""
+    return [
+        *(html.Note(line) for line in found.problems),
+        html.Text(f'{found.partition}: {found.summary()}'),
         html.Text(f'{margin_line(found)}. Compensator: {found.compensator}.'),
-        html.Picture.of(found.plot(), 'Each draw of the posterior; the line is the limit.'),
         html.Table(HEADER, rows(found), 'Over the draws'),
         html.Text(f'{sensitivity_line(found)}.'),
+        *(html.Note(line) for line in found.notes),
     ]
-    blocks += [html.Note(line) for line in found.notes]
-    section = html.Section(f'Stability of {found.partition}', blocks)
+
+
+def page(found: StabilityResult) -> html.Page:
+    """Return the report."""
+    picture = html.Picture.of(found.plot(), 'Each draw of the posterior; the line is the limit.')
+    section = html.Section(f'Stability of {found.partition}', [*brief(found), picture])
     lead = '; '.join((*found.problems, found.summary()))
-    return html.write(path, 'Hybrid test', lead, [section], made=f'{found.draws} draws')
+    return html.Page('Hybrid test', lead, [section], f'{found.draws} draws')

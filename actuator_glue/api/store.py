@@ -13,8 +13,8 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from actuator_glue.api.definitions import definitions, register
 from actuator_glue.errors import InputError
+from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.records import Array
 
 T = TypeVar('T')
@@ -39,7 +39,9 @@ def save(
     """
     arrays: dict[str, Any] = {}
     text = np.array(
-        json.dumps({'schema': schema, 'value': _pack(value, arrays), **definitions(effects)})
+        json.dumps(
+            {'schema': schema, 'value': _pack(value, arrays), **CATALOGUE.definitions(effects)}
+        )
     )
     path = Path(path)
     try:
@@ -62,7 +64,7 @@ def load(path: Path | str, schema: str, cls: type[T]) -> T:
             if content['schema'] != schema:
                 raise InputError(f'{path}: holds {content["schema"]}, not {schema}')
             if 'definitions' in content:
-                register(content['definitions'], str(path))
+                CATALOGUE.define(content['definitions'], str(path))
             return typing.cast(T, _unpack(cls, content['value'], file))
     except InputError:
         raise

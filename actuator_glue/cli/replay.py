@@ -13,7 +13,6 @@ from actuator_glue.io.json_file import write_json
 if TYPE_CHECKING:
     from actuator_glue.api.replay_result import Replay
 
-ROWS = 20  # windows shown to people; JSON has all
 SETTINGS = ('window', 'hop', 'settle', 'shaping_factor', 'evaluations', 'seed')
 
 
@@ -52,7 +51,9 @@ def run(args: argparse.Namespace) -> int:
     settings = {name: getattr(args, name) for name in SETTINGS}
     with progress('replaying', 1.0) as done:
         found = replay(source, namespace=args.namespace, progress=done, **settings)
-    _show(found, args)
+    from actuator_glue.api.replay_report import TITLE, header, rows
+
+    table(TITLE, header(found), rows(found), args)
     for line in (*found.notes, *list(dict.fromkeys(found.events))[:20]):
         note(line)
     _verdict(found, args)
@@ -63,33 +64,6 @@ def run(args: argparse.Namespace) -> int:
     )
     write_json(found.to_json(), args.json)
     return 1 if found.identical is False else 0
-
-
-def _show(found: Replay, args: argparse.Namespace) -> None:
-    names = list(found.windows[-1].parameters)
-    shown = [w for w in found.windows if list(w.parameters) == names]
-    if len(shown) > ROWS:
-        shown = [shown[i * (len(shown) - 1) // (ROWS - 1)] for i in range(ROWS)]
-    rows = []
-    for w in shown:
-        coverage = [b.coverage[-1] for b in w.bands if b.kind == 'total']
-        rows.append(
-            (
-                str(w.window),
-                f'{w.end_s:.2f}',
-                *(f'{p.mean:.4g} {_percent(p.stddev, p.mean)}' for p in w.parameters.values()),
-                f'{max(p.rhat for p in w.parameters.values()):.2f}',
-                f'{1e6 * w.error.rms_m:.1f}',
-                f'{100 * coverage[-1]:.0f} %' if coverage else '-',
-            )
-        )
-    columns = ('window', 'end [s]', *names, 'R-hat', 'rms [um]', 'cover')
-    title = 'Posterior mean (SI units) and standard deviation (% of it) of each window'
-    table(title, columns, rows, args)
-
-
-def _percent(stddev: float, mean: float) -> str:
-    return f'{100 * stddev / abs(mean):3.0f}%' if mean else '  -%'
 
 
 def _verdict(found: Replay, args: argparse.Namespace) -> None:

@@ -159,8 +159,8 @@ def _truth(
     args: argparse.Namespace, command: Command | Record, stiffness: float
 ) -> dict[str, Any]:
     """Return what is true about the plant."""
-    from actuator_glue.api.definitions import definitions
     from actuator_glue.api.simulation import samples_of, sizes
+    from actuator_glue.model.effects import CATALOGUE
 
     samples = samples_of(command)
     effects = dict(map(_parse_effect, args.effect))
@@ -170,7 +170,7 @@ def _truth(
         'plant': args.plant,
         'theta': dict(zip(structure.names, theta.tolist(), strict=True)),
         'effects': list(structure.effects),
-        **definitions(structure.effects),
+        **CATALOGUE.definitions(structure.effects),
         'seed': args.seed,
     }
 

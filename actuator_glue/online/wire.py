@@ -15,7 +15,6 @@ import numpy as np
 from actuator_glue.errors import InputError
 from actuator_glue.inference.choice import ModelChoice, choose_model
 from actuator_glue.model.effects import CATALOGUE
-from actuator_glue.model.effects.terms.definition import entries, mapping
 from actuator_glue.online.forecast import Prediction
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.settings import EstimatorSettings
@@ -94,8 +93,8 @@ def model_choice(message: Any) -> ModelChoice:
         begin = {name: _NAN if value is None else float(value) for name, value in places}
     except (ValueError, TypeError, AttributeError) as error:
         raise InputError(f'EstimatorSetup: the model cannot be read ({error})') from error
-    for effect in entries(defined, 'EstimatorSetup') if defined else ():
-        CATALOGUE.register(effect, replace=True)
+    if defined:
+        CATALOGUE.define(defined, 'EstimatorSetup')
     return choose_model(list(message.effects), box, begin)
 
 
@@ -120,8 +119,7 @@ def estimator_setup(
         index: running index of that window's first sample.
     """
     # What is no part of the package goes along: the bag alone is enough for a replay.
-    own = mapping(e for e in CATALOGUE.registered() if e.name in model.effects)
-    more = {'definitions': own} if own else {}
+    more = CATALOGUE.definitions(model.effects)
     start = [None if np.isnan(v) else v for v in model.start]
     return {
         'index': index,

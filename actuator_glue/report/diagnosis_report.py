@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.records import source_name
 from actuator_glue.report import diagnosis_figures as figures
-from actuator_glue.report.html import Block, Note, Picture, Section, Table, Text, write
+from actuator_glue.report.html import Block, Note, Page, Picture, Section, Table, Text
 
 
 def _um(value: float) -> str:
@@ -48,6 +46,23 @@ def _error(found: DiagnosisData) -> Section:
     return Section('Error before and after', blocks)
 
 
+def _posterior(found: DiagnosisData) -> Table:
+    rows = [
+        [
+            e.name,
+            name,
+            f'{p.mean:.4g}',
+            f'{p.stddev:.2g}',
+            f'{p.lower:.4g} to {p.upper:.4g}',
+            p.unit,
+        ]
+        for e in found.effects
+        for name, p in e.parameters.items()
+    ]
+    header = ['effect', 'parameter', 'mean', 'sd', '95 % interval', 'unit']
+    return Table(header, rows, 'Posterior of the effects.')
+
+
 def _effects(found: DiagnosisData) -> Section:
     blocks: list[Block] = []
     if found.effects:
@@ -81,18 +96,7 @@ def _effects(found: DiagnosisData) -> Section:
                 prose=True,
             )
         )
-        blocks.append(
-            Table(
-                ['effect', 'parameter', 'mean', 'sd', '95 % interval', 'unit'],
-                [
-                    [e.name, name, f'{p.mean:.4g}', f'{p.stddev:.2g}',
-                     f'{p.lower:.4g} to {p.upper:.4g}', p.unit]
-                    for e in found.effects
-                    for name, p in e.parameters.items()
-                ],
-                'Posterior of the effects.',
-            )
-        )  # fmt: skip
+        blocks.append(_posterior(found))
         if len(found.names) > 4:
             blocks.append(
                 Picture.of(figures.posteriors(found), 'Posterior of the effects (DREAM(ZS)).')
@@ -168,11 +172,15 @@ def _records(found: DiagnosisData) -> Section:
     return Section('Records', [Table(header, rows, 'What was read, and from where.', prose=True)])
 
 
-def write_report(found: DiagnosisData, path: Path) -> Path:
-    """Write the report of a diagnosis and return its path.
+def brief(found: DiagnosisData) -> list[Block]:
+    """Return verdict, effects and advice in text and tables."""
+    blocks: list[Block] = [Text(found.summary())]
+    if found.effects:
+        blocks.append(_posterior(found))
+    return [*blocks, *(Note(line) for line in found.advice)]
 
-    Raises:
-        InputError: the file cannot be written.
-    """
+
+def page(found: DiagnosisData) -> Page:
+    """Return the report of a diagnosis."""
     sections = [_error(found), _effects(found), _residual(found), _records(found)]
-    return write(path, 'Diagnosis', found.summary(), sections)
+    return Page('Diagnosis', found.summary(), sections)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
+from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 from matplotlib.figure import Figure
 
 from actuator_glue import __version__
@@ -68,22 +69,23 @@ class Section:
     blocks: Sequence[Block]
 
 
-def render(title: str, lead: str, sections: Sequence[Section], *, made: str = '') -> str:
-    """Return the whole page as HTML.
+class Page(NamedTuple):
+    """A report.
 
-    Args:
-        title: title of the report.
+    Attributes:
+        title: its title.
         lead: one paragraph that says what was done and what came out.
         sections: numbered in this order; tables and figures are numbered through.
         made: one line on how and when it was made (the caller's clock and arguments).
-
-    Raises:
-        ValueError: a table row with another length than its header.
     """
-    for section in sections:
-        for block in section.blocks:
-            if isinstance(block, Table) and any(len(r) != len(block.header) for r in block.rows):
-                raise ValueError(f'table {block.caption!r}: a row is not as long as the header')
+
+    title: str
+    lead: str
+    sections: Sequence[Section]
+    made: str = ''
+
+
+def _template(name: str) -> Template:
     environment = Environment(
         loader=FileSystemLoader(TEMPLATES),
         autoescape=True,
@@ -91,22 +93,37 @@ def render(title: str, lead: str, sections: Sequence[Section], *, made: str = ''
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    page = environment.get_template('report.html.j2')
-    return page.render(title=title, lead=lead, sections=sections, made=made, version=__version__)
+    return environment.get_template(f'{name}.html.j2')
 
 
-def write(
-    path: Path, title: str, lead: str, sections: Sequence[Section], *, made: str = ''
-) -> Path:
-    """Write the page to a file and return its path; arguments and errors as `render`.
+def fragment(blocks: Sequence[Block]) -> str:
+    """Return blocks as HTML without a page around them, for notebooks."""
+    return _template('fragment').render(blocks=blocks)
+
+
+def render(page: Page) -> str:
+    """Return the whole page as HTML.
+
+    Raises:
+        ValueError: a table row with another length than its header.
+    """
+    for section in page.sections:
+        for block in section.blocks:
+            if isinstance(block, Table) and any(len(r) != len(block.header) for r in block.rows):
+                raise ValueError(f'table {block.caption!r}: a row is not as long as the header')
+    return _template('report').render(**page._asdict(), version=__version__)
+
+
+def write(path: Path, page: Page) -> Path:
+    """Write the page to a file and return its path; errors as `render`.
 
     Raises:
         InputError: the file cannot be written.
     """
-    page = render(title, lead, sections, made=made)
+    text = render(page)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(page, encoding='utf-8')
+        path.write_text(text, encoding='utf-8')
     except OSError as error:
         raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error
     return path

@@ -148,8 +148,7 @@ def _serve(pipe: Connection, warm: Callable[[], None] | None, nice: int) -> None
             effects, function, args = task
             started = time.monotonic()
             try:
-                for effect in effects:
-                    CATALOGUE.register(effect, replace=True)
+                CATALOGUE.take(effects)
                 kind, payload = DONE, function(*args, tell)
             except Exception as error:
                 kind, payload = FAILED, f'{type(error).__name__}: {error}'

@@ -90,4 +90,4 @@ def write(results: Results, path: Path, *, made: str = '') -> Path:
         made: how it was made (the command).
     """
     lead, found = sections(results)
-    return html.write(path, TITLE, lead, found, made=made)
+    return html.write(path, html.Page(TITLE, lead, found, made))

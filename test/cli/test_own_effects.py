@@ -23,7 +23,8 @@ from actuator_glue.model.structure import Structure
 from actuator_glue.online import wire
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.records import Record
-from actuator_glue.report.diagnosis_report import write_report
+from actuator_glue.report import html
+from actuator_glue.report.diagnosis_report import page
 from actuator_glue.workers.worker import DONE, Answer, Worker
 
 CUBIC = """\
@@ -90,7 +91,7 @@ def test_diagnose_and_report(own: str, tmp_path: Path) -> None:
     assert [e.name for e in found.effects] == ['bent-sensor']
     assert found.effects[0].parameters['bend'].mean == pytest.approx(20.0, rel=0.1)
     report = tmp_path / 'report.html'
-    write_report(found, report)
+    html.write(report, page(found))
     assert 'bend*y**2' in report.read_text()
 
 

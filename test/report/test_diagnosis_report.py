@@ -3,7 +3,6 @@
 import re
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -19,7 +18,8 @@ from actuator_glue.diagnosis.result import (
     Trace,
 )
 from actuator_glue.report import diagnosis_figures as figures
-from actuator_glue.report.diagnosis_report import write_report
+from actuator_glue.report.diagnosis_report import page as page_of
+from actuator_glue.report.html import render
 
 RATE = 100.0
 FOLDER = '/laboratory/2026/campaign'
@@ -133,16 +133,16 @@ def test_what_was_not_added_is_not_drawn() -> None:
         assert any('after' in t.get_text() for t in two.legends[0].get_texts())
 
 
-def test_paths_stand_in_one_table(tmp_path: Path) -> None:
+def test_paths_stand_in_one_table() -> None:
     """The headline names files; where they lay is told once for each."""
     found = diagnosis(6e-5)
     assert f'backlash in {LONG} only' in found.summary()
     assert FOLDER not in found.summary()
-    page = write_report(found, tmp_path / 'report.html').read_text()
+    page = render(page_of(found))
     text = re.sub(r'data:image/png;base64,[^"]*', '', page)
     assert '<title>Diagnosis</title>' in text
     assert text.count(FOLDER) == len(found.traces)
     assert text.index(FOLDER) > text.index('What was read')
     same = replace(found, effects=(), structure=(), verdict='none')
-    page = write_report(same, tmp_path / 'none.html').read_text()
+    page = render(page_of(same))
     assert 'nothing was added' in page

@@ -9,7 +9,7 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from actuator_glue.errors import InputError
-from actuator_glue.report.html import Note, Picture, Section, Table, Text, render, write
+from actuator_glue.report.html import Note, Page, Picture, Section, Table, Text, render, write
 
 
 class Checker(HTMLParser):
@@ -35,7 +35,7 @@ def test_page_is_whole_numbered_and_self_contained(tmp_path) -> None:
         Section('First', [Text('a < b & c'), Table(('x', 'y'), [(1, 'two')], 'A table'), picture]),
         Section('Second', [Note('found'), Text(Markup('<b>bold</b>')), picture]),
     ]
-    path = write(tmp_path / 'deep' / 'report.html', 'Title', 'Lead', sections, made='seed 3')
+    path = write(tmp_path / 'deep' / 'report.html', Page('Title', 'Lead', sections, 'seed 3'))
     page = path.read_text(encoding='utf-8')
     checker = Checker()
     checker.feed(page)
@@ -49,10 +49,10 @@ def test_page_is_whole_numbered_and_self_contained(tmp_path) -> None:
 
 def test_ragged_table_is_refused() -> None:
     with pytest.raises(ValueError, match='as long as the header'):
-        render('T', 'L', [Section('S', [Table(('a', 'b'), [(1,)], 'c')])])
+        render(Page('T', 'L', [Section('S', [Table(('a', 'b'), [(1,)], 'c')])]))
 
 
 def test_a_page_that_cannot_be_written_is_one_clear_error(tmp_path: Path) -> None:
     (tmp_path / 'file').write_text('')
     with pytest.raises(InputError, match='cannot be written'):
-        write(tmp_path / 'file' / 'page.html', 'T', 'L', [])
+        write(tmp_path / 'file' / 'page.html', Page('T', 'L', []))

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 from actuator_glue.errors import InputError
 from actuator_glue.model.effects import coefficients
 from actuator_glue.model.effects.effect import Effect
+from actuator_glue.model.effects.terms.definition import entries, mapping
 from actuator_glue.model.parameters import NAMES as BASE
 
 
@@ -60,6 +62,32 @@ class Registry(dict[str, Effect]):
                 )
         self[effect.name] = effect
         return effect
+
+    def take(self, effects: Iterable[Effect]) -> None:
+        """Register effects in place of others of the same names.
+
+        Raises:
+            InputError: as `register`.
+        """
+        for effect in effects:
+            self.register(effect, replace=True)
+
+    def define(self, content: Any, source: str) -> None:
+        """Register effects from their definitions; `source` says where these come from.
+
+        Raises:
+            InputError: an effect cannot be used.
+        """
+        self.take(entries(content, source))
+
+    def definitions(self, names: Iterable[str]) -> dict[str, Any]:
+        """Return `{'definitions': ...}` of those effects that are no part of the package, or {}.
+
+        What is kept or sent with it can be read where the file of effects is not at hand.
+        """
+        wanted = set(names)
+        own = mapping(e for e in self.registered() if e.name in wanted)
+        return {'definitions': own} if own else {}
 
     def unregister(self, name: str) -> None:
         """Forget an effect that was registered.

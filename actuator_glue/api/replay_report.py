@@ -1,0 +1,94 @@
+"""A replay as tables and pictures: its windows, and their parameters against time."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import source_name
+from actuator_glue.report import html
+from actuator_glue.report.timeseries import ParameterCourse, parameters_against_time
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from actuator_glue.api.replay_result import Replay, WindowEstimate
+
+
+ROWS = 20  # windows shown to people; JSON has all
+TITLE = 'Posterior mean (SI units) and standard deviation (% of it) of each window'
+
+
+def header(found: Replay) -> tuple[str, ...]:
+    """Return the columns of `rows`."""
+    return ('window', 'end [s]', *_names(found), 'R-hat', 'rms [um]', 'cover')
+
+
+def rows(found: Replay) -> list[tuple[str, ...]]:
+    """Return a row of text for each of some windows, evenly chosen where there are many."""
+    shown = _windows(found)
+    if len(shown) > ROWS:
+        shown = [shown[i * (len(shown) - 1) // (ROWS - 1)] for i in range(ROWS)]
+    out = []
+    for w in shown:
+        coverage = [b.coverage[-1] for b in w.bands if b.kind == 'total']
+        out.append(
+            (
+                str(w.window),
+                f'{w.end_s:.2f}',
+                *(f'{p.mean:.4g} {_percent(p.stddev, p.mean)}' for p in w.parameters.values()),
+                f'{max(p.rhat for p in w.parameters.values()):.2f}',
+                f'{1e6 * w.error.rms_m:.1f}',
+                f'{100 * coverage[-1]:.0f} %' if coverage else '-',
+            )
+        )
+    return out
+
+
+def _percent(stddev: float, mean: float) -> str:
+    return f'{100 * stddev / abs(mean):3.0f}%' if mean else '  -%'
+
+
+def _names(found: Replay) -> list[str]:
+    return list(found.windows[-1].parameters)
+
+
+def _windows(found: Replay) -> list[WindowEstimate]:
+    """Return the windows of the last one's model: the parameters of others are others."""
+    names = _names(found)
+    return [w for w in found.windows if list(w.parameters) == names]
+
+
+def brief(found: Replay) -> list[html.Block]:
+    """Return the summary, the windows, what differs and what limits the answer."""
+    told = [*(found.compared.differing[:ROWS] if found.compared else ()), *found.notes]
+    return [
+        html.Text(found.summary()),
+        html.Table(header(found), rows(found), TITLE),
+        *(html.Note(line) for line in told),
+    ]
+
+
+def page(found: Replay) -> html.Page:
+    """Return the report of a replay."""
+    picture = html.Picture.of(found.plot(), 'Every parameter, with two standard deviations.')
+    events = [html.Text(line) for line in dict.fromkeys(found.events)]
+    sections = [html.Section('Windows', [*brief(found), picture])]
+    if events:
+        sections.append(html.Section('Events', events))
+    return html.Page(f'Replay of {source_name(found.bag)}', found.summary(), sections)
+
+
+def parameters_figure(found: Replay) -> Figure:
+    """Draw every parameter's mean and two standard deviations against time."""
+    names, windows = _names(found), _windows(found)
+    known = {p.name: p for p in Structure(found.effects).parameters}
+    mean = np.array([[w.parameters[n].mean for n in names] for w in windows])
+    spread = 2.0 * np.array([[w.parameters[n].stddev for n in names] for w in windows])
+    time_s = np.array([w.end_s for w in windows])
+    course = ParameterCourse(
+        time_s, mean, mean - spread, mean + spread, 'mean and two standard deviations'
+    )
+    return parameters_against_time(course, [known[n] for n in names])
