@@ -32,7 +32,7 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
         'a free actuator); wins over what a file says',
     )
     parser.add_argument(
-        '--channels', metavar='MAP.yaml', help='channel map for laboratory text or .mat'
+        '--channels', metavar='MAP.yaml', help='channel map: columns of files, or topics of a bag'
     )
     parser.add_argument(
         '--hold',

@@ -161,7 +161,8 @@ def _nothing(path: Path | str) -> str:
     held = [f'{t.name} ({t.type}, {t.count})' for t in summarise(path).topics.values()]
     return (
         f'{path}: no two samples of {SAMPLE_BLOCK} in this bag; it holds '
-        f'{", ".join(held) or "no message"}'
+        f'{", ".join(held) or "no message"}; `actuator-glue map {path}` proposes a channel map '
+        'where these are the channels'
     )
 
 

@@ -14,6 +14,11 @@ from actuator_glue.io.yaml_file import mapping, number, parse, read_text, whole
 from actuator_glue.records import check_stiffness
 
 Column = str | int
+_CHOICES = {
+    'decimal': ('.', ','),
+    'hold': ('zoh', 'linear'),
+    'stamps': ('header', 'published', 'logged'),
+}
 # Inside {...} YAML reads the [s] of `column: Time [s]` as a list.
 _BRACKETS = re.compile(r'column:\s*[^\'"\s][^\'",}]*\[')
 _QUOTES = "put quotes around names with brackets, as in column: 'Time [s]'"
@@ -24,7 +29,7 @@ class Channel:
     """One channel of a file.
 
     Attributes:
-        column: name, or number counted from 1; for .mat the variable, `struct.field` included.
+        column: name in full, or number counted from 1; of a bag `/topic`, `/topic.field`.
         unit: unit of the values after scaling.
         scale: factor from the file's values to `unit`, e.g. mm per V.
         offset: value in `unit` added after scaling.
@@ -56,6 +61,8 @@ class ChannelMap:
         hold: how the command runs between its samples, zoh or linear.
         stiffness: specimen stiffness [N/m].
         actuator: name of the actuator.
+        stamps: of a bag's messages: header (acquisition), published or logged; the first that
+            every message has where left out.
         source: the map's file, for messages.
     """
 
@@ -72,7 +79,19 @@ class ChannelMap:
     hold: Literal['zoh', 'linear'] | None = None
     stiffness: float | None = None
     actuator: str = 'actuator'
+    stamps: Literal['header', 'published', 'logged'] | None = None
     source: str = ''
+
+    def roles(self) -> dict[str, Channel]:
+        """Return the channels that the map names, by role."""
+        found = {role: getattr(self, role) for role in ROLES}
+        return {role: channel for role, channel in found.items() if channel is not None}
+
+    @property
+    def topics(self) -> bool:
+        """Whether the channels are topics of a bag."""
+        columns = (channel.column for channel in self.roles().values())
+        return all(isinstance(column, str) and column.startswith('/') for column in columns)
 
 
 def read_channel_map(path: Path | str) -> ChannelMap:
@@ -107,7 +126,7 @@ def parse_channel_map(content: object, source: str) -> ChannelMap:
     number(values, 'stiffness', where)
     for name in ('header_lines', 'rest_samples'):
         whole(values, name, where)
-    for name, allowed in (('decimal', ('.', ',')), ('hold', ('zoh', 'linear'))):
+    for name, allowed in _CHOICES.items():
         if values.get(name) is not None and values[name] not in allowed:
             raise InputError(f'{where}: {name} is {values[name]!r}; use one of {allowed}')
     for name in ('delimiter', 'actuator'):
@@ -118,7 +137,11 @@ def parse_channel_map(content: object, source: str) -> ChannelMap:
     if values.get('stiffness') is not None:
         values['stiffness'] = check_stiffness(values['stiffness'], where)
     made = ChannelMap(**{k: v for k, v in values.items() if v is not None}, source=source)
-    if made.time is None and made.rate is None:
+    if made.topics and (made.time is not None or made.sample_number is not None):
+        raise InputError(
+            f'{where}: messages have stamps of their own; leave `time` and `sample_number` out'
+        )
+    if made.time is None and made.rate is None and not made.topics:
         raise InputError(f'{where}: give `rate` in Hz, or a `time` channel')
     wants_rest = [c for c in (made.command, made.measured, made.force) if c is not None]
     if any(c.remove_rest_offset for c in wants_rest) and made.rest_samples < 1:

@@ -95,24 +95,30 @@ def _by_name(path: Path) -> tuple[dict[str, Array], dict[str, str], float]:
 
 def _mapped(path: Path, channels: ChannelMap) -> tuple[dict[str, Array], float]:
     """Return channels in SI units, rest offsets removed, and the period."""
-    roles = {
-        role: channel
-        for role in ('time', 'command', 'measured', 'force')
-        if (channel := getattr(channels, role)) is not None
-    }
+    roles = channels.roles()
     raw, counter = _raw(path, channels, roles)
     if counter is not None:
         _check_counter(counter, path)
+    values = in_si(raw, channels, str(path))
+    if channels.rate is not None:
+        return values, 1.0 / channels.rate
+    return values, uniform_period(values['time'], str(path))
+
+
+def in_si(raw: dict[str, Array], channels: ChannelMap, source: str) -> dict[str, Array]:
+    """Return channels in SI units, scaled, offsets at rest removed, by their role.
+
+    Raises:
+        InputError: a channel is not at rest where its map says so.
+    """
     values = {}
-    for role, channel in roles.items():
-        where = f'{path}: {role}'
+    for role, channel in channels.roles().items():
+        where = f'{source}: {role}'
         column = raw[role] * channel.scale + channel.offset
         if channel.remove_rest_offset:
             column = column - _rest_offset(column, channels.rest_samples, where, role)
         values[role] = column * factor(role, channel.unit, where)
-    if channels.rate is not None:
-        return values, 1.0 / channels.rate
-    return values, uniform_period(values['time'], str(path))
+    return values
 
 
 def _raw(

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from actuator_glue.errors import InputError
 from actuator_glue.io import laboratory
+from actuator_glue.io.bag_mapped import read_mapped
 from actuator_glue.io.bag_reader import Note, is_bag, refuse, warn_caller
 from actuator_glue.io.bag_records import read_records
 from actuator_glue.io.channel_map import ChannelMap, read_channel_map
@@ -24,9 +25,9 @@ def load(
     """Return the one record of a bag or laboratory file.
 
     Args:
-        path: bag folder, .mcap, .mat or delimited text.
+        path: bag folder, .mcap, or a laboratory file of any format.
         stiffness: specimen stiffness [N/m]; None for what the file says.
-        channels: channel map for a laboratory file.
+        channels: channel map for a laboratory file, or one of topics for a bag.
         hold: how the command runs between its samples; None for what the file says.
 
     Raises:
@@ -51,10 +52,10 @@ def load_records(
     """Return the records of bags and laboratory files, in the order given.
 
     Args:
-        paths: bag folders, .mcap, .mat or delimited text; one bag may hold several records.
+        paths: bag folders, .mcap, laboratory files; one bag may hold several records.
         stiffness: specimen stiffness [N/m]: one for all, or one per path, or one per record;
             None for what the files say. What is given wins over what the files say.
-        channels: channel map for the laboratory files.
+        channels: channel map for the laboratory files, or for bags where it names topics.
         hold: how the command runs between its samples; None for what the files say.
         note: called with one line per damage of a bag; the default raises it.
         gap: called with one line where a bag lacks samples or its clock jumps, and is split
@@ -70,9 +71,13 @@ def load_records(
         raise InputError('no record given')
     if isinstance(channels, (str, Path)):
         channels = read_channel_map(channels)
+    if channels is not None and hold is not None:
+        channels = replace(channels, hold=hold)
     groups: list[list[Record]] = []
     for path in paths:
-        if is_bag(path):
+        if is_bag(path) and channels is not None and channels.topics:
+            groups.append(read_mapped(path, channels, note=note, gap=gap, warn=warn))
+        elif is_bag(path):
             groups.append(read_records(path, note=note, gap=gap, warn=warn))
         else:
             groups.append([laboratory.read(path, channels=channels, hold=hold)])

@@ -58,7 +58,12 @@ def uniform_period(time: Array, where: str) -> float:
             f'{where}: samples are not uniform in time: sample {at} is {off[at] / period:.2g} '
             f'periods off; resample the record; {_ROUNDED}'
         )
+    return near_whole_rate(period, len(time))
+
+
+def near_whole_rate(period: float, samples: int) -> float:
+    """Return the period of a whole number of Hz where so many samples do not tell it from it."""
     whole = round(1.0 / period)
-    if whole and abs(1.0 / whole - period) * len(time) < 0.05 * period:
+    if whole and abs(1.0 / whole - period) * samples < 0.05 * period:
         return 1.0 / whole
     return period

@@ -286,7 +286,8 @@ def test_the_how_to_says_what_is_true(tmp_path: Path) -> None:
     """Its channel map is the shipped one, its CSV is read, its table names every entry."""
     text = (ROOT / 'docs' / 'howto_your_data.md').read_text()
     blocks = re.findall(r'```(\w*)\n(.*?)```', text, flags=re.DOTALL)
-    (described,) = [yaml.safe_load(body) for kind, body in blocks if kind == 'yaml']
+    described, topics = [yaml.safe_load(body) for kind, body in blocks if kind == 'yaml']
+    assert parse_channel_map(topics, 'topics').topics
     shipped = read_channel_map(MTS_MAP)
     assert parse_channel_map(described, shipped.source) == shipped
     (example,) = [body for kind, body in blocks if body.startswith('time_s')]
