@@ -133,7 +133,7 @@ def test_a_slow_command_is_held(tmp_path: Path) -> None:
     held = np.repeat(np.float32(COMMAND[few]).astype(float), 10)[: len(record)]
     np.testing.assert_allclose(record.command, held * 1e-3, rtol=1e-12)
     np.testing.assert_allclose(
-        record.measured, np.float32(MEASURED).astype(float)[: len(record)] * 1e-3
+        record.measured, np.float32(MEASURED).astype(float)[: len(record)] * 1e-3, atol=1e-18
     )
 
 
