@@ -56,6 +56,12 @@ def of(
             same = all(CATALOGUE[t].group == group for t in tied)
             way = _EXPERIMENT.get(group, _OTHERWISE) if same else _OTHERWISE
             out.append(f'{name} cannot be told from {", ".join(tied)} here; record {way}')
+        out += [
+            f'{r.name}, which is {name} at {r.limit[0]} = {_neutral(r.name):g}, is not excluded: '
+            f'{r.limit[0]} may be as far as {r.limit[1]:.3g} (95 %)'
+            for r in found.rivals[name]
+            if r.limit and r.tied
+        ]
         if stretches[name].agree is False:
             sizes = ', '.join(f'{v:.3g}' for v in stretches[name].values)
             unit = entries[name].parameters[0].unit
@@ -98,6 +104,12 @@ def of(
             f'(threshold {1e6 * found.material:.1f} um)'
         )
     return tuple(out)
+
+
+def _neutral(richer: str) -> float:
+    """Value at which a richer form is the effect it holds."""
+    holds = CATALOGUE[richer].holds
+    return holds[2] if holds else 0.0
 
 
 def unidentified(data: Data, estimates: dict[str, Estimate]) -> tuple[str, ...]:

@@ -20,6 +20,7 @@ from actuator_glue.diagnosis import (
 from actuator_glue.diagnosis.completeness import Decision
 from actuator_glue.diagnosis.detect import alarm_of
 from actuator_glue.diagnosis.estimate import Estimate
+from actuator_glue.diagnosis.finding import Candidate, Finding
 from actuator_glue.diagnosis.fit import Space
 from actuator_glue.diagnosis.homogeneity import Homogeneity
 from actuator_glue.diagnosis.measurement import Measured
@@ -31,14 +32,15 @@ from actuator_glue.diagnosis.pipeline import (
     with_the_right_hold,
 )
 from actuator_glue.diagnosis.preparation import prepare
-from actuator_glue.diagnosis.result import Candidate, DiagnosisData, Finding
+from actuator_glue.diagnosis.ranking import standard_error, weights
+from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.diagnosis.search import Trial
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.verify import Side, traces, verify
 from actuator_glue.inference.at_bound import Pressed, pressed
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.parameters import BASE
-from actuator_glue.records import Array, Record
+from actuator_glue.records import Record
 
 Clock = Callable[[], float]
 
@@ -187,7 +189,11 @@ def _findings(
     out = []
     entries = {e.name: e for e in decision.final.structure.entries}
     for name in decision.names:
-        rivals = found.rivals[name]
+        described = learned_term.is_learned(entries[name])
+        # A learned term describes; there is no cause by its name that might be true.
+        rivals = tuple(
+            replace(r, probability=decision.certainty * r.probability) for r in found.rivals[name]
+        )
         tied = [r for r in rivals if r.tied]
         own = {p.name: estimates[p.name] for p in entries[name].parameters}
         first = next(iter(own.values()))
@@ -196,10 +202,9 @@ def _findings(
             Finding(
                 name=name,
                 alternatives=tuple(r.name for r in tied if r.name != name),
-                # A learned term describes; there is no cause by its name that might be true.
                 probability=math.nan
-                if learned_term.is_learned(entries[name])
-                else decision.certainty * next(r.probability for r in rivals if r.name == name),
+                if described
+                else next(r.probability for r in rivals if r.name == name),
                 place=entries[name].place,
                 parameters=own,
                 error_without=float(np.sqrt(found.final.mean_square + gained**2)),
@@ -209,6 +214,7 @@ def _findings(
                 agrees_across_windows=stretches[name].agree,
                 windows=stretches[name].values,
                 records=_records_of(decision.final, name),
+                rivals=() if described else rivals,
             )
         )
     for effect in decision.measured:
@@ -217,7 +223,7 @@ def _findings(
             Finding(
                 name=effect.name,
                 alternatives=(),
-                probability=1.0,
+                probability=math.nan,
                 place=CATALOGUE[effect.name].place,
                 parameters=_measured_estimates(effect),
                 error_without=total,
@@ -245,17 +251,18 @@ def _excludes_neutral(estimate: Estimate) -> bool:
 
 
 def _candidates(found: Selection, seen: tuple[Measured, ...]) -> tuple[Candidate, ...]:
-    base = float(found.base.scores.sum())
-    scores: Array = np.array([float(t.scores.sum()) - base for t in found.singles])
-    weights = np.exp(np.clip(scores - scores.max(), -700.0, 0.0))
-    weights /= weights.sum()
+    base = found.base.scores
+    known = weights(np.stack([*(t.scores for t in found.singles), base]))
     rows = [
-        Candidate(t.added, float(s), t.fit.rms, float(w))
-        for t, s, w in zip(found.singles, scores, weights, strict=True)
-    ]
+        Candidate(
+            t.added, float((t.scores - base).sum()), t.fit.rms, float(w),
+            standard_error(t.scores - base),
+        )
+        for t, w in zip(found.singles, known, strict=False)
+    ]  # fmt: skip
     base_rms = found.base.fit.rms
     rows += [
-        Candidate(m.name, m.nats, float(np.sqrt(max(0.0, base_rms**2 - m.rms**2))), 0.0)
+        Candidate(m.name, m.nats, float(np.sqrt(max(0.0, base_rms**2 - m.rms**2))), math.nan)
         for m in seen
     ]
     return tuple(sorted(rows, key=lambda c: c.error))

@@ -9,7 +9,8 @@ from actuator_glue.diagnosis.verdict import misses
 from actuator_glue.records import source_name
 
 if TYPE_CHECKING:
-    from actuator_glue.diagnosis.result import DiagnosisData, Finding
+    from actuator_glue.diagnosis.finding import Finding
+    from actuator_glue.diagnosis.result import DiagnosisData
 
 
 def _named(effect: Finding, found: DiagnosisData) -> str:

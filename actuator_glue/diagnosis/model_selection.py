@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
+from actuator_glue.diagnosis.finding import Rival
+from actuator_glue.diagnosis.ranking import compare, removed
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.search import Search, Trial
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -14,25 +14,6 @@ from actuator_glue.diagnosis.thresholds import Thresholds
 Progress = Callable[[str, float], None]
 # Rounds in which members may be swapped for better or simpler ones.
 _SWAPS = 4
-
-
-@dataclass(frozen=True)
-class Rival:
-    """An effect in the place of another, everything refitted: how far behind the best it is.
-
-    Attributes:
-        name: the effect.
-        nats: evidence of the best over it (0 for the best itself).
-        excess: rms error it leaves beyond the best [m].
-        tied: these data cannot tell it from the best.
-        probability: among all rivals.
-    """
-
-    name: str
-    nats: float
-    excess: float
-    tied: bool
-    probability: float
 
 
 @dataclass(frozen=True)
@@ -62,11 +43,6 @@ class Selection:
     left: float
     noise: float
     material: float
-
-
-def removed(before: Trial, after: Trial) -> float:
-    """Rms error that a larger structure removes [m]."""
-    return float(np.sqrt(max(0.0, before.mean_square - after.mean_square)))
 
 
 class ModelSelection:
@@ -183,7 +159,7 @@ class ModelSelection:
                 if len(current.effects) > 1:
                     names = self.search.screened(rest, names)[: self.settings.tried]
                 trials = self.search.additions(rest, names)
-                rivals[name] = self.compare(rest, current, name, trials)
+                rivals[name] = self._rivals(rest, current, name, trials)
                 if trials and trials[0].scores.sum() > best.scores.sum():
                     best = trials[0]
             if best is current:
@@ -193,6 +169,12 @@ class ModelSelection:
                 break
             current = best
         return current, rivals
+
+    def _rivals(
+        self, rest: Trial, best: Trial, name: str, trials: Sequence[Trial]
+    ) -> tuple[Rival, ...]:
+        assert self.search.scorer is not None
+        return compare(rest, best, name, trials, self.search.scorer, self.settings)
 
     def simpler(self, current: Trial, rivals: dict[str, tuple[Rival, ...]]) -> Trial:
         """Take a rival of fewer parameters that these data cannot tell from a member."""
@@ -204,26 +186,3 @@ class ModelSelection:
                 if rival.tied and fewer and rival.nats < self.settings.tie_nats:
                     return self.search.trial(effects, rival.name)
         return current
-
-    def compare(
-        self, rest: Trial, best: Trial, name: str, trials: Sequence[Trial]
-    ) -> tuple[Rival, ...]:
-        """Say how far behind the best each rival is."""
-        s = self.settings
-        whole = removed(rest, best)
-        rows = [(name, 0.0, 0.0, True)]
-        for trial in trials:
-            nats = max(0.0, evidence(best.scores, trial.scores))
-            excess = removed(trial, best)
-            extra = len(trial.fit.theta) - len(best.fit.theta)
-            tied = (
-                removed(rest, trial) > 0.5 * whole
-                and (nats < s.tie_nats or excess < s.tie_share * whole)
-                # A richer form of the same that gains nothing is no alternative.
-                and not (extra > 0 and best.scores.sum() >= trial.scores.sum())
-            )
-            rows.append((trial.added, nats, excess, tied))
-        weights = np.array([np.exp(-min(nats, 700.0)) for _, nats, _, _ in rows])
-        weights /= weights.sum()
-        out = [Rival(*row, float(w)) for row, w in zip(rows, weights, strict=True)]
-        return tuple(sorted(out, key=lambda r: (r.nats, r.name != name)))

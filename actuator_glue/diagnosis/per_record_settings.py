@@ -13,8 +13,10 @@ from dataclasses import replace
 import numpy as np
 
 from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.fit import fit
-from actuator_glue.diagnosis.model_selection import Rival, Selection, removed
+from actuator_glue.diagnosis.model_selection import Selection
+from actuator_glue.diagnosis.ranking import removed, standard_error, weights
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.search import Search, Trial
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -25,6 +27,7 @@ from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 
 SETTINGS = ('gain', 'bias', 'delay', 'clock-skew')
+_TIED = 4.0  # nats
 
 
 class OneRecord:
@@ -136,15 +139,15 @@ def _attribution(
 ) -> Selection:
     """What was found, with the best setting and its rivals in place of common sizes."""
     best = tried[0]
-    gap = [max(0.0, evidence(best.scores, t.scores)) for t in tried]
-    weights = np.exp(-np.minimum(gap, 700.0))
-    weights /= weights.sum()
-    rows = zip(tried, gap, weights, strict=True)
-    rivals = [
-        Rival(t.added, nats, removed(t, best), nats < 4.0 and t.added != best.added, float(w))
-        for t, nats, w in rows
-        if t is best or t.added != best.added
-    ]
+    known = weights(np.stack([t.scores for t in (*tried, start)]))
+    rivals = []
+    for trial, weight in zip(tried, known, strict=False):
+        if trial is best or trial.added != best.added:
+            nats = max(0.0, evidence(best.scores, trial.scores))
+            stderr = standard_error(best.scores - trial.scores)
+            tied = trial is not best and nats < _TIED
+            excess = removed(trial, best)
+            rivals.append(Rival(trial.added, nats, stderr, excess, tied, float(weight)))
     gained = evidence(best.scores, start.scores)
     kept = {n: found.rivals[n] for n in start.effects}
     return replace(

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 from actuator_glue.diagnosis.estimate import Estimate, Json, number
+from actuator_glue.diagnosis.finding import Candidate, Finding
 from actuator_glue.diagnosis.headline import headline
 from actuator_glue.diagnosis.learned_term import LearnedTerm
 from actuator_glue.inference.at_bound import Pressed
@@ -16,84 +17,6 @@ from actuator_glue.records import Array
 SCHEMA = 'actuator_glue.diagnosis/1'
 
 Verdict: TypeAlias = Literal['none', 'missing-effect', 'unexplained', 'undecided']
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """One effect that the records show and the model lacks.
-
-    Attributes:
-        name: best name in the catalogue.
-        alternatives: names that these data cannot tell from it (without `name` itself).
-        probability: probability of `name` among all single candidates at its turn; NaN for a
-            learned term, which is a description and no cause.
-        place: where in the loop it acts.
-        parameters: posterior of the effect's parameters.
-        error_without: fit error of the structure without any of the set [m].
-        error_with: fit error with `name` in it [m].
-        noise: rms of the noise that an effect of the measurement makes [m], which leaves the
-            simulated motion as it is and removes no error; None for all others.
-        evidence: out-of-sample log score gained, in nats of effectively independent samples.
-        plausible: its interval excludes the neutral value.
-        agrees_across_windows: its leading parameter is the same in all halves of the records
-            that fix it; None where fewer than two do (see diagnosis/homogeneity.py).
-        windows: the leading parameter in each of these halves [unit of the parameter].
-        records: sources of the records that alone have it; empty where all do.
-    """
-
-    name: str
-    alternatives: tuple[str, ...]
-    probability: float
-    place: str
-    parameters: dict[str, Estimate]
-    error_without: float
-    error_with: float
-    evidence: float
-    plausible: bool = True
-    agrees_across_windows: bool | None = None
-    windows: tuple[float, ...] = ()
-    records: tuple[str, ...] = ()
-    noise: float | None = None
-
-    def to_json(self) -> Json:
-        """Return the JSON object of one finding."""
-        return {
-            'name': self.name,
-            'alternatives': list(self.alternatives),
-            'probability': number(self.probability),
-            'place': self.place,
-            'parameters': {name: p.to_json() for name, p in self.parameters.items()},
-            'error_without': number(self.error_without),
-            'error_with': number(self.error_with),
-            'evidence': number(self.evidence),
-            'plausible': self.plausible,
-            'agrees_across_windows': self.agrees_across_windows,
-            'windows': [number(v) for v in self.windows],
-            'records': list(self.records),
-            'noise': self.noise,
-        }
-
-
-@dataclass(frozen=True, slots=True)
-class Candidate:
-    """One effect tried at the first turn (base + effect refitted together).
-
-    Attributes:
-        name: name in the catalogue.
-        score: out-of-sample log score against Eq. (2) alone, effective nats.
-        error: free-run rms error of base + effect, refitted [m].
-        probability: probability among the candidates.
-    """
-
-    name: str
-    score: float
-    error: float
-    probability: float
-
-    def to_json(self) -> Json:
-        """Return the JSON object of one candidate."""
-        values = {k: number(getattr(self, k)) for k in ('score', 'error', 'probability')}
-        return {'name': self.name, **values}
 
 
 @dataclass(frozen=True, slots=True)

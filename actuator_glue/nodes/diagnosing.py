@@ -12,7 +12,7 @@ from actuator_glue_msgs.msg import Candidate, Effect
 from actuator_glue_msgs.srv import SetModel
 
 from actuator_glue.api.diagnosis import Diagnosis, diagnose
-from actuator_glue.diagnosis.result import Finding
+from actuator_glue.diagnosis.finding import Finding
 from actuator_glue.errors import InputError
 from actuator_glue.io.load import load_records
 from actuator_glue.model.commands import noise

@@ -37,7 +37,7 @@ def one(seed: int, cache: Path, generator: str) -> dict[str, Any]:
     from actuator_glue.records import Record
 
     case = import_module(generator).build(seed)
-    names = ('sweep-0', 'sweep-250', 'held')
+    names = ('first', 'second', 'held')
     rows = zip(case.commands, case.measured, case.stiffness, names, strict=True)
     records = [Record(u, y, 1.0 / case.rate, stiffness=k, source=s) for u, y, k, s in rows]
     start = time.perf_counter()
@@ -77,13 +77,17 @@ def main() -> int:
     )
     parser.add_argument('--jobs', type=int, default=1)
     parser.add_argument(
-        '--variant', action='store_true', help='the second generator: other forms, other tests'
+        '--generator',
+        choices=('cases', 'variant', 'mixed'),
+        default='cases',
+        help='cases: one effect on one test; variant: other forms, other tests; mixed: several '
+        'effects, spikes, onsets',
     )
     parser.add_argument('--out', type=Path, default=Path('out/blind'))
     args = parser.parse_args()
     seeds = range(args.first, args.first + args.cases)
-    generator = 'variant' if args.variant else 'cases'
-    out = args.out / 'variant' if args.variant else args.out
+    generator = args.generator
+    out = args.out if generator == 'cases' else args.out / generator
     results = []
     with ProcessPoolExecutor(args.jobs) as pool:
         futures = [pool.submit(one, seed, out / 'cases', generator) for seed in seeds]

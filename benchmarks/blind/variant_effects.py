@@ -151,6 +151,14 @@ def _install(name: str, size: float, e: Array, theta: Array, forms: Forms, strok
             values = {'valve_play': size}
         case 'position-gain':
             values = {'position_gain': -size}
+        case 'command-lag':
+            values = {'command_lag': size}
+        case 'command-rate':
+            values = {'command_rate': size / (stroke * 2 * np.pi * 8.0)}
+        case 'loop-lag':
+            values = {'loop_lag': size}
+        case 'turbulent-leak':
+            values = {'turbulent_leak': size * 10.0 * np.sqrt(500.0)}
         case _:
             pass  # sensor effects: see `_sense`
     for key, value in values.items():
@@ -215,18 +223,27 @@ def respond(
     stiffness: Sequence[float],
     forms: Forms,
     seed: int,
+    onset: tuple[str, float] = ('', 0.0),
 ) -> list[Array]:
-    """Noise-free sensor output of every record [m]."""
+    """Noise-free sensor output of every record [m].
+
+    The effect named in `onset`, one of the plant's, appears in the first record at its time [s]
+    and is there in all later ones.
+    """
     theta = theta.copy()
     stroke = float(np.abs(commands[0]).max())
     e = np.array(list(plant.NEUTRAL.values()))
     for name, size in effects.items():
-        _install(name, size, e, theta, forms, stroke)
+        if name != onset[0]:
+            _install(name, size, e, theta, forms, stroke)
+    later = e.copy()
+    if onset[0] in effects:
+        _install(onset[0], effects[onset[0]], later, theta, forms, stroke)
     out = []
     # Zipped loosely: sizes are sought on the first records only.
     for r, (command, k) in enumerate(zip(commands, stiffness, strict=False)):
         rng = np.random.default_rng([seed, r, 7])
-        y = plant.respond(command, theta, k, e)
+        y = plant.respond(command, theta, k, e, later, 0.0 if r else onset[1])
         for name, size in effects.items():
             y = _sense(name, size, y, forms, stroke, rng)
         out.append(np.asarray(y))

@@ -59,6 +59,10 @@ NEUTRAL = {
     'yield_gamma': 0.5,  # gamma share of the Bouc-Wen loop, beta = 1 - gamma
     'loosening': 0.0,  # share of the flow gain lost at once
     'loosening_at': 1e9,  # s
+    'command_lag': 0.0,  # s, low-pass in front of the controller
+    'command_rate': 0.0,  # s/m, one over the fastest command
+    'loop_lag': 0.0,  # s, pole of the controller's own transducer
+    'turbulent_leak': 0.0,  # N^0.5/s, leakage as through an orifice
 }
 INDEX = {name: i for i, name in enumerate(NEUTRAL)}
 (
@@ -67,6 +71,7 @@ INDEX = {name: i for i, name in enumerate(NEUTRAL)}
     POSITION_GAIN, DROOP, DROOP_FORM, DROOP_FLOW, DROOP_TIME, GAIN_DRIFT, DRIFT_FORM, COULOMB,
     FRICTION_FORM, STRIBECK, STRIBECK_SPEED, SUPPORT_STICK, VISCOUS, RETURN_DAMPING, MASS, GAP,
     HARDENING, YIELD_X, YIELD_RATIO, YIELD_POWER, YIELD_GAMMA, LOOSENING, LOOSENING_AT,
+    COMMAND_LAG, COMMAND_RATE, LOOP_LAG, TURBULENT_LEAK,
 ) = range(len(NEUTRAL))  # fmt: skip
 _SLIP = 1e-3  # m/s
 _PRESLIDING = 5e-6  # m
@@ -143,17 +148,21 @@ def _dry(v, w, limit, form, h):
 
 
 @njit(cache=True)
-def respond(command, theta, k, e):
-    """Piston displacement at the samples of a held command (n,) [m], from rest."""
+def respond(command, theta, k, first_e, later_e, onset):
+    """Piston displacement at the samples of a held command (n,) [m], from rest.
+
+    The effects of `first_e` act until `onset` [s], those of `later_e` from then on.
+    """
     n = command.shape[0]
     h = 1.0 / (RATE * SUBSTEPS)
     b1, n0, a2, a3 = theta[0], theta[1], theta[2], theta[3]
     q = q2 = f = x = v = z = w = s = total = 0.0
-    felt = uplay = vplay = 0.0
+    felt = uplay = vplay = ulag = urate = 0.0
     out = np.empty(n)
-    dry = e[COULOMB] + e[STRIBECK] + (e[SUPPORT_STICK] if k > 0.0 else 0.0)
     for i in range(n):
         out[i] = x
+        e = first_e if i / RATE < onset else later_e
+        dry = e[COULOMB] + e[STRIBECK] + (e[SUPPORT_STICK] if k > 0.0 else 0.0)
         for j in range(SUBSTEPS):
             t = (i + j / SUBSTEPS) / RATE
             lag = e[DELAY] + e[AMPLITUDE_DELAY] * abs(command[i]) / 2e-3
@@ -162,8 +171,18 @@ def respond(command, theta, k, e):
             if e[RATE_GAIN] != 0.0 and at > 0:
                 u *= 1.0 + e[RATE_GAIN] * abs(command[at] - command[at - 1]) * RATE
             u *= e[GAIN]
+            if e[COMMAND_RATE] > 0.0:
+                most = h / e[COMMAND_RATE]
+                urate = min(max(u, urate - most), urate + most)
+                u = urate
+            if e[COMMAND_LAG] > 0.0:
+                ulag += (u - ulag) * (1.0 - math.exp(-h / e[COMMAND_LAG]))
+                u = ulag
             uplay = _play(uplay, u, e[COMMAND_PLAY])
-            felt = _play(felt, x, e[LOOP_PLAY])
+            read = _play(felt, x, e[LOOP_PLAY])
+            if e[LOOP_LAG] > 0.0:
+                read = felt + (read - felt) * (1.0 - math.exp(-h / e[LOOP_LAG]))
+            felt = read
             error = uplay - felt + e[NULL]
             total += h * error
             error += e[INTEGRAL] * total
@@ -189,6 +208,8 @@ def respond(command, theta, k, e):
                     s += h * (abs(flow) / e[DROOP_FLOW] - 0.4) / e[DROOP_TIME]
                     s = min(max(s, 0.0), 1.5)
             pull = f + h * (flow - a3 * f)
+            if e[TURBULENT_LEAK] > 0.0:
+                pull -= h * math.copysign(e[TURBULENT_LEAK] * math.sqrt(abs(f)), f)
             limit = e[COULOMB] + e[STRIBECK] * math.exp(-abs(v) / e[STRIBECK_SPEED])
             if k > 0.0:
                 limit += e[SUPPORT_STICK]

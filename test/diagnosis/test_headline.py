@@ -8,7 +8,8 @@ import pytest
 
 from actuator_glue.api import diagnosis as module
 from actuator_glue.cli.main import main
-from actuator_glue.diagnosis.result import Alarm, DiagnosisData, Finding, HeldOutError, Verdict
+from actuator_glue.diagnosis.finding import Finding
+from actuator_glue.diagnosis.result import Alarm, DiagnosisData, HeldOutError, Verdict
 from actuator_glue.diagnosis.verdict import conclude
 
 NONE = np.empty((0, 4))

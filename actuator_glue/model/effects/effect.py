@@ -94,6 +94,8 @@ class Effect:
         expression: what it does to the signal of its place, where the compiled step has no stage
             of its own for it (see terms.term).
         searched: whether the diagnosis tries it.
+        holds: the effect of which it is a richer form, and the parameter and its value at which
+            it is that effect.
     """
 
     name: str
@@ -112,6 +114,7 @@ class Effect:
     variance: Variance | None = None
     expression: Expression | None = None
     searched: bool = True
+    holds: tuple[str, str, float] | None = None
 
     @property
     def linear(self) -> bool:

@@ -27,4 +27,5 @@ EFFECT = Effect(
         for ratio, speed in ((1.5, 0.005), (2.0, 0.03))
     ),
     switches=(rows.ON_STRIBECK,),
+    holds=('coulomb-friction', 'breakaway_ratio', 1.0),
 )

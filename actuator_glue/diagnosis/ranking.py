@@ -1,0 +1,98 @@
+"""How sure a ranking is: rival structures, their distance with its standard error, their weights.
+
+Scores come block by block, so that the spread over blocks says how far a ranking is chance: a
+rival whose deficit is within two standard errors is not excluded, however many nats that is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from actuator_glue.diagnosis.finding import Rival
+from actuator_glue.diagnosis.posterior import laplace
+from actuator_glue.diagnosis.score import Scorer, evidence
+from actuator_glue.diagnosis.search import Trial
+from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.model.effects import CATALOGUE
+from actuator_glue.records import Array
+
+_DRAWS = 2000
+_SEED = 0
+_BEYOND = 2.0  # standard errors
+_NORMAL_95 = 1.959964
+_SAME = 0.5  # of what the best removes: a rival that removes less is none
+
+
+def removed(before: Trial, after: Trial) -> float:
+    """Rms error that a larger structure removes [m]."""
+    return float(np.sqrt(max(0.0, before.mean_square - after.mean_square)))
+
+
+def standard_error(difference: Array) -> float:
+    """Return the standard error of the sum of block differences (B,) [nats]."""
+    return float(np.sqrt(len(difference)) * difference.std(ddof=1))
+
+
+def weights(scores: Array) -> Array:
+    """Return the probability of every structure (K,) from its out-of-sample block scores (K, B).
+
+    The blocks are reweighted as in the Bayesian bootstrap, and the structures by the exponential
+    of their score in every such draw (pseudo-BMA+: Yao, Vehtari, Simpson & Gelman 2018).
+    """
+    count = scores.shape[1]
+    share = np.random.default_rng(_SEED).dirichlet(np.ones(count), _DRAWS)
+    total = count * (scores - scores.max(axis=0)) @ share.T
+    likely = np.exp(np.maximum(total - total.max(axis=0), -700.0))
+    return np.asarray((likely / likely.sum(axis=0)).mean(axis=1))
+
+
+def compare(
+    rest: Trial,
+    best: Trial,
+    name: str,
+    trials: Sequence[Trial],
+    scorer: Scorer,
+    settings: Thresholds,
+) -> tuple[Rival, ...]:
+    """Say how far behind the best each rival is, best first.
+
+    Args:
+        rest: the structure without the effect; its weight is that of "none of these".
+        best: the structure with it.
+        name: the effect.
+        trials: structures with another effect in its place.
+        scorer: noise that they were scored with.
+        settings: thresholds.
+    """
+    whole = removed(rest, best)
+    known = weights(np.stack([t.scores for t in (best, *trials, rest)]))
+    out = [Rival(name, 0.0, 0.0, 0.0, True, float(known[0]))]
+    for trial, weight in zip(trials, known[1:], strict=False):
+        nats = max(0.0, evidence(best.scores, trial.scores))
+        stderr = standard_error(best.scores - trial.scores)
+        excess = removed(trial, best)
+        near = nats < max(settings.tie_nats, _BEYOND * stderr)
+        near = near or excess < settings.tie_share * whole
+        extra = len(trial.fit.theta) - len(best.fit.theta)
+        limit = _limit(trial, name, scorer) if near else None
+        # A richer form that gains nothing is no alternative, unless it holds the effect itself.
+        idle = extra > 0 and best.scores.sum() >= trial.scores.sum() and limit is None
+        tied = near and removed(rest, trial) > _SAME * whole and not idle
+        out.append(Rival(trial.added, nats, stderr, excess, tied, float(weight), limit))
+    return tuple(sorted(out, key=lambda r: (r.nats, r.name != name)))
+
+
+def _limit(trial: Trial, name: str, scorer: Scorer) -> tuple[str, float] | None:
+    """How far the effect added last may be from another of which it is a richer form."""
+    effect = CATALOGUE.get(trial.added)
+    if effect is None or effect.holds is None or effect.holds[0] != name:
+        return None
+    _, parameter, value = effect.holds
+    at = next(i for i, p in enumerate(trial.model.parameters) if p.name == parameter)
+    bounds = trial.model.parameters[at]
+    covariance, _ = laplace(scorer, trial.fit, np.eye(len(trial.fit.z)))
+    fitted, spread = float(trial.fit.theta[at]), _NORMAL_95 * float(np.sqrt(covariance[at, at]))
+    limit = fitted + spread if fitted >= value else fitted - spread
+    return parameter, float(np.clip(limit, bounds.lower, bounds.upper))
