@@ -12,6 +12,7 @@ from actuator_glue.api.result import Result
 from actuator_glue.diagnosis import diagnose as core
 from actuator_glue.diagnosis.estimate import Json
 from actuator_glue.diagnosis.result import SCHEMA, DiagnosisData
+from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.effects import save_effects
 from actuator_glue.errors import InputError
 from actuator_glue.model.effects import CATALOGUE
@@ -99,6 +100,7 @@ def diagnose(
     seed: int = 1,
     jobs: int = 2,
     progress: Progress | None = None,
+    false_alarms: float = 0.01,
 ) -> Diagnosis:
     """Ask whether Eq. (2) explains records and, if not, which effects it lacks.
 
@@ -109,6 +111,7 @@ def diagnose(
         seed: seed of every random step; the same seed gives the same diagnosis.
         jobs: threads for the refits of candidates; the result does not depend on it.
         progress: called with (stage, share of it done in [0, 1]).
+        false_alarms: probability of an addition on a healthy machine.
 
     Returns:
         Verdict, additions with their evidence, error before and after, the augmented model.
@@ -120,8 +123,16 @@ def diagnose(
         raise InputError(f'seed {seed} is negative')
     if jobs < 1:
         raise InputError(f'jobs {jobs} is below 1')
+    if not 0.0 < false_alarms < 1.0:
+        raise InputError(f'false_alarms {false_alarms:g} is no probability between 0 and 1')
     given = [records] if isinstance(records, Record) else list(records)
     found = core.diagnose(
-        given, holdout, seed=seed, jobs=jobs, progress=progress, clock=time.perf_counter
+        given,
+        holdout,
+        seed=seed,
+        jobs=jobs,
+        progress=progress,
+        settings=Thresholds(false_alarms=false_alarms),
+        clock=time.perf_counter,
     )
     return Diagnosis(**{f.name: getattr(found, f.name) for f in fields(found)})

@@ -61,6 +61,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='OUT.yaml',
         help='also write learned terms, if there are any, as a file for --effects-file',
     )
+    parser.add_argument(
+        '--false-alarms',
+        type=float,
+        default=0.01,
+        metavar='P',
+        help='probability of an addition on a healthy machine (default 0.01)',
+    )
     parser.add_argument('--seed', type=int, default=1, metavar='S', help='seed (default 1)')
     parser.add_argument(
         '--jobs', type=int, default=2, metavar='N', help='threads for the refits (default 2)'
@@ -88,7 +95,14 @@ def run(args: argparse.Namespace) -> int:
             at = max(at, _STAGES[stage] + share * (min(later) - _STAGES[stage]))
             done(at)
 
-        found = diagnose(records, held or None, seed=args.seed, jobs=args.jobs, progress=tell)
+        found = diagnose(
+            records,
+            held or None,
+            seed=args.seed,
+            jobs=args.jobs,
+            progress=tell,
+            false_alarms=args.false_alarms,
+        )
     _show(found, args)
     write_json(found.to_json(), args.json)
     if args.report is not None:

@@ -105,9 +105,14 @@ def statistics(data: Data, error: Array) -> dict[str, float]:
 
 
 def alarm_of(
-    found: Selection, seen: tuple[Measured, ...], decision: Decision, data: Data, seed: int
+    found: Selection,
+    seen: tuple[Measured, ...],
+    decision: Decision,
+    data: Data,
+    seed: int,
+    level: float,
 ) -> Alarm:
-    """Describe the alarm that the decision stands on."""
+    """Describe the alarm that the decision stands on; `level` is that of false alarms."""
     error = found.base.fit.error
     return Alarm(
         raised=decision.verdict != 'none',
@@ -115,5 +120,7 @@ def alarm_of(
         threshold=found.material,
         noise=found.noise,
         p_value=p_value(data, splits_of(data, error), seed),
+        false_alarms=level,
+        nats=found.nats,
         tests=statistics(data, error),
     )

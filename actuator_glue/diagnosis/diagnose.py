@@ -99,7 +99,7 @@ def diagnose(
     before, after = sides
     tell('held-out', 0.0)
     error, coverage, curves = verify(
-        data, prepared.held, before, after, found.base.fit.error, decision.noise, seed, result.line
+        data, prepared.held, before, after, decision.noise, seed, result.line, len(found.singles)
     )
     space = Space(after.model, max(r.duration for r in data.records))
     estimates, held_at = _estimates(space, after), _pressed(space, after)
@@ -114,7 +114,7 @@ def diagnose(
         error=error,
         candidates=_candidates(found, result.seen),
         coverage=coverage,
-        alarm=alarm_of(found, result.seen, decision, data, seed),
+        alarm=alarm_of(found, result.seen, decision, data, seed, settings.false_alarms),
         advice=(
             *advice.at_bound(held_at, estimates),
             *(term.sentence() for term in learned),

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
+from actuator_glue.diagnosis import false_alarms
 from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.ranking import compare, removed
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
@@ -31,6 +32,7 @@ class Selection:
         left: rms structure of the final residual [m].
         noise: rms of what no structure explains [m].
         material: materiality threshold [m].
+        nats: evidence that any addition must have.
     """
 
     base: Trial
@@ -43,6 +45,7 @@ class Selection:
     left: float
     noise: float
     material: float
+    nats: float
 
 
 class ModelSelection:
@@ -51,6 +54,7 @@ class ModelSelection:
     def __init__(self, search: Search, settings: Thresholds, progress: Progress) -> None:
         self.search, self.settings, self.progress = search, settings, progress
         self.noise = self.first = self.material = 0.0
+        self.nats = settings.nats
 
     def renoise(self, error_of: Trial | None = None) -> None:
         """Take the noise from the residual of a structure (first: of the base)."""
@@ -83,7 +87,7 @@ class ModelSelection:
         """
         extra = len(larger.fit.theta) - len(smaller.fit.theta)
         nats = evidence(larger.scores, smaller.scores) - extra - cost
-        return removed(smaller, larger) >= threshold and nats >= self.settings.nats
+        return removed(smaller, larger) >= threshold and nats >= self.nats
 
     def extend(self, beam: Sequence[Trial], stage: int) -> list[Trial]:
         """Refit every structure of the beam with its most promising further effects."""
@@ -104,6 +108,11 @@ class ModelSelection:
         singles = self.search.additions(base, None, lambda d: self.progress('effect 1', d))
         self.renoise(singles[0])
         base, singles = self.search.trial(()), self.rescored(singles)
+        scorer = self.search.scorer
+        assert scorer is not None
+        self.nats = false_alarms.threshold(
+            self.search.signatures(), base.fit.jacobian, scorer, s.false_alarms
+        )
         current = base
         ranked: list[Trial] = list(singles)
         threshold = self.material
@@ -137,7 +146,7 @@ class ModelSelection:
             nats[name] = evidence(current.scores, rest.scores)
         return Selection(
             base, tuple(singles), current, rivals, gains, nats,
-            self.first, self.left(current), self.noise, self.material,
+            self.first, self.left(current), self.noise, self.material, self.nats,
         )  # fmt: skip
 
     def pruned(self, current: Trial) -> Trial:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
@@ -78,6 +79,8 @@ class Alarm:
         threshold: materiality threshold for it [m].
         noise: rms of the rest [m].
         p_value: of the structure under the fitted base model with its own coloured noise.
+        false_alarms: probability of any addition on a healthy machine, as asked for.
+        nats: evidence that an addition must have for it.
         tests: further statistics shown to people (whiteness, harmonics, drift, ...).
     """
 
@@ -86,11 +89,13 @@ class Alarm:
     threshold: float
     noise: float
     p_value: float
+    false_alarms: float = math.nan
+    nats: float = math.nan
     tests: dict[str, float] = field(default_factory=dict)
 
     def to_json(self) -> Json:
         """Return the JSON object of the alarm."""
-        numbers = ('structured', 'threshold', 'noise', 'p_value')
+        numbers = ('structured', 'threshold', 'noise', 'p_value', 'false_alarms', 'nats')
         return {
             'raised': self.raised,
             **{k: number(getattr(self, k)) for k in numbers},

@@ -142,6 +142,11 @@ class Search:
             self._signatures[name] = thetas[:, model.columns(name)], signature
         return self._signatures[name]
 
+    def signatures(self) -> Array:
+        """What every effect adds to Eq. (2) as fitted, at all its starting sizes (s, N) [m]."""
+        rows = np.concatenate([self._signature(name)[1] for name in self.names])
+        return np.asarray(rows[np.isfinite(rows).all(axis=1)])
+
     def screen(self, current: Trial, name: str) -> tuple[float, Array]:
         """Project the residual on an effect's signatures, current parameters refitted linearly.
 

@@ -13,7 +13,9 @@ class Thresholds:
         noise_share: an effect is material where it removes more than this share of the noise rms,
         stroke_share: and more than this share of the command's amplitude.
         later_share: where most is explained, a further effect must remove this share of it.
-        nats: smallest out-of-sample evidence for any addition.
+        false_alarms: probability of an addition on a healthy machine (diagnosis/false_alarms.py).
+        nats: smallest out-of-sample evidence for another hold, one record's own setting, or a
+            generic surrogate.
         tie_nats: two effects cannot be told apart below this evidence,
         tie_share: or where they differ by less than this share of what the better one removes.
         left_noise: the model is unexplained where structure above this share of the noise
@@ -29,6 +31,7 @@ class Thresholds:
     noise_share: float = 0.5
     stroke_share: float = 1e-3
     later_share: float = 0.08
+    false_alarms: float = 0.01
     nats: float = 10.0
     tie_nats: float = 4.0
     tie_share: float = 0.1

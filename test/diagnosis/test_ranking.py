@@ -1,0 +1,54 @@
+"""Rankings: weights from block scores, their class of none, and the level of false alarms."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from actuator_glue.diagnosis import false_alarms
+from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.ranking import standard_error, weights
+from actuator_glue.diagnosis.score import Scorer, splits_of
+from actuator_glue.records import Record
+
+
+def test_a_rival_within_its_standard_error_keeps_a_probability() -> None:
+    """Two standard errors of 100 nats behind is not excluded, whatever the nats are.
+
+    (Normal: a deficit of 1.9 standard errors is made up in 2.9 % of samples of blocks; the seed
+    of the draws is fixed, so this fails never or always.)
+    """
+    rng = np.random.default_rng(0)
+    difference = rng.standard_normal(50)
+    difference += 1.9 / np.sqrt(50) * difference.std(ddof=1) - difference.mean()
+    difference *= 30.0
+    assert difference.sum() > 250.0
+    assert difference.sum() / standard_error(difference) == pytest.approx(1.9)
+    best, rival = weights(np.stack([difference, 0.0 * difference]))
+    assert best + rival == pytest.approx(1.0)
+    assert 0.005 < rival < 0.08
+
+
+def test_equal_gains_in_all_blocks_are_certain() -> None:
+    """Where every block says the same the exponential of the nats decides."""
+    best, rival = weights(np.stack([np.full(40, 0.1), np.zeros(40)]))
+    assert rival / best == pytest.approx(np.exp(-4.0), rel=1e-6)
+
+
+def test_the_best_of_many_candidates_by_chance() -> None:
+    """Evidence that independent candidates reach on noise: known in closed form."""
+    n, period = 6000, 1e-2
+    record = Record(np.zeros(n), np.zeros(n), period, stiffness=0.0)
+    data = Data.whole([record])
+    rng = np.random.default_rng(1)
+    noise = 1e-5 * rng.standard_normal(n)
+    scorer = Scorer.of(data, splits_of(data, noise))
+    signatures, base = rng.standard_normal((40, n)), rng.standard_normal((4, n))
+    found = [false_alarms.threshold(signatures, base, scorer, p) for p in (0.1, 0.01, 1e-4)]
+    # Largest of 40 squared normal numbers: P(all below 2 nats) = (1 - p)
+    for level, nats in zip((0.1, 0.01, 1e-4), found, strict=True):
+        expected = 0.5 * stats.chi2.isf(-np.expm1(np.log1p(-level) / 40), 1)
+        assert nats == pytest.approx(expected, rel=0.05)
+    # Forty copies of one candidate are one candidate.
+    same = np.repeat(signatures[:1], 40, axis=0)
+    alone = false_alarms.threshold(same, base, scorer, 0.01)
+    assert alone == pytest.approx(0.5 * stats.chi2.isf(0.01, 1), rel=0.05)
