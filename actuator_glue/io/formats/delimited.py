@@ -20,7 +20,7 @@ from actuator_glue.records import Array
 
 _ROWS = 10_000  # rows formatted at a time
 # A comma may be the decimal sign where there is another delimiter, so it comes last.
-_DELIMITERS = (';', '\t', ',')
+DELIMITERS = (';', '\t', ',')
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,24 +82,25 @@ def read_head(
     line = top[header_lines - 1] if header_lines else ''
     units: list[str] = []
     if header_lines and len(top) > header_lines:
-        parting = delimiter or _delimiter(top[header_lines])
-        units = units_line(_fields(top[header_lines], parting))
+        parting = delimiter or delimiter_of(top[header_lines])
+        units = units_line(fields_of(top[header_lines], parting))
     header_lines += bool(units)
     sample = top[header_lines] if len(top) > header_lines else line
     if delimiter is None:
-        delimiter = _delimiter(sample)
+        delimiter = delimiter_of(sample)
     # With both signs in a line the comma can only part thousands, which nobody can read safely.
-    comma = any(',' in field for field in _fields(sample, delimiter))
+    comma = any(',' in field for field in fields_of(sample, delimiter))
     decimal = ',' if comma and '.' not in sample else '.'
-    names = _fields(line, delimiter)
+    names = fields_of(line, delimiter)
     return TextHead(names, header_lines, delimiter, notes, decimal, encoding, tuple(units))
 
 
-def _delimiter(line: str) -> str | None:
-    return next((d for d in _DELIMITERS if d in line), None)
+def delimiter_of(line: str) -> str | None:
+    """Return the delimiter of a line, None for blanks."""
+    return next((d for d in DELIMITERS if d in line), None)
 
 
-def _fields(line: str, delimiter: str | None) -> list[str]:
+def fields_of(line: str, delimiter: str | None) -> list[str]:
     """Return the entries of a line without the quotes about them."""
     if not line.strip():
         return []

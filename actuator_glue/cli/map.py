@@ -1,0 +1,165 @@
+"""Look at an unknown file or bag: its columns with ranges and rates, and a channel map for it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from actuator_glue.arguments import Output, number
+from actuator_glue.cli._output import add_json, note, say, table
+from actuator_glue.errors import InputError
+from actuator_glue.io.json_file import write_json
+
+if TYPE_CHECKING:
+    from actuator_glue.io.look import ColumnLook, FileLook
+    from actuator_glue.io.propose import Guess, Proposal
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument('file', metavar='FILE', help='any file of numbers, or any bag')
+    parser.add_argument(
+        '--rate', type=number, metavar='HZ', help='samples per second, where no column tells them'
+    )
+    parser.add_argument(
+        '--out', type=Output, metavar='MAP.yaml', help='write the proposed channel map there'
+    )
+    add_json(parser)
+
+
+def run(args: argparse.Namespace) -> int:
+    """Print columns and proposal; 1 where the file cannot be used, with a map or without.
+
+    Raises:
+        InputError: the file cannot be read, or holds no numbers.
+    """
+    from actuator_glue.io.look import look
+    from actuator_glue.io.propose import propose
+
+    found = look(args.file)
+    if args.rate is not None and not args.rate > 0.0:
+        raise InputError(f'--rate {args.rate:g}: give samples per second, more than 0')
+    proposal = propose(found, args.rate)
+    plain = not _fault(args.file, None)
+    rows = [_row(column, found) for column in found.columns]
+    title = f'{args.file}: {found.what}, {len(found.columns)} columns of numbers'
+    table(title, ('column', 'unit', 'samples', 'least', 'greatest', 'remark'), rows, args)
+    text = map_text(found, proposal) if proposal.complete else ''
+    refused = _fault(args.file, text) if text else _missing(proposal)
+    if text:
+        for line in text.splitlines():
+            say(line, args)
+    if text and args.out is not None:
+        _write(Path(args.out), text)
+        say(f'{args.out}: written; check it, then `info {args.file} --channels {args.out}`', args)
+    if plain:
+        say(f'{args.file} needs no channel map: it is read as it is', args)
+    elif refused:
+        note(refused)
+    content = {
+        'schema': 'actuator_glue.map/1',
+        'path': str(args.file),
+        'columns': [_describe(column) for column in found.columns],
+        'channels': {role: _reasons(guess) for role, guess in proposal.channels.items()},
+        'map': text or None,
+        'needed': not plain,
+        'works': not refused,
+        'problem': refused or None,
+    }
+    write_json(content, args.json)
+    return 1 if refused and not plain else 0
+
+
+def map_text(found: FileLook, proposal: Proposal) -> str:
+    """Return a proposal as YAML, with a comment that says why beside each channel."""
+    lines = [f'# Proposed for {found.path.name}; check what is marked CHECK.']
+    lines += [f'{name}: {json.dumps(value)}' for name, value in found.layout.items()]
+    if proposal.rate is not None:
+        lines.append(f'rate: {proposal.rate:.9g}  # Hz')
+    if proposal.counter is not None:
+        lines.append(f'sample_number: {_quoted(proposal.counter.name)}  # goes up by one')
+    for role, guess in proposal.channels.items():
+        scale = f', scale: {guess.scale:g}' if guess.scale != 1.0 else ''
+        entry = f'{{column: {_quoted(guess.column.name)}, unit: {_quoted(guess.unit)}{scale}}}'
+        lines.append(f'{role}: {entry}  # {"; ".join(guess.reasons)}')
+        lines += [f'#   CHECK {what}' for what in guess.unsure]
+    return '\n'.join(lines) + '\n'
+
+
+def _quoted(value: str | int) -> str:
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _fault(path: str, text: str | None) -> str:
+    """Return why the file cannot be read with a map, or without; empty where it can."""
+    import yaml
+
+    from actuator_glue.io.channel_map import parse_channel_map
+    from actuator_glue.io.load import load_records
+
+    try:
+        channels = text and parse_channel_map(yaml.safe_load(text), 'proposed map')
+        load_records(path, channels=channels or None, gap=note, warn=note)
+    except InputError as error:
+        return f'with this map the file is refused: {error}'
+    return ''
+
+
+def _missing(proposal: Proposal) -> str:
+    names = [role for role in ('command', 'measured') if role not in proposal.channels]
+    if not names:
+        return 'no column tells the times of the samples; give their rate with --rate HZ'
+    return (
+        f'no {" and no ".join(names)} could be told from these columns; write the channel map by '
+        'hand (docs/howto_your_data.md)'
+    )
+
+
+def _write(path: Path, text: str) -> None:
+    try:
+        path.write_text(text, encoding='utf-8')
+    except OSError as error:
+        raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error
+
+
+def _row(column: ColumnLook, found: FileLook) -> tuple[str, ...]:
+    low, high = column.range()
+    name = str(column.name) if isinstance(column.name, str) else f'{column.name} {column.label}'
+    number = [f'{low:.6g}', f'{high:.6g}']
+    return (name.strip(), column.unit, str(len(column.values)), *number, _remark(column))
+
+
+def _remark(column: ColumnLook) -> str:
+    if column.times is not None:
+        return f'{column.rate:.6g} messages/s' if column.rate else ''
+    if column.counts:
+        return 'goes up by one'
+    if column.rate is not None:
+        return f'even steps of {1.0 / column.rate:.6g}'
+    return '' if column.moves else 'does not move'
+
+
+def _describe(column: ColumnLook) -> dict[str, Any]:
+    low, high = column.range()
+    return {
+        'column': column.name,
+        'label': column.label,
+        'unit': column.unit or None,
+        'samples': len(column.values),
+        'least': low,
+        'greatest': high,
+        'rate_hz': column.rate if column.times is not None else None,
+        'remark': _remark(column) or None,
+    }
+
+
+def _reasons(guess: Guess) -> dict[str, Any]:
+    return {
+        'column': guess.column.name,
+        'unit': guess.unit,
+        'scale': guess.scale,
+        'reasons': list(guess.reasons),
+        'check': list(guess.unsure),
+    }

@@ -1,0 +1,250 @@
+"""Channel maps proposed for a file that nobody has described: which column is what, and why."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from actuator_glue.io.look import ColumnLook, FileLook
+from actuator_glue.io.units import ROLES
+from actuator_glue.records import Array
+
+# Words of the field for each role, in the languages of controllers; whole words or parts.
+_WORDS = {
+    'time': r'time|zeit|temps|tiempo|timestamp|^t$|\bsec(onds)?\b',
+    'command': r'command|cmd|target|refer|\bref\b|desired|set.?point|demand|soll|input|program',
+    'measured': r'meas|actual|feedback|\bfbk?\b|\bist\b|respon|achieved|lvdt|encoder|output',
+    'force': r'force|load|kraft|\bcell\b|fuerza|effort',
+}
+_SAMPLES = 200_000  # of a channel that are compared
+_ALIKE = 0.8  # correlation above which one displacement follows another
+_LATEST = 0.25  # s; no actuator follows later
+
+
+@dataclass(frozen=True, slots=True)
+class Guess:
+    """One channel of a proposed map.
+
+    Attributes:
+        column: which column.
+        unit: its unit, or the likeliest where the file does not say.
+        reasons: why it is taken for this role.
+        unsure: what a reader has to check.
+        scale: factor from the file's values to `unit`; -1 where the sign is turned.
+    """
+
+    column: ColumnLook
+    unit: str
+    reasons: tuple[str, ...]
+    unsure: tuple[str, ...] = ()
+    scale: float = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Proposal:
+    """A proposed channel map.
+
+    Attributes:
+        channels: guesses by role; `command` and `measured` may be missing.
+        counter: the column that counts samples.
+        rate: samples per second, where no column holds times.
+    """
+
+    channels: dict[str, Guess]
+    counter: ColumnLook | None
+    rate: float | None
+
+    @property
+    def complete(self) -> bool:
+        """Whether command and measured were found, and times or a rate."""
+        timed = 'time' in self.channels or self.rate is not None
+        return {'command', 'measured'} <= set(self.channels) and timed
+
+
+def propose(found: FileLook, given: float | None = None) -> Proposal:
+    """Return which columns are command, measured displacement, force and time.
+
+    Args:
+        found: the file.
+        given: samples per second, where the reader knows them.
+    """
+    columns = [c for c in found.columns if c.moves]
+    counter = next((c for c in columns if c.times is None and c.counts), None)
+    clock = _clock(columns) if all(c.times is None for c in columns) else None
+    rest = [c for c in columns if c is not counter and (clock is None or c is not clock.column)]
+    rest = [c for c in rest if len(c.values) == _commonest(rest) or c.times is not None]
+    if given is not None:
+        clock = None
+    rate = given or _rate(found, rest, clock)
+    named: dict[str, Guess] = {}
+    for role in ('command', 'measured', 'force'):
+        hits = [
+            c for c in rest if _called(c, role) and all(g.column is not c for g in named.values())
+        ]
+        if len(hits) == 1:
+            named[role] = _guess(hits[0], role, (f'called {hits[0].label.strip()!r}',))
+    # Without a rate a lag is told in samples.
+    channels = _displacements(rest, named, rate or 1.0)
+    if clock is not None:
+        channels = {'time': clock, **channels}
+    return Proposal(channels, counter, None if clock is not None else rate)
+
+
+def _commonest(columns: list[ColumnLook]) -> int:
+    lengths = [len(c.values) for c in columns]
+    return max(set(lengths), key=lengths.count, default=0)
+
+
+def _called(column: ColumnLook, role: str) -> bool:
+    return re.search(_WORDS[role], _plain(column.label), re.IGNORECASE) is not None
+
+
+def _plain(label: str) -> str:
+    """Return a name with a blank for every underscore, dot, slash and change of case."""
+    return re.sub(r'[_./\[\]()-]|(?<=[a-z])(?=[A-Z])', ' ', label).strip()
+
+
+def _clock(columns: list[ColumnLook]) -> Guess | None:
+    """Return the column of times: it goes on evenly, and not by one."""
+    even = [c for c in columns if c.rate is not None and not c.counts]
+    even += [c for c in columns if c.rate is not None and c.counts and _called(c, 'time')]
+    even.sort(key=lambda c: not _called(c, 'time'))
+    if not even:
+        return None
+    column = even[0]
+    reasons = ['goes on evenly']
+    if _called(column, 'time'):
+        reasons.insert(0, f'called {column.label.strip()!r}')
+    return _guess(column, 'time', tuple(reasons))
+
+
+def _rate(found: FileLook, rest: list[ColumnLook], clock: Guess | None) -> float | None:
+    """Return samples per second: by the clock, by stamps, or as the file states."""
+    if clock is not None and clock.column.rate is not None:
+        return clock.column.rate / ROLES['time'][clock.unit]
+    if found.period is not None:
+        return 1.0 / found.period
+    rates = [c.rate for c in rest if c.times is not None and c.rate is not None]
+    return max(rates, default=None)
+
+
+def _guess(column: ColumnLook, role: str, reasons: tuple[str, ...]) -> Guess:
+    """Return a guess with the unit that name or file give, or the likeliest of the role."""
+    tail = re.search(r'(?:[_\s]|[\[(])([A-Za-zµμ]+)[\])]?\s*$', column.label)
+    for unit in (column.unit, tail[1] if tail else ''):
+        if unit in ROLES[role]:
+            return Guess(column, unit, reasons)
+    likeliest = {'time': 's', 'command': 'mm', 'measured': 'mm', 'force': 'kN'}[role]
+    if role == 'time' and column.rate is not None and column.rate <= 2.0:
+        likeliest = 'ms'  # nobody samples an actuator once a second
+    stated = f'{column.unit!r} is no unit of it' if column.unit else 'the file states no unit'
+    return Guess(column, likeliest, reasons, (f'unit: {stated}, and a scale may be needed',))
+
+
+def _displacements(
+    columns: list[ColumnLook], named: dict[str, Guess], rate: float
+) -> dict[str, Guess]:
+    """Return command and measured: by name, or as the two alike of which one follows."""
+    force = named.get('force')
+    free = [c for c in columns if force is None or c is not force.column]
+    free = [c for c in free if c.unit not in ROLES['force'] and not _called(c, 'force')]
+    chosen = dict(named)
+    if {'command', 'measured'} <= set(named):
+        return _with_force(chosen, columns)
+    best: tuple[tuple[bool, float], float, float, ColumnLook, ColumnLook] | None = None
+    for i, one in enumerate(free):
+        for other in free[i + 1 :]:
+            likeness, lag = follows(_at(one, rate), _at(other, rate), rate)
+            pair = (one, other) if lag >= 0.0 else (other, one)
+            fits = all(g.column in pair for r, g in named.items() if r != 'force')
+            # A force moves with what is measured; what is measured moves after the command.
+            rank = (abs(lag) > 0.5 / rate, abs(likeness))
+            if fits and rank[1] > _ALIKE and (best is None or rank > best[0]):
+                best = (rank, likeness, abs(lag), *pair)
+    if best is None:
+        return _with_force(chosen, columns)
+    _, likeness, lag, first, second = best
+    if first is _column(named, 'measured') or second is _column(named, 'command'):
+        first, second = second, first
+    return _with_force(_pair(chosen, (first, second), likeness, lag, rate), columns)
+
+
+def _pair(
+    chosen: dict[str, Guess],
+    pair: tuple[ColumnLook, ColumnLook],
+    likeness: float,
+    lag: float,
+    rate: float,
+) -> dict[str, Guess]:
+    """Add command and measured, which are alike, where they have no name."""
+    first, second = pair
+    late = f'{lag:.0f} samples' if rate == 1.0 else f'{1e3 * lag:.3g} ms'
+    told = f'{late}, correlation {likeness:.4f}'
+    either = () if lag > 0.5 / rate else ('which of the two is the command: neither is later',)
+    if 'command' not in chosen:
+        guess = _guess(first, 'command', (f'{_name(second)} follows it by {told}',))
+        chosen['command'] = _unsure(guess, either)
+    if 'measured' not in chosen:
+        guess = _guess(second, 'measured', (f'follows {_name(first)} by {told}',))
+        if likeness < 0.0:
+            either = (*either, 'sign: it moves against the command, so its scale is -1')
+        scale = -1.0 if likeness < 0.0 else 1.0
+        chosen['measured'] = replace(_unsure(guess, either), scale=scale)
+    return chosen
+
+
+def _column(named: dict[str, Guess], role: str) -> ColumnLook | None:
+    return named[role].column if role in named else None
+
+
+def _with_force(chosen: dict[str, Guess], columns: list[ColumnLook]) -> dict[str, Guess]:
+    """Add the only column that has a unit of force, where none is called so."""
+    taken = [guess.column for guess in chosen.values()]
+    units = [c for c in columns if c.unit in ROLES['force'] and all(c is not t for t in taken)]
+    if 'force' not in chosen and len(units) == 1:
+        chosen['force'] = _guess(units[0], 'force', (f'its unit is {units[0].unit}',))
+    order = ('command', 'measured', 'force')
+    return {role: chosen[role] for role in order if role in chosen}
+
+
+def _unsure(guess: Guess, what: tuple[str, ...]) -> Guess:
+    return replace(guess, unsure=(*guess.unsure, *what))
+
+
+def _name(column: ColumnLook) -> str:
+    return f'column {column.name}' if isinstance(column.name, int) else str(column.name)
+
+
+def _at(column: ColumnLook, rate: float) -> Array:
+    """Return a channel at uniform times; a topic's messages come when they come."""
+    if column.times is None:
+        return column.values
+    grid = np.arange(0.0, float(column.times[-1]), 1.0 / rate)
+    values: Array = np.interp(grid, column.times, column.values)
+    return values
+
+
+def follows(one: Array, other: Array, rate: float) -> tuple[float, float]:
+    """Return the greatest correlation of two channels, and by how much the second is later [s].
+
+    Args:
+        one: shape (n,).
+        other: shape (m,).
+        rate: samples per second of both.
+    """
+    length = min(len(one), len(other), _SAMPLES)
+    latest = min(int(_LATEST * (1000.0 if rate == 1.0 else rate)), length // 3)
+    if length < 8 or latest < 1:
+        return 0.0, 0.0
+    a, b = (np.nan_to_num(v[:length] - np.nanmean(v[:length])) for v in (one, other))
+    size = 1 << (2 * length - 1).bit_length()
+    # c[k] = sum a[n] b[n + k]: its peak is where b repeats a, k samples later.
+    spectrum = np.conj(np.fft.rfft(a, size)) * np.fft.rfft(b, size)
+    correlation = np.fft.irfft(spectrum, size)
+    lags = np.concatenate([np.arange(latest + 1), np.arange(-latest, 0)])
+    values = correlation[lags]
+    peak = int(np.abs(values).argmax())
+    norm = float(np.linalg.norm(a) * np.linalg.norm(b))
+    return (float(values[peak]) / norm if norm else 0.0), float(lags[peak]) / rate

@@ -1,0 +1,134 @@
+"""`actuator-glue map`: what an unknown file holds, and a channel map that reads it."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from scipy.io import savemat
+
+from actuator_glue.cli.main import main
+from actuator_glue.io.channel_map import parse_channel_map
+from actuator_glue.io.load import load_records
+
+RATE, COUNT = 512.0, 4000
+TIME = np.arange(COUNT) / RATE
+
+
+def channels(seed: int = 0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return command [mm], what is measured 8 samples later with noise, and a force [kN]."""
+    rng = np.random.default_rng(seed)
+    command = np.convolve(rng.standard_normal(COUNT + 99), np.ones(100) / 10.0, 'valid')
+    measured = 0.97 * np.roll(command, 8) + 0.01 * rng.standard_normal(COUNT)
+    measured[:8] = 0.0
+    return command, measured, 3.0 * measured + 0.5 * rng.standard_normal(COUNT)
+
+
+def looked(tmp_path: Path, path: Path, *options: str, code: int = 0) -> dict:
+    """Run `map` and return its JSON."""
+    out = tmp_path / 'map.json'
+    assert main(['map', str(path), '--json', str(out), '--force', *options]) == code
+    found: dict = json.loads(out.read_text())
+    assert found['schema'] == 'actuator_glue.map/1'
+    return found
+
+
+def write(path: Path, head: str, columns: list[np.ndarray], delimiter: str = ',') -> Path:
+    """Write a text with some lines above its numbers."""
+    rows = [delimiter.join(f'{v:.6f}' for v in row) for row in np.column_stack(columns)]
+    path.write_text('\n'.join([head, *rows]) + '\n', encoding='utf-8')
+    return path
+
+
+@pytest.mark.parametrize('seed', range(4))
+def test_channels_without_names_are_told_by_what_they_do(tmp_path: Path, seed: int) -> None:
+    """The one that follows is measured; the proposal reads the file; a force is not guessed."""
+    command, measured, force = channels(seed)
+    nothing = np.full(COUNT, 7.0)
+    columns = [np.arange(COUNT), measured, nothing, command, force]
+    path = write(tmp_path / 'a.txt', 'Logger 3\nsome; remark\n\nN;A;B;C;D', columns, ';')
+    found = looked(tmp_path, path, '--rate', '512')
+    assert found['channels']['command']['column'] == 'C'
+    assert found['channels']['measured']['column'] == 'A'
+    assert '15.6 ms' in found['channels']['measured']['reasons'][0]
+    assert 'force' not in found['channels']
+    assert any('unit' in line for line in found['channels']['command']['check'])
+    described = yaml.safe_load(found['map'])
+    assert (described['header_lines'], described['sample_number']) == (4, 'N')
+    (record,) = load_records(path, channels=parse_channel_map(described, 'map'))
+    np.testing.assert_allclose(record.command, command * 1e-3, atol=1e-9)
+    assert record.rate == 512.0
+    missing = looked(tmp_path, path, code=1)
+    assert '--rate' in missing['problem']
+    assert missing['map'] is None
+
+
+def test_names_units_and_times_are_used(tmp_path: Path) -> None:
+    """Words of controllers in two languages, a line of units, a clock in ms."""
+    command, measured, force = channels()
+    head = 'Zeit,Sollwert,Istwert,Kraft\nms,mm,mm,kN'
+    path = write(tmp_path / 'a.csv', head, [1e3 * TIME, command, measured, force])
+    out = tmp_path / 'map.yaml'
+    found = looked(tmp_path, path, '--out', str(out))
+    (record,) = load_records(path, channels=out)
+    np.testing.assert_allclose(record.command, command * 1e-3, atol=1e-9)
+    assert record.force is not None
+    np.testing.assert_allclose(record.force, force * 1e3, atol=1e-2)
+    assert record.rate == pytest.approx(RATE, rel=1e-6)
+    assert all(not channel['check'] for channel in found['channels'].values())
+    ranges = {c['column']: (c['least'], c['greatest']) for c in found['columns']}
+    assert ranges['Istwert'] == pytest.approx((measured.min(), measured.max()), abs=1e-6)
+
+
+def test_a_turned_channel_and_a_matrix(tmp_path: Path) -> None:
+    """A measurement of opposite sign gets a scale of -1 and a word; columns of a .mat."""
+    command, measured, _ = channels()
+    savemat(tmp_path / 'a.mat', {'run': {'data': np.column_stack([TIME, command, -measured])}})
+    found = looked(tmp_path, tmp_path / 'a.mat')
+    assert found['channels']['measured']['column'] == 'run.data(:,3)'
+    assert found['channels']['measured']['scale'] == -1.0
+    assert any('sign' in line for line in found['channels']['measured']['check'])
+    assert found['works']
+
+
+def test_a_bag_of_other_topics(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Its topics with their rates; the proposal reads it."""
+    from rosbags.rosbag2 import StoragePlugin, Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    command, measured, _ = channels()
+    store = get_typestore(Stores.ROS2_JAZZY)
+    kind = 'std_msgs/msg/Float64'
+    with Writer(tmp_path / 'bag', version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+        topics = [writer.add_connection(n, kind, typestore=store) for n in ('/a/x', '/b')]
+        for i in range(COUNT):
+            for topic, values in zip(topics, (measured, command), strict=True):
+                data = store.serialize_cdr(store.types[kind](values[i]), kind)
+                writer.write(topic, 10**18 + round(i * 1e9 / RATE), data)
+    found = looked(tmp_path, tmp_path / 'bag')
+    assert found['channels']['command']['column'] == '/b'
+    assert found['columns'][0]['rate_hz'] == pytest.approx(RATE)
+    (record,) = load_records(
+        tmp_path / 'bag', channels=parse_channel_map(yaml.safe_load(found['map']), 'map')
+    )
+    np.testing.assert_allclose(record.measured, measured * 1e-3, rtol=1e-12)
+    assert 'messages/s' in capsys.readouterr().out
+
+
+def test_a_file_that_needs_no_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """It is told so, and nothing is asked of the reader."""
+    command, measured, _ = channels()
+    head = 'time_s,command_mm,measured_mm'
+    path = write(tmp_path / 'a.csv', head, [TIME, command, measured])
+    assert not looked(tmp_path, path)['needed']
+    assert 'needs no channel map' in capsys.readouterr().out
+
+
+def test_nothing_alike_is_no_proposal(tmp_path: Path) -> None:
+    """Channels that have nothing to do with each other: exit code 1, no map written."""
+    noise = np.random.default_rng(0).standard_normal((2, COUNT))
+    path = write(tmp_path / 'a.csv', 't,p,q', [TIME, *noise])
+    found = looked(tmp_path, path, '--out', str(tmp_path / 'map.yaml'), code=1)
+    assert found['map'] is None
+    assert not (tmp_path / 'map.yaml').exists()
