@@ -18,7 +18,7 @@ BOTTOM = {'errors', 'records', 'jit', 'normal'}
 CORE = BOTTOM | {'model', 'inference'}
 EVERYTHING = CORE | {
     'online', 'diagnosis', 'report', 'io', 'interfaces', 'workers', 'effects',
-    'hybrid',
+    'hybrid', 'streams',
 }  # fmt: skip
 # Each folder or top module, and what it may import besides itself.
 ARROWS = {
@@ -43,6 +43,7 @@ ARROWS = {
     'hybrid': CORE,
     'report': CORE | {'online', 'diagnosis', 'io'},
     'io': {'records', 'errors', 'interfaces', 'hybrid'},
+    'streams': {'records', 'errors', 'io'},
     'workers': CORE | {'online'},
     'api': EVERYTHING,
     'nodes': EVERYTHING | {'api'},

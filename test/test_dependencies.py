@@ -46,6 +46,7 @@ LIBRARIES = {
     'numpy': Names('numpy', 'python3-numpy'),
     'openpyxl': Names('openpyxl', 'python3-openpyxl'),
     'pyarrow': Names('pyarrow', None),
+    'pylsl': Names('pylsl', None),
     'pytest': Names('pytest', 'python3-pytest'),
     'pytest_timeout': Names('pytest-timeout', 'python3-pytest-timeout'),
     'rich': Names('rich', 'python3-rich'),
@@ -58,7 +59,7 @@ LIBRARIES = {
     'zstandard': Names('zstandard', None),
 }
 # Libraries of the extra `lab`, each asked for where a file needs it.
-OPTIONAL = {'h5py', 'nptdms', 'openpyxl', 'pyarrow'}
+OPTIONAL = {'h5py', 'nptdms', 'openpyxl', 'pyarrow', 'pylsl'}
 # Options of pytest that pyproject.toml and Makefile use; nothing imports these plug-ins.
 PLUGINS = {'pytest_timeout', 'xdist'}
 

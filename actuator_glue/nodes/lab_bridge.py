@@ -1,43 +1,66 @@
-"""A laboratory file or bag, published as if it were being measured."""
+"""A laboratory's data as the suite's topics: a file played, or a live stream listened to."""
 
 from __future__ import annotations
 
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import replace
-from functools import partial
 from typing import Any
 
 from actuator_glue.errors import InputError
-from actuator_glue.io.load import load_records
 from actuator_glue.nodes import spin, streamer
 from actuator_glue.nodes.blocks import BlockPublisher
+from actuator_glue.nodes.lab_file import FileSource
+from actuator_glue.nodes.lab_live import LiveSource
+from actuator_glue.nodes.lab_results import ResultsOut
 from actuator_glue.nodes.pacer import Step
 from actuator_glue.nodes.parameters import Spec
-from actuator_glue.records import Record
 
 SPECS = (
     Spec('file', '', 'laboratory file or bag', read_only=True),
     Spec('channels', '', 'channel map of the file (YAML)', read_only=True),
     Spec(
-        'specimen_stiffness', -1.0, 'specimen stiffness k, -1 for what the file says',
+        'source', '', 'live stream in place of a file: udp://HOST:PORT, tcp://HOST:PORT, lsl:NAME '
+        'or openfresco://HOST:PORT', read_only=True,
+    ),
+    Spec('layout', '', 'layout of the source (YAML), empty for that of `send`', read_only=True),
+    Spec(
+        'rate', 0.0, 'sample rate of the source, 0 for what the layout says', 'Hz', 0.0, 1e5, True
+    ),
+    Spec(
+        'allow', [''], 'IP addresses and networks that may send; none for this machine alone',
+        read_only=True,
+    ),
+    Spec('key_file', '', 'file with the key of signed messages (HMAC-SHA256)', read_only=True),
+    Spec(
+        'results', '', 'where results go back to: udp://HOST:PORT or lsl:NAME, empty for nowhere',
+        read_only=True,
+    ),
+    Spec(
+        'specimen_stiffness', -1.0, 'specimen stiffness k, -1 for what file or layout says',
         'N/m', -1.0, 1e12, True,
     ),
     Spec(
-        'hold', 'file', 'how the command runs between its samples', read_only=True,
-        choices=('file', 'zoh', 'linear'),
+        'hold', 'file', 'how the command runs between its samples; file: as file or layout says',
+        read_only=True, choices=('file', 'zoh', 'linear'),
     ),
-    Spec('actuator', '', 'name of the actuator, empty for what the file says', read_only=True),
-    Spec('block', 10, 'samples per message', '1', 1, 100_000, True),
-    Spec('preview', 0.0, 'how far ahead commands are published, 0 for not', 's', 0.0, 60.0, True),
+    Spec(
+        'actuator', '', 'name of the actuator, empty for what file or layout says', read_only=True
+    ),
+    Spec('block', 10, 'samples per message, of a source about', '1', 1, 100_000, True),
+    Spec(
+        'preview', 0.0, 'how far ahead commands of a file are published, 0 for not', 's',
+        0.0, 60.0, True,
+    ),
     *streamer.specs(exit_at_end=True),
 )  # fmt: skip
 
 
 class LabBridgeNode(streamer.Streamer):
-    """Publishes the samples of a file at their own rate, or faster."""
+    """Publishes the samples of a file at their own rate, or of a live source as they come."""
 
     def __init__(self) -> None:
+        self._source: FileSource | LiveSource | None = None
+        self._results: ResultsOut | None = None
         super().__init__('lab_bridge', SPECS)
 
     def check(self, values: Mapping[str, Any]) -> None:
@@ -45,68 +68,53 @@ class LabBridgeNode(streamer.Streamer):
         if -1.0 < values['specimen_stiffness'] < 0.0:
             raise InputError(
                 f'specimen_stiffness {values["specimen_stiffness"]:g} N/m is negative; give it in '
-                'N/m, or -1 for what the file says'
+                'N/m, or -1 for what file or layout says'
             )
+
+    @property
+    def speed(self) -> float:
+        """A live source keeps its own time."""
+        return 0.0 if isinstance(self._source, LiveSource) else super().speed
 
     def do_configure(self) -> None:
-        """Read the whole file, so that what is wrong with it is said before a test begins."""
+        """Read the file or begin to listen: what is wrong is said before a test begins."""
         values = self.parameters.values()
-        if not values['file']:
-            raise InputError('parameter file is empty; give a laboratory file or a bag')
-        given = values['specimen_stiffness']
-        self.records = load_records(
-            values['file'],
-            channels=values['channels'] or None,
-            stiffness=None if given < 0.0 else given,
-            hold=None if values['hold'] == 'file' else values['hold'],
-            note=lambda text: self.complain('file', text),
-            gap=lambda text: self.complain('file', text),
-        )
-        if values['actuator']:
-            self.records = [replace(r, actuator=values['actuator']) for r in self.records]
-        for record in self.records:
-            known = 'not known' if record.stiffness is None else f'{record.stiffness:g} N/m'
-            self.get_logger().info(
-                f'{record.source}: {len(record)} samples at {record.rate:g} Hz, '
-                f'specimen stiffness {known}'
-            )
-        self.out = BlockPublisher(self.publisher)
+        out = BlockPublisher(self.publisher)
+        kind = LiveSource if values['source'] else FileSource
+        if values['results']:
+            self._results = ResultsOut(self, values)
+        try:
+            self._source = kind(self, values, out)
+        except InputError:
+            self.do_cleanup()
+            raise
+        for line in self._source.described():
+            self.get_logger().info(line)
+
+    def do_activate(self) -> None:
+        """Begin the stream, and listen for results."""
+        if self._results is not None:
+            self._results.listen()
+        super().do_activate()
+
+    def do_cleanup(self) -> None:
+        """Close what was opened."""
+        for opened in (self._source, self._results):
+            if opened is not None:
+                opened.close()
+        self._source = self._results = None
 
     def stream(self) -> Iterator[Step]:
-        """Yield the blocks of all records, one record after another."""
-        offset = 0.0
-        for record in self.records:
-            yield from self._record(record, offset)
-            offset += record.duration
+        """Yield what file or source gives."""
+        assert self._source is not None
+        return self._source.steps()
 
-    def _record(self, record: Record, offset: float) -> Iterator[Step]:
-        size = self.parameters['block']
-        ahead = round(self.parameters['preview'] * record.rate)
-        self._start_clock(record)
-        self.out.setup(record.stiffness, record.hold, record.first_index, record.source)
-        if not offset:
-            self.introduce()
-            self._start_clock(record)
-        for start in range(0, len(record), size):
-            stop = min(start + size, len(record))
-            due = offset + stop * record.period
-            yield Step(due, partial(self._publish, record, start, stop, ahead))
-
-    def _start_clock(self, record: Record) -> None:
-        now = self.get_clock().now().nanoseconds
-        self.out.begin(record.actuator, record.period, now, record.first_index)
-
-    def _publish(self, record: Record, start: int, stop: int, ahead: int) -> None:
-        first = 0 if start == 0 else min(start + ahead, len(record))
-        last = min(stop + ahead, len(record))
-        if ahead and last > first:
-            self.out.preview(record.first_index + first, record.command[first:last])
-        part = slice(start, stop)
-        force = None if record.force is None else record.force[part]
-        self.out.samples(
-            record.first_index + start, record.command[part], record.measured[part], force
-        )
-        self.samples.add(stop - start)
+    def do_report(self) -> None:
+        """What every stream reports, and what is known of the source."""
+        super().do_report()
+        for opened in (self._source, self._results):
+            if opened is not None:
+                self.health.values.update(opened.report())
 
 
 def main(args: list[str] | None = None) -> int:

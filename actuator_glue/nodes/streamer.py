@@ -69,6 +69,11 @@ class Streamer(base.SuiteNode):
         return made
 
     @property
+    def speed(self) -> float:
+        """Stream seconds per second, 0 for no waiting."""
+        return float(self.parameters['speed'])
+
+    @property
     def subscribers(self) -> int:
         """How many our publisher has met: others on the topic would not get the first samples."""
         return int(self._samples_out.get_subscription_count())
@@ -104,7 +109,7 @@ class Streamer(base.SuiteNode):
         """Begin the stream."""
         self.samples = Rate()
         self._waited_for = None
-        self.pacer = Pacer(self.stream(), self.ready, self.parameters['speed'], self._ended)
+        self.pacer = Pacer(self.stream(), self.ready, self.speed, self._ended)
         self.pacer.start()
 
     def do_deactivate(self) -> None:

@@ -1,0 +1,165 @@
+"""What lab_bridge listens to: a live stream of a laboratory's controller."""
+
+from __future__ import annotations
+
+import time
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from actuator_glue.errors import InputError
+from actuator_glue.nodes.blocks import BlockPublisher
+from actuator_glue.nodes.pacer import Step
+from actuator_glue.nodes.streamer import Streamer
+from actuator_glue.streams.address import Allowed
+from actuator_glue.streams.layout import PLAIN
+from actuator_glue.streams.layout_file import read_layout
+from actuator_glue.streams.reception import Reception, Samples
+from actuator_glue.streams.seal import read_key
+from actuator_glue.streams.transports import Terms, source
+
+# What a count says, for people; each is shown on /diagnostics the moment it grows.
+FAULTS = {
+    'lost': 'samples were lost and are a gap',
+    'duplicates': 'samples came twice and were left out',
+    'reordered': 'samples came out of order and were put right',
+    'late': 'samples came too late and were left out',
+    'implausible': 'samples have a number far off the stream and were left out',
+    'restarts': 'times the sender began to count anew',
+    'interruptions': 'times the connection broke: a gap as long as the silence',
+    'malformed': 'messages do not fit the layout and were left out',
+    'not authentic': 'messages have no valid signature and were left out',
+    'senders refused': 'messages came from senders that are not allowed',
+    'second sender': 'messages came from a second sender while the first still sends',
+    'overruns': 'samples were dropped because this node was too slow',
+    'not finite': 'samples hold NaN or infinity',
+    'socket errors': 'errors of the socket',
+    'site unreachable': "times the site behind the shadow didn't answer",
+}
+# Nothing for so long is told [s].
+SILENT = 1.0
+# Longest pause between two looks at the socket [s].
+LOOK = 0.02
+
+
+class LiveSource:
+    """A stream that arrives; listens from configuration on, publishes while active.
+
+    Args:
+        node: who publishes.
+        values: its parameters.
+        out: where samples go.
+
+    Raises:
+        InputError: address, layout, key or rate cannot be used, or the port is taken.
+    """
+
+    def __init__(self, node: Streamer, values: Mapping[str, Any], out: BlockPublisher) -> None:
+        if values['file']:
+            raise InputError('parameters file and source are both given; keep one')
+        self._node, self._out = node, out
+        transport, self._address = source(values['source'])
+        layout = read_layout(values['layout']) if values['layout'] else PLAIN
+        rate = values['rate'] or layout.rate
+        if rate is None:
+            raise InputError(
+                f'{self._address}: the sample rate is not known; give it in the layout '
+                '(rate: 1000) or as parameter rate'
+            )
+        seal = read_key(values['key_file']) if values['key_file'] else None
+        self._fresh = partial(
+            Reception, layout, rate, in_order=transport.in_order, signed=seal is not None
+        )
+        self._reception = self._fresh()
+        self._warnings = self._reception.warnings(layout.modulus)
+        given = values['specimen_stiffness']
+        self._stiffness = layout.stiffness if given < 0.0 else given
+        self._hold = layout.hold or 'zoh' if values['hold'] == 'file' else values['hold']
+        self._actuator = values['actuator'] or layout.actuator
+        self._period = 1.0 / rate
+        self._pause = min(0.5 * values['block'] * self._period, LOOK)
+        terms = Terms(
+            layout,
+            rate,
+            lambda: int(node.get_clock().now().nanoseconds),
+            Allowed([entry for entry in values['allow'] if entry]),
+            seal,
+        )
+        self._listener = transport.listen(self._address, terms)
+        self._told: Counter[str] = Counter()
+        self._finite: Counter[str] = Counter()
+
+    def described(self) -> list[str]:
+        """Return what is listened to."""
+        known = 'not known' if self._stiffness is None else f'{self._stiffness:g} N/m'
+        return [
+            f'listening to {self._address}: {1.0 / self._period:g} Hz, order by '
+            f'{self._reception.order}, specimen stiffness {known}',
+            *self._warnings,
+        ]
+
+    def steps(self) -> Iterator[Step]:
+        """Yield what has arrived, for ever."""
+        self._reception = self._fresh()
+        self._announce()
+        self._node.introduce()
+        # What came while nobody was ready is of the time before the stream.
+        while self._listener.receive(0.0):
+            pass
+        last = time.monotonic()
+        while True:
+            batches = self._listener.receive(0.1)
+            now = time.monotonic()
+            found = [s for rows in batches for s in self._reception.push(rows, now)]
+            found += self._reception.waited(now, self._node.get_clock().now().nanoseconds)
+            if found:
+                last = now
+            elif now - last > SILENT:
+                self._node.complain('silence', f'nothing arrives from {self._address}')
+            self._tell()
+            yield Step(0.0, partial(self._publish, found))
+            if batches:
+                time.sleep(self._pause)
+
+    def report(self) -> dict[str, Any]:
+        """Return counts, offset and skew of the sender's clock."""
+        clock = self._reception.clock
+        return {
+            'source': str(self._address),
+            'order by': self._reception.order,
+            **{name: self._told[name] for name in ('messages', 'connections', *FAULTS)},
+            'clock offset to sender (s)': clock.offset,
+            'clock skew to sender (ppm)': 1e6 * clock.skew,
+            'spread of shortest delays (s)': clock.spread,
+            'clock steps': clock.steps,
+        }
+
+    def close(self) -> None:
+        """Stop listening."""
+        self._listener.close()
+
+    def _announce(self) -> None:
+        now = self._node.get_clock().now().nanoseconds
+        self._out.begin(self._actuator, self._period, now)
+        self._out.setup(self._stiffness, self._hold, 0, str(self._address))
+
+    def _publish(self, found: list[Samples]) -> None:
+        for samples in found:
+            if samples.began and self._reception.counts['restarts']:
+                self._announce()
+            self._out.begin(self._actuator, self._period, samples.stamp_ns, samples.index)
+            self._out.samples(samples.index, samples.command, samples.measured, samples.force)
+            self._node.samples.add(len(samples.command))
+            bad = ~(np.isfinite(samples.command) & np.isfinite(samples.measured))
+            self._finite['not finite'] += int(bad.sum())
+
+    def _tell(self) -> None:
+        """Show what has gone wrong since the last look; counts are read by another thread."""
+        counts = self._listener.counts + self._reception.counts + self._finite
+        for name, meaning in FAULTS.items():
+            if counts[name] > self._told[name]:
+                self._node.complain(name, f'{counts[name] - self._told[name]} {meaning}')
+        self._told = counts

@@ -1,0 +1,1 @@
+"""Live streams of laboratories, without ROS: transports, layouts, sequences, clocks."""

@@ -1,0 +1,103 @@
+"""Lines of text to columns, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_glue.records import Array
+from actuator_glue.streams.layout import Layout
+
+LONGEST = 8192  # bytes of a line; one without end is no line
+
+
+def places(layout: Layout, names: Sequence[str] | None) -> dict[str, int]:
+    """Return the column, from 0, of each field.
+
+    Args:
+        layout: fields in order, or with a column of their own.
+        names: names of the columns, where they are known.
+
+    Raises:
+        LookupError: a named column is not there.
+    """
+    found: dict[str, int] = {}
+    place = 0
+    for field in layout.sample:
+        at = place if field.column is None else field.column
+        place += field.count
+        if not field.role:
+            continue
+        if isinstance(at, str):
+            if names is None or at not in names:
+                raise LookupError(at)
+            found[field.name] = list(names).index(at)
+        else:
+            found[field.name] = at if field.column is None else at - 1
+    return found
+
+
+class Lines:
+    """Lines of one layout; `begin` before the first of a connection.
+
+    Args:
+        layout: what a line holds.
+    """
+
+    def __init__(self, layout: Layout) -> None:
+        self._layout = layout
+        self.begin()
+
+    def begin(self) -> None:
+        """Forget the names of columns."""
+        self._places: dict[str, int] | None = None
+        if not self._layout.header:
+            try:
+                self._places = places(self._layout, None)
+            except LookupError:
+                self._places = None  # named columns: the first line must name them
+
+    def decoded(self, lines: Sequence[bytes]) -> tuple[dict[str, NDArray[Any]], int]:
+        """Return the values by field, as sent, and how many lines cannot be read."""
+        delimiter, bad = self._layout.delimiter, 0
+        rows: list[list[float]] = []
+        for line in lines:
+            entries = line.decode('utf-8', 'replace').split(delimiter)
+            if self._places is None:
+                try:
+                    self._places = places(self._layout, [e.strip(' "\r') for e in entries])
+                except LookupError:
+                    bad += 1
+                continue
+            try:
+                rows.append([float(entries[at]) for at in self._places.values()])
+            except (ValueError, IndexError):
+                bad += 1
+        table = np.array(rows, dtype=np.float64).reshape(len(rows), len(self._layout.fields))
+        names = self._places or self._layout.fields
+        return dict(zip(names, table.T, strict=False)), bad
+
+    def encoded(self, values: Mapping[str, Array]) -> list[bytes]:
+        """Return one line per sample, without its end; fields in the layout's order."""
+        delimiter = self._layout.delimiter
+        columns: list[list[str]] = []
+        size = len(values['command'])
+        for field in self._layout.sample:
+            if field.name == 'counter':
+                columns.append([str(int(v)) for v in values['counter']])
+            elif field.role:
+                columns.append([repr(float(v)) for v in field.sent(values[field.name])])
+            else:
+                columns += [['0'] * size] * field.count
+        return [delimiter.join(row).encode() for row in zip(*columns, strict=True)]
+
+    def head(self) -> bytes:
+        """Return the line that names the columns."""
+        names = []
+        for field in self._layout.sample:
+            name = field.column if isinstance(field.column, str) else field.name
+            names += [name] * field.count
+        return self._layout.delimiter.join(names).encode()

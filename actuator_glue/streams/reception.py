@@ -1,0 +1,171 @@
+"""From what arrives to stamped samples in order: layout, sequence and clock put together."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import Literal, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_glue.errors import InputError
+from actuator_glue.records import Array
+from actuator_glue.streams.clock import ClockMap
+from actuator_glue.streams.layout import Layout, Rows
+from actuator_glue.streams.sequence import Run, Sequence
+
+# What tells the order of samples: a counter, else their times, else that they arrive in order.
+Order: TypeAlias = Literal['counter', 'time', 'arrival']
+# Arrival in order: times further apart than this are a gap, not jitter [s].
+_JITTER = 0.1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Samples:
+    """Consecutive samples with their place in the stream.
+
+    Attributes:
+        index: running index of the first.
+        stamp_ns: when it was taken, by the receiver's clock [ns].
+        command: shape (n,) [m].
+        measured: shape (n,) [m].
+        force: shape (n,) [N], or None.
+        began: the sender began to count anew with them.
+    """
+
+    index: int
+    stamp_ns: int
+    command: Array
+    measured: Array
+    force: Array | None
+    began: bool
+
+
+class Reception:
+    """State machine without clock, socket or ROS.
+
+    Args:
+        layout: what is received.
+        rate: sample rate [Hz].
+        in_order: whether the transport delivers everything, and in order.
+        signed: whether messages are signed.
+
+    Raises:
+        InputError: signed messages that carry neither counter nor time.
+    """
+
+    def __init__(
+        self, layout: Layout, rate: float, *, in_order: bool = False, signed: bool = False
+    ) -> None:
+        self.rate = rate
+        self.counts: Counter[str] = Counter()
+        self.clock = ClockMap()
+        names = layout.fields
+        self.order: Order = 'arrival'
+        if 'counter' in names:
+            self.order = 'counter'
+        elif 'time' in names and not in_order:
+            self.order = 'time'
+        if signed and self.order == 'arrival':
+            raise InputError(
+                'key: the layout has neither counter nor time, so that a message recorded by '
+                'somebody could be sent again; add a counter'
+            )
+        self._force = 'force' in names
+        modulus = layout.modulus if self.order == 'counter' else None
+        self._sequence = Sequence(rate, modulus, restarts=not signed, counts=self.counts)
+        self._arrived = 0
+        self._last_time: float | None = None
+        self._last_arrival = 0.0
+        self._last_stamp = 0
+
+    def warnings(self, modulus: int | None) -> list[str]:
+        """Return what cannot be seen in such a stream, for people."""
+        if self.order == 'arrival':
+            return ['the layout has neither counter nor time: lost samples cannot be seen']
+        if modulus is not None and modulus < 2.0 * self.rate:
+            seconds = 0.5 * modulus / self.rate
+            return [f'the counter is so small that gaps beyond {seconds:.3g} s are miscounted']
+        return []
+
+    def push(self, rows: Rows, now: float) -> list[Samples]:
+        """Take rows as they came.
+
+        Args:
+            rows: at least one sample, or a mark that a connection begins.
+            now: monotonic time [s].
+        """
+        runs: list[Run] = []
+        if rows.fresh:
+            runs += self._interrupted(now)
+        if len(rows.command):
+            runs += self._ordered(rows, now)
+            self._last_arrival = now
+        out = self._stamped(runs, rows.arrival_ns)
+        return out
+
+    def waited(self, now: float, now_ns: int) -> list[Samples]:
+        """Return what has waited long enough for samples that did not come."""
+        return self._stamped(self._sequence.waited(now), now_ns)
+
+    def _ordered(self, rows: Rows, now: float) -> list[Run]:
+        size = len(rows.command)
+        columns = np.empty((size, 4))
+        columns[:, 0], columns[:, 1] = rows.command, rows.measured
+        columns[:, 2] = 0.0 if rows.force is None else rows.force
+        columns[:, 3] = np.nan if rows.time is None else rows.time
+        runs: list[Run] = []
+        if self.order == 'counter' and rows.counter is not None:
+            counter = rows.counter
+        elif self.order == 'time' and rows.time is not None:
+            counter = np.rint(rows.time * self.rate).astype(np.int64)
+        else:
+            runs += self._jumped(rows.time, now)
+            counter = np.arange(self._arrived, self._arrived + size, dtype=np.int64)
+            self._arrived += size
+        return runs + self._sequence.push(counter, columns, now)
+
+    def _jumped(self, time: NDArray[np.float64] | None, now: float) -> list[Run]:
+        """Leave a gap where the times of samples that arrive in order jump ahead."""
+        if time is None:
+            return []
+        before, self._last_time = self._last_time, float(time[-1])
+        if before is None:
+            return []
+        missing = round((float(time[0]) - before) * self.rate) - 1
+        if missing < max(1, _JITTER * self.rate) or missing > 3600 * self.rate:
+            return []
+        self.counts['lost'] += missing
+        return self._step_over(missing, now)
+
+    def _interrupted(self, now: float) -> list[Run]:
+        """A connection begins: how many samples went by is known only by a counter or the time."""
+        self._last_time = None
+        if self.order != 'arrival' or not self._arrived:
+            return []
+        self.counts['interruptions'] += 1
+        return self._step_over(max(1, round((now - self._last_arrival) * self.rate)), now)
+
+    def _step_over(self, samples: int, now: float) -> list[Run]:
+        self._arrived += samples
+        return self._sequence.skip(samples, now)
+
+    def _stamped(self, runs: list[Run], arrival_ns: int) -> list[Samples]:
+        found = []
+        for place, run in enumerate(runs):
+            if run.began:
+                self.clock = ClockMap()
+            times = run.rows[:, 3]
+            first, last = run.index / self.rate, (run.index + len(run.rows) - 1) / self.rate
+            if not np.isnan(times).any():
+                first, last = float(times[0]), float(times[-1])
+            if place == len(runs) - 1:
+                self.clock.update(last, arrival_ns)
+            elif run.began:
+                self.clock.update(first, arrival_ns)
+            stamp = self.clock.stamp_ns(first)
+            force = run.rows[:, 2] if self._force else None
+            command, measured = run.rows[:, 0], run.rows[:, 1]
+            found.append(Samples(run.index, stamp, command, measured, force, run.began))
+        return found

@@ -1,0 +1,224 @@
+"""Each transport over the loopback device: what is sent arrives, and what is not for us does not."""
+
+import socket
+import struct
+import threading
+import time
+from contextlib import closing, contextmanager
+
+import numpy as np
+import pytest
+from streaming import connect, free_port, joined, layout, listen, received, record, terms
+
+from actuator_glue.errors import InputError
+from actuator_glue.streams.layout import PLAIN
+from actuator_glue.streams.play import play
+from actuator_glue.streams.reception import Reception
+from actuator_glue.streams.seal import Seal
+from actuator_glue.streams.transports import source
+
+SEAL = Seal(b'a key of twenty byte')
+
+
+def address(scheme):
+    if scheme == 'lsl':
+        pytest.importorskip('pylsl', reason='pip install "actuator_glue[lab]"')
+        return f'lsl:test-{free_port()}'
+    kind = socket.SOCK_DGRAM if scheme == 'udp' else socket.SOCK_STREAM
+    return f'{scheme}://127.0.0.1:{free_port(kind)}'
+
+
+def sent(at, its, what, speed=1.0):
+    """Play a record in a thread, as another program would."""
+
+    def work():
+        with closing(connect(at, its)) as sender:
+            play(what, its.layout, sender, speed)
+
+    thread = threading.Thread(target=work, daemon=True)
+    thread.start()
+    return thread
+
+
+@pytest.mark.parametrize(('scheme', 'seal'), [
+    ('udp', None), ('udp', SEAL), ('tcp', None), ('tcp', SEAL), ('lsl', None),
+])  # fmt: skip
+def test_a_record_arrives_bit_by_bit(scheme, seal):
+    at, its, what = address(scheme), terms(seal=seal), record(600)
+    order = source(at)[0].in_order
+    reception = Reception(PLAIN, 1000.0, in_order=order, signed=seal is not None)
+    with closing(listen(at, its)) as listener:
+        thread = sent(at, its, what)
+        found = received(listener, 600, reception, timeout=20.0)
+        thread.join(5.0)
+        index, command, measured, force = joined(found)
+        assert np.array_equal(index, np.arange(600))
+        assert np.array_equal(command, what.command)
+        assert np.array_equal(measured, what.measured)
+        assert np.array_equal(force, what.force)
+        assert listener.counts['messages'] == 600
+    assert not +reception.counts
+    stamps = np.array([s.stamp_ns for s in found])
+    assert (np.diff(stamps) > 0).all() and abs(stamps[0] * 1e-9 - time.time()) < 10.0
+
+
+def test_datagrams_that_are_not_for_us_are_counted_and_left_out():
+    at = address('udp')
+    its = terms(seal=SEAL)
+    port = int(at.rpartition(':')[2])
+    with closing(listen(at, its)) as listener, closing(socket.socket(type=socket.SOCK_DGRAM)) as s:
+        plain = struct.pack('<Idddd', 0, 0, 1, 1, 1)
+        for wrong in (b'', b'x', plain, plain + bytes(32), plain * 3):
+            s.sendto(wrong, ('127.0.0.1', port))
+        s.sendto(plain + SEAL.sign(plain), ('127.0.0.1', port))
+        found = received(listener, 1, Reception(PLAIN, 1000.0, signed=True))
+        assert len(found) == 1
+        assert listener.counts['malformed'] == 4 and listener.counts['not authentic'] == 1
+
+
+def test_a_second_sender_is_heard_when_the_first_is_silent(monkeypatch):
+    from actuator_glue.streams.transports import udp
+
+    monkeypatch.setattr(udp, 'SILENT', 0.2)
+    at, what = address('udp'), record(4)
+    with closing(listen(at)) as listener, closing(connect(at)) as one, closing(connect(at)) as two:
+        values = {
+            'counter': np.arange(4.0), 'time': what.time, 'command': what.command,
+            'measured': what.measured, 'force': what.force,
+        }  # fmt: skip
+        one.send(values)
+        assert sum(len(r.command) for r in listener.receive(1.0)) == 4
+        two.send(values)
+        assert listener.receive(0.1) == [] and listener.counts['second sender'] == 4
+        time.sleep(0.25)
+        two.send(values)
+        assert sum(len(r.command) for r in listener.receive(1.0)) == 4
+
+
+def test_a_sender_that_is_not_allowed_is_not_heard():
+    for scheme in ('udp', 'tcp'):
+        at = address(scheme)
+        with closing(listen(at, terms(allow=('192.0.2.1',)))) as listener:
+            sent(at, terms(), record(20)).join(5.0)
+            assert received(listener, 1, timeout=0.5) == []
+            assert listener.counts['senders refused'] >= 1
+
+
+def test_a_line_without_end_ends_the_connection_only():
+    at = address('tcp')
+    port = int(at.rpartition(':')[2])
+    with closing(listen(at)) as listener:
+        with closing(socket.create_connection(('127.0.0.1', port))) as hostile:
+            hostile.sendall(b'9' * 100_000)
+            assert received(listener, 1, timeout=0.5) == []
+        assert listener.counts['malformed'] == 1 and len(listener._rest) == 0
+        thread = sent(at, terms(), record(50))
+        assert len(joined(received(listener, 50))[0]) == 50
+        thread.join(5.0)
+
+
+def test_a_broken_connection_without_counter_is_a_gap():
+    bare = layout([{'name': n, 'unit': 'm'} for n in ('command', 'measured')])
+    at, its = address('tcp'), terms(bare)
+    reception = Reception(bare, 1000.0, in_order=True)
+    with closing(listen(at, its)) as listener:
+        sent(at, its, record(100), 0.0)
+        first = received(listener, 100, reception)
+        time.sleep(0.3)
+        sent(at, its, record(50), 0.0)
+        second = received(listener, 50, reception)
+    assert joined(first)[0].tolist() == list(range(100))
+    assert reception.counts['interruptions'] == 1
+    index = joined(second)[0]
+    assert 390 <= index[0] <= 2000 and np.array_equal(np.diff(index), np.ones(49))
+
+
+def test_a_taken_port_and_a_missing_partner_are_told():
+    at = address('udp')
+    with closing(listen(at)), pytest.raises(InputError, match='cannot listen there'):
+        listen(at)
+    with pytest.raises(InputError, match='does anybody listen'):
+        connect(address('tcp'))
+
+
+# OpenFresco.
+
+FRESCO = [
+    {'name': 'command', 'unit': 'in'},
+    {'name': 'measured', 'unit': 'in'},
+    {'name': 'force', 'unit': 'kip'},
+]
+
+
+@contextmanager
+def site(port, answers):
+    """A laboratory's site: answers whatever asks for it, and keeps what it heard."""
+    heard = []
+
+    def serve():
+        with closing(server), closing(server.accept()[0]) as peer:
+            stream = peer.makefile('rb')
+            heard.append(stream.read(44))
+            trial = 0.0
+            while len(message := stream.read(256 * 8)) == 256 * 8:
+                heard.append(message)
+                values = struct.unpack('256d', message)
+                if values[0] == 3:
+                    trial = values[1]
+                elif values[0] in answers:
+                    peer.sendall(struct.pack('256d', 0.9 * trial, 7.0 * trial, *[0.0] * 254))
+
+    server = socket.create_server(('127.0.0.1', port))
+    thread = threading.Thread(target=serve, daemon=True)
+    thread.start()
+    yield heard
+    thread.join(5.0)
+
+
+def test_the_shadow_of_openfresco_hears_everything_and_changes_nothing():
+    here, there = free_port(socket.SOCK_STREAM), free_port(socket.SOCK_STREAM)
+    its = terms(layout(FRESCO, forward=f'127.0.0.1:{there}', rate=1000), rate=1000.0)
+    reception = Reception(its.layout, 1000.0, in_order=True)
+    said, back = [], []
+    with (
+        closing(listen(f'openfresco://127.0.0.1:{here}', its)) as shadow,
+        site(there, (6, 10)) as heard,
+    ):
+        with closing(socket.create_connection(('127.0.0.1', here))) as client:
+            said.append(struct.pack('11i', 1, 0, 0, 0, 0, 1, 0, 0, 1, 0, 256))
+            client.sendall(said[-1])
+            stream = client.makefile('rb')
+            for step in range(50):
+                for action, value in ((3, 0.01 * step), (6, 0.0), (10, 0.0)):
+                    said.append(struct.pack('256d', action, value, *[0.0] * 254))
+                    client.sendall(said[-1])
+                    if action != 3:
+                        back.append(struct.unpack('256d', stream.read(2048)))
+            said.append(struct.pack('256d', 99, *[0.0] * 255))
+            client.sendall(said[-1])
+            found = received(shadow, 50, reception)
+            stream.close()
+        assert shadow.counts['messages'] == 50 and not shadow.counts['malformed']
+    assert heard == said
+    assert np.allclose([b[0] for b in back[::2]], 0.009 * np.arange(50))
+    index, command, measured, force = joined(found)
+    assert index.tolist() == list(range(50))
+    assert np.allclose(command, 0.0254 * 0.01 * np.arange(50))
+    assert np.allclose(measured, 0.9 * command)
+    assert np.allclose(force, 4448.2216152605 * 7.0 * 0.01 * np.arange(50))
+
+
+def test_a_shadow_relays_what_it_does_not_understand():
+    here, there = free_port(socket.SOCK_STREAM), free_port(socket.SOCK_STREAM)
+    its = terms(layout(FRESCO, forward=f'127.0.0.1:{there}', rate=1000))
+    with closing(socket.create_server(('127.0.0.1', there))) as server:
+        with closing(listen(f'openfresco://127.0.0.1:{here}', its)) as listener:
+            with closing(socket.create_connection(('127.0.0.1', here))) as client:
+                peer = server.accept()[0]
+                client.sendall(b'\xff' * 5000)
+                with closing(peer):
+                    assert peer.makefile('rb').read(5000) == b'\xff' * 5000
+                    peer.sendall(b'answer')
+                    assert client.makefile('rb').read(6) == b'answer'
+                assert listener.receive(0.1) == []
+            assert listener.counts['malformed'] == 1
