@@ -1,7 +1,5 @@
 """Addresses, who may send, and keys."""
 
-import os
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -73,10 +71,10 @@ def test_beyond_this_machine_senders_must_be_named(scheme):
 def test_a_key_is_long_enough_and_nobody_elses(tmp_path):
     path = tmp_path / 'key'
     path.write_text('0123456789abcdef0123\n')
-    os.chmod(path, 0o644)
+    path.chmod(0o644)
     with pytest.raises(InputError, match='chmod 600'):
         read_key(path)
-    os.chmod(path, 0o600)
+    path.chmod(0o600)
     assert read_key(path).sign(b'x') == Seal(b'0123456789abcdef0123').sign(b'x')
     path.write_text('short')
     with pytest.raises(InputError, match='16 to 4096 bytes'):

@@ -1,4 +1,4 @@
-"""Each transport over the loopback device: what is sent arrives, and what is not for us does not."""
+"""Each transport over the loopback device: what is sent arrives, what is not for us does not."""
 
 import socket
 import struct
@@ -211,14 +211,16 @@ def test_the_shadow_of_openfresco_hears_everything_and_changes_nothing():
 def test_a_shadow_relays_what_it_does_not_understand():
     here, there = free_port(socket.SOCK_STREAM), free_port(socket.SOCK_STREAM)
     its = terms(layout(FRESCO, forward=f'127.0.0.1:{there}', rate=1000))
-    with closing(socket.create_server(('127.0.0.1', there))) as server:
-        with closing(listen(f'openfresco://127.0.0.1:{here}', its)) as listener:
-            with closing(socket.create_connection(('127.0.0.1', here))) as client:
-                peer = server.accept()[0]
-                client.sendall(b'\xff' * 5000)
-                with closing(peer):
-                    assert peer.makefile('rb').read(5000) == b'\xff' * 5000
-                    peer.sendall(b'answer')
-                    assert client.makefile('rb').read(6) == b'answer'
-                assert listener.receive(0.1) == []
-            assert listener.counts['malformed'] == 1
+    with (
+        closing(socket.create_server(('127.0.0.1', there))) as server,
+        closing(listen(f'openfresco://127.0.0.1:{here}', its)) as listener,
+    ):
+        with closing(socket.create_connection(('127.0.0.1', here))) as client:
+            peer = server.accept()[0]
+            client.sendall(b'\xff' * 5000)
+            with closing(peer):
+                assert peer.makefile('rb').read(5000) == b'\xff' * 5000
+                peer.sendall(b'answer')
+                assert client.makefile('rb').read(6) == b'answer'
+            assert listener.receive(0.1) == []
+        assert listener.counts['malformed'] == 1

@@ -1,0 +1,244 @@
+"""Live streams through lab_bridge: samples to the bit, faults told, results back."""
+
+import socket
+import struct
+import subprocess
+import sys
+import time
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+import pytest
+from actuator_glue_msgs.msg import PredictionBand
+from ros_nodes import QUICK, RATE, recorded
+
+from actuator_glue.io.bag_reader import decoded
+from actuator_glue.io.bag_records import write_record
+from actuator_glue.io.bag_writer import BagWriter
+from actuator_glue.model import linear
+from actuator_glue.model.commands import noise
+from actuator_glue.records import Record
+from actuator_glue.streams.results import FIELDS
+
+LAYOUTS = Path(__file__).resolve().parents[2] / 'config' / 'layouts'
+
+
+def free_port(kind=socket.SOCK_DGRAM):
+    with closing(socket.socket(socket.AF_INET, kind)) as found:
+        found.bind(('127.0.0.1', 0))
+        return found.getsockname()[1]
+
+
+def write(path, samples, rate, seed=0):
+    """A bag of one record of a linear actuator."""
+    command = noise(rate, samples / rate, 0.2, 8.0, seed=seed)[:samples]
+    theta = np.array([134.0, 1.1e9, 2.5e5, 0.5])
+    clean = linear.simulate(theta, command, stiffness=250e3, period=1 / rate)
+    measured = clean + 1e-5 * np.random.default_rng(seed).standard_normal(len(clean))
+    record = Record(command, measured, 1 / rate, 250e3, force=250e3 * clean, start_ns=10**18)
+    with BagWriter(path) as writer:
+        write_record(writer, record)
+    return record
+
+
+def send(bag, to, *options):
+    """The command, in a process of its own, as on another computer."""
+    command = [sys.executable, '-m', 'actuator_glue.cli.main', 'send', str(bag), '--to', to]
+    return subprocess.Popen([*command, *options], stderr=subprocess.PIPE, text=True)
+
+
+def channels(bag):
+    """Command, measured and force of every sample in a bag."""
+    blocks = [m for _, m in decoded(bag, ('SampleBlock',))]
+    parts = ('command', 'measured', 'force')
+    return [np.concatenate([getattr(m, name) for m in blocks]) for name in parts]
+
+
+def carried(start, probe, tmp_path, scheme, rate, seconds, layout=None):
+    """Stream a record through bridge and recorder; return it and what was recorded."""
+    kind = socket.SOCK_DGRAM if scheme == 'udp' else socket.SOCK_STREAM
+    at = (
+        f'lsl:servo-{free_port()}'
+        if scheme == 'lsl'
+        else f'{scheme}://127.0.0.1:{free_port(kind)}'
+    )
+    samples = round(rate * seconds)
+    given, bag = tmp_path / 'given', tmp_path / 'bag'
+    record = write(given, samples, rate)
+    recorder = start('recorder', bag=str(bag))
+    bridge = start(
+        'lab_bridge',
+        source=at,
+        layout=layout or '',
+        rate=rate,
+        wait_for=1,
+        block=round(rate / 100),
+    )
+    probe.until(lambda: 'the stream begins' in bridge.text, 60, 'bridge')
+    probe.for_a_while(0.5)
+    sender = send(given, at, *(['--layout', layout] if layout else []))
+    probe.until(
+        lambda: probe.number('lab_bridge', 'samples') == samples, seconds + 60, 'all samples'
+    )
+    assert sender.wait(10) in (0, 1), sender.stderr.read()
+    probe.for_a_while(1.0)
+    assert bridge.end() == 0, bridge.text
+    assert recorder.end() == 0, recorder.text
+    return record, bag
+
+
+def whole(probe, record, bag):
+    """Nothing was lost, and every sample is what was sent."""
+    assert np.array_equal(recorded(bag), np.arange(len(record)))
+    for name in ('lost', 'duplicates', 'malformed', 'implausible', 'overruns'):
+        assert probe.number('lab_bridge', name) == 0, name
+
+
+@pytest.mark.parametrize('scheme', ['udp', 'tcp', 'lsl'])
+def test_a_record_that_is_sent_is_recorded_to_the_bit(scheme, start, probe, tmp_path):
+    if scheme == 'lsl':
+        pytest.importorskip('pylsl', reason='pip install "actuator_glue[lab]"')
+    record, bag = carried(start, probe, tmp_path, scheme, 1000.0, 3.0)
+    whole(probe, record, bag)
+    for found, sent in zip(
+        channels(bag), (record.command, record.measured, record.force), strict=True
+    ):
+        assert np.array_equal(found, sent)
+    stamps = [
+        m.header.stamp.sec * 10**9 + m.header.stamp.nanosec
+        for _, m in decoded(bag, ('SampleBlock',))
+    ]
+    assert (np.diff(stamps) > 0).all() and abs(stamps[0] * 1e-9 - time.time()) < 60
+
+
+def test_a_layout_carries_ten_samples_per_datagram(start, probe, tmp_path):
+    layout = str(LAYOUTS / 'dspace.yaml')
+    record, bag = carried(start, probe, tmp_path, 'udp', 10_000.0, 1.0, layout)
+    whole(probe, record, bag)
+    command, measured, force = channels(bag)
+    # 32-bit values, in mm and kN.
+    assert np.allclose(command, record.command, atol=1e-9)
+    assert np.allclose(measured, record.measured, atol=1e-9)
+    assert np.allclose(force, record.force, rtol=1e-6, atol=1e-3)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize(('rate', 'seconds'), [(2000.0, 600.0), (10_000.0, 60.0)])
+def test_no_sample_is_lost_at_the_rates_of_laboratories(rate, seconds, start, probe, tmp_path):
+    record, bag = carried(start, probe, tmp_path, 'udp', rate, seconds)
+    whole(probe, record, bag)
+    assert np.array_equal(channels(bag)[1], record.measured)
+
+
+def datagram(number, command=0.0, measured=0.0):
+    return struct.pack('<Idddd', number % 2**32, number * 1e-3, command, measured, 0.0)
+
+
+def test_every_fault_of_a_wire_is_told_and_no_sample_is_made_up(start, probe, tmp_path):
+    port, bag = free_port(), tmp_path / 'bag'
+    recorder = start('recorder', bag=str(bag))
+    bridge = start('lab_bridge', source=f'udp://127.0.0.1:{port}', rate=1000.0, wait_for=1)
+    probe.until(lambda: 'the stream begins' in bridge.text, 60)
+    probe.until(lambda: 'nothing arrives' in probe.faults['lab_bridge'], 15)
+    out = socket.socket(type=socket.SOCK_DGRAM)
+
+    def put(*numbers, value=None):
+        for number in numbers:
+            out.sendto(
+                datagram(number, value or 1e-6 * number, 2e-6 * number), ('127.0.0.1', port)
+            )
+            time.sleep(1e-3)
+
+    def told(name):
+        probe.until(lambda: probe.number('lab_bridge', name) >= 1, 10, name)
+        assert bridge.alive
+
+    with closing(out):
+        put(*range(100))
+        put(103, 104)
+        told('lost')
+        put(104)
+        told('duplicates')
+        put(106, 105, *range(107, 120))
+        told('reordered')
+        put(102)
+        told('late')
+        put(2**31)
+        put(*range(120, 130))
+        told('implausible')
+        out.sendto(b'not a packet', ('127.0.0.1', port))
+        told('malformed')
+        put(130, value=float('nan'))
+        told('not finite')
+        put(*range(131, 140))
+        put(*range(50))
+        told('restarts')
+        probe.until(lambda: probe.number('lab_bridge', 'samples') == 187, 10, 'samples')
+    probe.for_a_while(1.0)
+    assert bridge.end() == 0 and recorder.end() == 0
+    assert 'Traceback' not in bridge.text
+    sent = [*range(100), *range(103, 140), *range(50)]
+    assert recorded(bag).tolist() == sent
+    command, measured, _ = channels(bag)
+    assert np.isnan(command[sent.index(130)]) and np.allclose(measured, 2e-6 * np.array(sent))
+    assert len([1 for _, m in decoded(bag, ('TestSetup',))]) == 2
+
+
+def test_results_go_back_to_the_controller(start, probe, tmp_path):
+    """A datagram of doubles per window, and how long the band takes from its last sample."""
+    port, given = free_port(), tmp_path / 'given'
+    at = f'udp://127.0.0.1:{free_port()}'
+    record = write(given, round(8 * RATE), RATE)
+    late = []
+
+    def band(message):
+        if message.scored and message.kind == 'total':
+            last = message.header.stamp.sec + 1e-9 * message.header.stamp.nanosec
+            last += (len(message.median) - 1) * message.period
+            late.append(time.time() - last)
+
+    probe.create_subscription(PredictionBand, 'prediction_band', band, 50)
+    estimator = start('estimator', **QUICK)
+    bridge = start(
+        'lab_bridge', source=at, rate=RATE, specimen_stiffness=250e3, wait_for=1, block=2,
+        results=f'udp://127.0.0.1:{port}',
+    )  # fmt: skip
+    controller = socket.socket(type=socket.SOCK_DGRAM)
+    with closing(controller):
+        controller.bind(('127.0.0.1', port))
+        probe.until(lambda: 'the stream begins' in bridge.text, 200, 'estimator compiled')
+        probe.for_a_while(0.5)
+        sender = send(given, at)
+        probe.until(lambda: probe.number('lab_bridge', 'results sent') >= 4, 60, 'results')
+        data = controller.recv(1000)
+    probe.until(lambda: probe.number('lab_bridge', 'samples') == len(record), 30, 'all samples')
+    assert sender.wait(30) in (0, 1)
+    values = dict(zip(FIELDS, struct.unpack(f'<{len(FIELDS)}d', data), strict=True))
+    assert 0.0 < values['delay'] < 0.1 and 0.5 < values['amplitude'] < 1.5
+    assert abs(values['time'] - time.time()) < 60
+    assert 20.0 < values['beta_1_mean'] < 400.0 and values['beta_1_stddev'] > 0.0
+    print(f'last sample to band: median {np.median(late):.3f} s, worst {max(late):.3f} s')
+    # A window may be computed for half a second.
+    assert np.median(late) < QUICK['time_budget'] + 0.5
+    assert estimator.end() == 0 and bridge.end() == 0
+
+
+@pytest.mark.parametrize(
+    ('parameters', 'told'),
+    [
+        ({'source': 'udp://0.0.0.0:5005', 'rate': 1000.0}, 'say which may send'),
+        ({'source': 'http://127.0.0.1:80'}, 'no address of a stream'),
+        ({'source': 'udp://127.0.0.1:5005'}, 'the sample rate is not known'),
+        ({'source': 'udp://127.0.0.1:5005', 'file': 'x.csv'}, 'keep one'),
+        ({'source': 'openfresco://127.0.0.1:5005', 'rate': 100.0}, 'forward'),
+        ({'source': 'udp://127.0.0.1:5005', 'layout': 'no.yaml'}, 'layout cannot be read'),
+        ({'file': 'x.csv', 'results': 'udp://192.0.2.1:5005'}, 'name it in allow'),
+        ({}, 'give a laboratory file or a bag'),
+    ],
+)
+def test_what_cannot_be_listened_to_is_said(parameters, told, start):
+    bridge = start('lab_bridge', **parameters)
+    assert bridge.wait(30) == 2
+    assert told in bridge.text and 'Traceback' not in bridge.text
