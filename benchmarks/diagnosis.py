@@ -6,7 +6,7 @@ import time
 
 import numpy as np
 
-from actuator_glue.diagnosis.diagnose import diagnose
+from actuator_glue.api.diagnosis import diagnose
 from actuator_glue.model import commands
 from actuator_glue.model.stream import Stream
 from actuator_glue.model.structure import Structure

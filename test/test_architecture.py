@@ -54,8 +54,11 @@ PURE = ('errors', 'records', 'normal', 'model', 'inference', 'online', 'diagnosi
 ROS = ('rclpy', 'launch', 'ament_index_python')
 HEAVY = ('numba', 'scipy', 'matplotlib', 'arviz', 'control', 'statsmodels', 'rosbags', 'rclpy')
 
-# Modules and calls through which print, clock, file or global random state would come in.
-IMPURE_MODULES = {'time', 'datetime', 'random', 'logging', 'pathlib', 'tempfile', 'shutil', 'glob'}
+# Modules and calls through which print, clock, file, thread or global random state would come in.
+IMPURE_MODULES = {
+    'time', 'datetime', 'random', 'logging', 'pathlib', 'tempfile', 'shutil', 'glob', 'os',
+    'threading', 'concurrent', 'multiprocessing',
+}  # fmt: skip
 IMPURE_CALLS = {'print', 'open', 'input'}
 SEEDED = {'Generator', 'PCG64', 'Philox', 'SeedSequence', 'BitGenerator', 'default_rng'}
 
@@ -115,7 +118,7 @@ def test_ros_is_imported_in_nodes_only(path: Path) -> None:
 
 @pytest.mark.parametrize('path', [p for p in SOURCES if folder_of(p) in PURE], ids=identifier)
 def test_core_is_pure(path: Path) -> None:
-    """No print, clock, file or global random state below io."""
+    """No print, clock, file, thread, process or global random state below io."""
     for module, line in imports(path):
         assert module.split('.')[0] not in IMPURE_MODULES, f'{identifier(path)}:{line} {module}'
     for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):

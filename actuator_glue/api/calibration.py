@@ -18,7 +18,8 @@ from actuator_glue.api.calibration_result import (
     RecordError,
 )
 from actuator_glue.api.compilation import compilation
-from actuator_glue.diagnosis.preparation import SETTLE, clean, initial_state
+from actuator_glue.diagnosis.data import SETTLE
+from actuator_glue.diagnosis.preparation import clean, initial_state
 from actuator_glue.errors import InputError
 from actuator_glue.inference.at_bound import pressed
 from actuator_glue.inference.chains import Chains

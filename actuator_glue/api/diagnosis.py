@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -126,13 +127,14 @@ def diagnose(
     if not 0.0 < false_alarms < 1.0:
         raise InputError(f'false_alarms {false_alarms:g} is no probability between 0 and 1')
     given = [records] if isinstance(records, Record) else list(records)
-    found = core.diagnose(
-        given,
-        holdout,
-        seed=seed,
-        jobs=jobs,
-        progress=progress,
-        settings=Thresholds(false_alarms=false_alarms),
-        clock=time.perf_counter,
-    )
+    with ThreadPoolExecutor(jobs) as pool:
+        found = core.diagnose(
+            given,
+            holdout,
+            seed=seed,
+            each=pool.map,
+            progress=progress,
+            settings=Thresholds(false_alarms=false_alarms),
+            clock=time.perf_counter,
+        )
     return Diagnosis(**{f.name: getattr(found, f.name) for f in fields(found)})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Protocol
 
@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.records import Array, Record
+
+SETTLE = 1.0  # s in which an unknown initial state is forgotten
 
 Mask = NDArray[np.bool_]
 
@@ -24,8 +26,10 @@ class Model(Protocol):
     def parameters(self) -> tuple[Parameter, ...]:
         """Parameters in the order of theta's columns."""
 
-    def simulate(self, theta: Array, record: Record, *, initial: Initial = 'rest') -> Array:
-        """Free-run sensor output (m, n) [m] of theta (m, p)."""
+    def simulate(
+        self, theta: Array, record: Record, *, initial: Initial = 'rest', origin: float = 0.0
+    ) -> Array:
+        """Free-run sensor output (m, n) [m] of theta (m, p); the test began `origin` s before."""
 
 
 # Numbers of a block that is worked on at a time, and the least of rows: the kernels' lanes.
@@ -49,19 +53,21 @@ class Data:
         masks: per record, which samples count, (n,) bool.
         initials: per record, the state it starts from: 'rest' or 'measured'.
         recorded: the records at the rate they were sampled with; the same where that was kept.
+        origins: per record, time of its first sample since the test began [s].
     """
 
     records: tuple[Record, ...]
     masks: tuple[Mask, ...]
     initials: tuple[Initial, ...]
     recorded: tuple[Record, ...]
+    origins: tuple[float, ...]
 
     @classmethod
     def whole(cls, records: Sequence[Record]) -> Data:
         """Count all samples; every record starts from rest."""
         ones = tuple(np.ones(len(r), dtype=np.bool_) for r in records)
         initials: list[Initial] = ['rest' for _ in ones]
-        return cls(tuple(records), ones, tuple(initials), tuple(records))
+        return cls(tuple(records), ones, tuple(initials), tuple(records), (0.0,) * len(ones))
 
     @cached_property
     def periods(self) -> tuple[float, ...]:
@@ -81,7 +87,7 @@ class Data:
             np.repeat(mask, count)[: len(record)]
             for record, mask, count in zip(self.recorded, self.masks, self.factors, strict=True)
         ]
-        return Data(self.recorded, tuple(masks), self.initials, self.recorded)
+        return replace(self, records=self.recorded, masks=tuple(masks))
 
     @cached_property
     def times(self) -> tuple[Array, ...]:
@@ -110,10 +116,11 @@ class Data:
         """
         table = np.atleast_2d(theta)
         out = np.empty((len(table), self.target.size))
-        rows = zip(self.records, self.initials, self.masks, self.parts, strict=True)
-        for record, initial, mask, part in rows:
+        rows = zip(self.records, self.initials, self.origins, self.masks, self.parts, strict=True)
+        for record, initial, origin, mask, part in rows:
             for some in chunks(len(table), len(record)):
-                out[some, part] = model.simulate(table[some], record, initial=initial)[:, mask]
+                y = model.simulate(table[some], record, initial=initial, origin=origin)
+                out[some, part] = y[:, mask]
         return out
 
     def split(self, errors: Array) -> list[Array]:

@@ -34,7 +34,7 @@ from actuator_glue.diagnosis.pipeline import (
 from actuator_glue.diagnosis.preparation import prepare
 from actuator_glue.diagnosis.ranking import standard_error, weights
 from actuator_glue.diagnosis.result import DiagnosisData
-from actuator_glue.diagnosis.search import Trial
+from actuator_glue.diagnosis.search import Each, Trial
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.verify import Side, traces, verify
 from actuator_glue.inference.at_bound import Pressed, pressed
@@ -50,7 +50,7 @@ def diagnose(
     holdout: Sequence[Record] | Record | None = None,
     *,
     seed: int = 0,
-    jobs: int = 1,
+    each: Each = map,
     progress: Progress | None = None,
     settings: Thresholds | None = None,
     clock: Clock | None = None,
@@ -62,7 +62,7 @@ def diagnose(
         holdout: record(s) that decide nothing and give the error before and after; without
             one, a quarter of each record is set aside in blocks before any look.
         seed: seed of every random step; the same seed gives the same diagnosis.
-        jobs: worker threads for the refits of candidates.
+        each: refits candidates: `map`, or that of a pool of threads, which is as good.
         progress: called with (stage, share done in [0, 1]).
         settings: thresholds.
         clock: gives seconds, for the duration reported (NaN without one).
@@ -75,8 +75,8 @@ def diagnose(
     tell = progress or (lambda stage, share: None)
     held = [holdout] if isinstance(holdout, Record) else list(holdout or ())
     tell('check', 0.0)
-    first = conclude(prepare(records, held), settings, jobs, tell)
-    result = with_learned_terms(with_the_right_hold(first, settings, jobs, tell))
+    first = conclude(prepare(records, held), settings, each, tell)
+    result = with_learned_terms(with_the_right_hold(first, settings, each, tell))
     prepared, data, scorer = result.prepared, result.data, result.scorer
     found, decision = result.found, result.decision
     stretches = homogeneity.agreement(decision.final, scorer)

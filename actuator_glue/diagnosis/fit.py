@@ -41,7 +41,12 @@ class Fit:
     @property
     def rms(self) -> float:
         """Rms of the error over the counted samples [m]."""
-        return float(np.sqrt(np.mean(self.error**2)))
+        return rms(self.error)
+
+
+def rms(error: Array) -> float:
+    """Root mean square."""
+    return float(np.sqrt(np.mean(error**2)))
 
 
 class Space:

@@ -49,12 +49,14 @@ class OneRecord:
         """Those of the structure, in its order."""
         return self._inner.parameters
 
-    def simulate(self, theta: Array, record: Record, *, initial: Initial = 'rest') -> Array:
+    def simulate(
+        self, theta: Array, record: Record, *, initial: Initial = 'rest', origin: float = 0.0
+    ) -> Array:
         """Free-run sensor output, the effect at its neutral value in other records [m]."""
         table = np.array(np.atleast_2d(theta))
         if not any(record is r for r in self.records):
             table[:, self._inner.columns(self.own)] = self._off
-        out = self._inner.simulate(table, record, initial=initial)
+        out = self._inner.simulate(table, record, initial=initial, origin=origin)
         return out.reshape(*np.shape(theta)[:-1], len(record))
 
 

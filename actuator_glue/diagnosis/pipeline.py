@@ -15,7 +15,7 @@ from actuator_glue.diagnosis.model_selection import ModelSelection, Selection
 from actuator_glue.diagnosis.preparation import Prepared
 from actuator_glue.diagnosis.regression import Surrogate
 from actuator_glue.diagnosis.score import Scorer, evidence
-from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.search import Each, Search
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.model.effects import CATALOGUE
 
@@ -54,13 +54,13 @@ class Conclusion:
     selection: ModelSelection
 
 
-def conclude(prepared: Prepared, settings: Thresholds, jobs: int, tell: Progress) -> Conclusion:
+def conclude(prepared: Prepared, settings: Thresholds, each: Each, tell: Progress) -> Conclusion:
     """Search for what the model lacks and decide; nothing looks at the held-out part."""
     tell('base fit', 0.0)
-    search = Search(prepared.fit, mean_effects(), jobs)
+    search = Search(prepared.fit, mean_effects(), each)
     line = hum.find(prepared.fit, search.base().error)
     if line is not None:
-        search = Search(hum.without(prepared.fit, line), mean_effects(), jobs)
+        search = Search(hum.without(prepared.fit, line), mean_effects(), each)
     selection = ModelSelection(search, settings, tell)
     result = _conclusion(prepared, selection, selection.run(), line)
     if result.decision.verdict != 'unexplained':
@@ -98,7 +98,7 @@ def _conclusion(
 
 
 def with_the_right_hold(
-    first: Conclusion, settings: Thresholds, jobs: int, tell: Progress
+    first: Conclusion, settings: Thresholds, each: Each, tell: Progress
 ) -> Conclusion:
     """Ask whether the command ran linearly between its samples instead of being held.
 
@@ -116,7 +116,7 @@ def with_the_right_hold(
     if before - base.rms**2 < first.found.material**2:
         return first
     tell('other hold', 0.0)
-    second = conclude(other, settings, jobs, tell)
+    second = conclude(other, settings, each, tell)
     a, b = first.found.final.fit, second.found.final.fit
     scorer = second.scorer
     gained = evidence(scorer.block_scores(b), scorer.block_scores(a)) - len(b.theta) + len(a.theta)

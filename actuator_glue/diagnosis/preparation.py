@@ -10,12 +10,11 @@ from scipy import ndimage
 
 from actuator_glue.diagnosis import decimate
 from actuator_glue.diagnosis.checks import check, refuse_repeats, where
-from actuator_glue.diagnosis.data import Data, Mask
+from actuator_glue.diagnosis.data import SETTLE, Data, Mask
 from actuator_glue.errors import InputError
 from actuator_glue.model.exact import Initial
 from actuator_glue.records import Record
 
-SETTLE = 1.0  # s in which an unknown initial state is forgotten
 _SHORTEST = 5.0  # s
 _MOVED = 2e-3  # of its largest excursion: a command within it has not begun
 _HEAD = 0.5  # s that show where it rests and how noisy its channel is
@@ -155,15 +154,18 @@ def prepare(records: Sequence[Record], holdout: Sequence[Record]) -> Prepared:
         if initial == 'measured':
             mask[: round(SETTLE / record.period)] = False
         masks.append(mask)
-    n = len(records)
+    n, origins = len(records), (0.0,) * len(every)
     if holdout:
-        fit = Data(tuple(every[:n]), tuple(masks[:n]), initials[:n], recorded[:n])
-        held = Data(tuple(every[n:]), tuple(masks[n:]), initials[n:], recorded[n:])
+        parts = (slice(0, n), slice(n, None))
+        fit, held = (
+            Data(tuple(every[s]), tuple(masks[s]), initials[s], recorded[s], origins[s])
+            for s in parts
+        )
         return Prepared(fit, held, tuple(notes))
     notes.append('every fourth block of each record held out')
     both = [
         tuple(m & side(_folds(r)) for m, r in zip(masks, every, strict=True))
         for side in (np.logical_not, np.asarray)
     ]
-    fit, held = (Data(tuple(every), side, initials, recorded) for side in both)
+    fit, held = (Data(tuple(every), side, initials, recorded, origins) for side in both)
     return Prepared(fit, held, tuple(notes))

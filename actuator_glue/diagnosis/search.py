@@ -1,28 +1,42 @@
-"""Refit Eq. (2) with effects added: screening of starting sizes, then the joint refit."""
+"""Refit Eq. (2) with effects added: rough refits of all candidates, then those that matter."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Protocol, TypeVar
 
 import numpy as np
 
 from actuator_glue.diagnosis import global_search
 from actuator_glue.diagnosis.data import Data, Model
-from actuator_glue.diagnosis.fit import Fit, base_starts, fit, sum_of_squares
+from actuator_glue.diagnosis.fit import Fit, base_starts, fit, rms, sum_of_squares
 from actuator_glue.diagnosis.score import Scorer
+from actuator_glue.diagnosis.screening import screen, signatures
+from actuator_glue.diagnosis.stretches import Part, stretches
 from actuator_glue.model.effects import CATALOGUE, Effect, Scale, scale
 from actuator_glue.model.parameters import BASE
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 
+_T = TypeVar('_T')
+_R = TypeVar('_R')
+
+
+class Each(Protocol):
+    """Calls a function with each of some arguments, as `map` does, perhaps several at a time."""
+
+    def __call__(self, function: Callable[[_T], _R], arguments: Iterable[_T], /) -> Iterable[_R]:
+        """Yield results in the order of the arguments."""
+
+
 _P = len(BASE)
 _COARSE = 8  # iterations of every refit; those in the running go on
 _TOLERANCE = 1e-4
+_FINISHED = 2  # iterations on all samples after those on stretches of them
 _PROMISING = 0.95  # of the error at most is left by friction that is looked at twice
 _POLISHED = 4
-_STARTS = 4  # starting sizes that survive the screening (the kernel works on 32 at a time)
 
 
 @dataclass(frozen=True)
@@ -73,12 +87,13 @@ class Search:
         entries: all effects there are, in the order in which they stand in a structure; those
             of the catalogue, and learned terms that nothing else knows.
         names: effects that act on the mean response.
-        jobs: threads (the kernels release the interpreter lock).
+        each: refits candidates, several at a time if it can (the kernels release the
+            interpreter lock).
     """
 
     data: Data
     names: tuple[str, ...]
-    jobs: int = 1
+    each: Each = map
     scorer: Scorer | None = None
     entries: dict[str, Effect] = field(default_factory=lambda: dict(CATALOGUE))
     _tried: dict[frozenset[str], Fit] = field(default_factory=dict)
@@ -114,12 +129,16 @@ class Search:
         model = self.structure(*current.effects, name)
         key = frozenset(model.effects)
         if key not in self._tried:
-            starts = self.screen(current, name)[1]
-            coarse = fit(self.data, model, starts, iterations=_COARSE, tolerance=_TOLERANCE)
+            starts, part = self.screen(current, name)[1], self._stand_in(model)
+            found = fit(part.data, model, starts, iterations=_COARSE, tolerance=_TOLERANCE)
             friction = not current.effects and self.entries[name].group == 'friction'
-            if friction and coarse.rms < _PROMISING * current.fit.rms:
-                coarse = global_search.refit(self.data, model, coarse, _COARSE, _TOLERANCE)
-            self._tried[key] = coarse
+            if friction and found.rms < _PROMISING * rms(current.fit.error[part.rows]):
+                found = global_search.refit(part.data, model, found, _COARSE, _TOLERANCE)
+            if part is not self._whole:
+                found = fit(
+                    self.data, model, found.theta, iterations=_FINISHED, tolerance=_TOLERANCE
+                )
+            self._tried[key] = found
         return self.trial(model.effects, name)
 
     def polish(self, trial: Trial) -> Trial:
@@ -131,16 +150,17 @@ class Search:
             self._polished.add(key)
         return self.trial(trial.effects, trial.added)
 
-    def _signature(self, name: str) -> tuple[Array, Array]:
-        """Starting sizes of an effect (s, k) and what each adds to Eq. (2) as fitted (s, N)."""
-        if name not in self._signatures:
-            base = self._tried[frozenset()]
-            model = self.structure(name)
-            thetas = model.starts(base.theta, self.scale())
-            output = self.data.simulate(model, thetas)
-            signature = output - (self.data.target - base.error)
-            self._signatures[name] = thetas[:, model.columns(name)], signature
-        return self._signatures[name]
+    def _stand_in(self, model: Structure) -> Part:
+        """Return the data that structures are refitted to roughly."""
+        return self._whole if any(e.record_time for e in model.entries) else self._stretches
+
+    @cached_property
+    def _whole(self) -> Part:
+        return Part(self.data, slice(None))
+
+    @cached_property
+    def _stretches(self) -> Part:
+        return stretches(self.data) or self._whole
 
     def signatures(self) -> Array:
         """What every effect adds to Eq. (2) as fitted, at all its starting sizes (s, N) [m]."""
@@ -148,53 +168,30 @@ class Search:
         return np.asarray(rows[np.isfinite(rows).all(axis=1)])
 
     def screen(self, current: Trial, name: str) -> tuple[float, Array]:
-        """Project the residual on an effect's signatures, current parameters refitted linearly.
+        """Project the residual on an effect's signatures (see diagnosis/screening.py).
 
         Returns:
             The largest share of the squared error that one of the effect's starting sizes can
             remove, and the starting parameters that promise most (s, p).
         """
-        effect = self.entries[name]
-        neutral = np.array(
-            [p.neutral if p.neutral is not None else 0.0 for p in effect.parameters]
-        )
-        rows, signature = self._signature(name)
-        lower = np.array([p.lower for p in effect.parameters])
-        upper = np.array([p.upper for p in effect.parameters])
-        names = [p.name for p in effect.parameters]
+        alone, base = self.structure(name), self._tried[frozenset()].theta
         model = self.structure(*current.effects, name)
-        is_new = np.array([p.name in names for p in model.parameters])
-
-        def join(values: Array) -> Array:
-            thetas = np.empty((len(values), len(is_new)))
-            thetas[:, is_new] = values
-            thetas[:, ~is_new] = current.fit.theta
-            return thetas
-
-        alive = np.asarray(np.isfinite(signature).all(axis=1))
-        signature = np.where(alive[:, None], signature, 0.0)
-        jac = current.fit.jacobian
-        scales = np.sqrt(np.einsum('pn,pn->p', jac, jac))
-        jac = jac[scales > 0] / scales[scales > 0, None]
-        inverse = np.linalg.pinv(jac @ jac.T, rcond=1e-9)
-        error = current.fit.error - jac.T @ (inverse @ (jac @ current.fit.error))
-        free = signature - (signature @ jac.T @ inverse) @ jac
-        free[np.abs(free).max(axis=1) > 1.0] = 0.0  # a metre of residual: it diverged
-        power = np.einsum('sn,sn->s', free, free)
-        cross = free @ error
-        amount = np.where(power > 0, cross / np.maximum(power, 1e-300), 0.0)
-        amount = np.clip(amount, 0.05, 4.0)
-        as_is = power - 2.0 * cross
-        scaled = amount**2 * power - 2.0 * amount * cross
-        # Every size as it stands, and scaled to what the residual asks for.
-        sizes = np.concatenate([rows, rows])
-        sizes[len(rows) :, 0] = neutral[0] + amount * (rows[:, 0] - neutral[0])
-        sizes = np.clip(sizes, lower, upper)
-        merit = np.concatenate([as_is, scaled])
-        merit[np.tile(~alive, 2)] = np.inf
-        chosen = np.argsort(merit, kind='stable')[:_STARTS]
-        share = np.where(power > 0, cross**2 / np.maximum(power, 1e-300), 0.0)
-        return float(share[alive].max(initial=0.0) / (error @ error)), join(sizes[chosen])
+        part = self._stand_in(model)
+        if name not in self._signatures:
+            thetas = alone.starts(base, self.scale())
+            seen = signatures(part.data, alone, thetas, base)
+            self._signatures[name] = thetas[:, alone.columns(name)], seen
+        sizes, seen = self._signatures[name]
+        fit = current.fit
+        share, best = screen(
+            self.entries[name].parameters, sizes, seen, fit.error[part.rows],
+            fit.jacobian[:, part.rows],
+        )  # fmt: skip
+        names = [p.name for p in self.entries[name].parameters]
+        new = np.array([p.name in names for p in model.parameters])
+        thetas = np.empty((len(best), len(new)))
+        thetas[:, new], thetas[:, ~new] = best, fit.theta
+        return share, thetas
 
     def additions(
         self,
@@ -209,26 +206,23 @@ class Search:
             return self.add(current, name)
 
         out: list[Trial] = []
-        with ThreadPoolExecutor(max(1, self.jobs)) as pool:
-            for i, trial in enumerate(pool.map(one, wanted)):
-                out.append(trial)
-                if progress is not None:
-                    progress((i + 1) / len(wanted))
-            out.sort(key=_by_score)
-            # Only what is near the best is worth the last digits.
-            near = 1.5 * out[0].mean_square if out else 0.0
-            polished = pool.map(
-                lambda t: self.polish(t[1]) if t[0] < 2 or t[1].mean_square < near else t[1],
-                list(enumerate(out))[:_POLISHED],
-            )
-            out = [*polished, *out[_POLISHED:]]
-        return sorted(out, key=_by_score)
+        for i, trial in enumerate(self.each(one, wanted)):
+            out.append(trial)
+            if progress is not None:
+                progress((i + 1) / len(wanted))
+        out.sort(key=_by_score)
+        # Only what is near the best is worth the last digits.
+        near = 1.5 * out[0].mean_square if out else 0.0
+        first = list(enumerate(out[:_POLISHED]))
+        polished = self.each(
+            lambda t: self.polish(t[1]) if t[0] < 2 or t[1].mean_square < near else t[1], first
+        )
+        return sorted([*polished, *out[_POLISHED:]], key=_by_score)
 
     def screened(self, current: Trial, names: Iterable[str]) -> list[str]:
         """Sort effects by what their signatures could remove from the present residual."""
-        with ThreadPoolExecutor(max(1, self.jobs)) as pool:
-            wanted = list(names)
-            shares = list(pool.map(lambda n: self.screen(current, n)[0], wanted))
+        wanted = list(names)
+        shares = list(self.each(lambda n: self.screen(current, n)[0], wanted))
         return [wanted[i] for i in np.argsort(-np.array(shares), kind='stable')]
 
     def without(self, current: Trial, name: str) -> Trial:

@@ -8,6 +8,7 @@ import numpy as np
 
 from actuator_glue.diagnosis import hum
 from actuator_glue.diagnosis.data import Data, Model, chunks
+from actuator_glue.diagnosis.fit import rms
 from actuator_glue.diagnosis.hum import Line
 from actuator_glue.diagnosis.result import HeldOutError, Trace
 from actuator_glue.diagnosis.score import BLOCK, pooled, splits_of
@@ -25,11 +26,6 @@ class Side:
     model: Model
     theta: Array
     draws: Array
-
-
-def rms(error: Array) -> float:
-    """Root mean square."""
-    return float(np.sqrt(np.mean(error**2)))
 
 
 def bootstrap(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -42,7 +41,6 @@ class ExactErrors:
         settle: samples at each record's beginning that are simulated but not counted; one
             number, or one per record.
         initial: state at the first sample: 'rest', or 'measured' from the first samples.
-        threads: how many threads share a batch; the result does not depend on it.
 
     Raises:
         InputError: no record, unknown stiffness or initial, settle too long.
@@ -53,14 +51,12 @@ class ExactErrors:
         records: Sequence[Record],
         settle: Sequence[int] | int = 0,
         initial: Initial = 'rest',
-        threads: int = 1,
     ) -> None:
         if not records:
             raise InputError('no record given; at least one is needed')
         if initial not in ('rest', 'measured'):
             raise InputError(f"initial state {initial!r} is unknown; use 'rest' or 'measured'")
         self.records = tuple(records)
-        self.threads = threads
         self.settle = settle_samples(self.records, settle)
         self.stiffness = tuple(record.known_stiffness() for record in self.records)
         self.starts: tuple[Array, ...] = tuple(
@@ -95,20 +91,9 @@ class ExactErrors:
         foh = record.hold == 'linear'
         out = np.empty((len(systems), 2))
 
-        def some(part: slice) -> None:
-            rows = kernel.discretise(systems[part], record.period, foh)
-            start, settle = self.starts[r], self.settle[r]
-            kernel.error_sums(rows, start, record.measured, self.padded[r], settle, foh, out[part])
-
-        # Whole blocks of lanes for every thread.
-        blocks = -(-len(systems) // kernel.LANES)
-        size = kernel.LANES * -(-blocks // max(self.threads, 1))
-        parts = [slice(i, i + size) for i in range(0, len(systems), max(size, 1))]
-        if len(parts) < 2:
-            some(slice(None))
-        else:
-            with ThreadPoolExecutor(len(parts)) as pool:
-                list(pool.map(some, parts))
+        rows = kernel.discretise(systems, record.period, foh)
+        start, settle = self.starts[r], self.settle[r]
+        kernel.error_sums(rows, start, record.measured, self.padded[r], settle, foh, out)
         return out
 
     def residuals(self, theta: ArrayLike) -> list[Array]:

@@ -10,7 +10,7 @@ from typing import Any
 
 from rich.console import Console
 
-from actuator_glue.diagnosis.diagnose import diagnose as diagnose_records
+from actuator_glue.api.diagnosis import diagnose as diagnose_records
 from actuator_glue.errors import InputError
 from actuator_glue.report import bag_content, estimate_figures
 from examples.demonstration import pictures
@@ -164,9 +164,7 @@ def _diagnose(outcome: SessionOutcome, folder: Path, display: Display, seed: int
         # The number of stages depends on what is found; the bar never runs full before the end.
         display.advance(stage, min(len(seen) - 1 + share, STAGES - 0.1))
 
-    outcome.diagnosis = diagnose_records(
-        [outcome.content.record], seed=seed, jobs=2, progress=tell, clock=time.perf_counter
-    )
+    outcome.diagnosis = diagnose_records([outcome.content.record], seed=seed, progress=tell)
     pictures.residual(outcome.diagnosis, folder / 'diagnosis.png')
     display.advance(stage, STAGES)
 

@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -198,8 +199,9 @@ def test_the_same_seed_gives_the_same_diagnosis() -> None:
     """Bit for bit, with one thread or two, posterior included."""
     a, b, held = make(['delay'], [8e-3], 13)
     settings = Thresholds(evaluations=3000)
-    one = diagnose([a, b], held, seed=4, jobs=1, settings=settings).to_json()
-    two = diagnose([a, b], held, seed=4, jobs=2, settings=settings).to_json()
+    one = diagnose([a, b], held, seed=4, settings=settings).to_json()
+    with ThreadPoolExecutor(2) as pool:
+        two = diagnose([a, b], held, seed=4, each=pool.map, settings=settings).to_json()
     assert one == two
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis.diagnose import diagnose
+from actuator_glue.api.diagnosis import diagnose
 from actuator_glue.io.load import load_records
 from actuator_glue.records import Record
 

@@ -81,16 +81,6 @@ def test_result_of_a_theta_does_not_depend_on_its_batch():
     np.testing.assert_array_equal(together, alone)
 
 
-@pytest.mark.parametrize('threads', [2, 3, 50])
-def test_result_does_not_depend_on_the_threads(threads):
-    records = [make_record(1001, 1), make_record(1001, 2, 0.0)]
-    theta = TABLE_2 * np.random.default_rng(0).uniform(0.5, 2.0, (333, 4))
-    for m in (0, 1, 64, 333):
-        np.testing.assert_array_equal(
-            ExactErrors(records, threads=threads)(theta[:m]), ExactErrors(records)(theta[:m])
-        )
-
-
 def test_singular_and_extreme_thetas_do_not_raise():
     errors = ExactErrors([make_record(500, 1, 0.0), make_record(500, 2)])
     corners = np.array(np.meshgrid(*zip(LOWER, UPPER, strict=True))).reshape(4, -1).T

@@ -96,6 +96,8 @@ class Effect:
         searched: whether the diagnosis tries it.
         holds: the effect of which it is a richer form, and the parameter and its value at which
             it is that effect.
+        record_time: its time counts from a record's first sample, wherever in the test that lies:
+            no stretch of a record can stand for the record.
     """
 
     name: str
@@ -115,6 +117,7 @@ class Effect:
     expression: Expression | None = None
     searched: bool = True
     holds: tuple[str, str, float] | None = None
+    record_time: bool = False
 
     @property
     def linear(self) -> bool:

@@ -20,4 +20,5 @@ EFFECT = Effect(
     source='Jelali & Kroll 2003 (viscosity and bulk modulus against temperature)',
     starts=lambda s: ((0.05 / s.duration,), (-0.05 / s.duration,), (0.2 / s.duration,)),
     switches=(rows.ON_FLOW,),
+    record_time=True,
 )

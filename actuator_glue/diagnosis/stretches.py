@@ -1,0 +1,58 @@
+"""Stretches of long records: enough to tell roughly how large an effect is, at a part of the cost.
+
+They are spread evenly over every record, so over a sweep's frequencies and amplitudes too, and
+start from the measured state. What they lead to is finished, and judged, on all samples.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_glue.diagnosis.data import SETTLE, Data
+from actuator_glue.model.exact import Initial
+
+_LENGTH = 5.0  # s of a stretch, its settling not counted
+_TOTAL = 60.0  # s of all stretches
+_LONG = 2.0  # times as much as them: shorter records are taken whole
+
+
+@dataclass(frozen=True)
+class Part:
+    """A part of some data, or all of it.
+
+    Attributes:
+        data: the part, each stretch a record of its own.
+        rows: where its counted samples lie in the joined vectors of the whole.
+    """
+
+    data: Data
+    rows: NDArray[np.intp] | slice
+
+
+def stretches(data: Data) -> Part | None:
+    """Return stretches that stand for long records; None where the records are not long."""
+    total = sum(record.duration for record in data.records)
+    if total < _LONG * _TOTAL:
+        return None
+    records, masks, initials, origins, rows = [], [], [], [], []
+    for i, (record, mask) in enumerate(zip(data.records, data.masks, strict=True)):
+        place = data.parts[i].start + np.cumsum(mask) - 1
+        count = max(1, round(_TOTAL * record.duration / total / _LENGTH))
+        size = min(len(record), round((_LENGTH + SETTLE) / record.period))
+        for begin in np.linspace(0, len(record) - size, count).astype(int).tolist():
+            initial: Initial = data.initials[i] if begin == 0 else 'measured'
+            own = mask[begin : begin + size].copy()
+            if initial == 'measured':
+                own[: round(SETTLE / record.period)] = False
+            if not own.any():
+                continue
+            records.append(record.slice(begin, begin + size))
+            masks.append(own)
+            initials.append(initial)
+            origins.append(data.origins[i] + begin * record.period)
+            rows.append(place[begin : begin + size][own])
+    part = Data(tuple(records), tuple(masks), tuple(initials), tuple(records), tuple(origins))
+    return Part(part, np.concatenate(rows))
