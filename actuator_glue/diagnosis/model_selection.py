@@ -108,11 +108,7 @@ class ModelSelection:
         singles = self.search.additions(base, None, lambda d: self.progress('effect 1', d))
         self.renoise(singles[0])
         base, singles = self.search.trial(()), self.rescored(singles)
-        scorer = self.search.scorer
-        assert scorer is not None
-        self.nats = false_alarms.threshold(
-            self.search.signatures(), base.fit.jacobian, scorer, s.false_alarms
-        )
+        self.nats = false_alarms.threshold(*self.search.signatures(), s.false_alarms)
         current = base
         ranked: list[Trial] = list(singles)
         threshold = self.material

@@ -16,6 +16,7 @@ import numpy as np
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.fit import Fit
 from actuator_glue.diagnosis.noise import Split, split, whiten, whitener
+from actuator_glue.diagnosis.stretches import Part
 from actuator_glue.records import Array
 
 BLOCK = 2.0  # s
@@ -45,6 +46,10 @@ class Scorer:
             edges = part.start + np.linspace(0, size, count + 1).astype(int)
             blocks += [slice(int(a), int(b)) for a, b in pairwise(edges)]
         return cls(data, tuple(whitener([s]) for s in splits), tuple(blocks))
+
+    def of_part(self, part: Part) -> Scorer:
+        """Return the same noise for a part of the data, which has no blocks."""
+        return Scorer(part.data, tuple(self.taps[i] for i in part.records), ())
 
     def whiten(self, rows: Array) -> Array:
         """Whiten joined rows (..., N), record by record."""

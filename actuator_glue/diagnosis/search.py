@@ -156,16 +156,35 @@ class Search:
 
     @cached_property
     def _whole(self) -> Part:
-        return Part(self.data, slice(None))
+        return Part(self.data, slice(None), tuple(range(len(self.data.records))))
 
     @cached_property
     def _stretches(self) -> Part:
         return stretches(self.data) or self._whole
 
-    def signatures(self) -> Array:
-        """What every effect adds to Eq. (2) as fitted, at all its starting sizes (s, N) [m]."""
-        rows = np.concatenate([self._signature(name)[1] for name in self.names])
-        return np.asarray(rows[np.isfinite(rows).all(axis=1)])
+    def _signature(self, name: str, part: Part) -> tuple[Array, Array]:
+        """Starting sizes of an effect (s, k) and what each adds to Eq. (2) as fitted (s, M)."""
+        if name not in self._signatures:
+            alone, base = self.structure(name), self._tried[frozenset()].theta
+            thetas = alone.starts(base, self.scale())
+            seen = signatures(part.data, alone, thetas, base)
+            self._signatures[name] = thetas[:, alone.columns(name)], seen
+        return self._signatures[name]
+
+    def signatures(self) -> tuple[Array, Array, Scorer]:
+        """Every effect's at all its starting sizes (s, M) [m], beside what it is seen against.
+
+        That is the Jacobian of Eq. (2) (4, M), and the noise.
+        """
+        assert self.scorer is not None
+        part, rows = self._stretches, []
+        for name in self.names:
+            own = self._stand_in(self.structure(name))
+            seen = self._signature(name, own)[1]
+            rows.append(seen if own is part else seen[:, part.rows])
+        every = np.concatenate(rows)
+        jacobian = self._tried[frozenset()].jacobian[:, part.rows]
+        return every[np.isfinite(every).all(axis=1)], jacobian, self.scorer.of_part(part)
 
     def screen(self, current: Trial, name: str) -> tuple[float, Array]:
         """Project the residual on an effect's signatures (see diagnosis/screening.py).
@@ -174,15 +193,9 @@ class Search:
             The largest share of the squared error that one of the effect's starting sizes can
             remove, and the starting parameters that promise most (s, p).
         """
-        alone, base = self.structure(name), self._tried[frozenset()].theta
         model = self.structure(*current.effects, name)
-        part = self._stand_in(model)
-        if name not in self._signatures:
-            thetas = alone.starts(base, self.scale())
-            seen = signatures(part.data, alone, thetas, base)
-            self._signatures[name] = thetas[:, alone.columns(name)], seen
-        sizes, seen = self._signatures[name]
-        fit = current.fit
+        part, fit = self._stand_in(self.structure(name)), current.fit
+        sizes, seen = self._signature(name, part)
         share, best = screen(
             self.entries[name].parameters, sizes, seen, fit.error[part.rows],
             fit.jacobian[:, part.rows],

@@ -26,10 +26,12 @@ class Part:
     Attributes:
         data: the part, each stretch a record of its own.
         rows: where its counted samples lie in the joined vectors of the whole.
+        records: from which record of the whole each of its records is.
     """
 
     data: Data
     rows: NDArray[np.intp] | slice
+    records: tuple[int, ...]
 
 
 def stretches(data: Data) -> Part | None:
@@ -37,7 +39,7 @@ def stretches(data: Data) -> Part | None:
     total = sum(record.duration for record in data.records)
     if total < _LONG * _TOTAL:
         return None
-    records, masks, initials, origins, rows = [], [], [], [], []
+    records, masks, initials, origins, rows, of = [], [], [], [], [], []
     for i, (record, mask) in enumerate(zip(data.records, data.masks, strict=True)):
         place = data.parts[i].start + np.cumsum(mask) - 1
         count = max(1, round(_TOTAL * record.duration / total / _LENGTH))
@@ -54,5 +56,6 @@ def stretches(data: Data) -> Part | None:
             initials.append(initial)
             origins.append(data.origins[i] + begin * record.period)
             rows.append(place[begin : begin + size][own])
+            of.append(i)
     part = Data(tuple(records), tuple(masks), tuple(initials), tuple(records), tuple(origins))
-    return Part(part, np.concatenate(rows))
+    return Part(part, np.concatenate(rows), tuple(of))
