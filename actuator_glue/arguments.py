@@ -37,9 +37,7 @@ class Folder(Output):
 
 def add_force(parser: argparse.ArgumentParser) -> None:
     """Add `--force`."""
-    parser.add_argument(
-        '--force', action='store_true', help='write over what is there already'
-    )  # fmt: skip
+    parser.add_argument('--force', action='store_true', help='write over what is there already')
 
 
 def claim(path: Path | str, args: argparse.Namespace) -> Path:

@@ -23,9 +23,16 @@ register = CATALOGUE.register
 unregister = CATALOGUE.unregister
 
 __all__ = [
-    'CATALOGUE', 'Effect', 'Parameter', 'load_effects', 'read_effects', 'register', 'save_effects',
-    'term', 'unregister',
-]  # fmt: skip
+    'CATALOGUE',
+    'Effect',
+    'Parameter',
+    'load_effects',
+    'read_effects',
+    'register',
+    'save_effects',
+    'term',
+    'unregister',
+]
 
 
 def load_effects(path: Path | str) -> tuple[Effect, ...]:

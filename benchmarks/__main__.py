@@ -29,9 +29,14 @@ PEERS = ('emcee_samplers', 'pydream_sampler', 'spotpy_sampler', 'pints_samplers'
 def _isolated(interpreter: Path | str, *arguments: str, timeout: float = 600.0) -> None:
     """Run a module in a process of its own, so that nothing it loads or pins stays."""
     subprocess.run(
-        [str(interpreter), '-m', *arguments], cwd=ROOT, check=True, timeout=timeout,
-        env={**os.environ, 'PYTHONPATH': str(ROOT)}, capture_output=True, text=True,
-    )  # fmt: skip
+        [str(interpreter), '-m', *arguments],
+        cwd=ROOT,
+        check=True,
+        timeout=timeout,
+        env={**os.environ, 'PYTHONPATH': str(ROOT)},
+        capture_output=True,
+        text=True,
+    )
 
 
 def problem_r(out: Path) -> dict[str, Any]:

@@ -24,10 +24,16 @@ def python(folder: Path) -> Path:
         subprocess.run([sys.executable, '-m', 'venv', '--clear', str(folder)], check=True)
         subprocess.run(
             [
-                str(interpreter), '-m', 'pip', 'install', '--quiet', '--disable-pip-version-check',
-                '-r', str(REQUIREMENTS),
+                str(interpreter),
+                '-m',
+                'pip',
+                'install',
+                '--quiet',
+                '--disable-pip-version-check',
+                '-r',
+                str(REQUIREMENTS),
             ],
             check=True,
-        )  # fmt: skip
+        )
         stamp.write_text(wanted)
     return interpreter

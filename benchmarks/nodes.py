@@ -109,11 +109,18 @@ def _stream(
     start(
         'actuator_sim',
         {
-            'rate': rate, 'block': block, 'duration': seconds, 'rest': 0.0, 'command': 'noise',
-            'frequency_start': 0.2, 'frequency_end': 8.0, 'preview': 1.0, 'wait_for': 2,
+            'rate': rate,
+            'block': block,
+            'duration': seconds,
+            'rest': 0.0,
+            'command': 'noise',
+            'frequency_start': 0.2,
+            'frequency_end': 8.0,
+            'preview': 1.0,
+            'wait_for': 2,
             'exit_at_end': True,
         },
-    )  # fmt: skip
+    )
     time.sleep(3.0)  # its start is no part of a stream
     began = {name: _cpu(node) for name, node in processes.items()}
     last = began

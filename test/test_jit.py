@@ -27,10 +27,14 @@ def test_fresh_and_cached_code_agree_to_the_bit(tmp_path: Path) -> None:
     compiled, cached = (
         subprocess.run(
             [sys.executable, '-c', WORK],
-            env=environment, check=True, capture_output=True, text=True, timeout=300,
+            env=environment,
+            check=True,
+            capture_output=True,
+            text=True,
+            timeout=300,
         ).stdout
         for _ in range(2)
-    )  # fmt: skip
+    )
     assert any(tmp_path.rglob('*.nbc'))
     assert compiled == cached
 
@@ -54,8 +58,12 @@ def test_a_changed_callee_is_compiled_again(tmp_path: Path) -> None:
         done = subprocess.run(
             [sys.executable, '-c', 'from actuator_glue.outer import outer; print(outer(0.0))'],
             env={k: v for k, v in os.environ.items() if k != 'NUMBA_CACHE_DIR'},
-            cwd=tmp_path, check=True, capture_output=True, text=True, timeout=300,
-        )  # fmt: skip
+            cwd=tmp_path,
+            check=True,
+            capture_output=True,
+            text=True,
+            timeout=300,
+        )
         found.append(float(done.stdout))
     assert found == [10.0, 20.0, 20.0]
     assert len(list((package / '__pycache__').glob('compiled-*'))) == 2
@@ -70,8 +78,12 @@ def test_links_lead_to_the_same_compiled_code(tmp_path: Path) -> None:
     )
     done = subprocess.run(
         [sys.executable, '-c', work],
-        cwd=tmp_path, check=True, capture_output=True, text=True, timeout=300,
-    )  # fmt: skip
+        cwd=tmp_path,
+        check=True,
+        capture_output=True,
+        text=True,
+        timeout=300,
+    )
     package, kernel = map(Path, done.stdout.split())
     assert package.parent == tmp_path / 'actuator_glue'
     assert kernel == kernel.resolve() != package.parent / 'model' / 'kernel.py'

@@ -13,10 +13,24 @@ import actuator_glue as ag
 from actuator_glue.cli.main import main
 
 NAMES = {
-    'Calibration', 'Command', 'Diagnosis', 'InputError', 'Partition', 'Record', 'Replay',
-    'Specimen', 'StabilityResult', 'calibrate', 'diagnose', 'effects', 'load', 'load_records',
-    'replay', 'rths', 'simulate',
-}  # fmt: skip
+    'Calibration',
+    'Command',
+    'Diagnosis',
+    'InputError',
+    'Partition',
+    'Record',
+    'Replay',
+    'Specimen',
+    'StabilityResult',
+    'calibrate',
+    'diagnose',
+    'effects',
+    'load',
+    'load_records',
+    'replay',
+    'rths',
+    'simulate',
+}
 
 
 @pytest.fixture(scope='module')
@@ -51,10 +65,11 @@ def test_importing_costs_and_changes_nothing() -> None:
     )
     # The bootstrapper of ROS wheels starts Python anew: only the package itself is timed.
     rows = [
-        subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
-        .stdout.split()
+        subprocess.run(
+            [sys.executable, '-c', code], capture_output=True, text=True, check=True
+        ).stdout.split()
         for _ in range(5)
-    ]  # fmt: skip
+    ]
     assert all(row[1:] == ['True', 'True', '1'] for row in rows)
     assert min(float(row[0]) for row in rows) <= 0.3
 
@@ -146,11 +161,13 @@ def test_the_command_line_gives_the_same_numbers(tmp_path: Path) -> None:
     untimed = {'seconds', 'compile_seconds', 'times_real_time'}
     more = ('--stiffness', '250e3')
     pairs = (
-        (ag.calibrate(record, evaluations=24_000).to_json(),
-         written(tmp_path, 'calibrate', file, *more, '--evaluations', 24_000)),
+        (
+            ag.calibrate(record, evaluations=24_000).to_json(),
+            written(tmp_path, 'calibrate', file, *more, '--evaluations', 24_000),
+        ),
         (ag.diagnose(record).to_json(), written(tmp_path, 'diagnose', file, *more)),
         (ag.replay(record).to_json(), written(tmp_path, 'replay', file, *more)),
-    )  # fmt: skip
+    )
     for ours, theirs in pairs:
         kept = {k: v for k, v in json.loads(json.dumps(ours)).items() if k not in untimed}
         assert kept == {k: v for k, v in theirs.items() if k not in untimed}

@@ -21,9 +21,19 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     source, out = tmp_path_factory.mktemp('source'), tmp_path_factory.mktemp('wheel')
     # Links: setuptools reads through them; what it writes stays beside them.
     for name in (
-        'pyproject.toml', 'setup.py', 'setup.cfg', 'README.md', 'LICENSE', 'package.xml',
-        'resource', 'launch', 'config', 'actuator_glue', 'studies', 'examples',
-    ):  # fmt: skip
+        'pyproject.toml',
+        'setup.py',
+        'setup.cfg',
+        'README.md',
+        'LICENSE',
+        'package.xml',
+        'resource',
+        'launch',
+        'config',
+        'actuator_glue',
+        'studies',
+        'examples',
+    ):
         (source / name).symlink_to(ROOT / name)
     command = ['-m', 'pip', 'wheel', '--quiet', '--no-deps', '--no-build-isolation', '-w', out]
     subprocess.run([sys.executable, *command, '.'], cwd=source, check=True)
@@ -94,8 +104,12 @@ def test_command_line_works_in_a_bare_environment(wheel: Path, tmp_path: Path) -
     ):
         done = subprocess.run(
             [tools / 'actuator-glue', *line.split()],
-            env=environment, cwd=tmp_path, capture_output=True, text=True, check=False,
-        )  # fmt: skip
+            env=environment,
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
         assert done.returncode in statuses, f'{line}: {done.stdout}{done.stderr}'
     without = 'import importlib.util as u; assert not u.find_spec("rclpy"); import actuator_glue'
     subprocess.run([tools / 'python', '-c', without], env=environment, cwd=tmp_path, check=True)

@@ -156,9 +156,15 @@ def simulate(
         part = slice(start, min(start + BLOCK, len(samples)))
         measured[part], force[part] = moved.step(samples[part])
     return Record(
-        samples, measured, 1.0 / rate, known, force, hold=hold, actuator='simulated',
+        samples,
+        measured,
+        1.0 / rate,
+        known,
+        force,
+        hold=hold,
+        actuator='simulated',
         source='simulated',
-    )  # fmt: skip
+    )
 
 
 def samples_of(command: Command | Record) -> Array:

@@ -12,7 +12,7 @@ import numpy as np
 
 from actuator_glue.inference import student
 from actuator_glue.inference.archive import newest
-from actuator_glue.inference.moves import UNTEMPERED, Knobs, ProposalContext, Tuning
+from actuator_glue.inference.moves.move import UNTEMPERED, Knobs, ProposalContext, Tuning
 from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.inference.transforms.log import Log
 from actuator_glue.jit import njit
@@ -47,14 +47,17 @@ def tuned(points: Array, counts: Array, settings: SamplerSettings, box: Log) -> 
         lower=box.low,
         width=box.width,
         tuning=Tuning(
-            np.empty(len(moves)), np.empty(settings.crossovers), np.empty(d), np.empty(d),
+            np.empty(len(moves)),
+            np.empty(settings.crossovers),
+            np.empty(d),
+            np.empty(d),
             np.empty((d, d)),
         ),
         tempering=UNTEMPERED,
         fixed=np.array([-1.0 if move.share is None else move.share for move in moves]),
         most=np.array([move.most for move in moves]),
         knobs=Knobs(settings.pairs, settings.unit_jump, settings.jitter, settings.noise),
-    )  # fmt: skip
+    )
     _fit(points, counts, context, True)
     return context
 
@@ -151,9 +154,18 @@ def rescue(z: Array, x: Array, values: Array, target: Array, total: Array) -> No
 
 @njit(fastmath=False)
 def learn(
-    z: Array, x: Array, values: Array, target: Array, total: Array, rows: Array, size: int,
-    counts: Array, context: ProposalContext, burning: bool, fitted: int,
-) -> int:  # fmt: skip
+    z: Array,
+    x: Array,
+    values: Array,
+    target: Array,
+    total: Array,
+    rows: Array,
+    size: int,
+    counts: Array,
+    context: ProposalContext,
+    burning: bool,
+    fitted: int,
+) -> int:
     """Have the moves follow an archive that has grown, in place; return its size at the last fit.
 
     In burn-in outlier chains are rescued and everything is fitted anew; after it only when the

@@ -20,7 +20,7 @@ from actuator_glue.inference.adaptation import empty_counts, tuned
 from actuator_glue.inference.archive import Archive
 from actuator_glue.inference.compiled import compiled
 from actuator_glue.inference.evaluate import LogDensity, check_values, evaluate
-from actuator_glue.inference.moves import UNTEMPERED, Tempering, uniforms_per_chain
+from actuator_glue.inference.moves.move import UNTEMPERED, Tempering, uniforms_per_chain
 from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.inference.steps import ChainState, Course, many
 from actuator_glue.inference.transforms.log import Log
@@ -102,9 +102,18 @@ def anneal(
     while power < 1.0 and evaluations + chains * settings.steps <= most:
         chosen = np.empty(len(z), np.intp)
         power = _reweigh(
-            z, values, log_jacobian, reference.centre, reference.factor, power, settings.survivors,
-            rng.random(2), chosen, start, target,
-        )  # fmt: skip
+            z,
+            values,
+            log_jacobian,
+            reference.centre,
+            reference.factor,
+            power,
+            settings.survivors,
+            rng.random(2),
+            chosen,
+            start,
+            target,
+        )
         archive = Archive.of(z[chosen])
         tempering = Tempering(power, reference.centre, reference.factor)
         context = tuned(archive.rows, counts, settings, box)._replace(tempering=tempering)
@@ -125,10 +134,18 @@ def anneal(
 # Strict floating point: not-a-number and minus infinity are asked for.
 @njit(fastmath=False)
 def _reweigh(
-    z: Array, values: Array, log_jacobian: Array, centre: Array, factor: Array, power: float,
-    survivors: float, places: Array, chosen: NDArray[np.intp], start: NDArray[np.intp],
+    z: Array,
+    values: Array,
+    log_jacobian: Array,
+    centre: Array,
+    factor: Array,
+    power: float,
+    survivors: float,
+    places: Array,
+    chosen: NDArray[np.intp],
+    start: NDArray[np.intp],
     target: Array,
-) -> float:  # fmt: skip
+) -> float:
     """Return the next power; resample the points z (m, p) by the weights that leads to.
 
     Args:

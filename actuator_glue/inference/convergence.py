@@ -78,9 +78,12 @@ def rhat_and_ess(draws: Array) -> tuple[Array, Array]:
     values = split.reshape(len(split), -1)
     bulk, folded = np.empty_like(split), np.empty_like(split)
     _rank(
-        values, np.argsort(values, axis=1), _scores(values.shape[1]), bulk.reshape(values.shape),
+        values,
+        np.argsort(values, axis=1),
+        _scores(values.shape[1]),
+        bulk.reshape(values.shape),
         folded.reshape(values.shape),
-    )  # fmt: skip
+    )
     reduction = np.maximum(_potential_reduction(bulk, 1.0), _potential_reduction(folded, 1.0))
     return reduction, _effective(bulk)
 

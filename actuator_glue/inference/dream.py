@@ -24,7 +24,7 @@ from actuator_glue.inference.archive import Archive
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.compiled import compiled
 from actuator_glue.inference.evaluate import LogDensity, check_values, evaluate
-from actuator_glue.inference.moves import Tuning, uniforms_per_chain
+from actuator_glue.inference.moves.move import Tuning, uniforms_per_chain
 from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.inference.state import Info, State
 from actuator_glue.inference.steps import ChainState, Path, enter, many, one
@@ -133,9 +133,14 @@ def step(rng: np.random.Generator, state: State) -> tuple[State, Info]:
     state = _own(state)
     course, archive, fitted = state.course, state.archive, state.fitted
     now, accepted, label = one(
-        _uniforms(rng, state, 1)[0], state.now, archive, state.context, course.moves,
-        state.log_density, state.counts,
-    )  # fmt: skip
+        _uniforms(rng, state, 1)[0],
+        state.now,
+        archive,
+        state.context,
+        course.moves,
+        state.log_density,
+        state.counts,
+    )
     if state.adapting:
         state.sum_log_density[:] += now.log_density
     if state.until_append == 1:
@@ -151,9 +156,14 @@ def stretch(rng: np.random.Generator, state: State, count: int) -> tuple[State, 
     """
     state = _own(state)
     now, archive, fitted, path = many(
-        _uniforms(rng, state, count), state.now, state.archive, state.course, state.counts,
-        state.until_append, state.learning,
-    )  # fmt: skip
+        _uniforms(rng, state, count),
+        state.now,
+        state.archive,
+        state.course,
+        state.counts,
+        state.until_append,
+        state.learning,
+    )
     return _later(state, now, archive, fitted, count), path
 
 

@@ -11,8 +11,9 @@ import math
 import numpy as np
 
 from actuator_glue.inference import student
-from actuator_glue.inference.moves import (
-    MOVES,
+from actuator_glue.inference.moves import MOVES
+from actuator_glue.inference.moves.draw import choose
+from actuator_glue.inference.moves.move import (
     U_ACCEPT,
     U_MOVE,
     ProposalContext,
@@ -21,7 +22,6 @@ from actuator_glue.inference.moves import (
     Workspace,
     dispatch,
 )
-from actuator_glue.inference.moves.draw import choose
 from actuator_glue.inference.transforms.log import physical
 from actuator_glue.jit import njit
 from actuator_glue.records import Array
@@ -31,9 +31,15 @@ _propose_by = dispatch(MOVES)
 
 @njit
 def propose(
-    z: Array, uniforms: Array, rows: Array, size: int, context: ProposalContext,
-    candidate: Array, x: Array, workspace: Workspace,
-) -> None:  # fmt: skip
+    z: Array,
+    uniforms: Array,
+    rows: Array,
+    size: int,
+    context: ProposalContext,
+    candidate: Array,
+    x: Array,
+    workspace: Workspace,
+) -> None:
     """Write a candidate of every chain, (n, p), x the same in physical units, and `workspace`."""
     tuning, knobs, scratch = context.tuning, context.knobs, workspace.scratch
     for i in range(z.shape[0]):
@@ -89,9 +95,16 @@ def expect(target: Array, power: float, workspace: Workspace) -> None:
 
 @njit
 def accept(
-    z: Array, x: Array, log_density: Array, target: Array, new_z: Array, new_x: Array,
-    new_log_density: Array, new_target: Array, workspace: Workspace,
-) -> int:  # fmt: skip
+    z: Array,
+    x: Array,
+    log_density: Array,
+    target: Array,
+    new_z: Array,
+    new_x: Array,
+    new_log_density: Array,
+    new_target: Array,
+    workspace: Workspace,
+) -> int:
     """Metropolis-Hastings: overwrite the new_ arrays with the current state where rejected.
 
     A target that is not a number is rejected. Returns the first chain whose candidate has a

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Literal
 
 from actuator_glue.errors import InputError
-from actuator_glue.inference.moves import MOVES, PUBLISHED, Move
+from actuator_glue.inference.moves import MOVES, PUBLISHED
+from actuator_glue.inference.moves.move import Move
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from actuator_glue.inference.archive import Archive
 from actuator_glue.inference.compiled import compiled
 from actuator_glue.inference.evaluate import LogDensity
-from actuator_glue.inference.moves import ProposalContext
+from actuator_glue.inference.moves.move import ProposalContext
 from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.inference.steps import ChainState, Course, Learning
 from actuator_glue.records import Array

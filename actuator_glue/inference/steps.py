@@ -16,7 +16,8 @@ from actuator_glue.inference.archive import Archive
 from actuator_glue.inference.compiled import Compiled, log_densities
 from actuator_glue.inference.evaluate import LogDensity, evaluate, refuse_infinite
 from actuator_glue.inference.metropolis import propose
-from actuator_glue.inference.moves import MOVES, Move, ProposalContext, dispatch, workspace
+from actuator_glue.inference.moves import MOVES
+from actuator_glue.inference.moves.move import Move, ProposalContext, dispatch, workspace
 from actuator_glue.jit import njit
 from actuator_glue.records import Array
 
@@ -136,9 +137,15 @@ def enter(
     """
     archive = archive.append(now.z)
     fitted = adaptation.learn(
-        *now, learning.total, archive.capacity_rows, archive.size, counts, context,
-        learning.adapting > 0, learning.fitted,
-    )  # fmt: skip
+        *now,
+        learning.total,
+        archive.capacity_rows,
+        archive.size,
+        counts,
+        context,
+        learning.adapting > 0,
+        learning.fitted,
+    )
     return archive, int(fitted)
 
 
@@ -198,10 +205,21 @@ def many(
         if course.density is not None:
             target[0] = now.log_target
             more, size, fitted = kernels(course.moves).advance(
-                uniforms[done:], *now[:3], archive.capacity_rows, archive.size,
-                until_append - done, every, context, course.density, counts, path.z[done:],
-                path.x[done:], path.log_density[done:], target, learning,
-            )  # fmt: skip
+                uniforms[done:],
+                *now[:3],
+                archive.capacity_rows,
+                archive.size,
+                until_append - done,
+                every,
+                context,
+                course.density,
+                counts,
+                path.z[done:],
+                path.x[done:],
+                path.log_density[done:],
+                target,
+                learning,
+            )
             archive = archive.grown(size)
             learning = Learning(learning.total, learning.adapting - more, int(fitted))
             done += more
@@ -227,10 +245,23 @@ def many(
 
 @njit(**_STRICT)
 def _advance(
-    uniforms: Array, z: Array, x: Array, values: Array, rows: Array, size: int, until_append: int,
-    every: int, context: ProposalContext, density: Compiled, counts: Array, path_z: Array,
-    path_x: Array, path_values: Array, target: Array, learning: Learning,
-) -> tuple[int, int, int]:  # fmt: skip
+    uniforms: Array,
+    z: Array,
+    x: Array,
+    values: Array,
+    rows: Array,
+    size: int,
+    until_append: int,
+    every: int,
+    context: ProposalContext,
+    density: Compiled,
+    counts: Array,
+    path_z: Array,
+    path_x: Array,
+    path_values: Array,
+    target: Array,
+    learning: Learning,
+) -> tuple[int, int, int]:
     """Do steps, in place; return how many, the archive's size, and that at the last fit.
 
     The target of the chains is read from target[0] and ends in target[count % 2].

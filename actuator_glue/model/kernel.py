@@ -189,9 +189,13 @@ def respond(
         # Four samples per pass: loading and storing the lanes costs more than stepping them.
         while i + 5 < n:
             u0, u1, u2, u3, u4, u5 = (
-                command[i], command[i + 1], command[i + 2], command[i + 3], command[i + 4],
+                command[i],
+                command[i + 1],
+                command[i + 2],
+                command[i + 3],
+                command[i + 4],
                 command[i + 5],
-            )  # fmt: skip
+            )
             for j in range(L):
                 y, d = S[_Y * L + j], S[_D * L + j]
                 decay, pull = S[_DECAY * L + j], S[_PULL * L + j]

@@ -11,9 +11,17 @@ from actuator_glue.records import Array
 
 # Sampling coordinates of an effect's parameters (`ridge_effects`), in the order they are undone.
 Coordinate: TypeAlias = Literal[
-    'gain', 'damping', 'share', 'sliding-force', 'mass-damping', 'lost-share', 'flow', 'per-flow',
-    'log', 'line',
-]  # fmt: skip
+    'gain',
+    'damping',
+    'share',
+    'sliding-force',
+    'mass-damping',
+    'lost-share',
+    'flow',
+    'per-flow',
+    'log',
+    'line',
+]
 
 
 @dataclass(frozen=True, slots=True)

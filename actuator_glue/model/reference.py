@@ -51,8 +51,9 @@ def _thinned(record: Record, every: int) -> Record:
 def _search(record: Record, settle: int, start: Array, held: bool) -> Array:
     """Return the best point of a grid that is drawn ever closer around its best point."""
     measured = ExactErrors([record], settle)
-    still = Record(record.command, 0.0 * record.measured, record.period, record.stiffness,
-                   hold=record.hold)  # fmt: skip
+    still = Record(
+        record.command, 0.0 * record.measured, record.period, record.stiffness, hold=record.hold
+    )
     silent = ExactErrors([still], settle)
     measured.starts = silent.starts = (start,)
     n = len(record) - settle

@@ -37,10 +37,8 @@ from actuator_glue.records import Array
 
 _njit: Any = partial(njit, fastmath=False)
 
-# In the order in which they are undone.
-(
-    GAIN, DAMPING, SHARE, SLIDING, MASS_DAMPING, LOST_SHARE, FLOW, PER_FLOW, LOG, LINE,
-) = range(10)  # fmt: skip
+# In the order of `Coordinate`, in which they are undone.
+GAIN, DAMPING, SHARE, SLIDING, MASS_DAMPING, LOST_SHARE, FLOW, PER_FLOW, LOG, LINE = range(10)
 # No machine's d0/n0 is larger by more: it would lose ten parts in eleven of its static command.
 _STATIC = 10.0
 # No servo-valve is slower.
@@ -121,9 +119,15 @@ def _factor(kind: int, theta: Array, oil: Any) -> Any:
 
 @_njit
 def physical(
-    z: Array, k: float, low: Array, high: Array, at: NDArray[np.int64], middle: float, phi: Array,
+    z: Array,
+    k: float,
+    low: Array,
+    high: Array,
+    at: NDArray[np.int64],
+    middle: float,
+    phi: Array,
     theta: Array,
-) -> Any:  # fmt: skip
+) -> Any:
     """Fill theta (p,) from coordinates z (p,), return the log Jacobian less a constant.
 
     It is minus infinity where theta lies outside low..high. `at` is from `columns`, phi (4,) is
@@ -182,9 +186,15 @@ def physical(
 
 @_njit
 def physical_all(
-    z: Array, k: float, low: Array, high: Array, at: NDArray[np.int64], middle: float,
-    theta: Array, log_jacobian: Array,
-) -> None:  # fmt: skip
+    z: Array,
+    k: float,
+    low: Array,
+    high: Array,
+    at: NDArray[np.int64],
+    middle: float,
+    theta: Array,
+    log_jacobian: Array,
+) -> None:
     """Fill theta (m, p) and the log Jacobian (m,)."""
     phi = np.empty(4)
     for i in range(len(z)):

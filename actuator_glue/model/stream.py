@@ -82,9 +82,13 @@ class Stream:
             self._table = lti.tables(self._values, self.stiffness, self.period, linear, start)[0]
         else:
             self._table = run.tables(
-                self._values, self.structure.program, self.stiffness, self._substeps, self.period,
+                self._values,
+                self.structure.program,
+                self.stiffness,
+                self._substeps,
+                self.period,
                 start,
-            )[0]  # fmt: skip
+            )[0]
         self._history = np.zeros(1)
         self._offset = -1
         self._begin = 0

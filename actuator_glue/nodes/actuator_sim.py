@@ -34,9 +34,7 @@ SPECS = (
     Spec('rate', 1000.0, 'sample rate', 'Hz', 1.0, 20_000.0, True),
     Spec('block', 10, 'samples per message', '1', 1, 100_000, True),
     Spec('specimen_stiffness', 250e3, 'specimen stiffness k', 'N/m', 0.0, 1e9),
-    *(
-        Spec(p.name, _TRUE[p.name], p.meaning, p.unit, p.lower, p.upper, True) for p in BASE
-    ),
+    *(Spec(p.name, _TRUE[p.name], p.meaning, p.unit, p.lower, p.upper, True) for p in BASE),
     Spec('command', 'sweep', 'commanded displacement', read_only=True, choices=COMMANDS),
     Spec('command_file', '', 'bag or laboratory file whose command is used', read_only=True),
     Spec('channels', '', 'channel map of command_file', read_only=True),
@@ -55,15 +53,20 @@ SPECS = (
     Spec('preview', 0.0, 'how far ahead commands are published, 0 for not', 's', 0.0, 60.0, True),
     *streamer.specs(exit_at_end=False),
     Spec(
-        'undeclared_effect', '', f'effects of the plant, told to nobody; {undeclared.FORM}',
+        'undeclared_effect',
+        '',
+        f'effects of the plant, told to nobody; {undeclared.FORM}',
         secret=True,
     ),
     own_effects.SPEC,
     Spec(
-        'sealed_file', '', 'file that gets the truth about undeclared_effect, empty for '
-        '~/.ros/actuator_glue/truth_DATE-TIME.json', read_only=True,
+        'sealed_file',
+        '',
+        'file that gets the truth about undeclared_effect, empty for '
+        '~/.ros/actuator_glue/truth_DATE-TIME.json',
+        read_only=True,
     ),
-)  # fmt: skip
+)
 
 
 class SimulatorNode(streamer.Streamer):

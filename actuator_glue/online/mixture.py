@@ -62,9 +62,14 @@ def _sums(at: float, x: Array, inverse: Array, drift: Array) -> tuple[float, flo
 
 @njit
 def _direct(
-    x: Array, inverse: Array, drift: Array, probability: Array, start: Array, limits: Array,
+    x: Array,
+    inverse: Array,
+    drift: Array,
+    probability: Array,
+    start: Array,
+    limits: Array,
     coming: Array,
-) -> None:  # fmt: skip
+) -> None:
     """Solve F(limit) = probability, F the mean of normal distribution functions.
 
     Newton's steps; one that leaves the bracket, or a density that vanishes between components, is

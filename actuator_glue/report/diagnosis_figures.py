@@ -158,9 +158,13 @@ def loops(found: DiagnosisData) -> Figure:
             velocity = np.gradient(simulated, trace.time)
             left.plot(1e3 * simulated[part], residual[part], color=color, lw=0.6)
             right.plot(
-                1e3 * velocity[::step], residual[::step], '.', ms=0.8, color=color,
+                1e3 * velocity[::step],
+                residual[::step],
+                '.',
+                ms=0.8,
+                color=color,
                 label=_text(found, side),
-            )  # fmt: skip
+            )
         left.set_title(_title(trace, style.WIDTH - 0.7))
         left.set_xlabel('displacement [mm] (slow part)')
         left.set_ylabel('residual [um]')

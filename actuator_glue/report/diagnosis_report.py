@@ -147,14 +147,21 @@ def _residual(found: DiagnosisData) -> Section:
             ),
             Table(['statistic', 'value'], tests, 'Statistics of the residual of Eq. (2).'),
             Table(
-                ['record', 'structure [um]', 'noise [um]', 'frequency [Hz]', 'time [s]',
-                 'displacement [mm]',
-                 'at low velocity [%]', 'at large displacement [%]'],
+                [
+                    'record',
+                    'structure [um]',
+                    'noise [um]',
+                    'frequency [Hz]',
+                    'time [s]',
+                    'displacement [mm]',
+                    'at low velocity [%]',
+                    'at large displacement [%]',
+                ],
                 rows,
                 'Where the rest after the diagnosis sits on the fitting part (middle 80 %).',
             ),
         ],
-    )  # fmt: skip
+    )
 
 
 def _records(found: DiagnosisData) -> Section:

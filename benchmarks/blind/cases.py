@@ -256,6 +256,17 @@ def build(seed: int) -> Case:
     if seen or not ratio:
         ratio = left(measured if seen else clean)
     return Case(
-        seed, kind, names, theta, plant.RATE, STIFFNESS, commands, measured, clean, ratio, colour,
-        sizes, shares,
-    )  # fmt: skip
+        seed,
+        kind,
+        names,
+        theta,
+        plant.RATE,
+        STIFFNESS,
+        commands,
+        measured,
+        clean,
+        ratio,
+        colour,
+        sizes,
+        shares,
+    )

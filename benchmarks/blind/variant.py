@@ -133,6 +133,17 @@ def build(seed: int) -> Case:
     if seen or not ratio:
         ratio = left(measured if seen else clean)
     return Case(
-        seed, kind, names, theta, plant.RATE, STIFFNESS, inputs, measured, clean, ratio,
-        float(colour), sizes, shares,
-    )  # fmt: skip
+        seed,
+        kind,
+        names,
+        theta,
+        plant.RATE,
+        STIFFNESS,
+        inputs,
+        measured,
+        clean,
+        ratio,
+        float(colour),
+        sizes,
+        shares,
+    )

@@ -72,11 +72,16 @@ def write(results: Results, out: Path, made: str) -> int:
     for name, curve in drawn.items():
         write_curve(out / 'curves' / f'{name}.csv', curve)
     numbers = {
-        'schema': SCHEMA, 'version': __version__, 'source': published.SOURCE,
-        'seed': results.seed, 'quick': results.quick, 'sensor_noise': NOISE, 'level': LEVEL,
+        'schema': SCHEMA,
+        'version': __version__,
+        'source': published.SOURCE,
+        'seed': results.seed,
+        'quick': results.quick,
+        'sensor_noise': NOISE,
+        'level': LEVEL,
         'tables': {name: table.records() for name, table in tables.items()},
         'diagnosis': {name: found.to_json() for name, found in results.diagnoses.items()},
-    }  # fmt: skip
+    }
     write_json(numbers, str(out / 'results.json'))
     report.write(results, out / 'report.html', made=made)
     return len(tables) + len(drawn)
@@ -120,10 +125,15 @@ def progress() -> Iterator[Callable[[str, float], None]]:
     """Show stage, bar and time left; where standard error is no terminal, one line per stage."""
     console = Console(stderr=True)
     bar = Progress(
-        TextColumn('{task.description:<38}'), BarColumn(), TextColumn('{task.percentage:3.0f} %'),
-        TimeElapsedColumn(), TextColumn('left'), TimeRemainingColumn(), console=console,
+        TextColumn('{task.description:<38}'),
+        BarColumn(),
+        TextColumn('{task.percentage:3.0f} %'),
+        TimeElapsedColumn(),
+        TextColumn('left'),
+        TimeRemainingColumn(),
+        console=console,
         disable=not console.is_terminal,
-    )  # fmt: skip
+    )
     last = ''
     with bar:
         task = bar.add_task('starting', total=1.0)

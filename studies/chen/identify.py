@@ -41,9 +41,14 @@ def least(
         return 1e3 * error(relative * scale)
 
     solution = least_squares(
-        in_mm, np.ones(len(scale)), jac='3-point', bounds=(lower / scale, upper / scale),
-        xtol=1e-14, ftol=1e-14, gtol=1e-14,
-    )  # fmt: skip
+        in_mm,
+        np.ones(len(scale)),
+        jac='3-point',
+        bounds=(lower / scale, upper / scale),
+        xtol=1e-14,
+        ftol=1e-14,
+        gtol=1e-14,
+    )
     theta = np.clip(solution.x * scale, lower, upper)
     return theta, 1e-3 * np.asarray(solution.jac) / scale, 1e-3 * np.asarray(solution.fun)
 

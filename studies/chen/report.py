@@ -29,12 +29,16 @@ def prose(results: Results) -> str:
     """
     environment = Environment(loader=FileSystemLoader(TEMPLATES), undefined=StrictUndefined)
     environment.filters |= {
-        'num': words.num, 'percent': words.percent, 'power': words.power_of_two,
-        'listed': words.listed, 'reached': findings.reached, 'stiffness': stiffness_name,
+        'num': words.num,
+        'percent': words.percent,
+        'power': words.power_of_two,
+        'listed': words.listed,
+        'reached': findings.reached,
+        'stiffness': stiffness_name,
         'um': lambda rms, digits=3: words.num(rms, digits, 1e6) + ' µm',
         'mm': lambda rms: f'{1e3 * rms:.2f} mm',
         'signed': lambda share, digits=0: words.percent(float(share), digits, sign=True),
-    }  # fmt: skip
+    }
     names: dict[str, Any] = {
         m.__name__.rpartition('.')[2]: m
         for m in (findings, identify, library, published, responses, shaping, spread)

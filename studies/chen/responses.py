@@ -162,7 +162,11 @@ def _scored(
     )
     observed = record.measured[chosen]
     scores = score(
-        observed, cut, LEVEL, crps=crps_ensemble(observed, draws[:, chosen]),
-        frequency_hz=frequencies(record)[chosen], edges_hz=EDGES,
-    )  # fmt: skip
+        observed,
+        cut,
+        LEVEL,
+        crps=crps_ensemble(observed, draws[:, chosen]),
+        frequency_hz=frequencies(record)[chosen],
+        edges_hz=EDGES,
+    )
     return TimeBand(limits, np.array(inside), scores)

@@ -130,9 +130,13 @@ def study(
     word, found = round(added_rms * 1e9), []
     for i, factor in enumerate(shaping_factors):
         published = laboratory.run(
-            (50, i, word), whole, factor, evaluations[1], added_rms=added_rms,
+            (50, i, word),
+            whole,
+            factor,
+            evaluations[1],
+            added_rms=added_rms,
             settings=AS_PUBLISHED,
-        )  # fmt: skip
+        )
         ours = laboratory.run((51, i, word), whole, factor, evaluations[0], added_rms=added_rms)
         part = laboratory.run((52, i, word), kept, factor, evaluations[0], added_rms=added_rms)
         inside, width = _held_out(part.thinned(draws), records, added_rms)

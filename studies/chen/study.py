@@ -167,9 +167,13 @@ def study(seed: int = 1, *, quick: bool = False, progress: Progress | None = Non
     for name, added in (('sensor', 0.0), ('matched', wide.matched.added_rms)):
         laboratory.enter(f'shaping factors, {name} residual')
         shaped[name] = shaping.study(
-            laboratory, records, effort.shaping_factors, (effort.short, effort.published),
-            added_rms=added, draws=min(effort.draws, 400),
-        )  # fmt: skip
+            laboratory,
+            records,
+            effort.shaping_factors,
+            (effort.short, effort.published),
+            added_rms=added,
+            draws=min(effort.draws, 400),
+        )
 
     laboratory.enter('bands')
     thetas = {
@@ -204,7 +208,21 @@ def study(seed: int = 1, *, quick: bool = False, progress: Progress | None = Non
         covered.append(simulated_case(1000 * seed + i))
         laboratory.add(EVALUATIONS)
     return Results(
-        seed, quick, records, readings, identified, physical, sensor, wide, shapes, shaped,
+        seed,
+        quick,
+        records,
+        readings,
+        identified,
+        physical,
+        sensor,
+        wide,
+        shapes,
+        shaped,
         {kind: shaping.choose(entries) for kind, entries in shaped.items()},
-        curves, frequency, time, refits, diagnoses, covered,
-    )  # fmt: skip
+        curves,
+        frequency,
+        time,
+        refits,
+        diagnoses,
+        covered,
+    )

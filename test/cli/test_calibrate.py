@@ -19,9 +19,18 @@ def test_problem_r_from_csv_files(run, problem_r: Path, tmp_path: Path, rng_seed
     """
     records = (problem_r / 'r_1.csv', problem_r / 'r_2.csv')
     done = run(
-        'calibrate', *records, '--stiffness', 0, 250e3, '--seed', rng_seed,
-        '--draws', tmp_path / 'draws.npz', '--json', '-',
-    )  # fmt: skip
+        'calibrate',
+        *records,
+        '--stiffness',
+        0,
+        250e3,
+        '--seed',
+        rng_seed,
+        '--draws',
+        tmp_path / 'draws.npz',
+        '--json',
+        '-',
+    )
     assert done.code == 0, done.err
     content = done.json
     assert content['schema'] == 'actuator_glue.calibration/1'

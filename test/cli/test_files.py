@@ -300,13 +300,24 @@ def test_a_bad_set_up_is_told_and_the_rest_is_used(run, tmp_path: Path, short_ba
 
     (record,) = load_records(short_bag)
     wrong = messages.message(
-        'TestSetup', header=messages.header(record.start_ns, ''), actuator='a', index=0, rate=100,
-        specimen_stiffness=0.0, hold='cubic', source='',
-    )  # fmt: skip
+        'TestSetup',
+        header=messages.header(record.start_ns, ''),
+        actuator='a',
+        index=0,
+        rate=100,
+        specimen_stiffness=0.0,
+        hold='cubic',
+        source='',
+    )
     block = messages.message(
-        'SampleBlock', header=messages.header(0, ''), period=np.nan, index=10**6,
-        command=np.zeros(2), measured=np.zeros(2), force=np.zeros(0),
-    )  # fmt: skip
+        'SampleBlock',
+        header=messages.header(0, ''),
+        period=np.nan,
+        index=10**6,
+        command=np.zeros(2),
+        measured=np.zeros(2),
+        force=np.zeros(0),
+    )
     for name in ('set-up', 'set-up and block'):
         with BagWriter(tmp_path / name) as writer:
             write_record(writer, record)

@@ -110,12 +110,24 @@ def test_play_is_named_and_removed() -> None:
     out = json.loads(json.dumps(found.to_json(), allow_nan=False))
     assert out['schema'] == 'actuator_glue.diagnosis/1'
     assert set(out) >= {
-        'verdict', 'effects', 'error', 'candidates', 'coverage', 'advice', 'seconds'
-    }  # fmt: skip
+        'verdict',
+        'effects',
+        'error',
+        'candidates',
+        'coverage',
+        'advice',
+        'seconds',
+    }
     assert set(out['error']) >= {
-        'unit', 'split', 'before', 'before_ci', 'after', 'after_ci', 'noise_floor',
+        'unit',
+        'split',
+        'before',
+        'before_ci',
+        'after',
+        'after_ci',
+        'noise_floor',
         'removable_removed',
-    }  # fmt: skip
+    }
     assert out['candidates'][0]['name'] == 'backlash'
 
 

@@ -30,9 +30,24 @@ def diagnosis(
     alarm = Alarm(verdict != 'none', 1e-5, 5e-6, noise, 0.01)
     judged = conclude(verdict, any(e.noise is None for e in effects), error, alarm.threshold)
     return module.Diagnosis(
-        judged, effects, error, (), (0.9, 0.9), alarm, (), {}, (), (), NONE, 1.0, NONE, (),
-        {}, {'left': 12e-6}, 1.0,
-    )  # fmt: skip
+        judged,
+        effects,
+        error,
+        (),
+        (0.9, 0.9),
+        alarm,
+        (),
+        {},
+        (),
+        (),
+        NONE,
+        1.0,
+        NONE,
+        (),
+        {},
+        {'left': 12e-6},
+        1.0,
+    )
 
 
 @pytest.mark.parametrize(

@@ -17,8 +17,12 @@ FASTER = Path(os.environ.get('ACTUATOR_GLUE_FASTER', MTS.parent / 'faster')) / '
 FLOW = {'flow-asymmetry', 'flow-saturation', 'pressure-flow', 'supply-droop'}
 REVERSAL = {'backlash', 'valve-deadband', 'coulomb-friction', 'stribeck-friction'}
 SPECIMEN = {
-    'viscous-damping', 'payload-inertia', 'specimen-gap', 'specimen-hardening', 'specimen-yield'
-}  # fmt: skip
+    'viscous-damping',
+    'payload-inertia',
+    'specimen-gap',
+    'specimen-hardening',
+    'specimen-yield',
+}
 
 
 def mts() -> list[Record]:

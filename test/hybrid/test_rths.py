@@ -36,21 +36,39 @@ def posterior(
         for p, c in zip(structure.parameters, map(float, centre), strict=True)
     }
     return ag.Calibration(
-        parameters=marginals, draws=draws, log_density=np.zeros((250, 4)), best=centre,
-        error=FitError(0.0, 0.0, ()), at_bound=(), problems=(), notes=(), converged=True,
-        effects=effects, likelihood='glue', shaping_factor=256.0, seed=1, initial='rest',
-        settle=0.0, evaluations=1, seconds=0.0, compile_seconds=0.0,
+        parameters=marginals,
+        draws=draws,
+        log_density=np.zeros((250, 4)),
+        best=centre,
+        error=FitError(0.0, 0.0, ()),
+        at_bound=(),
+        problems=(),
+        notes=(),
+        converged=True,
+        effects=effects,
+        likelihood='glue',
+        shaping_factor=256.0,
+        seed=1,
+        initial='rest',
+        settle=0.0,
+        evaluations=1,
+        seconds=0.0,
+        compile_seconds=0.0,
         sources=(CalibratedRecord('test', 1, 200.0, 250e3, 'zoh'),),
-    )  # fmt: skip
+    )
 
 
 def structure(damping: float, delay: float = 0.0, rate: float = 8192.0) -> ag.Partition:
     """One degree of freedom at 1 Hz, all stiffness in the specimen."""
     w = 2.0 * np.pi
     return ag.Partition(
-        mass=1000.0, damping=2.0 * damping * w * 1000.0, stiffness=0.0,
-        specimen=ag.Specimen(0.0, 0.0, w**2 * 1000.0), rate=rate, computation_delay=delay,
-    )  # fmt: skip
+        mass=1000.0,
+        damping=2.0 * damping * w * 1000.0,
+        stiffness=0.0,
+        specimen=ag.Specimen(0.0, 0.0, w**2 * 1000.0),
+        rate=rate,
+        computation_delay=delay,
+    )
 
 
 def test_stable_and_unstable_for_certain() -> None:

@@ -11,7 +11,8 @@ from scipy import integrate, stats
 
 from actuator_glue.inference.convergence import ess_bulk
 from actuator_glue.inference.dream import Chains, SamplerSettings, sample
-from actuator_glue.inference.moves import MOVES, PUBLISHED, Move
+from actuator_glue.inference.moves import MOVES, PUBLISHED
+from actuator_glue.inference.moves.move import Move
 from actuator_glue.records import Array
 
 # Every moment test below fails by chance once in a million runs.

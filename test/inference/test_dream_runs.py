@@ -16,7 +16,7 @@ from scipy import stats
 from actuator_glue.errors import InputError
 from actuator_glue.inference.adaptation import rescue
 from actuator_glue.inference.dream import Chains, SamplerSettings, Watchers, init, sample, step
-from actuator_glue.inference.moves import SNOOKER
+from actuator_glue.inference.moves.snooker import SNOOKER
 from actuator_glue.inference.posterior import Target
 from actuator_glue.inference.posterior import sample as sample_posterior
 from actuator_glue.records import Array
@@ -44,9 +44,12 @@ def test_same_seed_same_bits_in_another_process() -> None:
     assert here != _digest(_short(8))
     code = 'import test_dream_runs as t; print(t._digest(t._short(7)))'
     there = subprocess.run(
-        [sys.executable, '-c', code], capture_output=True, text=True, check=True,
+        [sys.executable, '-c', code],
+        capture_output=True,
+        text=True,
+        check=True,
         env={'PYTHONPATH': ':'.join(p for p in sys.path if p)},
-    )  # fmt: skip
+    )
     assert there.stdout.strip() == here
 
 
@@ -64,9 +67,14 @@ def test_burn_in_is_a_share_of_the_run_and_never_ends_inside_the_adaptation(
     settings = SamplerSettings(population=100, burn_in=share)
     target = targets.scales()
     chains = sample(
-        np.random.default_rng(1), target.log_density, target.lower, target.upper,
-        evaluations=evaluations, settings=settings, archive=archive,
-    )  # fmt: skip
+        np.random.default_rng(1),
+        target.log_density,
+        target.lower,
+        target.upper,
+        evaluations=evaluations,
+        settings=settings,
+        archive=archive,
+    )
     steps = len(chains.draws)
     assert chains.burn == max(min(settings.adaptation, steps), int(share * steps))
     assert len(chains.kept) == steps - chains.burn
@@ -108,9 +116,13 @@ def test_the_published_sampler_has_the_published_moves_only() -> None:
     assert [move.name for move in published.moves] == ['parallel', 'snooker']
     target = targets.scales()
     chains = sample(
-        np.random.default_rng(1), target.log_density, target.lower, target.upper,
-        evaluations=6000, settings=published,
-    )  # fmt: skip
+        np.random.default_rng(1),
+        target.log_density,
+        target.lower,
+        target.upper,
+        evaluations=6000,
+        settings=published,
+    )
     assert chains.draws.shape[1] == 3 and chains.start_evaluations == 3
     assert chains.burn == len(chains.draws) // 2
 
@@ -252,9 +264,13 @@ def test_impossible_regions_and_not_a_number_are_never_entered() -> None:
 
     for start in ('annealed', 'prior'):
         chains = sample(
-            np.random.default_rng(0), log_density, [-5.0, -5.0], [5.0, 5.0],
-            evaluations=20_000, settings=SamplerSettings(start=start),
-        )  # fmt: skip
+            np.random.default_rng(0),
+            log_density,
+            [-5.0, -5.0],
+            [5.0, 5.0],
+            evaluations=20_000,
+            settings=SamplerSettings(start=start),
+        )
         draws = chains.posterior()
         assert draws[:, 0].min() >= 0.0
         assert draws[:, 1].max() <= 1.0

@@ -9,15 +9,16 @@ from scipy import stats
 
 from actuator_glue.inference import dream, metropolis, moves, student
 from actuator_glue.inference.adaptation import empty_counts, tuned
-from actuator_glue.inference.moves import (
-    MOVES,
+from actuator_glue.inference.moves import MOVES
+from actuator_glue.inference.moves.draw import distinct
+from actuator_glue.inference.moves.move import (
     NO_CLASS,
     U_FREE,
     Move,
     ProposalContext,
+    uniforms_per_chain,
     workspace,
 )
-from actuator_glue.inference.moves.draw import distinct
 from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.inference.transforms.log import Log
 from actuator_glue.jit import njit
@@ -51,9 +52,7 @@ def _tuned(context: ProposalContext, **parts: Array) -> ProposalContext:
 
 
 def _propose(rng, z, rows, context):
-    uniforms = rng.random(
-        (len(z), moves.uniforms_per_chain(MOVES, z.shape[1], context.knobs.pairs))
-    )
+    uniforms = rng.random((len(z), uniforms_per_chain(MOVES, z.shape[1], context.knobs.pairs)))
     candidate, x = np.empty_like(z), np.empty_like(z)
     space = workspace(*z.shape, context.knobs.pairs)
     metropolis.propose(z, uniforms, rows, len(rows), context, candidate, x, space)
@@ -277,9 +276,13 @@ def test_a_fourth_move_is_registered_from_outside(share: float | None, rng_seed:
     runs = []
     for rng in np.random.default_rng(rng_seed).spawn(8):
         run = dream.sample(
-            rng, target.log_density, target.lower, target.upper, evaluations=15_000,
+            rng,
+            target.log_density,
+            target.lower,
+            target.upper,
+            evaluations=15_000,
             settings=settings,
-        )  # fmt: skip
+        )
         scores = (run.posterior() - target.mean) / target.sd
         runs.append(np.append(scores.mean(axis=0), (scores**2).mean(axis=0)))
     truth = np.repeat((0.0, 1.0), 4)

@@ -182,11 +182,14 @@ def test_chunks_as_rosbag2_may_write_them(tmp_path: Path, bag: Path, compression
         ('', []),
         ('[not: a: list', []),
         ('- {history: 1, depth: 7, reliability: 2, durability: 1, liveliness: 1}', None),
-        ('- {history: keep_last, depth: 7, reliability: best_effort, durability: '
-         'transient_local, liveliness: automatic}', None),
+        (
+            '- {history: keep_last, depth: 7, reliability: best_effort, durability: '
+            'transient_local, liveliness: automatic}',
+            None,
+        ),
         ('- 5', []),
     ],
-)  # fmt: skip
+)
 def test_qos_of_older_bags_is_understood(text: str, expected: list[object] | None) -> None:
     """Numbers of bags before Jazzy become the names that version 9 has."""
     wanted = [Qos('best_effort', 'transient_local', 'keep_last', 7).as_dict()]

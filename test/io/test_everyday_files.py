@@ -137,23 +137,27 @@ def test_tdms(tmp_path: Path) -> None:
     path = tmp_path / 'a.tdms'
     with TdmsWriter(path) as writer:
         for at in (slice(0, 1), slice(1, 2), slice(2, 300), slice(300, COUNT)):
-            writer.write_segment([
-                RootObject({'stiffness_N_per_m': 250e3}),
-                *(
-                    ChannelObject('run', name, column[at], {'unit_string': unit})
-                    for (name, unit), column in zip(UNITS.items(), MATRIX.T, strict=True)
-                ),
-            ])  # fmt: skip
+            writer.write_segment(
+                [
+                    RootObject({'stiffness_N_per_m': 250e3}),
+                    *(
+                        ChannelObject('run', name, column[at], {'unit_string': unit})
+                        for (name, unit), column in zip(UNITS.items(), MATRIX.T, strict=True)
+                    ),
+                ]
+            )
     record = read(path)
     check(record)
     assert record.stiffness == 250e3
     check(read(path, channels=mapped(tuple(f'run/{name}' for name in UNITS))))
     waveform = {'wf_increment': 1e-3, 'wf_start_offset': 0.0}
     with TdmsWriter(tmp_path / 'b.tdms') as writer:
-        writer.write_segment([
-            ChannelObject('run', 'command_mm', COMMAND, waveform),
-            ChannelObject('run', 'measured_mm', MEASURED, waveform),
-        ])  # fmt: skip
+        writer.write_segment(
+            [
+                ChannelObject('run', 'command_mm', COMMAND, waveform),
+                ChannelObject('run', 'measured_mm', MEASURED, waveform),
+            ]
+        )
     check(read(tmp_path / 'b.tdms'), force=False)
 
 
@@ -204,10 +208,20 @@ def test_a_line_of_units_below_the_names(tmp_path: Path, form: str, coding: str)
     path = tmp_path / 'a.csv'
     path.write_bytes('\r\n'.join(lines).encode(coding))
     check(read(path))
-    check(read(path, channels=parse_channel_map({
-        'command': {'column': 'Command', 'unit': 'um'}, 'rate': 1000,
-        'measured': {'column': 'Measured', 'unit': 'mm'},
-        'force': {'column': 'Prüfkraft', 'unit': 'kN'}}, 'map')))  # fmt: skip
+    check(
+        read(
+            path,
+            channels=parse_channel_map(
+                {
+                    'command': {'column': 'Command', 'unit': 'um'},
+                    'rate': 1000,
+                    'measured': {'column': 'Measured', 'unit': 'mm'},
+                    'force': {'column': 'Prüfkraft', 'unit': 'kN'},
+                },
+                'map',
+            ),
+        )
+    )
 
 
 def test_a_missing_library_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

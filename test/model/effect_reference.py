@@ -153,9 +153,14 @@ class Reference:
             speed.direction = -mode if mode != 2 else 0
             event = margin if mode == 2 else speed
             s = solve_ivp(
-                self.rhs, (t, at[-1] + 1e-9), state, dense_output=True, args=(mode,),
-                events=event, **options,
-            )  # fmt: skip
+                self.rhs,
+                (t, at[-1] + 1e-9),
+                state,
+                dense_output=True,
+                args=(mode,),
+                events=event,
+                **options,
+            )
             assert s.success, s.message
             last = int(np.searchsorted(at, s.t[-1], side='right'))
             out[:, done:last] = s.sol(at[done:last])

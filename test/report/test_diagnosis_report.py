@@ -37,9 +37,19 @@ def trace(name: str, held_out: bool, play: float) -> Trace:
     measured = after + 1e-5 * rng.standard_normal(len(time))
     width = 2e-5
     return Trace(
-        f'{FOLDER}/{name}', held_out, time, 250e3, before, measured, before, after,
-        before - width, before + width, after - width, after + width,
-    )  # fmt: skip
+        f'{FOLDER}/{name}',
+        held_out,
+        time,
+        250e3,
+        before,
+        measured,
+        before,
+        after,
+        before - width,
+        before + width,
+        after - width,
+        after + width,
+    )
 
 
 def diagnosis(play: float, records: int = 2) -> DiagnosisData:
@@ -47,23 +57,44 @@ def diagnosis(play: float, records: int = 2) -> DiagnosisData:
     names = (LONG, 'spring.csv')[:records]
     size = Estimate(play, 1e-7, 0.9 * play, 1.1 * play, 'm', 0.0)
     found = Finding(
-        'backlash', (), 1.0, 'sensor', {'backlash': size}, 3e-5, 1e-5, 500.0,
+        'backlash',
+        (),
+        1.0,
+        'sensor',
+        {'backlash': size},
+        3e-5,
+        1e-5,
+        500.0,
         records=(f'{FOLDER}/{LONG}',),
-    )  # fmt: skip
+    )
     effects = (found,) if play else ()
     draws = np.random.default_rng(1).normal(1.0, 1e-3, (400, 4 + len(effects)))
     draws[:, 4:] *= play
     rest = {
-        'source': f'{FOLDER}/{LONG}', 'structure': 1e-6, 'noise': 1e-5, 'frequency_hz': [1, 2],
-        'time_s': [0, 20], 'displacement': [0.0, 2e-3], 'share_at_low_velocity': 0.5,
+        'source': f'{FOLDER}/{LONG}',
+        'structure': 1e-6,
+        'noise': 1e-5,
+        'frequency_hz': [1, 2],
+        'time_s': [0, 20],
+        'displacement': [0.0, 2e-3],
+        'share_at_low_velocity': 0.5,
         'share_at_large_displacement': 0.5,
-    }  # fmt: skip
+    }
     after = 1e-5 if play else 3e-5
     return DiagnosisData(
         verdict='missing-effect' if play else 'none',
         effects=effects,
-        error=HeldOutError(3e-5, (3e-5, 3e-5), after, (after, after), 1e-5, 1.0, (0.9, 1.0), 3e-5,
-                           ((f'{FOLDER}/{LONG}', 3e-5, after),)),
+        error=HeldOutError(
+            3e-5,
+            (3e-5, 3e-5),
+            after,
+            (after, after),
+            1e-5,
+            1.0,
+            (0.9, 1.0),
+            3e-5,
+            ((f'{FOLDER}/{LONG}', 3e-5, after),),
+        ),
         candidates=tuple(Candidate(f'effect-{i}', 1.0, 1e-5 * (1 + i), 0.1) for i in range(14)),
         coverage=(0.4, 0.95),
         alarm=Alarm(bool(play), 3e-5, 1e-6, 1e-5, 0.001),
@@ -75,11 +106,15 @@ def diagnosis(play: float, records: int = 2) -> DiagnosisData:
         rhat=1.0,
         best=draws[0],
         traces=tuple(trace(n, held, play) for held in (False, True) for n in names),
-        surrogate={'structure': ['Eq. (2)'], 'structure_error': 1e-5, 'features': ['u'],
-                   'error': 1e-5},
+        surrogate={
+            'structure': ['Eq. (2)'],
+            'structure_error': 1e-5,
+            'features': ['u'],
+            'error': 1e-5,
+        },
         remaining={'records': [rest]},
         seconds=1.0,
-    )  # fmt: skip
+    )
 
 
 def drawn(name: str, found: DiagnosisData) -> Figure:

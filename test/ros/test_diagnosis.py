@@ -27,9 +27,14 @@ def test_an_undeclared_effect_is_found_and_the_model_goes_on_with_it(start, prob
     probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 120, 'estimator compiled')
     probe.until(lambda: probe.value('diagnoser', 'state') == 'active', 30)
     simulator = start(
-        'actuator_sim', rate=250.0, duration=90.0, wait_for=3, exit_at_end=True,
-        undeclared_effect='backlash:backlash=6e-5', sealed_file=str(sealed),
-    )  # fmt: skip
+        'actuator_sim',
+        rate=250.0,
+        duration=90.0,
+        wait_for=3,
+        exit_at_end=True,
+        undeclared_effect='backlash:backlash=6e-5',
+        sealed_file=str(sealed),
+    )
     assert simulator.wait(180) == 0, simulator.text
     probe.for_a_while(2.0)
     for node in (estimator, diagnoser):

@@ -54,10 +54,17 @@ def test_every_launch_argument_is_used():
 def ended(monkeypatch):
     """What the launch file does at a node's end: called as launch calls it, which is no wheel."""
     for name in {
-        'launch', 'launch.actions', 'launch.conditions', 'launch.event_handlers', 'launch.events',
-        'launch.substitutions', 'launch_ros', 'launch_ros.actions',
-        'launch_ros.parameter_descriptions', 'launch_ros.substitutions',
-    }:  # fmt: skip
+        'launch',
+        'launch.actions',
+        'launch.conditions',
+        'launch.event_handlers',
+        'launch.events',
+        'launch.substitutions',
+        'launch_ros',
+        'launch_ros.actions',
+        'launch_ros.parameter_descriptions',
+        'launch_ros.substitutions',
+    }:
         monkeypatch.setitem(sys.modules, name, MagicMock())
     for kind in 'TimerAction', 'EmitEvent':
         made = lambda kind=kind, **given: SimpleNamespace(kind=kind, **given)  # noqa: E731

@@ -95,10 +95,15 @@ def test_the_first_run_on_a_machine_is_whole(start, probe, tmp_path, monkeypatch
         start('estimator', window=4.0, hop=2.0, time_budget=1.8),
         start('diagnoser', minimum=10.0),
         start(
-            'actuator_sim', rate=200.0, duration=90.0, wait_for=3, preview=3.0,
-            undeclared_effect='backlash:backlash=1e-4', sealed_file=str(sealed),
+            'actuator_sim',
+            rate=200.0,
+            duration=90.0,
+            wait_for=3,
+            preview=3.0,
+            undeclared_effect='backlash:backlash=1e-4',
+            sealed_file=str(sealed),
         ),
-    ]  # fmt: skip
+    ]
     probe.until(lambda: probe.number('estimator', 'windows') >= 5, 1200, 'windows')
     diagnosed = lambda: probe.value('diagnoser', 'last diagnosis')  # noqa: E731
     probe.until(diagnosed, 200, 'a diagnosis')

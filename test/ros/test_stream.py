@@ -85,9 +85,15 @@ def test_the_model_changes_live_and_the_replay_repeats_it(start, probe, tmp_path
     bag = tmp_path / 'bag'
     recorder, estimator = begin(start, probe, bag, **QUICK)
     start(
-        'actuator_sim', rate=RATE, duration=9.0, command='noise', frequency_end=8.0, wait_for=2,
-        undeclared_effect='delay:delay=0.004', sealed_file=str(tmp_path / 'truth.json'),
-    )  # fmt: skip
+        'actuator_sim',
+        rate=RATE,
+        duration=9.0,
+        command='noise',
+        frequency_end=8.0,
+        wait_for=2,
+        undeclared_effect='delay:delay=0.004',
+        sealed_file=str(tmp_path / 'truth.json'),
+    )
     probe.until(lambda: probe.number('estimator', 'windows') >= 3, 60, 'windows')
     refused = probe.call(SetModel, 'estimator/set_model', SetModel.Request(effects=['nothing']))
     assert not refused.success and 'not in the catalogue' in refused.message
@@ -170,9 +176,14 @@ def test_an_undeclared_effect_is_told_to_nobody_but_the_sealed_file(start, probe
     bag, sealed = tmp_path / 'bag', tmp_path / 'truth.json'
     recorder = start('recorder', bag=str(bag), topics=['/parameter_events', '/rosout'])
     simulator = start(
-        'actuator_sim', rate=RATE, duration=4.0, wait_for=1, exit_at_end=False,
-        undeclared_effect='backlash:backlash=6.25e-5', sealed_file=str(sealed),
-    )  # fmt: skip
+        'actuator_sim',
+        rate=RATE,
+        duration=4.0,
+        wait_for=1,
+        exit_at_end=False,
+        undeclared_effect='backlash:backlash=6.25e-5',
+        sealed_file=str(sealed),
+    )
     probe.until(lambda: probe.number('actuator_sim', 'samples') > 100, 30)
     (hidden,) = probe.get('actuator_sim', ['undeclared_effect'])
     assert 'backlash' not in hidden.string_value
@@ -204,9 +215,15 @@ def test_the_measured_record_streams_through_the_suite(start, probe, tmp_path):
     bag = tmp_path / 'bag'
     recorder, estimator = begin(start, probe, bag)
     bridge = start(
-        'lab_bridge', file=str(file), channels=str(ROOT / 'config/channels/mts.yaml'),
-        specimen_stiffness=0.0, speed=4.0, wait_for=2, preview=2.0, block=20,
-    )  # fmt: skip
+        'lab_bridge',
+        file=str(file),
+        channels=str(ROOT / 'config/channels/mts.yaml'),
+        specimen_stiffness=0.0,
+        speed=4.0,
+        wait_for=2,
+        preview=2.0,
+        block=20,
+    )
     assert bridge.wait(90) == 0, bridge.text
     finish(probe, recorder, estimator, 46_800)
     assert np.array_equal(recorded(bag), np.arange(46_800))

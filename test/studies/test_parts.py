@@ -67,9 +67,12 @@ class Entry(NamedTuple):
 
 def test_choice_takes_the_usable_factor_that_covers_best() -> None:
     shaped = [
-        Entry(8192.0, 0.3), Entry(512.0, 0.93), Entry(256.0, 0.97),
-        Entry(128.0, 0.95, informative=False), Entry(64.0, 0.95, converged=False),
-    ]  # fmt: skip
+        Entry(8192.0, 0.3),
+        Entry(512.0, 0.93),
+        Entry(256.0, 0.97),
+        Entry(128.0, 0.95, informative=False),
+        Entry(64.0, 0.95, converged=False),
+    ]
     choice = shaping.choose(shaped)
     assert choice.shaping_factor == 512.0  # as near as 256, and the narrower band
     assert choice.covers and choice.usable == 3 and choice.dropped == (128.0, 64.0)

@@ -8,31 +8,10 @@ them whatever happens. What every move must pass is in test/inference/test_moves
 from typing import Final
 
 from actuator_glue.inference.moves.independence import INDEPENDENCE
-from actuator_glue.inference.moves.move import (
-    NO_CLASS,
-    U_ACCEPT,
-    U_FREE,
-    U_MOVE,
-    UNTEMPERED,
-    Knobs,
-    Move,
-    ProposalContext,
-    Tempering,
-    Tuning,
-    Workspace,
-    dispatch,
-    uniforms_per_chain,
-    workspace,
-)
+from actuator_glue.inference.moves.move import Move
 from actuator_glue.inference.moves.parallel import PARALLEL
 from actuator_glue.inference.moves.snooker import SNOOKER
 
 # Those of DREAM(ZS) as Vrugt (2016) has it, and with what this package adds.
 PUBLISHED: Final[tuple[Move, ...]] = (PARALLEL, SNOOKER)
 MOVES: Final[tuple[Move, ...]] = (*PUBLISHED, INDEPENDENCE)
-
-__all__ = [
-    'INDEPENDENCE', 'MOVES', 'NO_CLASS', 'PARALLEL', 'PUBLISHED', 'SNOOKER', 'UNTEMPERED',
-    'U_ACCEPT', 'U_FREE', 'U_MOVE', 'Knobs', 'Move', 'ProposalContext', 'Tempering', 'Tuning',
-    'Workspace', 'dispatch', 'uniforms_per_chain', 'workspace',
-]  # fmt: skip

@@ -24,9 +24,15 @@ from actuator_glue.records import Array
 
 @njit
 def propose(
-    z: Array, uniforms: Array, rows: Array, size: int, tuning: Tuning, knobs: Knobs,
-    scratch: Scratch, candidate: Array,
-) -> tuple[float, int]:  # fmt: skip
+    z: Array,
+    uniforms: Array,
+    rows: Array,
+    size: int,
+    tuning: Tuning,
+    knobs: Knobs,
+    scratch: Scratch,
+    candidate: Array,
+) -> tuple[float, int]:
     """Write a candidate that does not depend on z: a `Move.propose`."""
     centre, factor = tuning.centre, tuning.factor
     there = student.DEGREES + student.draw(uniforms, U_FREE, centre, factor, candidate)

@@ -178,9 +178,16 @@ def dispatch(moves: Sequence[Move]) -> Callable[..., tuple[float, int]]:
     # Not kept in files, where a closure would not be found again: what calls it is.
     @njit(cache=False)
     def propose(
-        number: int, z: Array, uniforms: Array, rows: Array, size: int, tuning: Tuning,
-        knobs: Knobs, scratch: Scratch, candidate: Array,
-    ) -> tuple[float, int]:  # fmt: skip
+        number: int,
+        z: Array,
+        uniforms: Array,
+        rows: Array,
+        size: int,
+        tuning: Tuning,
+        knobs: Knobs,
+        scratch: Scratch,
+        candidate: Array,
+    ) -> tuple[float, int]:
         if before is None or number == last:
             return mine(z, uniforms, rows, size, tuning, knobs, scratch, candidate)
         return before(number, z, uniforms, rows, size, tuning, knobs, scratch, candidate)

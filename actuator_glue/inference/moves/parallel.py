@@ -20,9 +20,15 @@ from actuator_glue.records import Array
 
 @njit
 def propose(
-    z: Array, uniforms: Array, rows: Array, size: int, tuning: Tuning, knobs: Knobs,
-    scratch: Scratch, candidate: Array,
-) -> tuple[float, int]:  # fmt: skip
+    z: Array,
+    uniforms: Array,
+    rows: Array,
+    size: int,
+    tuning: Tuning,
+    knobs: Knobs,
+    scratch: Scratch,
+    candidate: Array,
+) -> tuple[float, int]:
     """Write a candidate: a `Move.propose`, of no crossover class for unit jumps.
 
     candidate = z + (1 + lambda) gamma sum_k (a_k - b_k) + epsilon over the d* coordinates that

@@ -20,9 +20,15 @@ from actuator_glue.records import Array
 
 @njit
 def propose(
-    z: Array, uniforms: Array, rows: Array, size: int, tuning: Tuning, knobs: Knobs,
-    scratch: Scratch, candidate: Array,
-) -> tuple[float, int]:  # fmt: skip
+    z: Array,
+    uniforms: Array,
+    rows: Array,
+    size: int,
+    tuning: Tuning,
+    knobs: Knobs,
+    scratch: Scratch,
+    candidate: Array,
+) -> tuple[float, int]:
     """Write a candidate on the line from an archive point through z: a `Move.propose`.
 
     candidate = z + gamma (P(b) - P(c)), gamma ~ U(1.2, 2.2), with P the orthogonal projection on

@@ -139,9 +139,14 @@ def _search(
 
 @njit
 def _substep(
-    w: Array, g: Array, program: machine.Code, on: NDArray[np.bool_], mean: float, rate: float,
+    w: Array,
+    g: Array,
+    program: machine.Code,
+    on: NDArray[np.bool_],
+    mean: float,
+    rate: float,
     time: float,
-) -> None:  # fmt: skip
+) -> None:
     """Carry the nonlinear loop on by one sub-step; `time` is its middle."""
     flows, falls, gaps = on[r.ON_FLOW], on[r.ON_STRIBECK], on[r.ON_GAP]
     if on[r.ON_TERMS]:

@@ -38,9 +38,14 @@ def _inside(at: Any, last: Any) -> Any:
 
 @njit
 def _find(
-    w: Array, places: NDArray[np.int32], last: float, offset: int, at: float, step: float,
+    w: Array,
+    places: NDArray[np.int32],
+    last: float,
+    offset: int,
+    at: float,
+    step: float,
     linear: bool,
-) -> None:  # fmt: skip
+) -> None:
     """Write which samples every lane needs, and what part of each.
 
     Args:

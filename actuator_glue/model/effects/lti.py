@@ -95,8 +95,11 @@ def _fill(
     row = np.empty(STATES, np.int64)
     phi = np.empty((STATES, STATES))
     first, second, late, later = (
-        np.empty(STATES), np.empty(STATES), np.empty(STATES), np.empty(STATES)
-    )  # fmt: skip
+        np.empty(STATES),
+        np.empty(STATES),
+        np.empty(STATES),
+        np.empty(STATES),
+    )
     small, initial = np.empty((STATES, STATES)), np.empty(STATES)
     into = np.empty((STATES, 3))
     for i in range(len(values)):

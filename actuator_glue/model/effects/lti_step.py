@@ -102,9 +102,15 @@ def _step3(w: Array, r: int, delayed: bool, u1: float, u2: float) -> None:
 
 @njit(nogil=True)
 def advance(
-    table: Array, third: int, delayed: bool, u: Array, offset: int, begin: int,
-    displacement: Array, force: Array,
-) -> None:  # fmt: skip
+    table: Array,
+    third: int,
+    delayed: bool,
+    u: Array,
+    offset: int,
+    begin: int,
+    displacement: Array,
+    force: Array,
+) -> None:
     """Write the recorded displacement at samples begin, begin+1, ... and carry the state on.
 
     Args:

@@ -31,9 +31,14 @@ def frequency_response(results: Results) -> Figure:
             for kind, colour, alpha in looks:
                 lower, upper = results.frequency[kind][test][name].limits.at(LEVEL)
                 axes.fill_between(
-                    GRID, unit * lower, unit * upper, color=colour, alpha=alpha, lw=0,
+                    GRID,
+                    unit * lower,
+                    unit * upper,
+                    color=colour,
+                    alpha=alpha,
+                    lw=0,
                     label=BANDS[kind],
-                )  # fmt: skip
+                )
             measured, table_2 = (
                 unit * quantity(name, curves[k]) for k in ('experiment', 'Table 2')
             )

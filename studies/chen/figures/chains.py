@@ -82,18 +82,32 @@ def spread_against_g(results: Results) -> Figure:
         factor = [s.shaping_factor for s in entries]
         for i, parameter in enumerate(BASE[:3]):
             left.plot(
-                factor, [s.ours.moments.cov[i] for s in entries], dash, marker=MARKS[i],
-                color=COLOURS[i], fillstyle=fill,
+                factor,
+                [s.ours.moments.cov[i] for s in entries],
+                dash,
+                marker=MARKS[i],
+                color=COLOURS[i],
+                fillstyle=fill,
                 label=style.SYMBOL[parameter.name] if kind == 'sensor' else None,
-            )  # fmt: skip
+            )
         right.plot(
-            factor, [100 * s.held_out for s in entries], dash, marker='o', fillstyle=fill,
-            color='black', label=KINDS[kind],
-        )  # fmt: skip
+            factor,
+            [100 * s.held_out for s in entries],
+            dash,
+            marker='o',
+            fillstyle=fill,
+            color='black',
+            label=KINDS[kind],
+        )
     left.plot(
-        [CHOSEN] * 3, TABLE_4['cov'][:3], '*', ms=9, color=style.PUBLISHED, label='Table 4',
+        [CHOSEN] * 3,
+        TABLE_4['cov'][:3],
+        '*',
+        ms=9,
+        color=style.PUBLISHED,
+        label='Table 4',
         zorder=5,
-    )  # fmt: skip
+    )
     right.axhline(100 * LEVEL, color=style.TRUTH, lw=0.9, label=f'nominal {100 * LEVEL:g} %')
     for kind, dash in zip(results.shaped, ('-', '--'), strict=True):
         left.plot([], [], dash, color='black', label=KINDS[kind])

@@ -17,25 +17,44 @@ TESTS = (0, 1)
 def readings(results: Results) -> StudyTable:
     """Return amplitude and phase read off the sweeps."""
     keys = (
-        'test', 'f [Hz]', 'amplitude ratio', 'expected', 'decay [1]', 'phase [rad]',
-        'expected phase [rad]', 'delay [s]',
-    )  # fmt: skip
+        'test',
+        'f [Hz]',
+        'amplitude ratio',
+        'expected',
+        'decay [1]',
+        'phase [rad]',
+        'expected phase [rad]',
+        'delay [s]',
+    )
     rows = [
         (
-            stiffness_name(test), r.frequency_hz, r.amplitude, abs(r.expected), r.decay, r.phase,
-            float(np.angle(r.expected)), r.delay,
+            stiffness_name(test),
+            r.frequency_hz,
+            r.amplitude,
+            abs(r.expected),
+            r.decay,
+            r.phase,
+            float(np.angle(r.expected)),
+            r.delay,
         )
         for test in TESTS
         for r in results.readings[test]
-    ]  # fmt: skip
+    ]
     return StudyTable(keys, rows)
 
 
 def transfer_functions(results: Results) -> StudyTable:
     """Return Eqs. (3a) and (3b) beside what was fitted, without and with noise."""
     keys = (
-        'test', 'coefficient', 'published', 'ours', 'off [1]', '95 % from', 'to', 'inside',
-    )  # fmt: skip
+        'test',
+        'coefficient',
+        'published',
+        'ours',
+        'off [1]',
+        '95 % from',
+        'to',
+        'inside',
+    )
     rows = []
     for test in TESTS:
         for kind, fits in results.identified.items():
@@ -63,9 +82,13 @@ def joint_fit(results: Results) -> StudyTable:
 def coefficients(results: Results) -> StudyTable:
     """Return the identified coefficients of Eq. (2b) beside what parameters give for them."""
     keys = (
-        'coefficient', 'identified', 'from Table 2', 'off with Table 2 [1]',
-        'from the joint fit', 'off with the joint fit [1]',
-    )  # fmt: skip
+        'coefficient',
+        'identified',
+        'from Table 2',
+        'off with Table 2 [1]',
+        'from the joint fit',
+        'off with the joint fit [1]',
+    )
     names = [f'{c} at {stiffness_name(t)}' for t in TESTS for c in ('d₁/d₂', 'd₀/d₂', 'n₀/d₂')]
     table_2, fitted = implied(TABLE_2), implied(results.physical.theta)
     off = table_2 / EQUATION_3 - 1.0, fitted / EQUATION_3 - 1.0
@@ -86,9 +109,14 @@ def rms(results: Results) -> StudyTable:
 def refits(results: Results) -> StudyTable:
     """Return structures refitted with and without a static gain."""
     keys = (
-        'structure', 'gain', 'fitted, k = 0 [m]', 'fitted, spring [m]', 'held out, k = 0 [m]',
-        'held out, spring [m]', *NAMES,
-    )  # fmt: skip
+        'structure',
+        'gain',
+        'fitted, k = 0 [m]',
+        'fitted, spring [m]',
+        'held out, k = 0 [m]',
+        'held out, spring [m]',
+        *NAMES,
+    )
     rows = [
         (
             r.name,

@@ -42,9 +42,16 @@ def displacement_coverage(results: Results) -> StudyTable:
 def histograms(results: Results) -> StudyTable:
     """Return the distributions of amplitude and phase at 1, 5 and 10 Hz, matched residual."""
     keys = (
-        'quantity', 'all draws, from', 'all draws, to', '95 %, from', '95 %, to', 'experiment',
-        'Eqs. (3a), (3b)', 'Table 2', 'draws below the experiment [1]',
-    )  # fmt: skip
+        'quantity',
+        'all draws, from',
+        'all draws, to',
+        '95 %, from',
+        '95 %, to',
+        'experiment',
+        'Eqs. (3a), (3b)',
+        'Table 2',
+        'draws below the experiment [1]',
+    )
     rows = []
     for test, curves in enumerate(results.curves):
         for name in QUANTITIES:
@@ -65,18 +72,30 @@ def histograms(results: Results) -> StudyTable:
 def scores(results: Results) -> StudyTable:
     """Return the scores of every displacement band by frequency."""
     keys = (
-        'test, band', 'from [Hz]', 'to [Hz]', 'samples', 'coverage (PICP) [1]', 'mean width [m]',
-        'CRPS [m]', 'interval score [m]',
-    )  # fmt: skip
+        'test, band',
+        'from [Hz]',
+        'to [Hz]',
+        'samples',
+        'coverage (PICP) [1]',
+        'mean width [m]',
+        'CRPS [m]',
+        'interval score [m]',
+    )
     rows = [
         (
-            f'{stiffness_name(test)}, {BANDS[kind]}', s.low_hz, min(s.high_hz, CLOSE_UPS[-1]),
-            s.samples, s.coverage, s.mean_width, s.crps, s.interval_score,
+            f'{stiffness_name(test)}, {BANDS[kind]}',
+            s.low_hz,
+            min(s.high_hz, CLOSE_UPS[-1]),
+            s.samples,
+            s.coverage,
+            s.mean_width,
+            s.crps,
+            s.interval_score,
         )
         for kind, bands in results.time.items()
         for test, band in enumerate(bands)
         for s in band.scores
-    ]  # fmt: skip
+    ]
     return StudyTable(keys, rows)
 
 

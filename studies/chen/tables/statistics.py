@@ -21,18 +21,32 @@ def priors(results: Results) -> StudyTable:
 def shaping_factors(results: Results, kind: str) -> StudyTable:
     """Return what each shaping factor leads to with one kind of residual."""
     keys = (
-        'G', 'R-hat < 1.2 after, from the prior', 'ours', 'R-hat, ours',
-        *(f'COV {s}' for s in SYMBOLS), 'widest of the prior [1]', 'held-out inside [1]',
-        'width [m]', 'converged', 'informative',
-    )  # fmt: skip
+        'G',
+        'R-hat < 1.2 after, from the prior',
+        'ours',
+        'R-hat, ours',
+        *(f'COV {s}' for s in SYMBOLS),
+        'widest of the prior [1]',
+        'held-out inside [1]',
+        'width [m]',
+        'converged',
+        'informative',
+    )
     rows = [
         (
-            shaping_factor(s.shaping_factor), s.published_trace.converged_at(),
-            s.ours_trace.converged_at(), s.ours.chains.rhat.max(), *s.ours.moments.cov,
-            s.ours.prior_share().max(), s.held_out, s.width, s.converged, s.informative,
+            shaping_factor(s.shaping_factor),
+            s.published_trace.converged_at(),
+            s.ours_trace.converged_at(),
+            s.ours.chains.rhat.max(),
+            *s.ours.moments.cov,
+            s.ours.prior_share().max(),
+            s.held_out,
+            s.width,
+            s.converged,
+            s.informative,
         )
         for s in results.shaped[kind]
-    ]  # fmt: skip
+    ]
     return StudyTable(keys, rows)
 
 
@@ -48,9 +62,15 @@ def choices(results: Results) -> StudyTable:
 def table_4(results: Results) -> StudyTable:
     """Return Table 4 of the paper and of both posteriors."""
     keys = (
-        'parameter', 'posterior', 'mean', 'standard deviation', 'skewness', 'COV',
-        'off in COV [1]', 'off Table 2 in the mean [1]',
-    )  # fmt: skip
+        'parameter',
+        'posterior',
+        'mean',
+        'standard deviation',
+        'skewness',
+        'COV',
+        'off in COV [1]',
+        'off Table 2 in the mean [1]',
+    )
     rows = []
     for i, name in enumerate(named_parameters()):
         published = [TABLE_4[m][i] for m in ('mean', 'stddev', 'skewness', 'cov')]
@@ -97,10 +117,20 @@ def posteriors(results: Results) -> StudyTable:
     for kind, entries in results.shaped.items():
         runs |= {f'G = {s.shaping_factor:g}, {KINDS[kind]}': s.ours for s in entries}
     keys = (
-        'posterior', 'parameter', 'shaping factor', 'residual rms [m]', 'added rms [m]',
-        'evaluations', 'R-hat', 'ESS', 'mean', 'standard deviation', 'skewness', 'COV',
+        'posterior',
+        'parameter',
+        'shaping factor',
+        'residual rms [m]',
+        'added rms [m]',
+        'evaluations',
+        'R-hat',
+        'ESS',
+        'mean',
+        'standard deviation',
+        'skewness',
+        'COV',
         'standard deviation over prior',
-    )  # fmt: skip
+    )
     rows = []
     for name, p in runs.items():
         m, chains = p.moments, p.chains

@@ -12,13 +12,33 @@ from actuator_glue.model.effects.effect import Effect
 
 # The order of their parameters in models of several effects; what is newer comes after them, by
 # name, so that results keep their order.
-_FIRST = (
-    'delay', 'gain', 'valve_lag', 'valve_deadband', 'valve_null', 'flow_saturation',
-    'pressure_flow', 'flow_asymmetry', 'supply_droop', 'gain_drift', 'coulomb_friction',
-    'stribeck_friction', 'backlash', 'viscous_damping', 'payload_inertia', 'specimen_gap',
-    'specimen_hardening', 'specimen_yield', 'sensor_lag', 'bias', 'drift', 'hum', 'quantisation',
-    'clock_skew', 'timing_jitter',
-)  # fmt: skip
+_FIRST = [
+    'delay',
+    'gain',
+    'valve_lag',
+    'valve_deadband',
+    'valve_null',
+    'flow_saturation',
+    'pressure_flow',
+    'flow_asymmetry',
+    'supply_droop',
+    'gain_drift',
+    'coulomb_friction',
+    'stribeck_friction',
+    'backlash',
+    'viscous_damping',
+    'payload_inertia',
+    'specimen_gap',
+    'specimen_hardening',
+    'specimen_yield',
+    'sensor_lag',
+    'bias',
+    'drift',
+    'hum',
+    'quantisation',
+    'clock_skew',
+    'timing_jitter',
+]
 
 
 def found() -> tuple[Effect, ...]:

@@ -222,9 +222,15 @@ def _motion(scale: Scale, time: Array, period: float) -> dict[str, tuple[int, Ar
     v = scale.stroke * turn * np.cos(turn * time)
     error = beta_1 * oil * v / into
     return {
-        't': (m.T, time), 'x': (m.X, x), 'y': (m.Y, x), 'v': (m.V, v), 'u': (m.U, x + error),
-        'e': (m.E, error), 'q': (m.Q, oil * v), 'f': (m.F, scale.stiffness * x),
-    }  # fmt: skip
+        't': (m.T, time),
+        'x': (m.X, x),
+        'y': (m.Y, x),
+        'v': (m.V, v),
+        'u': (m.U, x + error),
+        'e': (m.E, error),
+        'q': (m.Q, oil * v),
+        'f': (m.F, scale.stiffness * x),
+    }
 
 
 def _check_neutral(effect: Effect) -> None:

@@ -28,26 +28,44 @@ class Tree:
 # What a place changes, and what else is known there: u command, e control error, q flow (as rate
 # of force), f force, x displacement and v velocity of the piston, t time. At the sensor x is y.
 SIGNAL: Final = {
-    'command': 'u', 'valve': 'e', 'flow': 'q', 'specimen': 'f', 'piston': 'f', 'sensor': 'y',
-}  # fmt: skip
+    'command': 'u',
+    'valve': 'e',
+    'flow': 'q',
+    'specimen': 'f',
+    'piston': 'f',
+    'sensor': 'y',
+}
 KNOWN: Final = {
-    'command': 'uqfxvt', 'valve': 'euqfxvt', 'flow': 'qeufxvt', 'specimen': 'fxvqeut',
-    'piston': 'fxvqeut', 'sensor': 'yxt',
-}  # fmt: skip
+    'command': 'uqfxvt',
+    'valve': 'euqfxvt',
+    'flow': 'qeufxvt',
+    'specimen': 'fxvqeut',
+    'piston': 'fxvqeut',
+    'sensor': 'yxt',
+}
 PLACES: Final = {**{place: place for place in SIGNAL}, 'force': 'piston'}
 # Constant during a test; not at the sensor, where a record is all there is.
 CONSTANTS: Final = (*BASE, 'k')
-FUNCTIONS: Final = {
-    'abs': 1, 'sign': 1, 'sqrt': 1, 'exp': 1, 'log': 1, 'sin': 1, 'cos': 1, 'tanh': 1, 'atan': 1,
-    'min': 2, 'max': 2, 'clip': 3, 'dead': 2,
-}  # fmt: skip
+# Functions and how many arguments they take.
+FUNCTIONS: Final = dict.fromkeys(
+    ['abs', 'sign', 'sqrt', 'exp', 'log', 'sin', 'cos', 'tanh', 'atan'], 1
+) | {
+    'min': 2,
+    'max': 2,
+    'clip': 3,
+    'dead': 2,
+}
 # Functions that remember; the second argument, where there is one, holds during a test.
 MEMORY: Final = {'lag': 2, 'integral': 1, 'play': 2, 'limit_rate': 2}
 REMEMBERING: Final = ('command', 'valve', 'flow')
 _LONGEST: Final = 2000
 _OPERATORS: Final[dict[type[ast.operator], str]] = {
-    ast.Add: 'add', ast.Sub: 'sub', ast.Mult: 'mul', ast.Div: 'div', ast.Pow: 'pow',
-}  # fmt: skip
+    ast.Add: 'add',
+    ast.Sub: 'sub',
+    ast.Mult: 'mul',
+    ast.Div: 'div',
+    ast.Pow: 'pow',
+}
 
 
 @dataclass(frozen=True, slots=True)

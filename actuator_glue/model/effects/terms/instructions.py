@@ -8,9 +8,9 @@ from actuator_glue.model.effects.terms import machine as m
 from actuator_glue.model.effects.terms.expression import Tree
 
 _ONE: Final = {
-    'neg': m.NEG, 'abs': m.ABS, 'sign': m.SIGN, 'sqrt': m.SQRT, 'exp': m.EXP, 'log': m.LOG,
-    'sin': m.SIN, 'cos': m.COS, 'tanh': m.TANH, 'atan': m.ATAN,
-}  # fmt: skip
+    name: int(getattr(m, name.upper()))
+    for name in ['neg', 'abs', 'sign', 'sqrt', 'exp', 'log', 'sin', 'cos', 'tanh', 'atan']
+}
 # Most factors of a power that is multiplied out.
 _MOST: Final = 16
 _TINY: Final = 1e-150

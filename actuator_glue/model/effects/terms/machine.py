@@ -20,16 +20,12 @@ from actuator_glue.records import Array
 Code = NDArray[np.int32]
 # An instruction's numbers.
 WIDTH: Final = 6
-(
-    COPY, ADD, SUB, MUL, DIV, NEG, ABS, SIGN, SQRT, EXP, LOG, SIN, COS, TANH, ATAN, POW, MIN, MAX,
-    LESS, EQUAL, EDGE, SELECT, LAG, INTEGRAL, PLAY, LIMIT,
-) = range(26)  # fmt: skip
+COPY, ADD, SUB, MUL, DIV, NEG, ABS, SIGN, SQRT, EXP, LOG, SIN, COS, TANH, ATAN, POW = range(16)
+MIN, MAX, LESS, EQUAL, EDGE, SELECT, LAG, INTEGRAL, PLAY, LIMIT = range(16, 26)
 # Fixed registers: what moves, what of it changes with the increment dx, what holds.
 # NONE stands where an instruction has no operand.
-(
-    NONE, T, U, E, Q, F, X, V, Y, D_E, D_Q, D_F, ORIGIN, STEP, D_V_MIDDLE, D_V_END, BETA_1,
-    ALPHA_1_BETA_0, ALPHA_2, ALPHA_3, K,
-) = range(21)  # fmt: skip
+NONE, T, U, E, Q, F, X, V, Y, D_E, D_Q, D_F, ORIGIN, STEP, D_V_MIDDLE, D_V_END = range(16)
+BETA_1, ALPHA_1_BETA_0, ALPHA_2, ALPHA_3, K = range(16, 21)
 FIXED: Final = 21
 # Where the instructions of each part end, in row 0 of a program; and how often the balance of
 # forces is solved with them.
@@ -40,9 +36,8 @@ _strict: Any = partial(njit, fastmath=False)
 
 # Of the Taylor series of exp(t) - 1 and sin(t), with what the first leaves out at 0.7 below
 # rounding, and the second at a quarter turn.
-(
-    _E2, _E3, _E4, _E5, _E6, _E7, _E8, _E9, _E10, _E11, _E12, _E13, _E14,
-) = (1.0 / math.factorial(n) for n in range(2, 15))  # fmt: skip
+_E2, _E3, _E4, _E5, _E6, _E7, _E8 = (1.0 / math.factorial(n) for n in range(2, 9))
+_E9, _E10, _E11, _E12, _E13, _E14 = (1.0 / math.factorial(n) for n in range(9, 15))
 _TURN: Final = 1.0 / (2.0 * math.pi)
 _S3, _S5, _S7, _S9, _S11, _S13, _S15, _S17, _S19 = (
     (-1.0) ** (n // 2) / math.factorial(n) for n in range(3, 20, 2)
@@ -93,10 +88,8 @@ def execute(g: Array, program: Code, first: int, last: int) -> None:  # noqa: C9
     # As a constant it would have the short loops unrolled before they can become vector code.
     lanes = g.shape[1]
     for i in range(first, last):
-        op, d, a, b, c, s = (
-            program[i, 0], program[i, 1], program[i, 2], program[i, 3], program[i, 4],
-            program[i, 5],
-        )  # fmt: skip
+        op, d, a = program[i, 0], program[i, 1], program[i, 2]
+        b, c, s = program[i, 3], program[i, 4], program[i, 5]
         if op == MUL:
             for n in range(lanes):
                 g[d, n] = g[a, n] * g[b, n]

@@ -17,6 +17,7 @@ from actuator_glue.model.effects.rows import LANES
 from actuator_glue.model.effects.terms import machine as m
 from actuator_glue.model.effects.terms.expression import SIGNAL, Expression
 from actuator_glue.model.effects.terms.instructions import Emitter
+from actuator_glue.model.parameters import NAMES as BASE
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.records import Array
 
@@ -28,17 +29,18 @@ _VALUE: Final = {'t': m.T, 'u': m.U, 'e': m.E, 'q': m.Q, 'f': m.F, 'x': m.X, 'v'
 _MIDDLE: Final = {'e': -0.5, 'x': 0.5, 'v': m.D_V_MIDDLE}
 _END: Final = {'f': m.D_F, 'x': 1.0, 'v': m.D_V_END}
 _SLOPE: Final[dict[str, dict[str, int | float]]] = {
-    'command': {}, 'valve': _MIDDLE, 'flow': {**_MIDDLE, 'e': m.D_E, 'q': m.D_Q}, 'specimen': _END,
-    'piston': _END, 'sensor': {},
-}  # fmt: skip
+    'command': {},
+    'valve': _MIDDLE,
+    'flow': {**_MIDDLE, 'e': m.D_E, 'q': m.D_Q},
+    'specimen': _END,
+    'piston': _END,
+    'sensor': {},
+}
 # Functions with a kink.
 _KINKS: Final = {'abs', 'sign', 'min', 'max', 'clip', 'dead', 'sqrt'}
 # Where the slope of a part's signal is left.
 _LEFT: Final = {'valve': m.D_E, 'flow': m.D_Q, 'specimen': m.D_F, 'piston': m.D_F}
-_HOLDS: Final = {
-    'beta_1': m.BETA_1, 'alpha_1_beta_0': m.ALPHA_1_BETA_0, 'alpha_2': m.ALPHA_2,
-    'alpha_3': m.ALPHA_3, 'k': m.K,
-}  # fmt: skip
+_HOLDS: Final = dict(zip((*BASE, 'k'), range(m.BETA_1, m.K + 1), strict=True))
 
 
 class Written(NamedTuple):
