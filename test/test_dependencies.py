@@ -53,6 +53,7 @@ LIBRARIES = {
     'rosbags': Names('rosbags', 'python3-rosbags-pip'),
     'scipy': Names('scipy', 'python3-scipy'),
     'scoringrules': Names('scoringrules', None),
+    'sklearn': Names('scikit-learn', 'python3-sklearn'),
     'statsmodels': Names('statsmodels', None),
     'xdist': Names('pytest-xdist', 'python3-pytest-xdist'),
     'yaml': Names('pyyaml', 'python3-yaml'),

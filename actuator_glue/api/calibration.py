@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -15,6 +16,7 @@ from actuator_glue.api.calibration_result import (
     Calibration,
     FitError,
     Marginal,
+    PriorUse,
     RecordError,
 )
 from actuator_glue.api.compilation import compilation
@@ -22,10 +24,13 @@ from actuator_glue.diagnosis.data import SETTLE
 from actuator_glue.diagnosis.preparation import clean, initial_state
 from actuator_glue.errors import InputError
 from actuator_glue.inference.at_bound import pressed
+from actuator_glue.inference.carried import Carried, Drift
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.choice import ModelChoice, choose_model
+from actuator_glue.inference.informative_prior import InformativePrior
 from actuator_glue.inference.moments import moments
 from actuator_glue.inference.posterior import Problem, sample
+from actuator_glue.inference.prior_conflict import conflict
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
@@ -47,6 +52,11 @@ class CalibrationOptions:
         initial: state at the first sample, 'rest', 'measured', or 'auto' to look.
         settle: start of each record that only lets the initial state be forgotten [s]; None for
             0 from rest, else 1.
+        prior: an earlier calibration of the actuator, or the file it was saved to; None for
+            nothing known beside the bounds.
+        drift: standard deviation by which the logarithm of each parameter may have moved in an
+            hour since (random walk) [h^-1/2].
+        prior_age: time since that calibration [s].
     """
 
     effects: tuple[str, ...] = ()
@@ -57,12 +67,18 @@ class CalibrationOptions:
     seed: int = 1
     initial: Literal['auto', 'rest', 'measured'] = 'auto'
     settle: float | None = None
+    prior: Calibration | Path | str | None = None
+    drift: float = 0.02
+    prior_age: float = 0.0
 
     def __post_init__(self) -> None:
         if self.seed < 0:
             raise InputError(f'seed {self.seed} is negative')
         if self.settle is not None and self.settle < 0.0:
             raise InputError(f'settle {self.settle:g} s is negative')
+        if not 0.0 <= self.prior_age < np.inf:
+            raise InputError(f'prior_age {self.prior_age:g} s is no time since a calibration')
+        Drift(self.drift)
         for name, known in (
             ('likelihood', ('glue', 'gaussian', 'ar1')),
             ('initial', ('auto', 'rest', 'measured')),
@@ -119,9 +135,11 @@ def calibrate(
             shaping_factor=options.shaping_factor,
             initial=initial,
             settle=settle,
+            prior=_carried(options),
         )
+        target = problem.target()
         chains = sample(
-            problem.target(),
+            target,
             (options.seed,),
             options.evaluations,
             progress=None if progress is None else lambda made, _: progress(made),
@@ -135,6 +153,7 @@ def calibrate(
     fit = _fit(model, chains.best, cleaned, initial, settle)
     parameters = _marginals(model, chains)
     at_bound = pressed(chains.posterior(), model.names, *model.bounds)
+    prior = None if target.prior is None else _prior_use(options, target.prior, chains)
     converged = judgement.converged(parameters)
     return Calibration(
         parameters=parameters,
@@ -143,9 +162,11 @@ def calibrate(
         log_density=chains.log_density[chains.burn :],
         error=fit,
         at_bound=at_bound,
-        problems=tuple(judgement.problems(at_bound, parameters, fit)),
+        problems=tuple(judgement.problems(at_bound, parameters, fit, prior)),
         notes=(
-            *judgement.remarks(cleaned, parameters, chains.posterior(), converged, at_bound),
+            *judgement.remarks(
+                cleaned, parameters, chains.posterior(), converged, at_bound, prior
+            ),
             *notes,
         ),
         converged=converged,
@@ -159,6 +180,7 @@ def calibrate(
         seconds=seconds,
         compile_seconds=sum(compiled),
         sources=tuple(CalibratedRecord.of(r) for r in cleaned),
+        prior=prior,
         records=tuple(cleaned),
     )
 
@@ -193,6 +215,29 @@ def sampled_model(options: CalibrationOptions) -> ModelChoice:
             raise InputError(f'{parameter.name} cannot be negative; its bounds start at {least:g}')
     model = choose_model(options.effects, options.bounds)
     return model.with_autocorrelation() if options.likelihood == 'ar1' else model
+
+
+def _carried(options: CalibrationOptions) -> Carried | None:
+    """Return what is known before, as it is now."""
+    if options.prior is None:
+        return None
+    earlier = options.prior
+    if not isinstance(earlier, Calibration):
+        earlier = Calibration.load(earlier)
+    return earlier.carried().drifted(Drift(options.drift), options.prior_age)
+
+
+def _prior_use(options: CalibrationOptions, prior: InformativePrior, chains: Chains) -> PriorUse:
+    """Return how the prior described what it came from, and how it stood up to the records."""
+    source = 'a calibration' if isinstance(options.prior, Calibration) else str(options.prior)
+    return PriorUse(
+        source=source,
+        drift=options.drift,
+        age_s=options.prior_age,
+        components=len(prior.mixture.log_weights),
+        quality=prior.quality(),
+        p_value=conflict(prior, chains.posterior()).p_value,
+    )
 
 
 def _marginals(model: ModelChoice, chains: Chains) -> dict[str, Marginal]:

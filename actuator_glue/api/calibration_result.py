@@ -11,6 +11,7 @@ import numpy as np
 from actuator_glue.api import store
 from actuator_glue.api.result import Result
 from actuator_glue.inference.at_bound import Pressed
+from actuator_glue.inference.carried import Carried
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.records import Array, Record
 
@@ -20,6 +21,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from actuator_glue.report import html
+
+# Normal components of the prior that a calibration makes, at most.
+COMPONENTS = 4
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +101,27 @@ class CalibratedRecord:
         return cls(record.source, len(record), record.rate, record.stiffness, record.hold)
 
 
+@dataclass(frozen=True, slots=True)
+class PriorUse:
+    """The informative prior of a calibration, and how it stood up to the records.
+
+    Attributes:
+        source: the calibration it came from.
+        drift: standard deviation of the logarithm of a parameter after an hour [h^-1/2].
+        age_s: time between the calibrations [s].
+        components: normal components it has.
+        quality: energy coefficient between its draws and the mixture, 0 for equal.
+        p_value: prior predictive p-value of the records (Evans and Moshonov 2006).
+    """
+
+    source: str
+    drift: float
+    age_s: float
+    components: int
+    quality: float
+    p_value: float
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Calibration(Result):
     """A joint posterior, and what forbids or limits its use.
@@ -110,6 +135,7 @@ class Calibration(Result):
         at_bound: parameters that a bound of the prior holds.
         problems: why the posterior must not be used as it stands; empty where it may.
         notes: what these records cannot tell, and what was done to them.
+        prior: what was known before, beside the bounds; None where that was nothing.
         converged: R-hat of every parameter is at most 1.01.
         effects: effects of the model beyond Eq. (2).
         likelihood: 'glue', 'gaussian' or 'ar1'.
@@ -145,6 +171,7 @@ class Calibration(Result):
     seconds: float
     compile_seconds: float
     sources: tuple[CalibratedRecord, ...]
+    prior: PriorUse | None = None
     records: tuple[Record, ...] = ()
 
     @property
@@ -161,6 +188,15 @@ class Calibration(Result):
     def posterior(self) -> Array:
         """Draws of all chains, shape (m, p), SI units."""
         return self.draws.reshape(-1, self.draws.shape[2])
+
+    def carried(self) -> Carried:
+        """Return the draws as a prior for later tests of the same actuator."""
+        from actuator_glue.inference.mixture_density import components
+
+        found = Carried.thinned(self.names, self.posterior)
+        positive = (found.draws > 0.0).all(axis=0)
+        logs = np.where(positive, np.log(np.where(positive, found.draws, 1.0)), found.draws)
+        return replace(found, components=components(logs, COMPONENTS))
 
     @property
     def inference_data(self) -> arviz.InferenceData:
@@ -194,6 +230,7 @@ class Calibration(Result):
             'at_bound': [p.to_json() for p in self.at_bound],
             'notes': list(self.notes),
             'converged': self.converged,
+            'prior': None if self.prior is None else asdict(self.prior),
             'effects': list(self.effects),
             **CATALOGUE.definitions(self.effects),
             'likelihood': self.likelihood,

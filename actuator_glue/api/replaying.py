@@ -179,7 +179,8 @@ def _estimate(out: _Run, settings: EstimatorSettings, done: Progress) -> Compari
     def results(reports: Reports) -> Iterator[WindowResult]:
         model = live.models[0][1] if live is not None else None
         schedule = live.schedule() if live is not None else None
-        for told in run(counted(), settings, model, schedule, reports):
+        carried = live.carried if live is not None else None
+        for told in run(counted(), settings, model, schedule, reports, carried):
             if isinstance(told, WindowResult):
                 # Not the result itself: its samples and bands are many.
                 out.windows.append(_window(told))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from actuator_glue.arguments import Output, number
@@ -76,6 +77,27 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'of those of Table 3 or the catalogue; repeatable',
     )
     parser.add_argument(
+        '--prior',
+        type=Path,
+        metavar='FILE',
+        help='what an earlier `calibrate --save FILE` of this actuator knew',
+    )
+    parser.add_argument(
+        '--drift',
+        type=number,
+        default=0.02,
+        metavar='RATE',
+        help='how far the logarithm of each parameter may wander in an hour since, standard '
+        'deviation (default 0.02)',
+    )
+    parser.add_argument(
+        '--prior-age',
+        type=number,
+        default=0.0,
+        metavar='HOURS',
+        help='time since that calibration (default 0)',
+    )
+    parser.add_argument(
         '--save',
         '--draws',
         type=Output,
@@ -107,6 +129,9 @@ def run(args: argparse.Namespace) -> int:
         seed=args.seed,
         initial=args.initial,
         settle=args.settle,
+        prior=args.prior,
+        drift=args.drift,
+        prior_age=3600.0 * args.prior_age,
     )
     records = load(args)
     with progress('calibrating', args.evaluations) as done:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.inference.evaluate import LogDensity
+from actuator_glue.inference.mixture_density import NO_MIXTURE, Mixture, log_mixture
 from actuator_glue.jit import njit
 from actuator_glue.model import kernel, ridge
 from actuator_glue.model.fast import laguerre, quadratic
@@ -30,6 +31,8 @@ class Compiled(NamedTuple):
         stiffness: specimen stiffness [N/m] of those coordinates.
         low: lower bounds of the physical parameters, (p,).
         high: upper bounds, (p,).
+        prior: density of mapped coordinates in place of the uniform prior's; without a component
+            there is none.
     """
 
     rows: Array
@@ -42,6 +45,7 @@ class Compiled(NamedTuple):
     stiffness: float = 0.0
     low: Array = np.empty(0)
     high: Array = np.empty(0)
+    prior: Mixture = NO_MIXTURE
 
 
 def compiled(log_density: LogDensity) -> Compiled | None:
@@ -117,7 +121,7 @@ class Scratch(NamedTuple):
     Attributes:
         theta: physical parameters of the points inside the bounds, (m, 4).
         which: their places, (m,).
-        inner: log Jacobians of mapped points, (m,).
+        inner: log Jacobians of mapped points, or their log prior density, (m,).
         sums: error sums, (m, R, 2).
         slack: how far the sums may be wrong, (R, m) [m^2]; 0 for not worth mentioning.
     """
@@ -182,6 +186,8 @@ def log_densities(
             )
             if inner[count] == -np.inf:
                 continue
+            if len(density.prior.log_weights):
+                inner[count] = log_mixture(density.prior, x[i])
         else:
             for j in range(x.shape[1]):
                 theta[count, j] = x[i, j]

@@ -10,10 +10,12 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference import dream
+from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.inference.compiled import Compiled, compiled
 from actuator_glue.inference.evaluate import LogDensity
+from actuator_glue.inference.informative_prior import InformativePrior, informative_prior
 from actuator_glue.inference.likelihood import Ar1Likelihood, GaussianLikelihood, GlueLikelihood
 from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.inference.transforms import Composed, Transform
@@ -42,11 +44,13 @@ class Target:
         log_likelihood: of physical parameters, (m, p) -> (m,).
         bounds: lower and upper bounds of the parameters, (p,) each.
         transform: from the parameters to the coordinates; None: they are their own.
+        prior: what is known beside the bounds; None: the prior is uniform.
     """
 
     log_likelihood: LogDensity
     bounds: tuple[Array, Array]
     transform: Transform | None = None
+    prior: InformativePrior | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,6 +68,7 @@ class Problem:
         first_index: samples of the test before the records: what drifts did so from there.
         near: parameters (p,) near the best fit, where known; they save time and change nothing.
         shown: parameters (m, p) of an earlier posterior of this model, whose bends are taken off.
+        prior: draws of what is known of the parameters; None: no more than the box.
     """
 
     records: Sequence[Record]
@@ -75,6 +80,7 @@ class Problem:
     first_index: int = 0
     near: Array | None = None
     shown: Array | None = None
+    prior: Carried | None = None
 
     def target(self) -> Target:
         """Return the log likelihood with its prior and the coordinates to sample it in.
@@ -82,7 +88,9 @@ class Problem:
         Raises:
             InputError: records or settings that cannot be used.
         """
-        return Target(self._log_likelihood(), self.model.bounds, self._transform())
+        return Target(
+            self._log_likelihood(), self.model.bounds, self._transform(), self._informative()
+        )
 
     def _log_likelihood(self) -> LogDensity:
         effects, initial = self.model.effects, self.initial
@@ -97,14 +105,27 @@ class Problem:
             return GlueLikelihood(sums, self.shaping_factor)
         return GaussianLikelihood(sums)
 
+    def _informative(self) -> InformativePrior | None:
+        if self.prior is None:
+            return None
+        model = self.model
+        return informative_prior(
+            self.prior, model.names, model.lower, model.upper, self._stiffness()
+        )
+
+    def _stiffness(self) -> float | None:
+        """Return the one specimen stiffness of the records [N/m]; None where they have several."""
+        stiffnesses = {r.known_stiffness() for r in self.records}
+        return stiffnesses.pop() if len(stiffnesses) == 1 else None
+
     def _transform(self) -> Transform | None:
         """Coordinates for the bent ridge that one stiffness leaves; None for several."""
-        stiffnesses = {r.known_stiffness() for r in self.records}
-        if len(stiffnesses) > 1:
+        stiffness = self._stiffness()
+        if stiffness is None:
             return None
         record, names = self.records[0], self.model.names
         middle = (self.first_index + 0.5 * len(record)) * record.period
-        ridge = Ridge(names, *self.model.bounds, stiffnesses.pop(), middle)
+        ridge = Ridge(names, *self.model.bounds, stiffness, middle)
         few = self.shown is None or len(self.shown) < _ENOUGH * len(names)
         if few or not self.model.effects:
             return ridge
@@ -125,6 +146,8 @@ def sample(
 ) -> Chains:
     """Draw from a posterior; return chains of physical parameters with their log likelihoods.
 
+    With an informative prior its log density is part of them.
+
     Args:
         target: what is sampled.
         seed: words of the seed: equal ones give equal bits.
@@ -143,7 +166,12 @@ def sample(
     if transform is not None:
         if archive is None:
             settings, archive = _cold(target, transform, seed, settings)
-        density, bounds = _Density(density, transform), (transform.lower, transform.upper)
+        density = _Density(density, transform, target.prior)
+        bounds = transform.lower, transform.upper
+    elif target.prior is not None:
+        density = _Informed(density, target.prior)
+        if archive is None:
+            settings, archive = _cold(target, None, seed, settings)
     chains = dream.sample(
         np.random.default_rng(seed),
         density,
@@ -162,7 +190,7 @@ def sample(
 
 
 def _cold(
-    target: Target, transform: Transform, seed: Sequence[int], settings: SamplerSettings
+    target: Target, transform: Transform | None, seed: Sequence[int], settings: SamplerSettings
 ) -> tuple[SamplerSettings, Array]:
     """Return what starts the sampler from the prior: settings, and an archive of points.
 
@@ -170,10 +198,14 @@ def _cold(
     large: one start in four was lost to a hill 50 nats below.
     """
     low, high = target.bounds
-    points = np.random.default_rng((*seed, 3)).uniform(low, high, (_PRIOR, len(low)))
+    if target.prior is None:
+        points = np.random.default_rng((*seed, 3)).uniform(low, high, (_PRIOR, len(low)))
+    else:
+        points = target.prior.points(target.bounds, _PRIOR, (*seed, 3))
     # From an archive the sampler takes a quarter of its population.
     population = 4 * settings.points(len(low))
-    return replace(settings, population=population), transform.forward(points)
+    points = points if transform is None else transform.forward(points)
+    return replace(settings, population=population), points
 
 
 def _physical(chains: Chains, transform: Transform) -> Chains:
@@ -189,16 +221,20 @@ def _physical(chains: Chains, transform: Transform) -> Chains:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Density:
-    """Log likelihood of the physical parameters plus ln |dx/dz|."""
+    """Log likelihood of the physical parameters plus ln |dx/dz|, and a prior that informs."""
 
     log_likelihood: LogDensity
     transform: Transform
+    prior: InformativePrior | None = None
 
     def __call__(self, z: Array) -> Array:
         """Return the log posterior density (m,) of coordinates (m, p)."""
         x, values = self.transform.inverse(z)
         # Outside the prior's box the likelihood may be slow, and is not needed.
         inside = np.isfinite(values)
+        if self.prior is not None and inside.any():
+            values[inside] += self.prior.log_density(x[inside])
+            inside = np.isfinite(values)
         if inside.all():
             values += self.log_likelihood(x)
         elif inside.any():
@@ -210,4 +246,21 @@ class _Density:
         form = compiled(self.log_likelihood)
         if form is None or not isinstance(self.transform, Ridge):
             return None
-        return self.transform.compiled(form)
+        form = self.transform.compiled(form)
+        if form is None or self.prior is None:
+            return form
+        # The same coordinates: their Jacobians cancel.
+        same = isinstance(self.prior.transform, Ridge)
+        return form._replace(prior=self.prior.mixture) if same else None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Informed:
+    """Log likelihood plus log prior density of the physical parameters."""
+
+    log_likelihood: LogDensity
+    prior: InformativePrior
+
+    def __call__(self, x: Array) -> Array:
+        """Return the log posterior density (m,) of parameters (m, p)."""
+        return self.prior.log_density(x) + self.log_likelihood(x)

@@ -6,11 +6,14 @@ from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
+from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.errors import InputError
+from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.choice import ModelChoice, choose_model
+from actuator_glue.inference.informative_prior import informative_prior
 from actuator_glue.nodes import own_effects
 from actuator_glue.nodes.parameters import Spec
-from actuator_glue.online.settings import LIMITS, EstimatorSettings
+from actuator_glue.online.settings import CHOICES, LIMITS, EstimatorSettings
 
 
 def _specs() -> list[Spec]:
@@ -30,7 +33,23 @@ def _specs() -> list[Spec]:
 
 SPECS = (
     *_specs(),
-    Spec('likelihood', 'glue', 'likelihood', read_only=True, choices=('glue', 'gaussian')),
+    Spec('likelihood', 'glue', 'likelihood', read_only=True, choices=CHOICES['likelihood']),
+    Spec(
+        'prior',
+        'box',
+        'what is known before a window: bounds only, a calibration, or all earlier samples',
+        read_only=True,
+        choices=CHOICES['prior'],
+    ),
+    Spec('calibration', '', 'file of `calibrate --save` that priors begin with', read_only=True),
+    Spec('drift_of', [''], 'drift of single parameters, NAME=RATE each', read_only=True),
+    Spec(
+        'contradiction',
+        'widen',
+        'what follows when samples contradict the prior',
+        read_only=True,
+        choices=CHOICES['contradiction'],
+    ),
     Spec('levels', list(EstimatorSettings().levels), 'probability of each band', read_only=True),
     Spec('effects', [''], 'effects of the catalogue beyond Eq. (2)', read_only=True),
     own_effects.SPEC,
@@ -51,6 +70,26 @@ def settings(values: Mapping[str, Any]) -> EstimatorSettings:
     """
     known = {f.name for f in fields(EstimatorSettings)}
     return EstimatorSettings.from_mapping({n: v for n, v in values.items() if n in known})
+
+
+def carried(values: Mapping[str, Any]) -> Carried | None:
+    """Return the draws that priors begin with; None where they begin with the box.
+
+    Raises:
+        InputError: no calibration where one is needed or one that is not used, or a file that
+            holds none, or draws outside the bounds.
+    """
+    mode, path = values['prior'], values['calibration']
+    if not path:
+        if mode == 'calibration':
+            raise InputError("prior 'calibration' needs the file: calibration:=FILE")
+        return None
+    if mode == 'box':
+        raise InputError(f"calibration {path} is not used with prior 'box'")
+    found = Calibration.load(path).carried()
+    model = choose_model(effects(values))
+    informative_prior(found, model.names, model.lower, model.upper, None)
+    return found
 
 
 def requested(request: Any) -> ModelChoice:

@@ -24,7 +24,15 @@ from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.fitting import identifiable
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.sampling import Job
-from actuator_glue.online.stream import Dropped, Event, Failed, Rejected, Restarted, Window
+from actuator_glue.online.stream import (
+    Contradicted,
+    Dropped,
+    Event,
+    Failed,
+    Rejected,
+    Restarted,
+    Window,
+)
 from actuator_glue.workers.worker import DIED, FAILED, Answer
 
 
@@ -39,11 +47,13 @@ class EstimatorNode(WorkingNode):
         configuration.settings(values)
         own_effects.load(values)
         choose_model(configuration.effects(values))
+        configuration.carried(values)
 
     def do_configure(self) -> None:
         """Start the worker process, which compiles while nothing depends on it yet."""
         values = self.parameters.values()
         self.settings = configuration.settings(values)
+        self._carried = configuration.carried(values)
         self.employ(warm_up)
         self._out = {
             topic: self.publisher(topic)
@@ -54,7 +64,8 @@ class EstimatorNode(WorkingNode):
     def do_activate(self) -> None:
         """Begin with an empty window."""
         model = choose_model(configuration.effects(self.parameters.values()))
-        self.estimator = Estimator(self.settings, model, live=True)
+        self.estimator = Estimator(self.settings, model, live=True, carried=self._carried)
+        self.contradictions = 0
         self._announced: ModelChoice | None = None
         self._arrival: dict[int, float] = {}
         self.samples, self.windows = Rate(), Rate()
@@ -123,6 +134,9 @@ class EstimatorNode(WorkingNode):
             elif isinstance(event, Failed):
                 self.failed += 1
                 self.complain('window', f'window {event.number}: {event.message}')
+            elif isinstance(event, Contradicted):
+                self.contradictions += 1
+                self.complain('prior', event.message)
             elif isinstance(event, Restarted) and event.reason == 'setup':
                 self.get_logger().info(event.message)
                 self._say_identifiable()
@@ -201,7 +215,7 @@ class EstimatorNode(WorkingNode):
             record = job.window.record
             number, index = job.window.number, record.first_index
             stamp, actuator = record.start_ns, record.actuator
-        fields = wire.estimator_setup(self.settings, model, number, index)
+        fields = wire.estimator_setup(self.settings, model, number, index, self._carried)
         publish(self._out[topics.ESTIMATOR_SETUP], wire.Head(stamp, actuator), fields)
 
     def _set_model(self, request: Any, response: Any) -> Any:
@@ -239,7 +253,11 @@ class EstimatorNode(WorkingNode):
             'windows failed': self.failed,
             'deadlines missed': self.late + self.dropped,
             'model': ', '.join(self.estimator.model.effects) or 'Eq. (2)',
+            'prior': self.settings.prior,
+            'prior contradicted': self.contradictions,
         }
+        if self.last is not None and self.last.conflict is not None:
+            values['prior p-value'] = self.last.conflict.p_value
         if self.last is not None and self.last.rhat is not None:
             latency = sorted(self.latency)
             values |= {

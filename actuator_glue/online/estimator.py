@@ -8,10 +8,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from actuator_glue.errors import InputError
+from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.online.fitting import starting_points
 from actuator_glue.online.forecast import Frozen
 from actuator_glue.online.job import WindowResult
+from actuator_glue.online.knowledge import Knowledge
 from actuator_glue.online.sampling import Job, WindowFit
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import (
@@ -70,6 +72,7 @@ class Estimator:
         live: a few windows wait, so that a slow computer drops windows instead of falling
             behind; otherwise every window waits its turn.
         schedule: repeats a live run.
+        carried: draws of an earlier calibration, for the priors that start from one.
     """
 
     def __init__(
@@ -79,6 +82,7 @@ class Estimator:
         *,
         live: bool = False,
         schedule: Schedule | None = None,
+        carried: Carried | None = None,
     ) -> None:
         self.settings = settings
         self.model = model
@@ -88,6 +92,7 @@ class Estimator:
         self._windows = SlidingWindows(settings)
         self._waiting: list[Window] = []
         self._memory = _Memory()
+        self._knowledge = Knowledge(settings, carried)
         self._ahead = Ahead()
 
     @property
@@ -167,6 +172,7 @@ class Estimator:
             afresh=afresh,
             stop_at=None if self.schedule is None else self.schedule.done[_key(window)][1],
             frozen=self._judged(window),
+            prior=self._knowledge.prior(window),
         )
         ahead = self._ahead.between(window.end, job.forecast[1], record.period)
         self.running = replace(job, ahead=ahead)
@@ -186,7 +192,7 @@ class Estimator:
             del memory.frozen[:-MAX_FROZEN]
         if result.failure:
             return [Failed(window.number, window.record.first_index, result.failure)]
-        return []
+        return [*self._knowledge.learn(window, result.learned, result.conflict)]
 
     def abandon(self, reason: str) -> list[Event]:
         """Give up the running job, whose process has died."""

@@ -8,9 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from actuator_glue.errors import InputError
+from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.inference.convergence import rhat_and_ess
 from actuator_glue.inference.moments import Moments, moments
+from actuator_glue.inference.prior_conflict import Conflict
 from actuator_glue.online import fitting, sampling
 from actuator_glue.online.forecast import Frozen, Prediction, predictions
 from actuator_glue.online.response import ResponseBand, response_band
@@ -47,6 +49,8 @@ class WindowResult:
         forecast: bands over samples to come, where their command is known.
         frozen: the posterior, to be held against later samples.
         archive: points for the next window to start from.
+        learned: the posterior, for the priors of later windows.
+        conflict: how far the window contradicts its prior.
         failure: why there is no posterior; empty where there is one.
     """
 
@@ -69,6 +73,8 @@ class WindowResult:
     forecast: tuple[Prediction, ...] = ()
     frozen: Frozen | None = None
     archive: Array | None = None
+    learned: Carried | None = None
+    conflict: Conflict | None = None
     failure: str = ''
 
 
@@ -116,6 +122,8 @@ def _failed(job: Job, fitted: WindowFit, reason: str) -> WindowResult:
         job.model,
         frozen=fitted.frozen,
         archive=fitted.archive,
+        learned=fitted.learned,
+        conflict=fitted.conflict,
         failure=reason,
     )
 
@@ -154,6 +162,8 @@ def _report(job: Job, fitted: WindowFit, limits: bool) -> WindowResult:
         forecast=tuple(_forecast(job, frozen, seed)) if limits else (),
         frozen=frozen,
         archive=fitted.archive,
+        learned=fitted.learned,
+        conflict=fitted.conflict,
     )
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TypeAlias
 
 from actuator_glue.errors import InputError
+from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.choice import ModelChoice, choose_model
 from actuator_glue.online import wire
 from actuator_glue.online.estimator import Estimator, Schedule
@@ -40,6 +41,7 @@ def replay(
     model: ModelChoice | None = None,
     schedule: Schedule | None = None,
     reports: Callable[[Iterable[Event | Sampled]], Iterator[WindowResult | Event]] = at_once,
+    carried: Carried | None = None,
 ) -> Iterator[WindowResult | Event]:
     """Run the estimator over what was streamed; yield results and events in order.
 
@@ -49,8 +51,9 @@ def replay(
         model: model to fit; Eq. (2) where None.
         schedule: repeats what a live run dropped or stopped early.
         reports: computes what windows publish, perhaps beside the sampling of the next ones.
+        carried: draws of an earlier calibration, for the priors that start from one.
     """
-    estimator = Estimator(settings, model or choose_model(), schedule=schedule)
+    estimator = Estimator(settings, model or choose_model(), schedule=schedule, carried=carried)
     return reports(_sampled(items, estimator))
 
 

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.online import wire
 from actuator_glue.online.estimator import Schedule
@@ -25,6 +26,7 @@ class Published:
     Attributes:
         settings: its settings; None where the bag has no EstimatorSetup.
         models: model from each window number on.
+        carried: draws that its priors began with; None where they began from the box.
         posteriors: PosteriorMoments by window number.
         scored: scored PredictionBands by window number, index and kind, as `_brief` leaves
             them: a long bag's bands do not fit into memory.
@@ -32,6 +34,7 @@ class Published:
 
     settings: EstimatorSettings | None = None
     models: list[tuple[int, ModelChoice]] = field(default_factory=list)
+    carried: Carried | None = None
     posteriors: dict[int, Any] = field(default_factory=dict)
     scored: dict[tuple[int, int, str], Any] = field(default_factory=dict)
 
@@ -58,6 +61,7 @@ def published(messages: Iterable[tuple[str, Any]]) -> Published:
         kind = name.rpartition('/')[2]
         if kind == 'EstimatorSetup':
             found.settings = wire.estimator_settings(message)
+            found.carried = wire.carried(message)
             found.models.append((int(message.window), wire.model_choice(message)))
         elif kind == 'PosteriorMoments':
             check_period(message.period, f'posterior of window {message.window}')

@@ -10,11 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.errors import InputError
+from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.inference.convergence import quick_rhat_and_ess
-from actuator_glue.inference.posterior import Problem, sample
+from actuator_glue.inference.posterior import Problem, Target, sample
 from actuator_glue.inference.predictive import fit_residual
+from actuator_glue.inference.prior_conflict import Conflict, conflict
 from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.inference.state import State
 from actuator_glue.online import fitting
@@ -47,6 +49,7 @@ class Job:
         stop_at: evaluations after which a live run was stopped; a replay repeats it.
         ahead: commands from the window's end to the forecast's, shape (na,) [m], where known.
         frozen: earlier posteriors whose forecasts this window's samples judge.
+        prior: what is known before the window; None for no more than the box.
     """
 
     window: Window
@@ -57,6 +60,7 @@ class Job:
     stop_at: int | None = None
     ahead: Array | None = None
     frozen: tuple[Frozen, ...] = ()
+    prior: Carried | None = None
 
     @property
     def evaluations(self) -> int:
@@ -93,6 +97,8 @@ class WindowFit:
         nrmse: rms_error over the standard deviation of the measured displacement.
         frozen: the posterior, to be held against later samples.
         archive: points to start from, shape (m, p).
+        learned: the posterior, for the priors of later windows; None where none is wanted.
+        conflict: how far the window contradicts its prior; None where that is the box.
         complete: the sampling was not ended early.
         failure: why there is nothing of all this; empty where there is.
     """
@@ -104,6 +110,8 @@ class WindowFit:
     nrmse: float = float('nan')
     frozen: Frozen | None = None
     archive: Array | None = None
+    learned: Carried | None = None
+    conflict: Conflict | None = None
     complete: bool = False
     failure: str = ''
 
@@ -122,7 +130,8 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> WindowFit:
     settle = round(job.settings.settle / record.period)
     noise = sensor_noise(record.measured)
     moved = _check_excited(record, settle, noise)
-    chains, complete = _sample(job, expired)
+    target = _target(job)
+    chains, complete = _sample(job, target, expired)
     posterior = chains.posterior()
     best = fitting.simulate(job.model, chains.best[np.newaxis], record)[0]
     residual = (record.measured - best)[settle:]
@@ -145,17 +154,23 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> WindowFit:
             noise=noise,
         ),
         archive=_archive(posterior[spread(len(posterior), ARCHIVE)], job.archive),
+        learned=(
+            Carried.thinned(job.model.names, posterior)
+            if job.settings.prior == 'sequential'
+            else None
+        ),
+        conflict=None if target.prior is None else conflict(target.prior, posterior),
         complete=complete,
     )
 
 
-def _sample(job: Job, expired: Callable[[], bool] | None) -> tuple[Chains, bool]:
-    """Return chains of physical parameters, and whether they are all that was wanted."""
+def _target(job: Job) -> Target:
+    """Return what is sampled."""
     settings, model, record = job.settings, job.model, job.window.record
     near = None
     if job.archive is not None:
         near = np.sort(job.archive, axis=0)[len(job.archive) // 2]
-    target = Problem(
+    return Problem(
         records=(record,),
         model=model,
         likelihood=settings.likelihood,
@@ -166,7 +181,13 @@ def _sample(job: Job, expired: Callable[[], bool] | None) -> tuple[Chains, bool]
         near=near,
         # What another model has shown says nothing about this one's bends.
         shown=None if job.afresh else job.archive,
+        prior=job.prior,
     ).target()
+
+
+def _sample(job: Job, target: Target, expired: Callable[[], bool] | None) -> tuple[Chains, bool]:
+    """Return chains of physical parameters, and whether they are all that was wanted."""
+    settings, record = job.settings, job.window.record
     archive = job.archive
     if archive is not None and target.transform is not None:
         archive = target.transform.forward(archive)

@@ -5,13 +5,21 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 
 from actuator_glue.errors import InputError
+from actuator_glue.inference.carried import Drift
 
 Likelihood: TypeAlias = Literal['glue', 'gaussian']
+PriorMode: TypeAlias = Literal['box', 'calibration', 'sequential']
+Contradiction: TypeAlias = Literal['widen', 'restart', 'alarm']
+CHOICES: dict[str, tuple[str, ...]] = {
+    'likelihood': get_args(Likelihood),
+    'prior': get_args(PriorMode),
+    'contradiction': get_args(Contradiction),
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +56,9 @@ LIMITS: dict[str, Limit] = {
     'frequency_max': Limit('Hz', 0.1, 1000.0, 'upper end of the frequency-response band'),
     'frequencies': Limit('1', 2, 2000, 'frequencies of the frequency-response band'),
     'headline_frequency': Limit('Hz', 0.01, 1000.0, 'frequency of the scalars for plotting'),
+    'drift': Limit('h^-1/2', 0.0, 100.0, 'standard deviation of ln parameter after an hour'),
+    'prior_age': Limit('s', 0.0, 3.2e9, 'time from the calibration to the start of the stream'),
+    'false_alarms': Limit('1/h', 1e-6, 1e3, 'false alarms of the check of the prior, at most'),
     'clock_tolerance': Limit('s', 1e-4, 60.0, 'step of the stamps that counts as a clock jump'),
 }
 
@@ -61,6 +72,11 @@ class EstimatorSettings:
     Attributes:
         likelihood: 'glue' is Eq. (4); 'gaussian' is a formal one.
         levels: probability of each band, ascending, in (0, 1).
+        prior: 'box' begins every window from the box; 'calibration' from a calibration;
+            'sequential' from all earlier samples that the window does not hold.
+        drift_of: rates of single parameters in place of `drift`, NAME=RATE each.
+        contradiction: what follows when data contradict the prior: 'widen' it, 'restart' from
+            the box, or 'alarm' only.
 
     Raises:
         InputError: a setting outside its range, or settings that contradict each other.
@@ -84,6 +100,12 @@ class EstimatorSettings:
     clock_tolerance: float = 0.1
     likelihood: Likelihood = 'glue'
     levels: tuple[float, ...] = (0.5, 0.95)
+    prior: PriorMode = 'box'
+    drift: float = 0.02
+    drift_of: tuple[str, ...] = ()
+    prior_age: float = 0.0
+    contradiction: Contradiction = 'widen'
+    false_alarms: float = 0.1
 
     def __post_init__(self) -> None:
         for name, limit in LIMITS.items():
@@ -98,8 +120,13 @@ class EstimatorSettings:
             raise InputError(f'levels {self.levels} must lie between 0 and 1')
         if list(self.levels) != sorted(set(self.levels)):
             raise InputError(f'levels {self.levels} must ascend')
-        if self.likelihood not in ('glue', 'gaussian'):
-            raise InputError(f'likelihood {self.likelihood!r} is unknown; use glue or gaussian')
+        for name, known in CHOICES.items():
+            if getattr(self, name) not in known:
+                raise InputError(
+                    f'{name} {getattr(self, name)!r} is unknown; use one of {", ".join(known)}'
+                )
+        object.__setattr__(self, 'drift_of', tuple(str(word) for word in self.drift_of if word))
+        self.drifts()
         if self.hop > self.window:
             raise InputError(f'hop {self.hop:g} s is longer than the window {self.window:g} s')
         if self.settle > 0.8 * self.window:
@@ -112,6 +139,21 @@ class EstimatorSettings:
                 f'time_budget {self.time_budget:g} s is longer than the hop {self.hop:g} s: '
                 'windows would pile up'
             )
+
+    def drifts(self) -> Drift:
+        """Return how far the parameters wander.
+
+        Raises:
+            InputError: a word of `drift_of` that is not NAME=RATE.
+        """
+        own = {}
+        for word in self.drift_of:
+            name, _, rate = word.partition('=')
+            try:
+                own[name.strip()] = float(rate)
+            except ValueError:
+                raise InputError(f'drift_of {word!r} is not NAME=RATE') from None
+        return Drift.of(self.drift, own)
 
     @staticmethod
     def from_mapping(values: Mapping[str, Any], source: str = '') -> EstimatorSettings:
@@ -130,6 +172,8 @@ class EstimatorSettings:
             try:
                 if name == 'levels':
                     clean[name] = tuple(float(v) for v in value)
+                elif name == 'drift_of':
+                    clean[name] = tuple(str(v) for v in value)
                 elif kinds[name] == 'int':
                     clean[name] = int(value)
                 elif kinds[name] == 'float':
@@ -156,6 +200,6 @@ class EstimatorSettings:
             raise InputError(f'{source}: estimator settings are no JSON ({error})') from error
         if not isinstance(values, dict):
             raise InputError(f'{source}: estimator settings are no JSON object')
-        for name in ('start', 'definitions'):  # belong to the model
+        for name in ('start', 'definitions', 'carried'):  # belong to the model and the prior
             values.pop(name, None)
         return EstimatorSettings.from_mapping(values, source)

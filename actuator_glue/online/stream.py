@@ -214,4 +214,21 @@ class Failed:
     message: str
 
 
-Event: TypeAlias = Restarted | Rejected | Dropped | Failed
+@dataclass(frozen=True, slots=True)
+class Contradicted:
+    """Samples contradict what was known of the parameters.
+
+    Attributes:
+        number: window that gave the alarm.
+        since: running index from which on samples contradict.
+        p_value: prior predictive p-value of that window.
+        message: for people.
+    """
+
+    number: int
+    since: int
+    p_value: float
+    message: str
+
+
+Event: TypeAlias = Restarted | Rejected | Dropped | Failed | Contradicted

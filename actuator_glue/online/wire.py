@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from actuator_glue.errors import InputError
+from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.choice import ModelChoice, choose_model
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.online.forecast import Prediction
@@ -107,8 +108,25 @@ def estimator_settings(message: Any) -> EstimatorSettings:
     return EstimatorSettings.from_json(message.settings, 'EstimatorSetup')
 
 
+def carried(message: Any) -> Carried | None:
+    """Return the draws that the priors of an EstimatorSetup began with, if any.
+
+    Raises:
+        InputError: they cannot be read.
+    """
+    try:
+        value = json.loads(message.settings).get('carried')
+    except (ValueError, AttributeError) as error:
+        raise InputError(f'EstimatorSetup: the prior cannot be read ({error})') from error
+    return None if value is None else Carried.from_json(value, 'EstimatorSetup')
+
+
 def estimator_setup(
-    settings: EstimatorSettings, model: ModelChoice, window: int, index: int
+    settings: EstimatorSettings,
+    model: ModelChoice,
+    window: int,
+    index: int,
+    carried: Carried | None = None,
 ) -> Fields:
     """Return the fields of an EstimatorSetup but its header.
 
@@ -117,9 +135,12 @@ def estimator_setup(
         model: model it goes on with.
         window: number of the first window it holds for.
         index: running index of that window's first sample.
+        carried: draws that the priors begin with, where there are any.
     """
     # What is no part of the package goes along: the bag alone is enough for a replay.
     more = CATALOGUE.definitions(model.effects)
+    if carried is not None:
+        more = {**more, 'carried': carried.to_json()}
     start = [None if np.isnan(v) else v for v in model.start]
     return {
         'index': index,

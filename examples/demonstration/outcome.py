@@ -45,7 +45,7 @@ def replay_bag(bag: Path) -> Comparison:
         return Comparison(differing=['no estimator published its settings into this bag'])
     streamed, model = items(decoded(bag, INPUTS)), live.models[0][1]
     with Reports() as reports:
-        results = replay(streamed, live.settings, model, live.schedule(), reports)
+        results = replay(streamed, live.settings, model, live.schedule(), reports, live.carried)
         return compare((r for r in results if isinstance(r, WindowResult)), live)
 
 

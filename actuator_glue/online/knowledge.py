@@ -1,0 +1,115 @@
+"""What earlier samples say before a window is looked at: the prior of each window."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from actuator_glue.inference.carried import Carried
+from actuator_glue.inference.prior_conflict import Conflict, SequentialTest
+from actuator_glue.online.settings import EstimatorSettings
+from actuator_glue.online.stream import Contradicted, Window
+
+# Overlapping windows whose posteriors are waited with, whatever the settings.
+_MOST = 1000
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Learned:
+    """A posterior, and the time of its middle and of its last sample [ns]."""
+
+    carried: Carried
+    middle_ns: int
+    last_ns: int
+
+
+class Knowledge:
+    """Priors for windows, from a calibration and from the windows before; bounded.
+
+    A window's samples are counted from `settle` on. Its sequential prior is the posterior of the
+    newest window that ended before that, drifted by the time between their middles: each
+    sample is counted once along the chain of windows that led there.
+
+    Args:
+        settings: of the estimator; `prior` says which prior is wanted.
+        carried: draws of the calibration, where there is one.
+    """
+
+    def __init__(self, settings: EstimatorSettings, carried: Carried | None) -> None:
+        self._settings = settings
+        self._first = carried if settings.prior != 'box' else None
+        self._drift = settings.drifts()
+        self._began_ns: int | None = None
+        self._learned: list[_Learned] = []
+        self._epoch = -1
+        self._tested_ns: int | None = None
+        independent = 3600.0 / max(settings.window - settings.settle, settings.hop)
+        self._test = SequentialTest(independent, settings.false_alarms)
+
+    def prior(self, window: Window) -> Carried | None:
+        """Return what is known before a window; None where it is no more than the box."""
+        if self._settings.prior == 'box':
+            return None
+        if window.epoch != self._epoch:
+            self._epoch, self._learned, self._tested_ns = window.epoch, [], None
+            self._test.restart()
+        start, middle, _ = self._times(window)
+        if self._began_ns is None:
+            self._began_ns = start
+        before = [one for one in self._learned if one.last_ns < start]
+        if before:
+            self._learned = self._learned[self._learned.index(before[-1]) :]
+            known = before[-1]
+            return known.carried.drifted(self._drift, (middle - known.middle_ns) * 1e-9)
+        if self._first is None:
+            return None
+        elapsed = (middle - self._began_ns) * 1e-9
+        return self._first.drifted(self._drift, self._settings.prior_age + elapsed)
+
+    def learn(
+        self, window: Window, posterior: Carried | None, found: Conflict | None
+    ) -> list[Contradicted]:
+        """Take a window's posterior, and how far it contradicts the window's prior."""
+        start, middle, last = self._times(window)
+        if self._settings.prior == 'sequential' and posterior is not None:
+            self._learned.append(_Learned(posterior, middle, last))
+            del self._learned[:-_MOST]
+        # Windows that share samples share their errors: only separate ones are counted.
+        if found is None or (self._tested_ns is not None and start <= self._tested_ns):
+            return []
+        self._tested_ns = last
+        if not self._test.add(found.p_value, window.record.first_index):
+            return []
+        self._test.restart()
+        return [self._contradicted(window, found)]
+
+    def _contradicted(self, window: Window, found: Conflict) -> Contradicted:
+        answer = self._settings.contradiction
+        factor = max(found.square / max(found.directions, 1), 1.0)
+        if answer == 'restart':
+            self._first, self._learned = None, []
+        elif answer == 'widen':
+            if self._first is not None:
+                self._first = self._first.widened(factor)
+            self._learned = [
+                _Learned(one.carried.widened(factor), one.middle_ns, one.last_ns)
+                for one in self._learned
+            ]
+        what = {
+            'widen': f'its variance is now {factor:.3g} times as large',
+            'restart': 'estimation begins again from the box',
+            'alarm': 'it is used all the same',
+        }[answer]
+        return Contradicted(
+            window.number,
+            self._test.since,
+            found.p_value,
+            f'window {window.number} contradicts what was known of the parameters (p = '
+            f'{found.p_value:.2g}; since sample {self._test.since}): {what}',
+        )
+
+    def _times(self, window: Window) -> tuple[int, int, int]:
+        """Return the stamps of the first counted, the middle and the last sample [ns]."""
+        record = window.record
+        settled = round(self._settings.settle / record.period)
+        start, last = record.stamp_ns(settled), record.stamp_ns(len(record) - 1)
+        return start, (start + last) // 2, last
