@@ -207,7 +207,7 @@ def test_settings_that_cannot_be_are_refused(changes, words):
 
 @pytest.mark.slow
 @pytest.mark.timeout(3600)
-@pytest.mark.parametrize('drift', [0.0, 1.0])
+@pytest.mark.parametrize('drift', [0.0, 0.3])
 def test_ranks_of_the_truth_are_uniform(drift, rng_seed):
     """Simulation-based calibration of carried and sequential priors (Talts et al. 2018).
 
@@ -225,7 +225,7 @@ def test_ranks_of_the_truth_are_uniform(drift, rng_seed):
         for step in range(5):
             if step:
                 theta = theta * np.exp(drift * np.sqrt(2.0 / 3600.0) * rng.standard_normal(4))
-            pieces.append(record(2.0, seed=int(rng.integers(2**31)), theta=theta, sd=1e-4))
+            pieces.append(record(2.0, seed=int(rng.integers(2**31)), theta=theta))
         posterior = None
         estimator = Estimator(settings, choose_model(), carried=known(spread=0.05, seed=case))
         for n, piece in enumerate(pieces):
@@ -244,5 +244,5 @@ def test_ranks_of_the_truth_are_uniform(drift, rng_seed):
     smooth = (np.array(ranks) + rng.random((len(ranks), 4))) / 51.0
     for i, name in enumerate(NAMES):
         p = kstest(smooth[:, i], 'uniform').pvalue
-        print(f'{name}: p {p:.3f}')
+        print(f'{name}: p {p:.3f}', np.histogram(smooth[:, i], 10, (0, 1))[0])
         assert p > 1e-3 / 8, name

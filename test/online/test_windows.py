@@ -237,7 +237,7 @@ def test_unusable_set_ups_say_why(values, told):
         ({'levels': ()}, 'between 0 and 1'),
         ({'levels': (1.0,)}, 'between 0 and 1'),
         ({'shaping_factor': np.nan}, 'shaping_factor = nan'),
-        ({'likelihood': 'ols'}, 'use glue or gaussian'),
+        ({'likelihood': 'ols'}, 'use one of glue, gaussian'),
     ],
 )
 def test_unusable_settings_say_why(values, told):
