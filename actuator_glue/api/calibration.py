@@ -11,14 +11,14 @@ from typing import Any, Literal
 import numpy as np
 
 from actuator_glue.api import judgement
-from actuator_glue.api.calibration_result import (
+from actuator_glue.api.calibration_parts import (
     CalibratedRecord,
-    Calibration,
     FitError,
     Marginal,
     PriorUse,
     RecordError,
 )
+from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.api.compilation import compilation
 from actuator_glue.diagnosis.data import SETTLE
 from actuator_glue.diagnosis.preparation import clean, initial_state

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from actuator_glue.api.calibration_result import FitError, Marginal, PriorUse
+from actuator_glue.api.calibration_parts import FitError, Marginal, PriorUse
 from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.records import Array, Record
 

@@ -9,7 +9,7 @@ import pytest
 from scipy import signal, stats
 
 import actuator_glue as ag
-from actuator_glue.api.calibration_result import CalibratedRecord, FitError, Marginal
+from actuator_glue.api.calibration_parts import CalibratedRecord, FitError, Marginal
 from actuator_glue.cli.main import main
 from actuator_glue.hybrid.stability import share
 from actuator_glue.model import linear

@@ -1,0 +1,105 @@
+"""What a calibration's result is made of: parameters, errors, records, the prior."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuator_glue.records import Array, Record
+
+
+@dataclass(frozen=True, slots=True)
+class Marginal:
+    """Posterior of one parameter, in its SI unit.
+
+    Attributes:
+        mean, stddev, skewness: moments of the draws.
+        cov: coefficient of variation, stddev / |mean|.
+        rhat: rank-normalised split R-hat (Vehtari et al. 2021), by arviz.
+        ess: bulk effective sample size, by arviz.
+        best: value of the draw of the highest likelihood.
+        unit: SI unit.
+        bounds: of the uniform prior.
+        prior_dominated: the draws are about as wide as the prior.
+    """
+
+    mean: float
+    stddev: float
+    skewness: float
+    cov: float
+    rhat: float
+    ess: float
+    best: float
+    unit: str
+    bounds: tuple[float, float]
+    prior_dominated: bool
+
+
+@dataclass(frozen=True, slots=True)
+class RecordError:
+    """Free-run error of the best draw in one record.
+
+    Attributes:
+        source: the record.
+        rms_m: root mean square [m].
+        offset_m: its mean [m].
+        nrmse: share of the spread measured; None where nothing moves.
+    """
+
+    source: str
+    rms_m: float
+    offset_m: float
+    nrmse: float | None
+
+    @classmethod
+    def of(cls, source: str, error: Array, measured: Array) -> RecordError:
+        """Return it for errors (n,) of measured displacement (n,) [m]."""
+        rms, spread = float(np.sqrt(np.mean(error**2))), float(measured.std())
+        return cls(source, rms, float(np.mean(error)), rms / spread if spread > 0.0 else None)
+
+
+@dataclass(frozen=True, slots=True)
+class FitError:
+    """Free-run error of the best draw over all records [m], as share of their spread, and each."""
+
+    rms_m: float
+    nrmse: float | None
+    records: tuple[RecordError, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class CalibratedRecord:
+    """A record that was calibrated with."""
+
+    source: str
+    samples: int
+    rate_hz: float
+    stiffness_n_per_m: float | None
+    hold: str
+
+    @classmethod
+    def of(cls, record: Record) -> CalibratedRecord:
+        """Describe a record."""
+        return cls(record.source, len(record), record.rate, record.stiffness, record.hold)
+
+
+@dataclass(frozen=True, slots=True)
+class PriorUse:
+    """The informative prior of a calibration, and how it stood up to the records.
+
+    Attributes:
+        source: the calibration it came from.
+        drift: standard deviation of the logarithm of a parameter after an hour [h^-1/2].
+        age_s: time between the calibrations [s].
+        components: normal components it has.
+        quality: energy coefficient between its draws and the mixture, 0 for equal.
+        p_value: prior predictive p-value of the records (Evans and Moshonov 2006).
+    """
+
+    source: str
+    drift: float
+    age_s: float
+    components: int
+    quality: float
+    p_value: float
