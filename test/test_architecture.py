@@ -44,6 +44,7 @@ ARROWS = {
     'report': CORE | {'online', 'diagnosis', 'io'},
     'io': {'records', 'errors', 'interfaces', 'hybrid'},
     'streams': {'records', 'errors', 'io'},
+    'view': {'records', 'errors', 'io', 'interfaces'},
     'workers': CORE | {'online'},
     'api': EVERYTHING,
     'nodes': EVERYTHING | {'api'},

@@ -30,6 +30,7 @@ class Names(NamedTuple):
 # None: rosdep has no key for it.
 LIBRARIES = {
     'PIL': Names('pillow', 'python3-pil'),
+    'aiohttp': Names('aiohttp', 'python3-aiohttp'),
     'arviz': Names('arviz', None),
     'colcon_core': Names('colcon-core', None),
     'colcon_python_setup_py': Names('colcon-python-setup-py', None),
@@ -60,7 +61,7 @@ LIBRARIES = {
     'zstandard': Names('zstandard', None),
 }
 # Libraries of the extra `lab`, each asked for where a file needs it.
-OPTIONAL = {'h5py', 'nptdms', 'openpyxl', 'pyarrow', 'pylsl'}
+OPTIONAL = {'aiohttp', 'h5py', 'nptdms', 'openpyxl', 'pyarrow', 'pylsl'}
 # Options of pytest that pyproject.toml and Makefile use; nothing imports these plug-ins.
 PLUGINS = {'pytest_timeout', 'xdist'}
 
@@ -119,7 +120,10 @@ def test_pip_installs_what_the_tests_import() -> None:
 def test_the_extra_lab_is_what_single_files_need() -> None:
     """Each of its libraries is named by a source, as an import or to `library`."""
     sources = ' '.join(p.read_text('utf-8') for p in (ROOT / 'actuator_glue').rglob('*.py'))
-    assert all(f"'{module}'" in sources or f'import {module}' in sources for module in OPTIONAL)
+    assert all(
+        f"'{module}'" in sources or re.search(rf'(import|from) {module}', sources)
+        for module in OPTIONAL
+    )
     expected = {LIBRARIES[m].pip for m in OPTIONAL}
     assert pip_names(PROJECT['optional-dependencies']['lab']) == expected
 

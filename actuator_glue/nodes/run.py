@@ -15,7 +15,9 @@ def _run(node: str) -> int:
     return int(module.main())
 
 
-actuator_sim, diagnoser, estimator, lab_bridge, recorder, replay = (
-    partial(_run, node)
-    for node in ('actuator_sim', 'diagnoser', 'estimator', 'lab_bridge', 'recorder', 'replay')
+_NODES = (
+    'actuator_sim', 'diagnoser', 'estimator', 'lab_bridge', 'recorder', 'replay', 'viewer',
+)  # fmt: skip
+actuator_sim, diagnoser, estimator, lab_bridge, recorder, replay, viewer = (
+    partial(_run, node) for node in _NODES
 )

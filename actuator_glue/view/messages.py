@@ -1,0 +1,172 @@
+"""Messages of the suite, of a bag or a live system, into a history."""
+
+from __future__ import annotations
+
+import math
+import threading
+from collections import deque
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from actuator_glue.errors import InputError
+from actuator_glue.io.bag_reader import as_published, messages
+from actuator_glue.io.bag_records import read_records
+from actuator_glue.io.messages import deserialize, full_name
+from actuator_glue.view.history import History
+
+_DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
+# Types that are shown, and what takes them.
+TYPES = {
+    'TestSetup': 'setup',
+    'SampleBlock': 'samples',
+    'PosteriorMoments': 'posterior',
+    'PredictionBand': 'band',
+    'FrequencyResponseBand': 'response',
+    'Diagnosis': 'diagnosis',
+    'DiagnosticArray': 'health',
+}
+# Live: a quarter of an hour at 1 kHz, 20 MB. A bag: all of it, up to 1.3 GB.
+LIVE_SAMPLES = 1 << 20
+_MOST_SAMPLES = 1 << 26
+_WINDOWS = 20  # scored windows over which the coverage is told
+_NODES = 64
+
+
+class Intake:
+    """Takes messages into a history; one thread writes while another reads.
+
+    Args:
+        history: where to.
+        title: what is shown, for people.
+
+    Attributes:
+        lock: held while the history changes.
+        live: whether there is more to come.
+    """
+
+    def __init__(self, history: History, title: str, *, live: bool) -> None:
+        self.history = history
+        self.title = title
+        self.live = live
+        self.lock = threading.Lock()
+        self._coverage: deque[tuple[float, int]] = deque(maxlen=_WINDOWS)
+        self._health: dict[str, dict[str, str]] = {}
+
+    def take(self, kind: str, message: Any) -> None:
+        """Take a message; `kind` is the bare name of its type."""
+        with self.lock:
+            getattr(self, f'_take_{TYPES[kind]}')(message)
+
+    def _take_samples(self, block: Any) -> None:
+        rows = {'command': block.command, 'measured': block.measured}
+        if len(block.measured) == len(block.command) > 0 and block.period > 0.0:
+            self.history.add_samples(int(block.index), float(block.period), rows)
+
+    def _take_setup(self, setup: Any) -> None:
+        content = {
+            'actuator': setup.actuator or setup.header.frame_id,
+            'stiffness': _number(setup.specimen_stiffness),
+            'rate': _number(setup.rate),
+            'source': setup.source,
+        }
+        self.history.add_event('setup', content)
+
+    def _take_posterior(self, posterior: Any) -> None:
+        columns = zip(
+            posterior.parameter_names, posterior.units, posterior.mean, posterior.stddev,
+            posterior.prior_dominated, strict=False,
+        )  # fmt: skip
+        rows = [
+            {'name': n, 'unit': u, 'mean': _number(m), 'sd': _number(s), 'prior': bool(p)}
+            for n, u, m, s, p in columns
+        ]
+        content = {
+            'window': int(posterior.window),
+            'parameters': rows,
+            'effects': list(posterior.effects),
+            'rhat': _number(posterior.rhat_max),
+            'ess': _number(posterior.ess_min),
+            'converged': bool(posterior.converged),
+            'nrmse': _number(posterior.nrmse),
+            'seconds': _number(posterior.seconds),
+        }
+        self.history.add_event('posterior', content)
+
+    def _take_band(self, band: Any) -> None:
+        if band.kind != 'total' or not len(band.levels):
+            return
+        count, levels = len(band.median), np.asarray(band.levels)
+        widest = len(levels) - 1
+        if len(band.lower) != count * len(levels) or len(band.upper) != len(band.lower):
+            return
+        part = slice(widest * count, (widest + 1) * count)
+        rows = {'lower': band.lower[part], 'median': band.median, 'upper': band.upper[part]}
+        self.history.add_band(int(band.index), rows)
+        if not band.scored:
+            return
+        self._coverage.append((float(band.widest_coverage), count))
+        shares, weights = zip(*self._coverage, strict=True)
+        content = {
+            'level': _number(band.widest_level),
+            'last': _number(band.widest_coverage),
+            'mean': _number(np.average(shares, weights=weights)),
+            'windows': len(self._coverage),
+            'width': _number(band.widest_width),
+            'forecast': bool(band.forecast),
+        }
+        self.history.add_event('coverage', content)
+
+    def _take_response(self, response: Any) -> None:
+        content = {
+            'frequency': _number(response.headline_frequency),
+            'amplitude': _number(response.headline_amplitude),
+            'phase': _number(response.headline_phase),
+            'delay': _number(response.headline_delay),
+        }
+        self.history.add_event('response', content)
+
+    def _take_diagnosis(self, found: Any) -> None:
+        content = {
+            'verdict': found.verdict,
+            'summary': found.summary,
+            'effects': [effect.name for effect in found.effects],
+            'advice': list(found.advice),
+        }
+        self.history.add_event('diagnosis', content)
+
+    def _take_health(self, array: Any) -> None:
+        for status in array.status[:_NODES]:
+            if status.name in self._health or len(self._health) < _NODES:
+                level = status.level
+                number = level[0] if isinstance(level, bytes) else int(level)
+                self._health[status.name] = {'level': str(number), 'message': status.message}
+        self.history.add_event('health', {name: dict(v) for name, v in self._health.items()})
+
+
+def _number(value: Any) -> float | None:
+    """Return what JSON can hold."""
+    return float(value) if math.isfinite(value) else None
+
+
+def read_bag(path: Path | str) -> Intake:
+    """Return everything that a bag holds.
+
+    Raises:
+        InputError: no bag, no samples, or more than fits into memory.
+    """
+    gaps: list[str] = []
+    records = read_records(path, note=gaps.append, gap=gaps.append, warn=gaps.append)
+    samples = sum(len(record) for record in records)
+    if samples > _MOST_SAMPLES:
+        raise InputError(f'{path}: {samples} samples do not fit into a page; cut the bag')
+    intake = Intake(History(samples + len(records)), str(path), live=False)
+    names = {_DIAGNOSTICS if n == 'DiagnosticArray' else full_name(n): n for n in TYPES}
+    for found in as_published(messages(path, types=names, note=gaps.append)):
+        try:
+            message = deserialize(found.type, found.data)
+        except InputError:
+            continue  # a message of another version; the rest can be shown
+        intake.take(names[found.type], message)
+    return intake

@@ -1,0 +1,116 @@
+"""What is kept of a test, and what a page is sent of it."""
+
+import json
+import struct
+
+import numpy as np
+import pytest
+from stream import RATE, band, block, feed, intake, posterior
+
+from actuator_glue.errors import InputError
+from actuator_glue.view.frames import Wanted, frame, parse_wanted
+from actuator_glue.view.history import ROWS, History
+
+
+def decode(data: bytes) -> tuple[dict, np.ndarray]:
+    """Return JSON and rows of a frame."""
+    (length,) = struct.unpack_from('<I', data)
+    head = json.loads(data[4 : 4 + length])
+    rows = np.frombuffer(data[4 + length :], '<f4').reshape(1 + len(ROWS), -1)
+    assert head['rows'] == ['time', *ROWS]
+    return head, rows
+
+
+def test_a_frame_is_what_was_measured() -> None:
+    """Times, samples in mm, band, and the state of that moment."""
+    head, rows = decode(frame(intake(12.0), Wanted(None, 1.0, 4000)))
+    assert (head['stop'], head['newest'], head['count']) == (12.0, 12.0, 1000)
+    expected = block(11000, 1000)
+    np.testing.assert_allclose(head['start'] + rows[0], np.arange(11000, 12000) / RATE, atol=1e-6)
+    np.testing.assert_allclose(rows[1], expected.command * 1e3, atol=1e-6)
+    np.testing.assert_allclose(rows[2], expected.measured * 1e3, atol=1e-6)
+    np.testing.assert_allclose(rows[5] - rows[3], 0.8, atol=1e-5)
+    assert head['state']['posterior']['parameters'][0]['mean'] == 123.4
+    assert head['state']['setup']['stiffness'] == 250e3
+
+
+def test_the_past_has_its_own_state() -> None:
+    """Scrolled back, the page shows what was known then, not what is known now."""
+    made = intake(5.0)
+    made.take('PosteriorMoments', posterior(99, 7.0))
+    head, _ = decode(frame(made, Wanted(3.0, 1.0, 100)))
+    assert head['stop'] == 3.0
+    assert head['state']['posterior']['window'] == 2
+    assert decode(frame(made, Wanted()))[0]['state']['posterior']['window'] == 99
+
+
+def test_decimation_keeps_peaks_and_the_band_outside() -> None:
+    """A spike of one sample among 10 000 is seen; points are bounded."""
+    made = History(20_000)
+    rows = {'command': np.zeros(10_000), 'measured': np.zeros(10_000)}
+    rows['measured'][4321] = 5e-3
+    made.add_samples(0, 1e-3, rows)
+    half = np.linspace(1e-3, 2e-3, 10_000)
+    made.add_band(0, {'lower': -half, 'median': 0 * half, 'upper': half})
+    curves = made.curves(0, 10_000, 400)
+    assert len(curves.times) <= 400
+    measured, lower, upper = (curves.rows[ROWS.index(n)] for n in ('measured', 'lower', 'upper'))
+    assert measured.max() == 5.0
+    assert abs(curves.times[measured.argmax()] - 4.321) < 0.05
+    assert (upper >= np.interp(curves.times, np.arange(10_000) * 1e-3, half * 1e3) - 1e-6).all()
+    np.testing.assert_array_equal(lower, -upper)
+
+
+def test_a_gap_is_empty_and_a_new_stream_goes_on() -> None:
+    """Lost samples are nothing; an index that goes back is appended; a new rate starts anew."""
+    made = intake(1.0)
+    made.take('SampleBlock', block(1100, 50))
+    head, rows = decode(frame(made, Wanted(None, 0.15, 4000)))
+    assert np.isnan(rows[2, :100]).all()
+    assert np.isfinite(rows[2, 100:]).all()
+    made.take('SampleBlock', block(0, 50))
+    head, rows = decode(frame(made, Wanted(None, 0.05, 4000)))
+    np.testing.assert_allclose(rows[2], block(0, 50).measured * 1e3, atol=1e-6)
+    assert head['newest'] == 1.2
+    slow = block(0, 50)
+    slow.period = 0.01
+    made.take('SampleBlock', slow)
+    head, _ = decode(frame(made, Wanted()))
+    assert head['newest'] == 0.5
+    assert head['state']['setup']['actuator'] == 'north'
+
+
+def test_an_hour_takes_no_more_than_a_minute() -> None:
+    """Rings are filled over and over; events are bounded; what is kept is right."""
+    made = intake(60.0, capacity=1 << 15)
+    before = made.history._ring.nbytes
+    feed(made, 60_000, 3_540_000)
+    assert made.history._ring.nbytes == before
+    assert all(len(events) <= 2000 for events in made.history._events.values())
+    head, rows = decode(frame(made, Wanted(None, 1.0, 4000)))
+    assert (head['newest'], head['oldest']) == (3600.0, pytest.approx(3600.0 - 32.768))
+    np.testing.assert_allclose(rows[2], block(3_599_000, 1000).measured * 1e3, atol=1e-6)
+    assert len(frame(made, Wanted(None, 1e6, 4000))) < 200_000
+
+
+def test_a_band_of_another_stream_does_no_harm() -> None:
+    """Far ahead, far behind, of uneven size: it is passed over."""
+    made = intake(2.0)
+    shown = frame(made, Wanted())
+    odd = band(500, 100)
+    odd.lower = odd.lower[:-3]
+    for wrong in (band(10**9, 100), odd):
+        made.take('PredictionBand', wrong)
+    assert decode(frame(made, Wanted()))[1].tobytes() == decode(shown)[1].tobytes()
+
+
+@pytest.mark.parametrize(
+    'text',
+    ['', '[]', '{}', '{"stop": "x", "span": 1, "points": 100}', '[' * 900,
+     '{"stop": NaN, "span": 1, "points": 100}', '{"stop": 1, "span": 1e9, "points": 100}',
+     '{"stop": 1, "span": 1, "points": -1}', '{"stop": 1, "span": 1, "points": Infinity}'],
+)  # fmt: skip
+def test_requests_that_are_none(text: str) -> None:
+    """Whatever a page sends, nothing but InputError comes out."""
+    with pytest.raises(InputError):
+        parse_wanted(text)

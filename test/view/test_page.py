@@ -1,0 +1,184 @@
+"""The page in a real browser, and who is let to it."""
+
+import asyncio
+import threading
+import time
+from pathlib import Path
+
+import aiohttp
+import numpy as np
+import pytest
+from browser import PROGRAM, Browser
+from stream import feed, intake
+
+from actuator_glue.errors import InputError
+from actuator_glue.view.messages import Intake, read_bag
+from actuator_glue.view.server import PageServer
+
+SESSION = Path(__file__).resolve().parents[2] / 'bags' / 'session'
+browser = pytest.mark.skipif(PROGRAM is None, reason='no Chromium on this computer')
+SHOWN = (
+    'north', '250 kN/m', 'beta_1', '123.4', '94 % inside the 95 % band', 'delay 31.2 ms',
+    'missing: backlash', '/estimator: R-hat high',
+)  # fmt: skip
+BAND = (190, 213, 233)  # the band's blue over white
+
+
+class Live:
+    """An intake that grows at its own rate from a thread, and its page."""
+
+    def __init__(self, seconds: float = 12.0) -> None:
+        self.intake: Intake = intake(seconds)
+        self._first = round(seconds * 1000)
+        self._end = threading.Event()
+        self._thread = threading.Thread(target=self._grow, daemon=True)
+
+    def __enter__(self) -> str:
+        """Return the page's address."""
+        self._server = PageServer(self.intake, 0)
+        self._thread.start()
+        return self._server.url
+
+    def __exit__(self, *_: object) -> None:
+        """End both."""
+        self._end.set()
+        self._thread.join()
+        self._server.close()
+
+    def _grow(self) -> None:
+        due = time.monotonic()
+        while not self._end.is_set():
+            feed(self.intake, self._first, 50)
+            self._first += 50
+            due += 0.05
+            time.sleep(max(due - time.monotonic(), 0.0))
+
+
+def blue(picture: np.ndarray) -> int:
+    """Count the pixels of the band."""
+    return int((np.abs(picture.astype(int) - BAND).max(axis=2) < 12).sum())
+
+
+@browser
+def test_a_live_page(tmp_path: Path) -> None:
+    """It asks nobody but us, is up to date, shows the band and what is known; pauses."""
+
+    async def look() -> None:
+        async with Browser() as page:
+            await page.open(url)
+            await page.until('document.body.dataset.frames > 5')
+            first, begin = int(await page.value('document.body.dataset.frames')), time.monotonic()
+            await asyncio.sleep(3.0)
+            frames = int(await page.value('document.body.dataset.frames')) - first
+            rate = frames / (time.monotonic() - begin)
+            print(f'{rate:.1f} frames/s')
+            assert 5.0 < rate < 25.0  # 20 where the computer has nothing else to do
+            text = await page.value('document.body.innerText')
+            for words in SHOWN:
+                assert words in text, words
+            picture = await page.picture()
+            picture.save(tmp_path / 'page.png')
+            seen = blue(np.asarray(picture))
+            assert seen > 5000, seen
+            await page.value("document.getElementById('run').click()")
+            await asyncio.sleep(0.5)
+            stopped = await page.value('document.body.dataset.stop')
+            await asyncio.sleep(1.0)
+            assert await page.value('document.body.dataset.stop') == stopped
+            back = "t = document.getElementById('time'); t.value = t.min; "
+            await page.value(back + "t.dispatchEvent(new Event('input'))")
+            await page.until('document.body.dataset.stop <= 10.1')
+            await page.value("document.getElementById('run').click()")
+            await page.until(f'document.body.dataset.stop > {stopped}')
+            assert all(r.startswith((url, url.replace('http', 'ws'))) for r in page.requests)
+            assert len(page.requests) >= 6
+            assert not page.faults
+
+    with Live() as url:
+        asyncio.run(look())
+
+
+@browser
+def test_a_bag_with_a_time_slider() -> None:
+    """The reference session: at its end the diagnosis, at its beginning none; it plays."""
+
+    async def look() -> None:
+        async with Browser() as page:
+            await page.open(server.url)
+            await page.until('document.body.dataset.frames > 0')
+            assert 'backlash' in await page.value('document.body.innerText')
+            slide = "t = document.getElementById('time'); t.value = 11; "
+            await page.value(slide + "t.dispatchEvent(new Event('input'))")
+            await page.until('document.body.dataset.stop < 11.1')
+            assert await page.value('last.state.diagnosis') is None
+            await page.value("document.getElementById('run').click()")
+            await page.until('document.body.dataset.stop > 12')
+            assert blue(np.asarray(await page.picture())) > 100
+            assert not page.faults
+
+    server = PageServer(read_bag(SESSION), 0)
+    try:
+        asyncio.run(look())
+    finally:
+        server.close()
+
+
+def test_who_is_let_in() -> None:
+    """Another name, another origin, no origin at the socket, other paths, absurd requests."""
+
+    async def knock() -> None:
+        async with aiohttp.ClientSession() as session:
+            own = server.url.rstrip('/')
+            port = own.rpartition(':')[2]
+
+            async def status(path: str = '/', **headers: str) -> int:
+                async with session.get(own + path, headers=headers) as answer:
+                    policy = answer.headers.get('Content-Security-Policy', '')
+                    assert answer.status != 200 or policy.startswith("default-src 'self';")
+                    return answer.status
+
+            assert await status() == 200
+            assert await status(Host=f'localhost:{port}') == 200
+            assert await status(Host=f'evil.example:{port}') == 403
+            assert await status(Host='127.0.0.1:1') == 403
+            assert await status(Origin='http://evil.example') == 403
+            assert await status('/socket') == 403
+            for path in ('/page.py', '/../server.py', '/%2e%2e/server.py', '/assets/page.js'):
+                assert await status(path) == 404
+            with pytest.raises(aiohttp.WSServerHandshakeError):
+                await session.ws_connect(own + '/socket', origin='http://evil.example')
+            for absurd in ('{}', 'x' * 5000):
+                async with session.ws_connect(own + '/socket', origin=own) as socket:
+                    await socket.send_str(absurd)
+                    while (await socket.receive()).type == aiohttp.WSMsgType.BINARY:
+                        pass
+                    assert socket.close_code in (1008, 1009)
+
+    server = PageServer(intake(1.0), 0)
+    try:
+        asyncio.run(knock())
+        with pytest.raises(InputError, match='choose another'):
+            PageServer(intake(1.0), int(server.url.rstrip('/').rpartition(':')[2]))
+    finally:
+        server.close()
+
+
+@browser
+@pytest.mark.slow
+def test_the_browser_does_not_grow() -> None:
+    """Five minutes at 20 frames per second: the heap after a collection stays where it was."""
+
+    async def look() -> None:
+        async with Browser() as page:
+            await page.open(url)
+            heap = []
+            for _ in range(10):
+                await asyncio.sleep(30.0)
+                await page.call('HeapProfiler.collectGarbage')
+                heap.append((await page.call('Runtime.getHeapUsage'))['usedSize'] / 1e6)
+            print('MB:', heap)
+            slope = float(np.polyfit(np.arange(7), heap[3:], 1)[0])  # MB per half minute
+            assert slope * 120 < 5.0  # per hour
+
+    with Live() as url:
+        asyncio.run(look())
