@@ -18,7 +18,7 @@ BOTTOM = {'errors', 'records', 'jit', 'normal'}
 CORE = BOTTOM | {'model', 'inference'}
 EVERYTHING = CORE | {
     'online', 'diagnosis', 'report', 'io', 'interfaces', 'workers', 'effects',
-    'hybrid', 'streams',
+    'hybrid', 'streams', 'view',
 }  # fmt: skip
 # Each folder or top module, and what it may import besides itself.
 ARROWS = {

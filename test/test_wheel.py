@@ -60,6 +60,7 @@ def test_wheel_holds_every_file_of_the_package(wheel: Path) -> None:
             f'actuator_glue/partitions/{p.name}'
             for p in (ROOT / 'config/partitions').glob('*.yaml')
         }
+        | {f'actuator_glue/view/assets/{p.name}' for p in (package / 'view/assets').iterdir()}
     )
     held = {n for n in zipfile.ZipFile(wheel).namelist() if n.startswith('actuator_glue/')}
     assert held == files
