@@ -104,6 +104,11 @@ class LabBridgeNode(streamer.Streamer):
                 opened.close()
         self._source = self._results = None
 
+    def clock_jumped(self) -> None:
+        """Stamps go on from the new time."""
+        if self._source is not None:
+            self._source.clock_jumped()
+
     def stream(self) -> Iterator[Step]:
         """Yield what file or source gives."""
         assert self._source is not None

@@ -47,6 +47,7 @@ class FileSource:
         if values['actuator']:
             records = [replace(r, actuator=values['actuator']) for r in records]
         self._records = records
+        self._clock_changed = False
 
     def described(self) -> list[str]:
         """Return a line per record."""
@@ -70,24 +71,31 @@ class FileSource:
     def close(self) -> None:
         """Nothing is held."""
 
+    def clock_jumped(self) -> None:
+        """Stamps go on from the new time."""
+        self._clock_changed = True
+
     def _record(self, record: Record, offset: float) -> Iterator[Step]:
         size = self._values['block']
         ahead = round(self._values['preview'] * record.rate)
-        self._start_clock(record)
+        self._start_clock(record, record.first_index)
         self._out.setup(record.stiffness, record.hold, record.first_index, record.source)
         if not offset:
             self._node.introduce()
-            self._start_clock(record)
+            self._start_clock(record, record.first_index)
         for start in range(0, len(record), size):
             stop = min(start + size, len(record))
             due = offset + stop * record.period
             yield Step(due, partial(self._publish, record, start, stop, ahead))
 
-    def _start_clock(self, record: Record) -> None:
+    def _start_clock(self, record: Record, index: int) -> None:
+        self._clock_changed = False
         now = self._node.get_clock().now().nanoseconds
-        self._out.begin(record.actuator, record.period, now, record.first_index)
+        self._out.begin(record.actuator, record.period, now, index)
 
     def _publish(self, record: Record, start: int, stop: int, ahead: int) -> None:
+        if self._clock_changed:
+            self._start_clock(record, record.first_index + start)
         first = 0 if start == 0 else min(start + ahead, len(record))
         last = min(stop + ahead, len(record))
         if ahead and last > first:

@@ -141,6 +141,9 @@ class LiveSource:
         """Stop listening."""
         self._listener.close()
 
+    def clock_jumped(self) -> None:
+        """Arrivals show it to the map of the sender's clock."""
+
     def _announce(self) -> None:
         now = self._node.get_clock().now().nanoseconds
         self._out.begin(self._actuator, self._period, now)

@@ -9,6 +9,10 @@ from typing import NamedTuple
 
 # A step counts as late from here on [s]; the operating system's sleep is good for a tenth of it.
 LATE = 5e-3
+# A clock that is not the computer's own is looked at this often [s], and has jumped where it moves
+# on by more than this between two looks [s].
+LOOK = 5e-3
+JUMP = 1.0
 
 
 class Step(NamedTuple):
@@ -31,6 +35,9 @@ class Pacer:
         ready: asked until it says that the stream may begin.
         speed: stream seconds per second; 0 for as fast as possible.
         done: called in the thread after the last step, or with what a step raised.
+        clock: time that paces [s]; None for the computer's. One that stands still holds the
+            stream up, and where it jumps the stream goes on from there.
+        jumped: called in the thread when it has jumped.
     """
 
     def __init__(
@@ -39,12 +46,17 @@ class Pacer:
         ready: Callable[[], bool],
         speed: float,
         done: Callable[[BaseException | None], None],
+        clock: Callable[[], float] | None = None,
+        jumped: Callable[[], None] = lambda: None,
     ) -> None:
         self._steps = steps
         self._ready = ready
         self._speed = speed
         self._done = done
+        self._clock = clock
+        self._jumped = jumped
         self._stop = threading.Event()
+        self._start = self._seen = 0.0
         self.late = 0
         self.latest = 0.0
         self._thread = threading.Thread(target=self._run, name='pacer', daemon=True)
@@ -77,17 +89,36 @@ class Pacer:
         while not self._ready():
             if self._stop.wait(0.02):
                 return
-        start: float | None = None
+        begun = False
         for step in self._steps:
-            # The first step is made before the stream begins: whatever it takes is not lateness.
-            start = time.monotonic() if start is None else start
+            if not begun:
+                # The first step is made before the stream begins: what it takes is not lateness.
+                self._start = self._seen = self._now()
+                begun = True
             if self._speed > 0.0:
-                wait = start + step.due / self._speed - time.monotonic()
-                if wait > 0.0:
-                    self._stop.wait(wait)
-                elif wait < -LATE:
-                    self.late += 1
-                    self.latest = max(self.latest, -wait)
+                self._wait(step.due / self._speed)
             if self._stop.is_set():
                 return
             step.act()
+
+    def _now(self) -> float:
+        return time.monotonic() if self._clock is None else self._clock()
+
+    def _wait(self, due: float) -> None:
+        """Wait until a step is due; note where it is late."""
+        waited = False
+        while not self._stop.is_set():
+            now = self._now()
+            if self._clock is not None:
+                moved, self._seen = now - self._seen, now
+                if not 0.0 <= moved <= JUMP:
+                    self._start += moved
+                    self._jumped()
+            wait = self._start + due - now
+            if wait <= 0.0:
+                if not waited and wait < -LATE:
+                    self.late += 1
+                    self.latest = max(self.latest, -wait)
+                return
+            waited = True
+            self._stop.wait(wait if self._clock is None else min(wait, LOOK))

@@ -113,7 +113,9 @@ class RecorderNode(base.SuiteNode):
             self.complain('bag', self._failed, ERROR)
 
     def _path(self, values: Mapping[str, Any]) -> Path:
-        path = Path(values['bag']) if values['bag'] else folders.unnamed('bag')
+        # Recorders of several actuators begin at the same moment.
+        kind = 'bag' + self.get_namespace().rstrip('/').replace('/', '_')
+        path = Path(values['bag']) if values['bag'] else folders.unnamed(kind)
         return path if self._bags == 0 else path.with_name(f'{path.name}_{self._bags + 1}')
 
     def _record(self, topic: topics.Topic) -> None:

@@ -74,6 +74,14 @@ class Streamer(base.SuiteNode):
         return float(self.parameters['speed'])
 
     @property
+    def simulated_time(self) -> bool:
+        """Whether /clock paces the stream; what may publish it itself cannot wait for it."""
+        return self.stamps_now and bool(self.get_parameter('use_sim_time').value)
+
+    def _simulated(self) -> float:
+        return 1e-9 * float(self.get_clock().now().nanoseconds)
+
+    @property
     def subscribers(self) -> int:
         """How many our publisher has met: others on the topic would not get the first samples."""
         return int(self._samples_out.get_subscription_count())
@@ -109,7 +117,10 @@ class Streamer(base.SuiteNode):
         """Begin the stream."""
         self.samples = Rate()
         self._waited_for = None
-        self.pacer = Pacer(self.stream(), self.ready, self.speed, self._ended)
+        clock = self._simulated if self.simulated_time else None
+        self.pacer = Pacer(
+            self.stream(), self.ready, self.speed, self._ended, clock, self.clock_jumped
+        )
         self.pacer.start()
 
     def do_deactivate(self) -> None:

@@ -31,8 +31,8 @@ def start(tmp_path):
     """Start nodes; whatever still runs at the end is killed."""
     running = []
 
-    def begin(executable, name=None, **parameters):
-        process = Process(executable, name or executable, parameters, tmp_path)
+    def begin(executable, name=None, *, namespace='', **parameters):
+        process = Process(executable, name or executable, parameters, tmp_path, namespace)
         running.append(process)
         return process
 

@@ -3,6 +3,7 @@
 import os
 import signal
 import subprocess
+import threading
 import time
 from collections import defaultdict
 from contextlib import contextmanager, suppress
@@ -17,6 +18,7 @@ from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
 from rclpy.node import Node
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rosgraph_msgs.msg import Clock
 
 from actuator_glue.io.bag_reader import decoded
 
@@ -44,14 +46,16 @@ def executable(name):
 class Process:
     """One node in a process of its own."""
 
-    def __init__(self, name, node, parameters, folder):
+    def __init__(self, name, node, parameters, folder, namespace=''):
         self.name = node
-        self.log = folder / f'{node}.log'
-        file = folder / f'{node}.yaml'
+        self.log = folder / f'{namespace}{node}.log'
+        file = folder / f'{namespace}{node}.yaml'
         file.write_text(yaml.safe_dump({'/**': {'ros__parameters': parameters}}))
         command = [str(executable(name)), '--ros-args', '--params-file', str(file)]
         if node != name:
             command += ['-r', f'__node:={node}']
+        if namespace:
+            command += ['-r', f'__ns:=/{namespace}']
         with self.log.open('wb') as log:
             self.process = subprocess.Popen(
                 command, stdout=log, stderr=subprocess.STDOUT, cwd=folder, start_new_session=True
@@ -232,3 +236,28 @@ def stranger(kind, topic):
     yield node.create_publisher(kind, topic, 10)
     node.destroy_node()
     context.shutdown()
+
+
+class Timekeeper:
+    """Publishes /clock a hundred times a second, at a speed that may be 0, from any time."""
+
+    def __init__(self, node, start=1000.0):
+        self._out = node.create_publisher(Clock, '/clock', 10)
+        self.now, self.speed, self._ended = start, 1.0, threading.Event()
+        self._thread = threading.Thread(target=self._run, daemon=True)
+        self._thread.start()
+
+    def _run(self):
+        last = time.monotonic()
+        while not self._ended.wait(0.01):
+            elapsed = time.monotonic() - last
+            last += elapsed
+            self.now += self.speed * elapsed
+            message = Clock()
+            message.clock.sec, fraction = divmod(int(self.now * 1e9), 10**9)
+            message.clock.nanosec = fraction
+            self._out.publish(message)
+
+    def end(self):
+        self._ended.set()
+        self._thread.join()

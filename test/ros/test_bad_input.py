@@ -9,8 +9,7 @@ import pytest
 from actuator_glue_msgs.action import Diagnose
 from rclpy.action import ActionClient
 from rclpy.duration import Duration
-from ros_nodes import QUICK, RATE, stranger
-from rosgraph_msgs.msg import Clock
+from ros_nodes import QUICK, RATE, Timekeeper, stranger
 from std_msgs.msg import String
 
 from actuator_glue.io.bag_reader import decoded
@@ -174,25 +173,17 @@ def test_a_simulated_clock_that_jumps_back_is_said_and_survived(start, probe):
         'estimator': start('estimator', use_sim_time=True, **QUICK),
         'actuator_sim': start('actuator_sim', use_sim_time=True, rate=RATE, wait_for=1),
     }
-    clock = probe.create_publisher(Clock, '/clock', 10)
-
-    def tick(seconds):
-        message = Clock()
-        message.clock.sec = seconds
-        clock.publish(message)
-
+    clock = Timekeeper(probe, 100.0)
     for node in nodes:
         probe.until(lambda node=node: node in probe.health, 60, node)
-    for seconds in (100, 101, 102):
-        tick(seconds)
-        probe.for_a_while(0.3)
     probe.until(lambda: probe.number('estimator', 'samples') > 0, 60, 'samples')
-    tick(50)
+    clock.now = 50.0
     for node, process in nodes.items():
         probe.until(lambda node=node: 'the clock jumped by -' in probe.faults[node], 15, node)
         assert process.alive
     # The simulator's stamps follow, and the estimator restarts its window for that reason.
     probe.until(lambda: 'at sample' in probe.faults['estimator'], 15, 'stamps')
+    clock.end()
     assert all(process.end() == 0 for process in nodes.values())
 
 

@@ -1,85 +1,78 @@
-"""The launch file: names only parameters and nodes that exist; a node that fails ends all."""
+"""The launch files: they name what exists, several actuators run apart, one failure ends all."""
 
-import ast
-import runpy
-import sys
-from pathlib import Path
 from types import SimpleNamespace
-from unittest.mock import MagicMock
 
+import launching_fake
+import numpy as np
 import pytest
+from launching_fake import LAUNCH, Noted, launched
+from ros_nodes import recorded
 
 from actuator_glue.nodes import base, parameter_file
 
-LAUNCH = Path(__file__).resolve().parents[2] / 'launch' / 'demo.launch.py'
+FILES = sorted(path.name.partition('.')[0] for path in LAUNCH.glob('*.launch.py'))
+# What each file can be asked to do.
+WAYS = {
+    'demo': (
+        {}, {'data': 'x.csv'}, {'source': 'udp://127.0.0.1:5005'}, {'replay': 'bag'},
+    ),
+    'four': ({}, {'sources': 'udp://a:1,udp://a:2,udp://a:3,udp://a:4'}, {'diagnose': 'true'}),
+}  # fmt: skip
+EVERY = [(file, way) for file in FILES for way in WAYS[file]]
 
 
-def calls():
-    """Executable and parameter names of every node(...) call, and of the shared dict."""
-    tree = ast.parse(LAUNCH.read_text())
-    for call in ast.walk(tree):
-        if isinstance(call, ast.Call) and getattr(call.func, 'id', '') == 'node':
-            name, *rest = call.args
-            inside = [n for r in rest for n in ast.walk(r)]
-            keys = {k.value for n in inside if isinstance(n, ast.Dict) for k in n.keys}
-            shared = any(isinstance(n, ast.Name) and n.id == 'stream' for n in inside)
-            yield name.value, keys | ({'wait_for', 'exit_at_end'} if shared else set())
+@pytest.fixture(autouse=True)
+def launch(monkeypatch):
+    """The modules of launch, which is no wheel."""
+    launching_fake.pretend(monkeypatch)
 
 
-def test_the_launch_file_names_what_exists():
-    found = list(calls())
-    assert {name for name, _ in found} == set(parameter_file.NODES) - {'replay'}
-    for name, keys in found:
-        known = {spec.name for spec in (*base.COMMON, *parameter_file.NODES[name])}
-        assert keys <= known, (name, keys - known)
+@pytest.mark.parametrize(('file', 'way'), EVERY)
+def test_a_launch_file_names_what_exists(file, way):
+    nodes, _, _ = launched(file, **way)
+    for node in nodes:
+        specs = {s.name: s for s in (*base.COMMON, *parameter_file.NODES[node.executable])}
+        for name, value in node.parameters[1].items():
+            if name != 'use_sim_time':
+                assert type(value) is type(specs[name].default), (node.executable, name)
 
 
-def test_every_launch_argument_is_used():
-    tree = ast.parse(LAUNCH.read_text())
-    (arguments,) = [
-        n.value for n in tree.body if isinstance(n, ast.Assign) and n.targets[0].id == 'ARGUMENTS'
-    ]
-    declared = {key.value for key in arguments.keys}
-    used = {
-        call.args[0].value
-        for call in ast.walk(tree)
-        if isinstance(call, ast.Call)
-        and getattr(call.func, 'id', '') in ('given', 'LaunchConfiguration')
-        and isinstance(call.args[0], ast.Constant)
-    }
-    assert declared == used
+def test_every_stream_can_be_launched():
+    ways = [launched('demo', **way)[0] for way in WAYS['demo']]
+    streams = [nodes[-1].executable for nodes in ways]
+    assert streams == ['actuator_sim', 'lab_bridge', 'lab_bridge', 'replay']
+    found = {n.executable for nodes in ways for n in nodes}
+    assert found == set(parameter_file.NODES)
 
 
-@pytest.fixture
-def ended(monkeypatch):
-    """What the launch file does at a node's end: called as launch calls it, which is no wheel."""
-    for name in {
-        'launch',
-        'launch.actions',
-        'launch.conditions',
-        'launch.event_handlers',
-        'launch.events',
-        'launch.substitutions',
-        'launch_ros',
-        'launch_ros.actions',
-        'launch_ros.parameter_descriptions',
-        'launch_ros.substitutions',
-    }:
-        monkeypatch.setitem(sys.modules, name, MagicMock())
-    for kind in 'TimerAction', 'EmitEvent':
-        made = lambda kind=kind, **given: SimpleNamespace(kind=kind, **given)  # noqa: E731
-        setattr(sys.modules['launch.actions'], kind, made)
-    rule = runpy.run_path(str(LAUNCH))['ended']
-
-    def call(node, code, shutting_down=False):
-        action = SimpleNamespace(node_executable=node)
-        event = SimpleNamespace(action=action, process_name=f'{node}-1', returncode=code)
-        return rule(event, SimpleNamespace(is_shutdown=shutting_down))
-
-    return call
+@pytest.mark.parametrize('file', FILES)
+def test_every_launch_argument_is_used_and_explained(file):
+    asked = set()
+    _, _, declared = launched(file)
+    for way in WAYS[file]:
+        given = Noted({d.args[0]: d.default_value for d in declared} | way)
+        launching_fake.load(file).nodes(given)
+        asked |= given.asked
+    assert {d.args[0] for d in declared} == asked | {'linger'}
+    assert all(len(d.description) > 8 for d in declared)
 
 
-def test_a_node_that_cannot_start_fails_the_launch(start, tmp_path, ended):
+def test_as_many_sources_as_actuators_are_needed():
+    with pytest.raises(RuntimeError, match='sources has 1 entries for 4 actuators'):
+        launched('four', sources='udp://127.0.0.1:5001')
+
+
+# What follows a node's end.
+
+
+def end(rule, node, code, shutting_down=False):
+    """Tell of a node's end as launch does."""
+    action = SimpleNamespace(node_executable=node)
+    event = SimpleNamespace(action=action, process_name=f'{node}-1', returncode=code)
+    return rule(event, SimpleNamespace(is_shutdown=shutting_down))
+
+
+def test_a_node_that_cannot_start_fails_the_launch(start, tmp_path):
     """A recorder whose bag exists; launch returns 1 for an exception and ends the others."""
     bag = tmp_path / 'bag'
     bag.mkdir()
@@ -88,20 +81,66 @@ def test_a_node_that_cannot_start_fails_the_launch(start, tmp_path, ended):
     code = recorder.wait(30.0)
     assert code == 2 and 'exists' in recorder.text, recorder.text
     with pytest.raises(RuntimeError, match='recorder-1 ended with exit code 2'):
-        ended('recorder', code)
+        end(launched('demo')[1], 'recorder', code)
 
 
 @pytest.mark.parametrize(('node', 'code'), [('estimator', 0), ('actuator_sim', 2)])
-def test_no_end_but_that_of_a_stream_is_a_success(node, code, ended):
+def test_no_end_but_that_of_a_stream_is_a_success(node, code):
     with pytest.raises(RuntimeError, match=f'{node}-1 ended with exit code {code}'):
-        ended(node, code)
+        end(launched('demo')[1], node, code)
 
 
-@pytest.mark.parametrize('node', ['actuator_sim', 'lab_bridge'])
-def test_the_end_of_the_stream_ends_all_later(node, ended):
-    timer = ended(node, 0)
-    assert timer.kind == 'TimerAction' and [a.kind for a in timer.actions] == ['EmitEvent']
+@pytest.mark.parametrize('node', ['actuator_sim', 'lab_bridge', 'replay'])
+def test_the_end_of_the_stream_ends_all_later(node):
+    timer = end(launched('demo')[1], node, 0)
+    assert timer.kind == 'TimerAction' and timer.period == 5.0
+    assert [a.kind for a in timer.actions] == ['EmitEvent']
 
 
-def test_what_ends_in_a_shutdown_is_no_failure(ended):
-    assert ended('estimator', -9, shutting_down=True) is None
+def test_the_end_of_the_last_of_four_streams_ends_all():
+    rule = launched('four')[1]
+    assert [end(rule, 'actuator_sim', 0) for _ in range(3)] == [None] * 3
+    assert end(rule, 'actuator_sim', 0).kind == 'TimerAction'
+
+
+def test_what_ends_in_a_shutdown_is_no_failure():
+    assert end(launched('demo')[1], 'estimator', -9, shutting_down=True) is None
+
+
+def side_by_side(start, probe, tmp_path, names):
+    """Launch actuators; each one's bag holds its own samples, whole, and its own estimates."""
+    nodes, _, _ = launched(
+        'four', names=','.join(names), bags=str(tmp_path), duration='9.0', stiffnesses='250e3'
+    )
+    running = {}
+    for node in nodes:
+        process = start(node.executable, namespace=node.namespace, **node.parameters[1])
+        running[f'{node.namespace}/{node.executable}'] = process
+    for name in names:
+        assert running[f'{name}/actuator_sim'].wait(400) == 0
+    probe.for_a_while(3.0)
+    for name in names:
+        assert running[f'{name}/estimator'].end() == 0
+        assert running[f'{name}/recorder'].end() == 0
+        assert np.array_equal(recorded(tmp_path / name), np.arange(10_001))
+        assert probe.number(f'{name}/estimator', 'samples') == 10_001
+        assert probe.number(f'{name}/estimator', 'windows') >= 1
+    first = [recorded_values(tmp_path / name) for name in names]
+    assert not any(np.array_equal(first[0], other) for other in first[1:])
+
+
+def recorded_values(bag):
+    """Measured displacement in a bag."""
+    from actuator_glue.io.bag_reader import decoded
+
+    return np.concatenate([m.measured for _, m in decoded(bag, ('SampleBlock',))])
+
+
+def test_two_actuators_side_by_side(start, probe, tmp_path):
+    side_by_side(start, probe, tmp_path, ['north', 'east'])
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(600)
+def test_four_actuators_side_by_side(start, probe, tmp_path):
+    side_by_side(start, probe, tmp_path, ['north', 'east', 'south', 'west'])
