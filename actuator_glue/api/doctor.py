@@ -53,8 +53,14 @@ def examine(folder: Path) -> Iterator[Finding]:
         folder: where bags will be written.
     """
     checks: tuple[Callable[[], Finding], ...] = (
-        ros, messages, dds, compiled, realtime, receive_buffer, partial(disk, folder)
-    )  # fmt: skip
+        ros,
+        messages,
+        dds,
+        compiled,
+        realtime,
+        receive_buffer,
+        partial(disk, folder),
+    )
     for check in checks:
         try:
             yield check()

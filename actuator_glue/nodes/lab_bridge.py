@@ -19,40 +19,60 @@ SPECS = (
     Spec('file', '', 'laboratory file or bag', read_only=True),
     Spec('channels', '', 'channel map of the file (YAML)', read_only=True),
     Spec(
-        'source', '', 'live stream in place of a file: udp://HOST:PORT, tcp://HOST:PORT, lsl:NAME '
-        'or openfresco://HOST:PORT', read_only=True,
+        'source',
+        '',
+        'live stream in place of a file: udp://HOST:PORT, tcp://HOST:PORT, lsl:NAME '
+        'or openfresco://HOST:PORT',
+        read_only=True,
     ),
     Spec('layout', '', 'layout of the source (YAML), empty for that of `send`', read_only=True),
     Spec(
         'rate', 0.0, 'sample rate of the source, 0 for what the layout says', 'Hz', 0.0, 1e5, True
     ),
     Spec(
-        'allow', [''], 'IP addresses and networks that may send; none for this machine alone',
+        'allow',
+        [''],
+        'IP addresses and networks that may send; none for this machine alone',
         read_only=True,
     ),
     Spec('key_file', '', 'file with the key of signed messages (HMAC-SHA256)', read_only=True),
     Spec(
-        'results', '', 'where results go back to: udp://HOST:PORT or lsl:NAME, empty for nowhere',
+        'results',
+        '',
+        'where results go back to: udp://HOST:PORT or lsl:NAME, empty for nowhere',
         read_only=True,
     ),
     Spec(
-        'specimen_stiffness', -1.0, 'specimen stiffness k, -1 for what file or layout says',
-        'N/m', -1.0, 1e12, True,
+        'specimen_stiffness',
+        -1.0,
+        'specimen stiffness k, -1 for what file or layout says',
+        'N/m',
+        -1.0,
+        1e12,
+        True,
     ),
     Spec(
-        'hold', 'file', 'how the command runs between its samples; file: as file or layout says',
-        read_only=True, choices=('file', 'zoh', 'linear'),
+        'hold',
+        'file',
+        'how the command runs between its samples; file: as file or layout says',
+        read_only=True,
+        choices=('file', 'zoh', 'linear'),
     ),
     Spec(
         'actuator', '', 'name of the actuator, empty for what file or layout says', read_only=True
     ),
     Spec('block', 10, 'samples per message, of a source about', '1', 1, 100_000, True),
     Spec(
-        'preview', 0.0, 'how far ahead commands of a file are published, 0 for not', 's',
-        0.0, 60.0, True,
+        'preview',
+        0.0,
+        'how far ahead commands of a file are published, 0 for not',
+        's',
+        0.0,
+        60.0,
+        True,
     ),
     *streamer.specs(exit_at_end=True),
-)  # fmt: skip
+)
 
 
 class LabBridgeNode(streamer.Streamer):

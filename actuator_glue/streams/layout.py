@@ -13,10 +13,20 @@ from actuator_glue.io.units import ROLES, factor
 from actuator_glue.records import Array, Hold
 
 TYPES = {
-    'float64': 'f8', 'double': 'f8', 'float32': 'f4', 'single': 'f4', 'float': 'f4',
-    'int8': 'i1', 'int16': 'i2', 'int32': 'i4', 'int64': 'i8',
-    'uint8': 'u1', 'uint16': 'u2', 'uint32': 'u4', 'uint64': 'u8',
-}  # fmt: skip
+    'float64': 'f8',
+    'double': 'f8',
+    'float32': 'f4',
+    'single': 'f4',
+    'float': 'f4',
+    'int8': 'i1',
+    'int16': 'i2',
+    'int32': 'i4',
+    'int64': 'i8',
+    'uint8': 'u1',
+    'uint16': 'u2',
+    'uint32': 'u4',
+    'uint64': 'u8',
+}
 
 
 @dataclass(frozen=True, slots=True)

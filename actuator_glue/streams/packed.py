@@ -25,9 +25,9 @@ class Packed:
         self._rate = rate
         order = '<' if layout.byte_order == 'little' else '>'
         sample = _dtype(layout.sample, order)
-        self._dtype = np.dtype([
-            *_entries(layout.packet, order, 'p'), ('sample', sample, (layout.samples,))
-        ])  # fmt: skip
+        self._dtype = np.dtype(
+            [*_entries(layout.packet, order, 'p'), ('sample', sample, (layout.samples,))]
+        )
         self._places = {f.name: f's{i}' for i, f in enumerate(layout.sample) if f.role}
         self._heads = {f.name: f'p{i}' for i, f in enumerate(layout.packet) if f.role}
 
@@ -93,10 +93,11 @@ def _put(packets: NDArray[Any], at: str, sent: Array) -> None:
 def _entries(fields: tuple[Field, ...], order: str, prefix: str) -> list[Any]:
     # Any name may be there twice or be no identifier: places are numbered.
     return [
-        (f'{prefix}{i}', order + TYPES[f.type], (f.count,)) if f.count > 1
+        (f'{prefix}{i}', order + TYPES[f.type], (f.count,))
+        if f.count > 1
         else (f'{prefix}{i}', order + TYPES[f.type])
         for i, f in enumerate(fields)
-    ]  # fmt: skip
+    ]
 
 
 def _dtype(fields: tuple[Field, ...], order: str) -> np.dtype[Any]:

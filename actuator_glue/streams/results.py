@@ -14,15 +14,33 @@ from actuator_glue.streams.seal import Seal
 
 # A controller reads them by place: new ones go to the end.
 FIELDS = (
-    'window', 'time', 'delay', 'amplitude', 'phase', 'frequency',
-    'beta_1_mean', 'alpha_1_beta_0_mean', 'alpha_2_mean', 'alpha_3_mean',
-    'beta_1_stddev', 'alpha_1_beta_0_stddev', 'alpha_2_stddev', 'alpha_3_stddev',
-    'rhat_max', 'coverage',
-)  # fmt: skip
+    'window',
+    'time',
+    'delay',
+    'amplitude',
+    'phase',
+    'frequency',
+    'beta_1_mean',
+    'alpha_1_beta_0_mean',
+    'alpha_2_mean',
+    'alpha_3_mean',
+    'beta_1_stddev',
+    'alpha_1_beta_0_stddev',
+    'alpha_2_stddev',
+    'alpha_3_stddev',
+    'rhat_max',
+    'coverage',
+)
 UNITS = {
-    'time': 's', 'delay': 's', 'phase': 'rad', 'frequency': 'Hz',
-    'beta_1': '1/s', 'alpha_1_beta_0': 'N/(m s^2)', 'alpha_2': 'N/m', 'alpha_3': '1/s',
-}  # fmt: skip
+    'time': 's',
+    'delay': 's',
+    'phase': 'rad',
+    'frequency': 'Hz',
+    'beta_1': '1/s',
+    'alpha_1_beta_0': 'N/(m s^2)',
+    'alpha_2': 'N/m',
+    'alpha_3': '1/s',
+}
 
 
 class ResultsSender(Protocol):

@@ -9,7 +9,10 @@ LAUNCH = Path(__file__).resolve().parents[2] / 'launch'
 MODULES = {
     'launch': ('LaunchDescription',),
     'launch.actions': (
-        'DeclareLaunchArgument', 'EmitEvent', 'OpaqueFunction', 'RegisterEventHandler',
+        'DeclareLaunchArgument',
+        'EmitEvent',
+        'OpaqueFunction',
+        'RegisterEventHandler',
         'TimerAction',
     ),
     'launch.event_handlers': ('OnProcessExit',),
@@ -18,7 +21,7 @@ MODULES = {
     'launch_ros': (),
     'launch_ros.actions': ('Node',),
     'launch_ros.substitutions': ('FindPackageShare',),
-}  # fmt: skip
+}
 
 
 def thing(kind):

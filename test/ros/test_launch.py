@@ -14,10 +14,13 @@ FILES = sorted(path.name.partition('.')[0] for path in LAUNCH.glob('*.launch.py'
 # What each file can be asked to do.
 WAYS = {
     'demo': (
-        {}, {'data': 'x.csv'}, {'source': 'udp://127.0.0.1:5005'}, {'replay': 'bag'},
+        {},
+        {'data': 'x.csv'},
+        {'source': 'udp://127.0.0.1:5005'},
+        {'replay': 'bag'},
     ),
     'four': ({}, {'sources': 'udp://a:1,udp://a:2,udp://a:3,udp://a:4'}, {'diagnose': 'true'}),
-}  # fmt: skip
+}
 EVERY = [(file, way) for file in FILES for way in WAYS[file]]
 
 

@@ -202,9 +202,14 @@ def test_results_go_back_to_the_controller(start, probe, tmp_path):
     probe.create_subscription(PredictionBand, 'prediction_band', band, 50)
     estimator = start('estimator', **QUICK)
     bridge = start(
-        'lab_bridge', source=at, rate=RATE, specimen_stiffness=250e3, wait_for=1, block=2,
+        'lab_bridge',
+        source=at,
+        rate=RATE,
+        specimen_stiffness=250e3,
+        wait_for=1,
+        block=2,
         results=f'udp://127.0.0.1:{port}',
-    )  # fmt: skip
+    )
     controller = socket.socket(type=socket.SOCK_DGRAM)
     with closing(controller):
         controller.bind(('127.0.0.1', port))

@@ -34,9 +34,24 @@ def test_an_address_is_read_and_written(text, found):
 
 @pytest.mark.parametrize(
     'text',
-    ['', 'udp', 'udp:', 'udp://', 'udp://h', 'udp://h:', 'udp://h:0', 'udp://h:99999',
-     'udp://:5', 'udp://h:٣', 'http://h:1', 'lsl:', "lsl:a' or 'b", 'tcp://a b:1', 'udp:h:1'],
-)  # fmt: skip
+    [
+        '',
+        'udp',
+        'udp:',
+        'udp://',
+        'udp://h',
+        'udp://h:',
+        'udp://h:0',
+        'udp://h:99999',
+        'udp://:5',
+        'udp://h:٣',
+        'http://h:1',
+        'lsl:',
+        "lsl:a' or 'b",
+        'tcp://a b:1',
+        'udp:h:1',
+    ],
+)
 def test_what_is_no_address_is_told(text):
     with pytest.raises(InputError):
         parse_address(text, SCHEMES)

@@ -32,7 +32,7 @@ yamls = st.recursive(
         st.lists(inner, max_size=4) | st.dictionaries(st.text(max_size=8), inner, max_size=4)
     ),
     max_leaves=12,
-)  # fmt: skip
+)
 entry = st.fixed_dictionaries(
     {},
     optional={
@@ -199,8 +199,13 @@ def test_a_hundred_thousand_hostile_datagrams_leave_memory_as_it_is():
 @pytest.mark.slow
 @pytest.mark.parametrize(
     'test',
-    [test_no_line_raises, test_no_datagram_raises, test_nothing_on_openfrescos_wire_raises,
-     test_no_layout_raises_but_for_its_reason, test_no_yaml_raises_but_for_its_reason],
-)  # fmt: skip
+    [
+        test_no_line_raises,
+        test_no_datagram_raises,
+        test_nothing_on_openfrescos_wire_raises,
+        test_no_layout_raises_but_for_its_reason,
+        test_no_yaml_raises_but_for_its_reason,
+    ],
+)
 def test_the_same_at_length(test):
     settings(max_examples=PLENTY, deadline=None)(test)()

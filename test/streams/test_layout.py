@@ -65,8 +65,10 @@ def test_a_packet_as_a_controller_packs_it():
             {'name': 'counter', 'type': 'uint16'},
             {'name': 'spare', 'type': 'uint8', 'count': 4},
         ],
-        samples=2, byte_order='big', rate=1000,
-    )  # fmt: skip
+        samples=2,
+        byte_order='big',
+        rate=1000,
+    )
     data = struct.pack('>H4xhhhh', 65_535, 100, -200, 300, -400)
     data += struct.pack('>H4xhhhh', 0, 1, 2, 3, 4)
     packed = Packed(found, 1000.0)
@@ -92,9 +94,12 @@ def test_what_is_packed_is_what_is_unpacked(kinds, order, many, head, counts):
         {'name': 'measured', 'type': kinds[1], 'unit': 'mm', 'scale': 0.5},
     ]
     found = layout(
-        values if head else [*values, counter], packet=[counter] if head else [],
-        samples=many, byte_order=order, counts=counts,
-    )  # fmt: skip
+        values if head else [*values, counter],
+        packet=[counter] if head else [],
+        samples=many,
+        byte_order=order,
+        counts=counts,
+    )
     whole = np.arange(3 * many) % 60
     sent = {'counter': whole * 1.0, 'command': 1e-3 * whole, 'measured': 0.5e-3 * whole}
     packed = Packed(found, 1000.0)

@@ -40,9 +40,16 @@ def sent(at, its, what, speed=1.0):
     return thread
 
 
-@pytest.mark.parametrize(('scheme', 'seal'), [
-    ('udp', None), ('udp', SEAL), ('tcp', None), ('tcp', SEAL), ('lsl', None),
-])  # fmt: skip
+@pytest.mark.parametrize(
+    ('scheme', 'seal'),
+    [
+        ('udp', None),
+        ('udp', SEAL),
+        ('tcp', None),
+        ('tcp', SEAL),
+        ('lsl', None),
+    ],
+)
 def test_a_record_arrives_bit_by_bit(scheme, seal):
     at, its, what = address(scheme), terms(seal=seal), record(600)
     order = source(at)[0].in_order
@@ -83,9 +90,12 @@ def test_a_second_sender_is_heard_when_the_first_is_silent(monkeypatch):
     at, what = address('udp'), record(4)
     with closing(listen(at)) as listener, closing(connect(at)) as one, closing(connect(at)) as two:
         values = {
-            'counter': np.arange(4.0), 'time': what.time, 'command': what.command,
-            'measured': what.measured, 'force': what.force,
-        }  # fmt: skip
+            'counter': np.arange(4.0),
+            'time': what.time,
+            'command': what.command,
+            'measured': what.measured,
+            'force': what.force,
+        }
         one.send(values)
         assert sum(len(r.command) for r in listener.receive(1.0)) == 4
         two.send(values)

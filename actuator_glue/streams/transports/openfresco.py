@@ -35,8 +35,13 @@ USUAL = {
     'time': 'ctrl_time_1',
 }
 COUNTED = (
-    'messages', 'connections', 'malformed', 'overruns', 'senders refused', 'site unreachable',
-)  # fmt: skip
+    'messages',
+    'connections',
+    'malformed',
+    'overruns',
+    'senders refused',
+    'site unreachable',
+)
 LARGEST = 4096  # doubles of a message
 _CHUNK = 1 << 16
 _PENDING = 1 << 20  # bytes on their way to a side that does not read
