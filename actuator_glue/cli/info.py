@@ -11,12 +11,19 @@ from actuator_glue.cli._output import add_json, note, say, table
 from actuator_glue.cli._records import add_records
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
+from actuator_glue.io.units import factor
 from actuator_glue.records import Record
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     add_records(parser)
+    parser.add_argument(
+        '--unit',
+        choices=('mm', 'm', 'um', 'in'),
+        default='mm',
+        help='unit of displacements that are shown (default mm); JSON is in m',
+    )
     add_json(parser)
 
 
@@ -99,11 +106,13 @@ def _show(record: Record, args: argparse.Namespace) -> None:
         f'{record.duration:.6g} s; {record.actuator}, {stiffness}, hold {record.hold}',
         args,
     )
-    channels = [('command', record.command * 1e3, 'mm'), ('measured', record.measured * 1e3, 'mm')]
+    unit = args.unit
+    scale = 1.0 / factor('command', unit, '--unit')
+    channels = [(n, getattr(record, n) * scale, unit) for n in ('command', 'measured')]
     if record.force is not None:
         channels.append(('force', record.force * 1e-3, 'kN'))
-    for name, values, unit in channels:
-        say(f'  {name:9} {values.min():10.4f} .. {values.max():10.4f} {unit}', args)
+    for name, values, shown in channels:
+        say(f'  {name:9} {values.min():10.5g} .. {values.max():10.5g} {shown}', args)
 
 
 def _describe(record: Record) -> dict[str, Any]:

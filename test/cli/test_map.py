@@ -132,3 +132,15 @@ def test_nothing_alike_is_no_proposal(tmp_path: Path) -> None:
     found = looked(tmp_path, path, '--out', str(tmp_path / 'map.yaml'), code=1)
     assert found['map'] is None
     assert not (tmp_path / 'map.yaml').exists()
+
+
+def test_info_shows_the_unit_that_is_asked_for(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """People read inches or micrometres; JSON stays in m."""
+    path = write(tmp_path / 'a.csv', 'time_s,command_mm,measured_mm', [TIME, 25.4 * TIME, TIME])
+    for unit, greatest in (('in', '7.8105'), ('mm', '198.39'), ('m', '0.19839')):
+        assert main(['info', str(path), '--unit', unit, '--json', '-']) == 0
+        shown = capsys.readouterr()
+        assert f'{greatest} {unit}' in shown.err
+        assert json.loads(shown.out)['files'][0]['records'][0]['command_m'][1] > 0.19
