@@ -14,7 +14,7 @@ import actuator_glue
 ROOT = Path(actuator_glue.__file__).resolve().parent
 SOURCES = sorted(p for p in ROOT.rglob('*.py'))
 
-BOTTOM = {'errors', 'records', 'jit', 'normal'}
+BOTTOM = {'errors', 'records', 'jit', 'normal', 'json_value'}
 CORE = BOTTOM | {'model', 'inference'}
 EVERYTHING = CORE | {
     'online', 'diagnosis', 'report', 'io', 'interfaces', 'workers', 'effects',
@@ -34,6 +34,7 @@ ARROWS = {
     'records': {'errors'},
     'jit': set(),
     'normal': {'jit'},
+    'json_value': set(),
     'arguments': {'errors'},
     'model': BOTTOM,
     'effects': BOTTOM | {'model'},
@@ -42,7 +43,7 @@ ARROWS = {
     'diagnosis': CORE,
     'hybrid': CORE,
     'report': CORE | {'online', 'diagnosis', 'io'},
-    'io': {'records', 'errors', 'interfaces', 'hybrid'},
+    'io': {'records', 'errors', 'json_value', 'interfaces', 'hybrid'},
     'streams': {'records', 'errors', 'io'},
     'view': {'records', 'errors', 'io', 'interfaces'},
     'workers': CORE | {'online'},
@@ -51,7 +52,17 @@ ARROWS = {
     'cli': EVERYTHING | {'api', 'arguments'},
 }
 # All below io but jit, which keeps compiled code in files.
-PURE = ('errors', 'records', 'normal', 'model', 'inference', 'online', 'diagnosis', 'hybrid')
+PURE = (
+    'errors',
+    'records',
+    'normal',
+    'json_value',
+    'model',
+    'inference',
+    'online',
+    'diagnosis',
+    'hybrid',
+)
 ROS = ('rclpy', 'launch', 'ament_index_python')
 HEAVY = ('numba', 'scipy', 'matplotlib', 'arviz', 'control', 'statsmodels', 'rosbags', 'rclpy')
 
@@ -137,7 +148,7 @@ def test_core_is_pure(path: Path) -> None:
 @pytest.mark.parametrize('path', SOURCES, ids=identifier)
 def test_files_stay_small(path: Path) -> None:
     """One idea per file."""
-    assert len(path.read_text(encoding='utf-8').splitlines()) <= 350
+    assert len(path.read_text(encoding='utf-8').splitlines()) <= 300
 
 
 OUTSIDE = sorted(p for f in ('studies', 'examples') for p in (ROOT.parent / f).rglob('*.py'))

@@ -1,21 +1,17 @@
-"""Posterior of one parameter, and numbers that JSON can carry."""
+"""Posterior of one parameter."""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from typing import Any, TypeAlias
 
-Json: TypeAlias = dict[str, Any]
+from actuator_glue.json_value import Json, JsonObject
+from actuator_glue.json_value import json_value as number
 
-
-def number(value: float) -> float | None:
-    """Return a number that JSON can carry: None for NaN and infinity."""
-    return float(value) if math.isfinite(value) else None
+__all__ = ['Estimate', 'Json', 'number']
 
 
 @dataclass(frozen=True, slots=True)
-class Estimate:
+class Estimate(JsonObject):
     """Posterior of one parameter.
 
     Attributes:
@@ -37,14 +33,3 @@ class Estimate:
     neutral: float | None = None
     identified: bool = True
     bounds: tuple[float, float] | None = None
-
-    def to_json(self) -> Json:
-        """Return the JSON object of one parameter."""
-        values = {k: number(getattr(self, k)) for k in ('mean', 'stddev', 'lower', 'upper')}
-        return {
-            **values,
-            'unit': self.unit,
-            'neutral': self.neutral,
-            'identified': self.identified,
-            'bounds': list(self.bounds) if self.bounds else None,
-        }

@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from actuator_glue.diagnosis.estimate import Estimate, Json, number
+from actuator_glue.diagnosis.estimate import Estimate
+from actuator_glue.json_value import Json, JsonObject, json_fields, json_value
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,10 +34,8 @@ class Rival:
 
     def to_json(self) -> Json:
         """Return the JSON object of one rival."""
-        keys = ('nats', 'stderr', 'excess', 'probability')
-        values = {k: number(getattr(self, k)) for k in keys}
         limit = {'parameter': self.limit[0], 'limit': self.limit[1]} if self.limit else None
-        return {'name': self.name, **values, 'tied': self.tied, 'limit': limit}
+        return {**json_fields(self), 'limit': limit}
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,27 +85,11 @@ class Finding:
 
     def to_json(self) -> Json:
         """Return the JSON object of one finding."""
-        return {
-            'name': self.name,
-            'alternatives': list(self.alternatives),
-            'probability': number(self.probability),
-            'place': self.place,
-            'parameters': {name: p.to_json() for name, p in self.parameters.items()},
-            'error_without': number(self.error_without),
-            'error_with': number(self.error_with),
-            'evidence': number(self.evidence),
-            'plausible': self.plausible,
-            'agrees_across_windows': self.agrees_across_windows,
-            'windows': [number(v) for v in self.windows],
-            'records': list(self.records),
-            'noise': self.noise,
-            'rivals': [r.to_json() for r in self.rivals],
-            'none_of_these': number(self.none),
-        }
+        return {**json_fields(self), 'none_of_these': json_value(self.none)}
 
 
 @dataclass(frozen=True, slots=True)
-class Candidate:
+class Candidate(JsonObject):
     """One effect tried at the first turn (base + effect refitted together).
 
     Attributes:
@@ -122,9 +105,3 @@ class Candidate:
     error: float
     probability: float
     stderr: float = math.nan
-
-    def to_json(self) -> Json:
-        """Return the JSON object of one candidate."""
-        keys = ('score', 'stderr', 'error', 'probability')
-        values = {k: number(getattr(self, k)) for k in keys}
-        return {'name': self.name, **values}

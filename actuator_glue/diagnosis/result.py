@@ -11,6 +11,7 @@ from actuator_glue.diagnosis.finding import Candidate, Finding
 from actuator_glue.diagnosis.headline import headline
 from actuator_glue.diagnosis.learned_term import LearnedTerm
 from actuator_glue.inference.at_bound import Pressed
+from actuator_glue.json_value import JsonObject, json_fields, json_value
 from actuator_glue.model.effects import CATALOGUE, Effect
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
@@ -53,24 +54,12 @@ class HeldOutError:
 
     def to_json(self) -> Json:
         """Return the JSON object of the held-out error."""
-        numbers = ('before', 'after', 'noise_floor', 'removable_removed', 'sham')
-        hum = self.after_without_hum
-        return {
-            'unit': 'm',
-            'split': self.split,
-            **{k: number(getattr(self, k)) for k in numbers},
-            'before_ci': [number(v) for v in self.before_ci],
-            'after_ci': [number(v) for v in self.after_ci],
-            'removed_ci': [number(v) for v in self.removed_ci],
-            'after_without_hum': None if hum is None else number(hum),
-            'records': [
-                {'source': s, 'before': number(b), 'after': number(a)} for s, b, a in self.records
-            ],
-        }
+        records = [{'source': s, 'before': b, 'after': a} for s, b, a in self.records]
+        return {'unit': 'm', **json_fields(self), 'records': json_value(records)}
 
 
 @dataclass(frozen=True, slots=True)
-class Alarm:
+class Alarm(JsonObject):
     """Why (or why not) the model of Eq. (2) is not enough.
 
     Attributes:
@@ -92,15 +81,6 @@ class Alarm:
     false_alarms: float = math.nan
     nats: float = math.nan
     tests: dict[str, float] = field(default_factory=dict)
-
-    def to_json(self) -> Json:
-        """Return the JSON object of the alarm."""
-        numbers = ('structured', 'threshold', 'noise', 'p_value', 'false_alarms', 'nats')
-        return {
-            'raised': self.raised,
-            **{k: number(getattr(self, k)) for k in numbers},
-            'tests': {k: number(v) for k, v in self.tests.items()},
-        }
 
 
 @dataclass(frozen=True, slots=True)

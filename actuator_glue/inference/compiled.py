@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from actuator_glue.inference.evaluate import LogDensity
 from actuator_glue.inference.mixture_density import NO_MIXTURE, Mixture, log_mixture
 from actuator_glue.jit import njit
-from actuator_glue.model import kernel, ridge
+from actuator_glue.model import kernel, kernel_lanes, ridge
 from actuator_glue.model.fast import laguerre, quadratic
 from actuator_glue.model.fast.errors import Samples
 from actuator_glue.records import Array
@@ -102,7 +102,7 @@ def _exactly(rows: Array, samples: Samples, theta: Array, slack: Array, sums: Ar
         table = kernel.discretise(systems, rows[r, laguerre.PERIOD], foh)
         begin, end = samples.first[r], samples.first[r + 1]
         out = np.empty((len(which), 2))
-        kernel.error_sums(
+        kernel_lanes.error_sums(
             table,
             samples.starts[r],
             samples.measured[begin:end],

@@ -3,25 +3,12 @@
 from __future__ import annotations
 
 import json
-import math
 import sys
 from pathlib import Path
 from typing import Any
 
 from actuator_glue.errors import InputError
-
-
-def clean(value: Any) -> Any:
-    """Return a value JSON can hold: numpy numbers as numbers, NaN and infinity as null."""
-    if isinstance(value, dict):
-        return {str(k): clean(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [clean(v) for v in value]
-    if hasattr(value, 'tolist'):
-        return clean(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value
+from actuator_glue.json_value import json_value
 
 
 def write_json(content: dict[str, Any], out: str | None) -> None:
@@ -32,7 +19,7 @@ def write_json(content: dict[str, Any], out: str | None) -> None:
     """
     if out is None:
         return
-    text = json.dumps(clean(content), indent=2, allow_nan=False) + '\n'
+    text = json.dumps(json_value(content), indent=2, allow_nan=False) + '\n'
     if out == '-':
         sys.stdout.write(text)
         return

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from actuator_glue.errors import InputError
-from actuator_glue.model import kernel, linear
+from actuator_glue.model import kernel, kernel_lanes, linear
 from actuator_glue.records import Array, Record
 
 Initial: TypeAlias = Literal['rest', 'measured']
@@ -93,7 +93,7 @@ class ExactErrors:
 
         rows = kernel.discretise(systems, record.period, foh)
         start, settle = self.starts[r], self.settle[r]
-        kernel.error_sums(rows, start, record.measured, self.padded[r], settle, foh, out)
+        kernel_lanes.error_sums(rows, start, record.measured, self.padded[r], settle, foh, out)
         return out
 
     def residuals(self, theta: ArrayLike) -> list[Array]:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from actuator_glue.errors import InputError
-from actuator_glue.model import kernel
+from actuator_glue.model import kernel, kernel_lanes
 from actuator_glue.records import Array, Hold, Record, check_stiffness
 
 _FIT_SPAN = 0.01  # s of measured samples that give the initial state (at least three samples)
@@ -173,7 +173,7 @@ def respond(
     rows = kernel.discretise(np.ascontiguousarray(system), period, hold == 'linear')
     out = np.empty((len(u) - first, len(rows)))
     x0, v0 = float(initial[0]), float(initial[1])
-    kernel.respond(rows, x0, v0, np.ascontiguousarray(u), first, out)
+    kernel_lanes.respond(rows, x0, v0, np.ascontiguousarray(u), first, out)
     return out.T
 
 
