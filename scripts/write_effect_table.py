@@ -1,10 +1,57 @@
 """Renew the table of docs/effects.md from the effect catalogue (`make docs`)."""
 
+from __future__ import annotations
+
 from pathlib import Path
 
-from actuator_glue.model.effects.table import renewed
+from actuator_glue.model.effects import CATALOGUE
+from actuator_glue.model.parameters import Parameter
 
 PAGE = Path(__file__).resolve().parent.parent / 'docs' / 'effects.md'
+BEGIN, END = '<!-- catalogue: begin (make docs) -->', '<!-- catalogue: end -->'
+
+
+def _parameter(p: Parameter) -> str:
+    unit = '' if p.unit == '1' else f' {p.unit}'
+    return f'`{p.name}` {p.meaning}: {p.lower:g} .. {p.upper:g}{unit}, neutral {p.neutral:g}'
+
+
+def markdown() -> str:
+    """Return the table, one row per effect, from the entries themselves."""
+    rows = [
+        '| effect | place | equation | parameters: bounds, neutral value | group | signature '
+        '| source |',
+        '|---|---|---|---|---|---|---|',
+    ]
+    for effect in CATALOGUE.values():
+        parameters = '<br>'.join(_parameter(p) for p in effect.parameters)
+        cells = (
+            f'`{effect.name}`',
+            effect.place,
+            effect.equation,
+            parameters,
+            effect.group,
+            effect.signature,
+            effect.source,
+        )
+        rows.append('| ' + ' | '.join(cell.replace('|', '\\|') for cell in cells) + ' |')
+    kept = ', '.join(f'`{e.name}`' for e in CATALOGUE.values() if not e.searched)
+    rows += ['', f'Not tried by the diagnosis, where their blind scores are not known: {kept}.']
+    return '\n'.join(rows)
+
+
+def renewed(page: str) -> str:
+    """Return a page with the table between its marks replaced by the catalogue's.
+
+    Raises:
+        ValueError: the page lacks a mark.
+    """
+    head, found, rest = page.partition(BEGIN)
+    _, end, tail = rest.partition(END)
+    if not found or not end:
+        raise ValueError(f'the page lacks {BEGIN!r} or {END!r}')
+    return f'{head}{BEGIN}\n{markdown()}\n{END}{tail}'
+
 
 if __name__ == '__main__':
     PAGE.write_text(renewed(PAGE.read_text(encoding='utf-8')), encoding='utf-8')

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from actuator_glue.errors import InputError
-from actuator_glue.inference.scores import instantaneous_frequency
 from actuator_glue.model.parameters import NAMES, Parameter
 from actuator_glue.records import Array, Record
 from actuator_glue.report import style
 from actuator_glue.report.bag_content import Content
+from actuator_glue.report.frequency import instantaneous_frequency
 from actuator_glue.report.timeseries import (
     Bands,
     ParameterCourse,

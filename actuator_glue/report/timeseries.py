@@ -13,10 +13,10 @@ from matplotlib.figure import Figure
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference.bands import Band
-from actuator_glue.inference.scores import instantaneous_frequency
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.records import Array, Record
 from actuator_glue.report import style
+from actuator_glue.report.frequency import instantaneous_frequency
 
 Zoom = tuple[float, float]
 MM = 1e3

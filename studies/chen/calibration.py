@@ -17,13 +17,13 @@ from studies.chen.library import (
     Record,
     band,
     commands,
-    coverage,
     fit_residual,
     linear,
     total_band,
 )
 from studies.chen.published import CHOSEN
 from studies.chen.responses import LEVEL, simulate
+from studies.chen.scores import coverage
 
 EVALUATIONS = 12_000  # of one case's calibration
 

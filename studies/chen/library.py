@@ -5,14 +5,13 @@ from __future__ import annotations
 from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.errors import InputError
-from actuator_glue.inference.bands import Band, band
+from actuator_glue.inference.bands import Band, band, check_draws
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.convergence import gelman_rubin
 from actuator_glue.inference.likelihood import Errors, GlueLikelihood
 from actuator_glue.inference.moments import Moments, moments
 from actuator_glue.inference.posterior import Target, sample
 from actuator_glue.inference.predictive import fit_residual, predictive_draws, total_band
-from actuator_glue.inference.scores import Scores, coverage, crps_ensemble, score
 from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.model import commands, linear
 from actuator_glue.model.exact import ExactErrors
@@ -41,14 +40,12 @@ __all__ = [
     'Moments',
     'Record',
     'SamplerSettings',
-    'Scores',
     'Structure',
     'Target',
     'band',
     'bounds',
+    'check_draws',
     'commands',
-    'coverage',
-    'crps_ensemble',
     'diagnose',
     'fit_residual',
     'gelman_rubin',
@@ -57,6 +54,5 @@ __all__ = [
     'predictive_draws',
     'reconstructed_tests',
     'sample',
-    'score',
     'total_band',
 ]

@@ -20,17 +20,14 @@ from studies.chen.library import (
     Array,
     Band,
     Record,
-    Scores,
     band,
-    coverage,
-    crps_ensemble,
     fit_residual,
     linear,
     predictive_draws,
-    score,
     total_band,
 )
 from studies.chen.published import CLOSE_UPS
+from studies.chen.scores import Scores, coverage, crps_ensemble, score
 
 LEVEL = 0.95
 GRID = np.linspace(0.2, 10.0, 99)  # Hz; below, a sweep of 60 s holds no whole cycle

@@ -10,9 +10,10 @@ from scipy.stats import norm
 
 from studies.chen.experiment import blocks
 from studies.chen.laboratory import AS_PUBLISHED, Laboratory, Posterior
-from studies.chen.library import Array, ExactErrors, Record, band, coverage, gelman_rubin
+from studies.chen.library import Array, ExactErrors, Record, band, gelman_rubin
 from studies.chen.published import THRESHOLD
 from studies.chen.responses import LEVEL, simulate
+from studies.chen.scores import coverage
 
 SETTLE = 0.5  # s; ten time constants of the slower test
 WIDEST = 0.5  # posterior over prior standard deviation

@@ -6,7 +6,7 @@ from scipy.signal import lfilter
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference.predictive import fit_residual, predictive_draws, total_band
-from actuator_glue.inference.scores import coverage
+from studies.chen.scores import coverage
 
 
 def ar1(rng: np.random.Generator, count: int, sd: float, phi: float) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import runpy
 from pathlib import Path
 
 import numpy as np
@@ -9,7 +10,6 @@ import pytest
 
 import actuator_glue
 from actuator_glue.model.effects import CATALOGUE, balance, scale
-from actuator_glue.model.effects.table import markdown, renewed
 from actuator_glue.model.parameters import NAMES, TABLE_2
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
@@ -109,6 +109,8 @@ def test_entries_are_complete() -> None:
 
 def test_page_is_in_step() -> None:
     """docs/effects.md holds the catalogue's table; `make docs` renews it."""
+    script = runpy.run_path(str(PAGE.parent.parent / 'scripts' / 'write_effect_table.py'))
+    markdown, renewed = script['markdown'], script['renewed']
     page = PAGE.read_text(encoding='utf-8')
     assert renewed(page) == page
     assert markdown().count('\n') == len(CATALOGUE) + 3

@@ -9,9 +9,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.errors import InputError
-from actuator_glue.inference.bands import COLUMNS_AT_ONCE, Band, check_draws
-from actuator_glue.records import Array
+from studies.chen.library import Array, Band, InputError, check_draws
+
+_COLUMNS_AT_ONCE = 4096  # their draws stay in the cache
 
 
 def coverage(observed: Array, lower: Array, upper: Array) -> float:
@@ -66,11 +66,11 @@ def crps_ensemble(observed: Array, draws: Array) -> Array:
     weight = np.full(count, 1.0 / count)
     parts = [
         _crps(
-            observed[start : start + COLUMNS_AT_ONCE],
-            draws[:, start : start + COLUMNS_AT_ONCE],
+            observed[start : start + _COLUMNS_AT_ONCE],
+            draws[:, start : start + _COLUMNS_AT_ONCE],
             weight,
         )
-        for start in range(0, len(observed), COLUMNS_AT_ONCE)
+        for start in range(0, len(observed), _COLUMNS_AT_ONCE)
     ]
     return np.concatenate(parts) if parts else np.empty(0)
 
@@ -156,35 +156,6 @@ def score(
         if chosen.any():
             scores.append(part(chosen, float(low), float(high)))
     return scores
-
-
-def instantaneous_frequency(command: Array, period: float) -> Array:
-    """Return the frequency of a command at each sample, shape (n,) [Hz].
-
-    Half the reciprocal of the time between zero crossings of the command about its mean, taken
-    at the middle of each half wave and joined by lines: defined for any command, exact for a
-    sine, and within a half wave of the truth for a sweep. A crossing counts once the command
-    has left a dead zone of 5 % of its rms, so that noise about zero is no frequency.
-
-    Args:
-        command: commanded displacement, shape (n,), any unit.
-        period: sample period [s].
-
-    Raises:
-        InputError: the command crosses its mean fewer than twice.
-    """
-    centred = np.asarray(command, dtype=np.float64) - np.mean(command)
-    dead = 0.05 * float(np.sqrt(np.mean(centred**2)))
-    out = np.flatnonzero(np.abs(centred) > dead)
-    turns = np.flatnonzero(np.diff(np.sign(centred[out])) != 0)
-    if len(turns) < 2:
-        raise InputError('the command crosses its mean fewer than twice: no frequency to speak of')
-    left, right = out[turns], out[turns + 1]
-    share = centred[left] / (centred[left] - centred[right])
-    crossing = (left + share * (right - left)) * period
-    middle = 0.5 * (crossing[1:] + crossing[:-1])
-    frequency = 0.5 / np.diff(crossing)
-    return np.asarray(np.interp(np.arange(len(centred)) * period, middle, frequency))
 
 
 def _same_length(observed: Array, lower: Array, upper: Array) -> tuple[Array, Array, Array]:

@@ -9,14 +9,8 @@ from scipy.stats import norm
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference.bands import Band, band
-from actuator_glue.inference.scores import (
-    coverage,
-    crps_ensemble,
-    instantaneous_frequency,
-    interval_score,
-    mean_width,
-    score,
-)
+from actuator_glue.report.frequency import instantaneous_frequency
+from studies.chen.scores import coverage, crps_ensemble, interval_score, mean_width, score
 
 
 def test_crps_of_ensemble_agrees_with_scoringrules(rng_seed: int) -> None:
