@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from actuator_glue import effects as effects
     from actuator_glue.api.calibration import calibrate as calibrate
     from actuator_glue.api.calibration_result import Calibration as Calibration
+    from actuator_glue.api.compensation import compare_compensators as compare_compensators
     from actuator_glue.api.diagnosis import Diagnosis as Diagnosis
     from actuator_glue.api.diagnosis import diagnose as diagnose
     from actuator_glue.api.replay_result import Replay as Replay
@@ -51,6 +52,7 @@ _PUBLIC = {
     'Specimen': ('hybrid.partition', 'Specimen'),
     'StabilityResult': ('api.stability', 'StabilityResult'),
     'calibrate': ('api.calibration', 'calibrate'),
+    'compare_compensators': ('api.compensation', 'compare_compensators'),
     'diagnose': ('api.diagnosis', 'diagnose'),
     'effects': ('effects', ''),
     'load': ('io.load', 'load'),

@@ -23,6 +23,7 @@ NAMES = {
     'Specimen',
     'StabilityResult',
     'calibrate',
+    'compare_compensators',
     'diagnose',
     'effects',
     'load',

@@ -3,23 +3,26 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from actuator_glue.api.calibration_result import Calibration
-from actuator_glue.api.stability import AtFrequency, DelayMargin, Spread, StabilityResult
+from actuator_glue.api.stability import AtFrequency, DelayMargin, StabilityResult
+from actuator_glue.api.virtual_test import VirtualResult, check_criteria, run, spread, summarise
 from actuator_glue.errors import InputError
-from actuator_glue.hybrid import stability
-from actuator_glue.hybrid.linear_system import System
-from actuator_glue.hybrid.loop import actuator, inverse_compensator
+from actuator_glue.hybrid import sampled, stability
+from actuator_glue.hybrid.actuator import nonlinear
+from actuator_glue.hybrid.compensator import Compensator
+from actuator_glue.hybrid.design import Loop, compensator_of
+from actuator_glue.hybrid.ground_motion import GroundMotion
 from actuator_glue.hybrid.margin import classical_margins, nominal, pure_delay_margin
 from actuator_glue.hybrid.partition import Partition
+from actuator_glue.hybrid.virtual import VirtualTest
+from actuator_glue.io.ground_motion import read_ground_motion
 from actuator_glue.io.partition import read_partition
-from actuator_glue.records import Array
 
-COMPENSATORS = ('none', 'inverse')
 FREQUENCIES = (1.0, 5.0, 10.0)  # Hz
 DRAWS = 1000
 
@@ -31,22 +34,29 @@ def rths(
     draws: int = DRAWS,
     frequencies: Sequence[float] = FREQUENCIES,
     compensator: str = 'none',
-    band_hz: float | None = None,
+    ground_motion: GroundMotion | Path | str | None = None,
+    criteria: Mapping[str, float] | None = None,
     seed: int = 1,
 ) -> StabilityResult:
     """Return how likely a hybrid test is unstable with a calibrated actuator.
 
-    Each draw's closed-loop transfer function, Eq. (2a) with the specimen's stiffness, stands in
-    the loop of the partition, whose force is held from sample to sample.
+    Each draw's actuator, Eq. (2a) with the specimen's stiffness and the linear effects of the
+    model, stands in the sampled loop of the partition. With a ground motion each draw runs the
+    record, all its effects included.
 
     Args:
         partition: the hybrid test; a YAML file, or the name of one that comes with the package.
         calibration: posterior of the actuator.
         draws: how many of its draws are used, evenly spread over it.
         frequencies: where the actuator's delay and amplitude are told [Hz].
-        compensator: 'none'; or 'inverse', the band-limited inverse of the posterior's mean.
-        band_hz: where the inverse is 3 dB down [Hz]; None for a fortieth of the sample rate.
-        seed: of the specimen's draws, where the partition gives it standard deviations.
+        compensator: 'none', 'inverse' of the posterior mean, 'ats-fixed' (the same within the
+            usual limits of the adaptive time series), 'ats' (adaptive), 'robust' (smallest 95th
+            percentile of J2).
+        ground_motion: a file, 'artificial' or 'artificial:SEED'.
+        criteria: peaks that must not be exceeded: 'drift' and 'displacement' of any floor [m],
+            'force' of the specimen [N].
+        seed: of the specimen's draws, where the partition gives it standard deviations, and of
+            the sensors' noise.
 
     Raises:
         InputError: a partition, posterior or option that cannot be used.
@@ -57,32 +67,44 @@ def rths(
     """
     if seed < 0:
         raise InputError(f'seed {seed} is negative')
+    if draws < 2:
+        raise InputError(f'{draws} draws are no distribution; use at least 2')
     started = time.perf_counter()
     if not isinstance(partition, Partition):
         partition = read_partition(partition)
-    _check(partition, draws, frequencies, compensator, band_hz)
+    if ground_motion is not None and not isinstance(ground_motion, GroundMotion):
+        ground_motion = read_ground_motion(ground_motion)
+    _check(partition, frequencies, ground_motion, criteria or {})
+    curved = nonlinear(calibration.effects)
+    if curved and ground_motion is None:
+        raise InputError(
+            f'the posterior has {", ".join(curved)}, which no linear loop has; give a ground '
+            'motion for a virtual test, or calibrate with linear effects only'
+        )
     posterior = calibration.posterior
     rows = np.linspace(0, len(posterior) - 1, min(draws, len(posterior))).astype(np.intp)
-    used = posterior[rows]
-    specimen = partition.specimen.drawn(np.random.default_rng(seed), len(used))
-    names, effects = calibration.names, calibration.effects
-    actuators = actuator(used, names, effects, specimen['stiffness'])
-    stiffness = np.array([partition.specimen.stiffness])
-    mean = actuator(posterior.mean(axis=0)[None], names, effects, stiffness)
-    inverse, described = None, 'none'
-    if compensator == 'inverse':
-        band = partition.rate / 40.0 if band_hz is None else band_hz
-        inverse = inverse_compensator(mean.system, band)
-        described = f'inverse of the posterior mean, low-pass at {band:g} Hz'
-    loop = stability.loops(partition, specimen, actuators.system, inverse)
-    delay = actuators.delay + partition.computation_delay
-    growth = stability.growth(loop, partition.period, delay)
-    margin = stability.signed_margin(loop, partition.period, delay, growth > 0.0)
-    tracking = stability.tracking(actuators, frequencies)
-    inputs = {n: used[:, i] for i, n in enumerate(names)}
+    specimen = partition.specimen.drawn(np.random.default_rng(seed), len(rows))
+    loop = Loop.of(partition, posterior[rows], calibration.names, calibration.effects, specimen)
+    ground = None if ground_motion is None else ground_motion.at(partition.period)
+    chosen = compensator_of(compensator, loop, ground)
+    effective = _effective(calibration)
+    virtual: VirtualResult | None = None
+    if ground is not None and ground_motion is not None:
+        test = VirtualTest(
+            partition, loop.draws, loop.names, loop.effects, specimen, chosen, ground, seed
+        )
+        motion = ground_motion.name, ground_motion.duration
+        virtual = summarise(run(test), test.time, motion, criteria or {}, effective)
+    growth = sampled.growth(loop.numerical, loop.plants, chosen.coefficients, partition.period)
+    open_loop = stability.loops(partition, specimen, loop.actuators.system, chosen)
+    delay = loop.actuators.delay + partition.computation_delay
+    margin = stability.signed_margin(open_loop, partition.period, delay, growth > 0.0)
+    tracking = stability.tracking(loop.actuators, frequencies)
+    inputs = {n: loop.draws[:, i] for i, n in enumerate(loop.names)}
     inputs |= {f'specimen {n}': column for n, column in specimen.items()}
     sensitive = stability.sensitivity(margin, inputs)
-    with_mean = stability.loops(partition, partition.specimen.nominal, mean.system, inverse)
+    with_mean = stability.loops(partition, partition.specimen.nominal, loop.mean.system, chosen)
+    by_test = virtual is not None and (bool(curved) or chosen.adaptive)
     return StabilityResult(
         partition=partition.name,
         natural_frequencies_hz=tuple(map(float, partition.natural_frequencies)),
@@ -92,7 +114,10 @@ def rths(
             'perfect_actuator': classical_margins(nominal(partition)),
             'mean_actuator': classical_margins(with_mean),
         },
-        p_unstable=stability.share(growth > 0.0, _effective(calibration)),
+        p_unstable=virtual.diverged
+        if virtual is not None and by_test
+        else stability.share(growth > 0.0, effective),
+        unstable_by='virtual test' if by_test else 'characteristic roots',
         margin_s=spread(margin) if np.isfinite(margin).all() else None,
         growth_per_s=spread(growth),
         bandwidth_hz=spread(tracking.bandwidth),
@@ -102,45 +127,30 @@ def rths(
         ),
         sensitivity=sensitive,
         most_sensitive=max(sensitive, key=lambda n: abs(sensitive[n]), default=None),
-        compensator=described,
-        draws=len(used),
+        compensator=str(chosen),
+        virtual=virtual,
+        draws=len(rows),
         seconds=time.perf_counter() - started,
         problems=calibration.problems,
-        notes=tuple(_notes(partition, calibration, loop, mean.delay)),
+        notes=tuple(_notes(loop, calibration, chosen, by_test)),
         margins_drawn=margin,
         growth_drawn=growth,
     )
 
 
-def spread(values: Array) -> Spread:
-    """Return mean, standard deviation and 95 % limits of values (m,)."""
-    lower, median, upper = np.quantile(values, (0.025, 0.5, 0.975))
-    return Spread(
-        float(values.mean()), float(values.std()), float(lower), float(median), float(upper)
-    )
-
-
 def _check(
     partition: Partition,
-    draws: int,
     frequencies: Sequence[float],
-    compensator: str,
-    band_hz: float | None,
+    motion: GroundMotion | None,
+    criteria: Mapping[str, float],
 ) -> None:
     half = 0.5 * partition.rate
-    if draws < 2:
-        raise InputError(f'{draws} draws are no distribution; use at least 2')
     for f in frequencies:
         if not 0.0 < f <= half:
             raise InputError(f'frequency {f:g} Hz is outside (0, {half:g}] Hz')
-    if compensator not in COMPENSATORS:
-        raise InputError(
-            f'compensator {compensator!r} is unknown; use one of {", ".join(COMPENSATORS)}'
-        )
-    if band_hz is not None and compensator == 'none':
-        raise InputError('a band is given but no compensator; use compensator inverse')
-    if band_hz is not None and not 0.0 < band_hz <= half:
-        raise InputError(f'band {band_hz:g} Hz is outside (0, {half:g}] Hz')
+    if criteria and motion is None:
+        raise InputError('a criterion needs a ground motion: without one nothing moves')
+    check_criteria(criteria)
 
 
 def _effective(calibration: Calibration) -> float:
@@ -149,11 +159,10 @@ def _effective(calibration: Calibration) -> float:
     return float(np.nanmin(sizes)) if np.isfinite(sizes).any() else 1.0
 
 
-def _notes(
-    partition: Partition, calibration: Calibration, loop: System, delay: Array
-) -> list[str]:
+def _notes(loop: Loop, calibration: Calibration, chosen: Compensator, by_test: bool) -> list[str]:
     """Return what limits the answer."""
     notes = []
+    partition = loop.partition
     if not calibration.converged:
         notes.append('the chains of the posterior have not converged (R-hat above 1.01)')
     known = [s.stiffness_n_per_m for s in calibration.sources if s.stiffness_n_per_m is not None]
@@ -163,11 +172,17 @@ def _notes(
             f'specimen stiffness {k:g} N/m lies outside those of the calibration '
             f'({min(known):g} to {max(known):g} N/m): Eq. (2) extrapolates'
         )
-    if partition.specimen.mass > 0.0:
+    if partition.specimen.mass > 0.0 and 'payload-inertia' not in loop.effects:
         notes.append(
             'Eq. (2) takes the specimen as a massless spring; its mass and damping act on the '
             'structure, not on the actuator'
         )
-    if float(delay[0]) > 0.0:
+    if float(loop.mean.delay[0]) > 0.0:
         notes.append('gain and phase margin of the mean actuator leave its delay effect out')
+    curved = nonlinear(loop.effects)
+    if curved:
+        notes.append(f'margins, roots and delays leave {", ".join(curved)} out')
+    if chosen.adaptive:
+        first = 'margins and roots' if by_test else 'P(unstable), margins and roots'
+        notes.append(f'{first} are those of the first coefficients; they adapt during a test')
     return notes

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from actuator_glue.api.result import Result
+from actuator_glue.api.virtual_test import Spread, VirtualResult
 from actuator_glue.hybrid.margin import Margins, psi
 from actuator_glue.hybrid.stability import Share
 from actuator_glue.records import Array
@@ -14,17 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from actuator_glue.report import html
-
-
-@dataclass(frozen=True, slots=True)
-class Spread:
-    """Distribution of a number over the draws: mean, standard deviation, 95 % limits."""
-
-    mean: float
-    stddev: float
-    lower: float
-    median: float
-    upper: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +55,9 @@ class StabilityResult(Result):
         rate_hz: sample rate of the loop.
         delay_margin: without an actuator, by its pure delay.
         margins: gain and phase margin of the same loop, and with the mean actuator.
-        p_unstable: share of draws with a characteristic root in the right half plane.
+        p_unstable: share of draws that are unstable.
+        unstable_by: how that is told: by 'characteristic roots' in the right half plane; or by
+            the 'virtual test', where the model is not linear or the compensator adapts.
         margin_s: further delay that the draws can bear; negative for unstable ones, where it is
             minus the smallest lead that reaches the stability limit; None where nothing limits.
         growth_per_s: real part of the rightmost characteristic root of the sampled loop.
@@ -74,6 +66,7 @@ class StabilityResult(Result):
         sensitivity: rank correlation of the margin with each parameter.
         most_sensitive: the parameter of the largest one; None where the margin does not vary.
         compensator: 'none', or what it is.
+        virtual: what the draws did under a ground motion; None where none was given.
         draws: how many were used.
         seconds: how long it took.
         problems: why the posterior must not be used as it stands.
@@ -89,6 +82,7 @@ class StabilityResult(Result):
     delay_margin: DelayMargin
     margins: dict[str, Margins]
     p_unstable: Share
+    unstable_by: str
     margin_s: Spread | None
     growth_per_s: Spread
     bandwidth_hz: Spread
@@ -96,6 +90,7 @@ class StabilityResult(Result):
     sensitivity: dict[str, float]
     most_sensitive: str | None
     compensator: str
+    virtual: VirtualResult | None
     draws: int
     seconds: float
     problems: tuple[str, ...]
@@ -127,6 +122,7 @@ class StabilityResult(Result):
             'psi': {'pure_delay': psi(margin.pure_delay), 'sampled': psi(margin.sampled)},
             'margins': {name: asdict(m) for name, m in self.margins.items()},
             'p_unstable': asdict(self.p_unstable),
+            'unstable_by': self.unstable_by,
             'indicators': {
                 'margin_s': None if self.margin_s is None else asdict(self.margin_s),
                 'growth_per_s': asdict(self.growth_per_s),
@@ -134,7 +130,9 @@ class StabilityResult(Result):
                 'tracking': [asdict(t) for t in self.tracking],
                 'sensitivity': self.sensitivity,
                 'most_sensitive': self.most_sensitive,
+                **({} if self.virtual is None else self.virtual.to_json()['indicators']),
             },
+            'virtual_test': None if self.virtual is None else self.virtual.to_json(),
             'compensator': self.compensator,
             'draws': self.draws,
             'seconds': self.seconds,

@@ -6,12 +6,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuator_glue.api.virtual_test import CRITERIA
 from actuator_glue.report import html, style
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from actuator_glue.api.stability import Spread, StabilityResult
+    from actuator_glue.api.stability import StabilityResult
+    from actuator_glue.api.virtual_test import Spread, VirtualResult
+    from actuator_glue.hybrid.stability import Share
 
 HEADER = ('quantity', 'unit', 'mean', 'sd', '2.5 %', '97.5 %')
 
@@ -44,14 +47,53 @@ def rows(found: StabilityResult) -> list[tuple[str, ...]]:
     out = [row('delay margin left', 'ms', found.margin_s, 1e3)] if found.margin_s else []
     out.append(row('rightmost root, real part', '1/s', found.growth_per_s))
     out.append(row('actuator bandwidth (-3 dB)', 'Hz', found.bandwidth_hz))
+    if found.virtual is not None:
+        for name, of in found.virtual.indicators.items():
+            text, unit, scale = _shown(name)
+            out.append(row(text, unit, of, scale))
     for at in found.tracking:
         out.append(row(f'actuator delay at {at.frequency_hz:g} Hz', 'ms', at.delay_s, 1e3))
         out.append(row(f'actuator amplitude at {at.frequency_hz:g} Hz', '-', at.amplitude))
     return out
 
 
-def margin_line(found: StabilityResult) -> str:
-    """Return tau_c in one line."""
+def _shown(name: str) -> tuple[str, str, float]:
+    """Return text, unit and factor of an indicator's name."""
+    if name == 'J1_s':
+        return 'J1, lag of the piston', 'ms', 1e3
+    if name.startswith('peak_'):
+        _, what, unit = name.split('_')
+        return f'peak {what}', *(('mm', 1e3) if unit == 'm' else ('kN', 1e-3))
+    return {'J2': 'J2, rms of tracking', 'J3': 'J3, peak of tracking'}.get(name, name), '%', 100.0
+
+
+def lines(found: StabilityResult) -> list[str]:
+    """Return margin, virtual test and sensitivity, a line each."""
+    out = [_margin(found)]
+    if found.virtual is not None:
+        virtual = found.virtual
+        out.append(
+            f'{virtual.ground_motion}, {virtual.duration_s:g} s: {_probability(virtual.diverged)} '
+            'of the draws diverge'
+        )
+        for failure in virtual.failures:
+            out.append(
+                f'P({failure.criterion} > {failure.limit:g} {CRITERIA[failure.criterion]}) = '
+                f'{_probability(failure.probability)}'
+            )
+    if found.most_sensitive is None:
+        out.append('the margin does not vary over the draws')
+    else:
+        rho = found.sensitivity[found.most_sensitive]
+        out.append(f'the margin follows {found.most_sensitive} most (rank correlation {rho:+.2f})')
+    return out
+
+
+def _probability(of: Share) -> str:
+    return f'{of.value:.4g} ({100 * of.level:g} % interval {of.lower:.3g} to {of.upper:.3g})'
+
+
+def _margin(found: StabilityResult) -> str:
     margin = found.delay_margin
     if not np.isfinite(margin.pure_delay):
         return 'no pure delay makes this loop unstable'
@@ -61,12 +103,26 @@ def margin_line(found: StabilityResult) -> str:
     )
 
 
-def sensitivity_line(found: StabilityResult) -> str:
-    """Return which parameter the margin follows most, in one line."""
-    if found.most_sensitive is None:
-        return 'the margin does not vary over the draws'
-    rho = found.sensitivity[found.most_sensitive]
-    return f'the margin follows {found.most_sensitive} most (rank correlation {rho:+.2f})'
+@style.styled
+def response_figure(found: VirtualResult) -> Figure:
+    """Draw each floor's 95 % band over time with the reference structure's response."""
+    floors = found.median.shape[1]
+    figure = style.new_figure(1.2 + 1.4 * min(floors, 4))
+    axes = figure.subplots(min(floors, 4), 1, sharex=True, squeeze=False)[:, 0]
+    for floor, ax in enumerate(axes):
+        ax.fill_between(
+            found.time_s,
+            1e3 * found.lower[:, floor],
+            1e3 * found.upper[:, floor],
+            color=style.BAND,
+            label='95 % of the draws',
+        )
+        reference = 1e3 * found.reference[:, floor]
+        ax.plot(found.time_s, reference, color=style.MEASURED, lw=0.5, label='reference')
+        ax.set_ylabel(f'floor {floor + 1} [mm]')
+    axes[0].legend(loc='upper right')
+    axes[-1].set_xlabel('time [s]')
+    return figure
 
 
 def brief(found: StabilityResult) -> list[html.Block]:
@@ -74,16 +130,20 @@ def brief(found: StabilityResult) -> list[html.Block]:
     return [
         *(html.Note(line) for line in found.problems),
         html.Text(f'{found.partition}: {found.summary()}'),
-        html.Text(f'{margin_line(found)}. Compensator: {found.compensator}.'),
+        html.Text(f'{". ".join(lines(found))}. Compensator: {found.compensator}.'),
         html.Table(HEADER, rows(found), 'Over the draws'),
-        html.Text(f'{sensitivity_line(found)}.'),
         *(html.Note(line) for line in found.notes),
     ]
 
 
 def page(found: StabilityResult) -> html.Page:
     """Return the report."""
-    picture = html.Picture.of(found.plot(), 'Each draw of the posterior; the line is the limit.')
-    section = html.Section(f'Stability of {found.partition}', [*brief(found), picture])
+    pictures = [
+        html.Picture.of(found.plot(), 'Each draw of the posterior; the line is the limit.')
+    ]
+    if found.virtual is not None and found.virtual.indicators:
+        picture = response_figure(found.virtual)
+        pictures.append(html.Picture.of(picture, f'Floors under {found.virtual.ground_motion}.'))
+    section = html.Section(f'Stability of {found.partition}', [*brief(found), *pictures])
     lead = '; '.join((*found.problems, found.summary()))
     return html.Page('Hybrid test', lead, [section], f'{found.draws} draws')

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuator_glue.errors import InputError
-from actuator_glue.hybrid.loop import actuator
+from actuator_glue.hybrid.actuator import actuator, nonlinear
 from actuator_glue.records import Array
 
 if TYPE_CHECKING:
@@ -38,6 +38,9 @@ def state_space(found: Calibration, stiffness: float, draw: str | int) -> Any:
     """
     import control
 
+    curved = nonlinear(found.effects)
+    if curved:
+        raise InputError(f'the model has {", ".join(curved)}, which no transfer function has')
     row = chosen_draw(found, draw)[None]
     model = actuator(row, found.names, found.effects, np.array([stiffness]))
     if 'delay' in found.effects:

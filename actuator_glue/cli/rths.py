@@ -7,6 +7,7 @@ limit, or the posterior must not be used as it stands. 2: the input cannot be us
 from __future__ import annotations
 
 import argparse
+from typing import Any
 
 from actuator_glue.arguments import Output, number
 from actuator_glue.cli._output import add_json, note, say, table
@@ -45,18 +46,35 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--compensator',
-        choices=('none', 'inverse'),
+        choices=('none', 'inverse', 'ats-fixed', 'ats', 'robust', 'best'),
         default='none',
-        help='inverse: the band-limited inverse of the posterior mean (default none)',
+        help='inverse of the posterior mean; the same within the limits of the adaptive time '
+        'series (ats-fixed), or adaptive (ats); robust: smallest 95th percentile of J2; best: try '
+        'all and take the best (default none)',
     )
     parser.add_argument(
-        '--band',
-        type=number,
-        metavar='HZ',
-        help='low-pass of the inverse (default a fortieth of the sample rate)',
+        '--ground-motion',
+        metavar='RECORD',
+        help='every draw runs this record: AT2 (PEER), text with time [s] and acceleration '
+        '[m/s^2], or artificial[:SEED]',
     )
     parser.add_argument(
-        '--seed', type=int, default=1, metavar='S', help="seed of the specimen's draws (default 1)"
+        '--scale', type=number, metavar='F', help='factor of the ground motion (default 1)'
+    )
+    parser.add_argument(
+        '--fail',
+        type=_criterion,
+        action='append',
+        metavar='WHAT=LIMIT',
+        help='tell how likely drift or displacement [m] of a floor, or force [N] of the specimen '
+        'exceeds this; repeatable',
+    )
+    parser.add_argument(
+        '--seed',
+        type=int,
+        default=1,
+        metavar='S',
+        help='seed of specimens and sensor noise (default 1)',
     )
     parser.add_argument(
         '--save', type=Output, metavar='OUT.npz', help='save the result with all its draws'
@@ -77,33 +95,68 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f'--limit {args.limit:g}: a probability lies between 0 and 1')
 
     from actuator_glue.api.calibration_result import Calibration
+    from actuator_glue.api.compensation import HEADER as COMPARED
+    from actuator_glue.api.compensation import compare_compensators
     from actuator_glue.api.rths import FREQUENCIES, rths
-    from actuator_glue.api.stability_report import HEADER, margin_line, rows, sensitivity_line
+    from actuator_glue.api.stability_report import HEADER, lines, rows
+    from actuator_glue.io.ground_motion import read_ground_motion
 
-    found = rths(
-        args.partition,
-        Calibration.load(args.posterior),
-        draws=args.draws,
-        frequencies=args.frequency or FREQUENCIES,
-        compensator=args.compensator,
-        band_hz=args.band,
-        seed=args.seed,
-    )
+    motion = None if args.ground_motion is None else read_ground_motion(args.ground_motion)
+    if args.scale is not None:
+        if motion is None:
+            raise InputError('--scale needs a --ground-motion to scale')
+        motion = motion.scaled(args.scale)
+    calibration = Calibration.load(args.posterior)
+    options = {
+        'draws': args.draws,
+        'frequencies': args.frequency or FREQUENCIES,
+        'criteria': dict(args.fail or ()),
+        'seed': args.seed,
+    }
+    compared = None
+    if args.compensator == 'best':
+        compared = compare_compensators(
+            args.partition, calibration, motion or 'artificial', **options
+        )
+        found = compared.found[compared.best]
+    else:
+        found = rths(
+            args.partition,
+            calibration,
+            compensator=args.compensator,
+            ground_motion=motion,
+            **options,
+        )
     go = not found.problems if args.limit is None else found.go(args.limit)
     for line in found.problems:
         say(line, args)
     if args.limit is not None:
         say(f'{"GO" if go else "NO-GO"} (limit {args.limit:g})', args)
+    if compared is not None:
+        say(compared.summary(), args)
+        table('compensators', COMPARED, compared.rows(), args)
     say(found.summary(), args)
-    say(margin_line(found), args)
+    for line in lines(found):
+        say(line, args)
     table(f'{found.partition}, compensator: {found.compensator}', HEADER, rows(found), args)
-    say(sensitivity_line(found), args)
     for line in found.notes:
         note(line)
     if args.save is not None:
         found.save(args.save)
     if args.report is not None:
         found.report(args.report)
-    decision = {} if args.limit is None else {'limit': args.limit, 'go': go}
-    write_json({**found.to_json(), **decision}, args.json)
+    more: dict[str, Any] = {} if args.limit is None else {'limit': args.limit, 'go': go}
+    if compared is not None:
+        more['comparison'] = compared.to_json()
+    write_json({**found.to_json(), **more}, args.json)
     return 0 if go else 1
+
+
+def _criterion(text: str) -> tuple[str, float]:
+    name, _, limit = text.partition('=')
+    try:
+        return name, float(limit)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(
+            f'{text!r} is no criterion; give for example drift=0.005'
+        ) from error

@@ -74,6 +74,9 @@ class Partition:
         rate: sample rate of the loop [Hz].
         interface: degree of freedom that the actuator imposes, counted from 0.
         computation_delay: from the measured force to the command that answers it [s].
+        displacement_noise, force_noise: white noise of the sensors, standard deviation [m, N].
+        influence: displacement of each degree of freedom when the ground moves by one, (n,);
+            ones where None is given.
         name: of the partition.
     """
 
@@ -84,6 +87,9 @@ class Partition:
     rate: float
     interface: int = 0
     computation_delay: float = 0.0
+    displacement_noise: float = 0.0
+    force_noise: float = 0.0
+    influence: Array | None = None
     name: str = 'partition'
 
     def __post_init__(self) -> None:
@@ -111,11 +117,31 @@ class Partition:
             raise InputError(
                 f'{self.name}: computation_delay {self.computation_delay:g} s is outside [0, 1] s'
             )
+        for name in ('displacement_noise', 'force_noise'):
+            if not 0.0 <= getattr(self, name) < np.inf:
+                raise InputError(f'{self.name}: {name} {getattr(self, name):g} is negative')
+        moved = () if self.influence is None else np.shape(self.influence)
+        if self.influence is not None and (
+            moved != (len(self.mass),) or not np.isfinite(self.influence).all()
+        ):
+            raise InputError(
+                f'{self.name}: influence has shape {moved}; give one finite number for each of '
+                f'the {len(self.mass)} degrees of freedom'
+            )
 
     @property
     def period(self) -> float:
         """Sample period [s]."""
         return 1.0 / self.rate
+
+    @property
+    def load(self) -> Array:
+        """Force on each degree of freedom while the ground accelerates by -1 m/s^2, (n,) [kg].
+
+        The whole structure's: the specimen stands on ground that does not move.
+        """
+        moved = np.ones(len(self.mass)) if self.influence is None else self.influence
+        return np.asarray(self.whole[0] @ moved)
 
     @property
     def whole(self) -> tuple[Array, Array, Array]:

@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import beta, spearmanr
 
-from actuator_glue.hybrid.linear_system import System, closed, held, series
-from actuator_glue.hybrid.loop import Actuator, substructures
+from actuator_glue.hybrid.actuator import Actuator
+from actuator_glue.hybrid.compensator import Compensator
+from actuator_glue.hybrid.linear_system import System, crossings, series
+from actuator_glue.hybrid.loop import substructures
 from actuator_glue.hybrid.margin import sampled_delay_margin
 from actuator_glue.hybrid.partition import Partition
 from actuator_glue.records import Array
 
 Flags = NDArray[np.bool_]
-
-_AT_ONCE = 64  # draws whose matrices are in memory together
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,43 +51,22 @@ def loops(
     partition: Partition,
     specimen: Mapping[str, Array],
     actuators: System,
-    compensator: System | None = None,
+    compensator: Compensator,
 ) -> System:
     """Return the open loop of each draw: substructures, compensator, actuator."""
-    loop = substructures(partition, specimen)
-    if compensator is not None:
-        loop = series(loop, compensator)
-    return series(loop, actuators)
-
-
-def growth(loop: System, period: float, delay: Array) -> Array:
-    """Return the real part of the rightmost characteristic root of the sampled loop, (m,) [1/s].
-
-    ln |z| / T of the largest root z of the loop whose force is held over each sample and whose
-    command comes `delay` later: positive where the test is unstable.
-
-    Args:
-        loop: continuous open loop with D = 0.
-        period: sample period T [s].
-        delay: of computation and of the actuator's command, (m,) [s].
-    """
-    out = np.empty(len(loop.D))
-    for first in range(0, len(out), _AT_ONCE):
-        part = slice(first, first + _AT_ONCE)
-        discrete = held(System(*(x[part] for x in loop)), period, delay[part])
-        radius = np.abs(np.linalg.eigvals(closed(discrete))).max(axis=1)
-        out[part] = np.log(radius) / period
-    return out
+    return series(substructures(partition, specimen), compensator.applied(actuators))
 
 
 def signed_margin(loop: System, period: float, delay: Array, unstable: Flags) -> Array:
     """Return the further delay that each draw can bear, (m,) [s].
 
     For an unstable draw it is negative: the smallest lead that brings a characteristic root to the
-    stability limit.
+    stability limit. The command is held as well, which is half a sample more of delay.
     """
-    later, sooner = sampled_delay_margin(loop, period, delay)
-    return np.where(unstable, -sooner, later)
+    later, sooner = sampled_delay_margin(loop, period, delay + 0.5 * period)
+    # At the limit itself the two ways of sampling may disagree by a thousandth of a sample.
+    sooner = np.minimum(sooner, np.where(later < 0.05 * period, 0.0, np.inf))
+    return np.where(unstable, -sooner, np.where(sooner < 0.05 * period, 0.0, later))
 
 
 def share(hits: Flags, effective: float, level: float = 0.95) -> Share:
@@ -107,14 +86,13 @@ def share(hits: Flags, effective: float, level: float = 0.95) -> Share:
 
 
 def tracking(found: Actuator, frequencies_hz: Sequence[float]) -> Tracking:
-    """Return delay, amplitude and bandwidth (3 dB below static) of second-order actuators."""
+    """Return delay, amplitude and bandwidth (3 dB below static) of linear actuators."""
     w = 2.0 * np.pi * np.asarray(frequencies_hz, dtype=np.float64)
     gain = found.system.response(np.broadcast_to(1j * w, (len(found.delay), len(w))))
     delay = -np.angle(gain) / w + found.delay[:, None]
-    # |G|^2 = |G(0)|^2 / 2: (a0 - w^2)^2 + (a1 w)^2 = 2 a0^2, a quadratic in w^2.
-    a0, a1 = -found.system.A[:, 1, 0], -found.system.A[:, 1, 1]
-    half = a0 - 0.5 * a1**2
-    bandwidth = np.sqrt(half + np.sqrt(half**2 + a0**2)) / (2.0 * np.pi)
+    static = found.system.response(np.zeros((len(found.delay), 1), dtype=np.complex128)).real
+    scaled = found.system._replace(C=found.system.C * np.sqrt(2.0) / np.abs(static))
+    bandwidth = np.nanmin(crossings(scaled), axis=1) / (2.0 * np.pi)
     return Tracking(delay, np.abs(gain), bandwidth)
 
 

@@ -21,10 +21,11 @@ _LARGEST = 2_000_000  # bytes
 _STRUCTURE = ('mass', 'damping', 'damping_ratio', 'stiffness')
 _KNOWN = {
     '': ('name', 'numerical', 'reference', 'interface', 'experimental', 'rate',
-         'computation_delay'),
+         'computation_delay', 'influence', 'noise'),
     'numerical': _STRUCTURE,
     'reference': _STRUCTURE,
     'experimental': (*_STRUCTURE, 'mass_sd', 'damping_sd', 'stiffness_sd'),
+    'noise': ('displacement', 'force'),
 }  # fmt: skip
 
 
@@ -68,7 +69,7 @@ def parse_partition(content: object, name: str = 'partition') -> Partition:
 
     Args:
         content: `numerical` or `reference`, `experimental`, `rate`, and where wanted `name`,
-            `interface`, `computation_delay`.
+            `interface`, `computation_delay`, `influence`, `noise`.
         name: where it says none.
 
     Raises:
@@ -95,6 +96,10 @@ def parse_partition(content: object, name: str = 'partition') -> Partition:
     interface = entries.get('interface', 1)
     if isinstance(interface, bool) or not isinstance(interface, int):
         raise InputError(f'interface is {brief(interface)}; give a whole number, counted from 1')
+    noise = {
+        name: _number(value, f'noise: {name}')
+        for name, value in _mapping(entries.get('noise') or {}, 'noise').items()
+    }
     partition = Partition(
         mass=mass,
         damping=damping,
@@ -103,6 +108,9 @@ def parse_partition(content: object, name: str = 'partition') -> Partition:
         rate=_number(_needed(entries, 'rate', ''), 'rate'),
         interface=interface - 1,
         computation_delay=_number(entries.get('computation_delay', 0.0), 'computation_delay'),
+        displacement_noise=noise.get('displacement', 0.0),
+        force_noise=noise.get('force', 0.0),
+        influence=_influence(entries.get('influence')),
         name=str(entries.get('name') or name),
     )
     return partition.without_specimen() if given[0] == 'reference' else partition
@@ -122,6 +130,14 @@ def _specimen(entries: Mapping[str, Any]) -> Specimen:
         damping = _needed(numbers, 'damping', where)
     spread = {n[:-3]: value for n, value in numbers.items() if n.endswith('_sd')}
     return Specimen(mass, damping, stiffness, spread)
+
+
+def _influence(value: object) -> Array | None:
+    if value is None:
+        return None
+    if not isinstance(value, list):
+        raise InputError(f'influence must be a list of numbers, not {brief(value)}')
+    return np.array([_number(v, 'influence') for v in value])
 
 
 def _mass(value: object, count: int, where: str) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy import signal
 
@@ -142,17 +144,47 @@ def earthquake(
     for name, value in (('ground_damping', ground_damping), ('corner_damping', corner_damping)):
         if not 0.0 < value <= 10.0:
             raise InputError(f'{name} {value:g} is outside (0, 10]')
-    tau = 0.1 * duration
+    # Twice integrated (1/s^2) the high-pass s^2/(s^2 + ...) of Clough and Penzien has no zeros.
+    ground, corner = (ground_hz, ground_damping), (corner_hz, corner_damping)
+    return _scaled(_kanai_tajimi(t, rate, seed, ground, corner, [1.0]), amplitude)
+
+
+def ground_acceleration(
+    rate: float, duration: float = 40.0, peak: float = 1.37, seed: int = 0
+) -> Array:
+    """Return the acceleration of an earthquake as `earthquake` makes them, shape (n,) [m/s^2].
+
+    Args:
+        rate: samples per second [Hz].
+        duration: length [s].
+        peak: largest acceleration; 1.37 m/s^2 is 40 % of El Centro 1940 [m/s^2].
+        seed: same seed, same motion.
+
+    Raises:
+        InputError: as `sweep`.
+    """
+    t = _times(rate, duration, 0.0)
+    _band(rate, 2.5)
+    return _scaled(_kanai_tajimi(t, rate, seed, (2.5, 0.6), (0.25, 0.7), [1.0, 0.0, 0.0]), peak)
+
+
+def _kanai_tajimi(
+    t: Array,
+    rate: float,
+    seed: int,
+    ground: tuple[float, float],
+    corner: tuple[float, float],
+    highpass: Sequence[float],
+) -> Array:
+    """Return filtered noise under an envelope; filters as (frequency [Hz], damping ratio)."""
+    tau = 0.1 * float(t[-1])
     envelope = (t / (2.0 * tau)) ** 2 * np.exp(2.0 - t / tau)
     drive = envelope * np.random.default_rng(seed).standard_normal(len(t))
-    wg, wf = 2.0 * np.pi * ground_hz, 2.0 * np.pi * corner_hz
-    # Kanai-Tajimi acceleration times s^2/(s^2 + ...) of Clough-Penzien, integrated twice (1/s^2).
-    numerator = np.array([2.0 * ground_damping * wg, wg**2])
-    denominator = np.polymul(
-        [1.0, 2.0 * ground_damping * wg, wg**2], [1.0, 2.0 * corner_damping * wf, wf**2]
-    )
+    (wg, zg), (wf, zf) = ((2.0 * np.pi * hz, damping) for hz, damping in (ground, corner))
+    numerator = np.polymul([2.0 * zg * wg, wg**2], highpass)
+    denominator = np.polymul([1.0, 2.0 * zg * wg, wg**2], [1.0, 2.0 * zf * wf, wf**2])
     z = signal.bilinear(numerator, denominator, rate)
-    return _scaled(signal.sosfilt(signal.tf2sos(*z), drive), amplitude)
+    return np.asarray(signal.sosfilt(signal.tf2sos(*z), drive))
 
 
 def recorded(record: Record, rate: float | None = None, amplitude: float | None = None) -> Array:

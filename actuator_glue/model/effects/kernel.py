@@ -138,7 +138,7 @@ def _search(
 
 
 @njit
-def _substep(
+def substep(
     w: Array,
     g: Array,
     program: machine.Code,
@@ -263,7 +263,7 @@ def advance(
                 mean, slope = stages.linear(u, offset, start, start + inverse)
             else:
                 mean = stages.held(u, at - offset)
-            _substep(w, g, program, on, mean, rate, (at + (j + 0.5) * inverse) * period)
+            substep(w, g, program, on, mean, rate, (at + (j + 0.5) * inverse) * period)
             if on[r.ON_TRANSDUCER]:
                 for n in range(r.LANES):
                     corrected = stages.chains(w, n, mean, slope)

@@ -44,7 +44,7 @@ NAMES: Final = (
     *BASE,
     *(p.name for e in catalogue.found() if e.exact is not None for p in e.parameters),
 )
-_KIND: Final = np.dtype([(name, np.float64) for name in NAMES])
+KIND: Final = np.dtype([(name, np.float64) for name in NAMES])
 # Time constants below this do not act: they would move the piston by less than 0.1 nm.
 _NOTHING = 1e-9  # s
 _NO_MASS = 1e-14  # s^2, mass over oil stiffness
@@ -53,7 +53,7 @@ _strict: Any = partial(njit, fastmath=False)
 
 
 @_strict
-def _system(p: Any, k: float, a: Array, b: Array, row: NDArray[np.int64], force: Array) -> None:
+def system(p: Any, k: float, a: Array, b: Array, row: NDArray[np.int64], force: Array) -> None:
     """Fill the system a (6, 6), its input b (6,) and force row (6,) of parameters p.
 
     row (6,) is the state each place of the table holds; -1 where an effect needs none.
@@ -90,7 +90,7 @@ def _system(p: Any, k: float, a: Array, b: Array, row: NDArray[np.int64], force:
 def _fill(
     values: Any, k: float, period: float, linear: bool, start: tuple[float, float], tables: Array
 ) -> None:
-    """Fill tables (blocks, SIZE) of parameter sets values (m,) of _KIND."""
+    """Fill tables (blocks, SIZE) of parameter sets values (m,) of KIND."""
     a, b, force = np.empty((STATES, STATES)), np.empty(STATES), np.empty(STATES)
     row = np.empty(STATES, np.int64)
     phi = np.empty((STATES, STATES))
@@ -111,7 +111,7 @@ def _fill(
         row[2] = 2 if row[3] >= 0 or t.damping > _NOTHING * oil else -1
         row[4] = 4 if t.valve_lag > _NOTHING else -1
         row[5] = 5 if t.sensor_lag > _NOTHING else -1
-        _system(t, k, a, b, row, force)
+        system(t, k, a, b, row, force)
         # States that do not act are left out of the matrix, not only zero: their place is empty.
         used = np.array([r for r in row if r >= 0])
         p = len(used)
@@ -181,5 +181,5 @@ def tables(
     # Parameters that are no numbers give answers that are none.
     rows[~np.isfinite(rows).all(axis=1)] = np.nan
     out = np.zeros((-(-len(rows) // LANES), SIZE))
-    _fill(rows.view(_KIND)[:, 0], float(stiffness), float(period), linear, start, out)
+    _fill(rows.view(KIND)[:, 0], float(stiffness), float(period), linear, start, out)
     return out

@@ -1,0 +1,115 @@
+"""Which compensator a hybrid test should use, and what it buys."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from actuator_glue.api.calibration_result import Calibration
+from actuator_glue.api.rths import DRAWS, rths
+from actuator_glue.api.stability import StabilityResult
+from actuator_glue.hybrid.compensator import KINDS
+from actuator_glue.hybrid.ground_motion import GroundMotion
+from actuator_glue.hybrid.partition import Partition
+
+HEADER = ('compensator', 'P(unstable)', 'upper 95 %', 'J1 [ms]', 'J2 median', 'J2 at 95 %')
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Comparison:
+    """The same hybrid test with every compensator.
+
+    Attributes:
+        found: one result for each kind, 'none' first.
+        best: the one to use: smallest upper bound of P(unstable), then smallest 95th percentile
+            of J2.
+    """
+
+    found: dict[str, StabilityResult]
+    best: str
+
+    def summary(self) -> str:
+        """Return which to use and what it buys, in one line."""
+        without, chosen = self.found['none'], self.found[self.best]
+        if self.best == 'none':
+            return 'use no compensator: none of them makes the test safer or closer'
+        return (
+            f'use {self.best}: J2 at the 95th percentile {_share(_worst(chosen))} instead of '
+            f'{_share(_worst(without))}, P(unstable) {chosen.p_unstable.value:.3g} instead of '
+            f'{without.p_unstable.value:.3g}'
+        )
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return a row of text for each compensator, under HEADER."""
+        out: list[tuple[str, ...]] = []
+        for kind, found in self.found.items():
+            p, of = found.p_unstable, found.virtual.indicators if found.virtual else {}
+            j1 = f'{1e3 * of["J1_s"].median:.2f}' if of else '-'
+            j2 = _share(of['J2'].median) if of else '-'
+            out.append((kind, f'{p.value:.3g}', f'{p.upper:.3g}', j1, j2, _share(_worst(found))))
+        return out
+
+    def to_json(self) -> dict[str, Any]:
+        """Return what tells the compensators apart."""
+        return {
+            'use': self.best,
+            'compensators': {
+                kind: {
+                    'p_unstable': found.to_json()['p_unstable'],
+                    'J2': found.to_json()['indicators'].get('J2'),
+                    'j2_percentile_95': _worst(found),
+                }
+                for kind, found in self.found.items()
+            },
+        }
+
+
+def compare_compensators(
+    partition: Partition | Path | str,
+    calibration: Calibration,
+    ground_motion: GroundMotion | Path | str = 'artificial',
+    *,
+    draws: int = DRAWS,
+    seed: int = 1,
+    **options: Any,
+) -> Comparison:
+    """Return a hybrid test with every compensator, and which of them to use.
+
+    Args:
+        partition: as `rths` takes it.
+        calibration: posterior of the actuator.
+        ground_motion: as `rths` takes it.
+        draws: how many draws run the record with each.
+        seed: of specimens and noise, the same for each.
+        options: further ones of `rths`.
+
+    Raises:
+        InputError: as `rths`.
+    """
+    found: dict[str, StabilityResult] = {
+        kind: rths(
+            partition,
+            calibration,
+            compensator=kind,
+            ground_motion=ground_motion,
+            draws=draws,
+            seed=seed,
+            **options,
+        )
+        for kind in KINDS
+    }
+
+    def rank(kind: str) -> tuple[float, float]:
+        worst = _worst(found[kind])
+        return found[kind].p_unstable.upper, float('inf') if worst is None else worst
+
+    return Comparison(found, min(found, key=rank))
+
+
+def _worst(found: StabilityResult) -> float | None:
+    return None if found.virtual is None else found.virtual.j2_percentile_95
+
+
+def _share(value: float | None) -> str:
+    return 'diverged' if value is None else f'{100.0 * value:.3g} %'

@@ -1,0 +1,89 @@
+"""Calibrated actuators as linear systems: Eq. (2) with the linear effects of the model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from actuator_glue.errors import InputError
+from actuator_glue.hybrid.linear_system import System
+from actuator_glue.model.effects import CATALOGUE, lti
+from actuator_glue.model.effects.lti_step import STATES
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Array
+
+# Time constants and masses below these act faster than any loop: their states would only be stiff.
+_SHORTEST = 1e-6  # s
+_LIGHTEST = 1e-8  # s^2, mass over stiffness of oil and specimen
+
+
+class Actuator(NamedTuple):
+    """The closed-loop actuator of each draw under its specimen's spring.
+
+    Attributes:
+        system: piston displacement over command, without delay.
+        delay: of the command, (m,) [s].
+        shown: row that gives the recorded displacement, (n,).
+    """
+
+    system: System
+    delay: Array
+    shown: Array
+
+
+def nonlinear(effects: Sequence[str]) -> tuple[str, ...]:
+    """Return the effects that no linear system has."""
+    return tuple(name for name in effects if not CATALOGUE[name].linear)
+
+
+def table_of(draws: Array, names: Sequence[str], structure: Structure) -> Array:
+    """Return draws (m, p) with the columns in the order of a structure's parameters."""
+    return np.asarray(draws)[:, [list(names).index(name) for name in structure.names]]
+
+
+def actuator(
+    draws: Array, names: Sequence[str], effects: Sequence[str], stiffness: Array
+) -> Actuator:
+    """Return each draw's actuator, its linear effects included, all others left out.
+
+    Args:
+        draws: parameters, shape (m, p), SI units.
+        names: parameter of each column.
+        effects: effects of the model beyond Eq. (2).
+        stiffness: specimen stiffness of each draw, (m,) [N/m].
+
+    Raises:
+        InputError: draws without an Eq. (2a).
+    """
+    structure = Structure(effects)
+    values = structure.values(table_of(draws, names, structure))
+    oil = values['alpha_2'] + stiffness
+    if not (oil > 0.0).all():
+        raise InputError(
+            'a draw has alpha_2 = 0 and its specimen no stiffness: Eq. (2) does not exist there'
+        )
+    used = sorted({0, 1} | {s for e in structure.entries for s in e.exact or ()})
+    row = np.array([s if s in used else -1 for s in range(STATES)])
+    for name, least in (
+        ('valve_lag', _SHORTEST),
+        ('sensor_lag', _SHORTEST),
+        ('damping', _SHORTEST * oil),
+        ('mass', _LIGHTEST * oil),
+    ):
+        if name != 'damping' or 'payload-inertia' not in effects:
+            values[name] = np.maximum(values[name], least)
+    rows = np.zeros(len(oil), lti.KIND)
+    for name in lti.NAMES:
+        rows[name] = values[name]
+    m, n = len(rows), len(used)
+    A, B = np.empty((m, n, n)), np.empty((m, n))
+    a, b, f = np.empty((STATES, STATES)), np.empty(STATES), np.empty(STATES)
+    for i, (one, k) in enumerate(zip(rows, stiffness, strict=True)):
+        lti.system(one, float(k), a, b, row, f)
+        A[i], B[i] = a[np.ix_(used, used)], b[used]
+    piston, shown = np.zeros((m, n)), np.zeros(n)
+    piston[:, 0] = 1.0
+    shown[used.index(5) if 5 in used else 0] = 1.0
+    return Actuator(System(A, B, piston, np.zeros(m)), values['delay'], shown)

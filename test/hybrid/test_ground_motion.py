@@ -1,0 +1,86 @@
+"""Ground motions: artificial ones, files of both kinds, what is refused."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import actuator_glue as ag
+from actuator_glue.hybrid.ground_motion import GroundMotion, artificial
+from actuator_glue.io.ground_motion import GRAVITY, read_ground_motion
+
+
+def test_an_artificial_motion() -> None:
+    """Peak, length, no drift, seeds; most of its power about the ground's 2.5 Hz."""
+    one, two = artificial(1), artificial(2)
+    assert np.abs(one.acceleration).max() == pytest.approx(1.37)
+    assert one.duration == pytest.approx(40.0)
+    assert not np.array_equal(one.acceleration, two.acceleration)
+    np.testing.assert_array_equal(one.acceleration, artificial(1).acceleration)
+    velocity = np.cumsum(one.acceleration) * one.period
+    assert abs(velocity[-1]) < 0.02 * np.abs(velocity).max()
+    power = np.abs(np.fft.rfft(one.acceleration)) ** 2
+    frequency = np.fft.rfftfreq(len(one.acceleration), one.period)
+    middle = float(power @ frequency / power.sum())
+    assert 1.5 < middle < 8.0
+
+
+def test_another_rate() -> None:
+    """Linear between the samples; the samples themselves stay."""
+    motion = GroundMotion(np.array([0.0, 1.0, -1.0]), 0.1, 'small')
+    np.testing.assert_allclose(motion.at(0.05), [0.0, 0.5, 1.0, 0.0, -1.0], atol=1e-12)
+    np.testing.assert_allclose(motion.scaled(2.0).acceleration, [0.0, 2.0, -2.0])
+
+
+def test_files(tmp_path: Path) -> None:
+    """PEER's format in g, and a table with a heading."""
+    at2 = tmp_path / 'RSN6_IMPVALL.AT2'
+    at2.write_text(
+        'PEER NGA STRONG MOTION DATABASE RECORD\nImperial Valley-02, 5/19/1940, El Centro, 180\n'
+        'ACCELERATION TIME SERIES IN UNITS OF G\nNPTS=      7, DT=   .0100 SEC,\n'
+        ' -.1000000E-02  .2000000E-02  .1000000E+00 -.3000000E+00  .1000000E-01\n'
+        '  .0000000E+00  .5000000E-02\n'
+    )
+    found = read_ground_motion(at2)
+    assert found.period == 0.01 and len(found.acceleration) == 7
+    assert found.acceleration[3] == pytest.approx(-0.3 * GRAVITY)
+    table = tmp_path / 'record.csv'
+    table.write_text('time [s], acceleration [m/s^2]\n0, 0.0\n0.02, 1.5\n0.04, -2.0\n')
+    found = read_ground_motion(table)
+    assert found.period == pytest.approx(0.02)
+    np.testing.assert_allclose(found.acceleration, [0.0, 1.5, -2.0])
+    assert read_ground_motion('artificial:3').name.endswith('seed 3)')
+
+
+@pytest.mark.parametrize(
+    ('text', 'said'),
+    [
+        ('nothing here\n', 'no rows'),
+        ('0 1\n0.1 2\n0.5 3\n', 'evenly'),
+        ('0 1 2\n0.1 2 3\n', 'has 3 numbers'),
+        ('0 1\n0.1 2\nnoise\n', 'line 3'),
+        ('0 0\n0.1 0\n', 'largest acceleration'),
+        ('0 1\n0.1 1e6\n', 'm/s'),
+        ('0 1\n0.1 nan\n', 'finite'),
+        ('IN UNITS OF G\nNPTS= 3, DT= .01\n1 2\n', 'NPTS is 3'),
+        ('IN UNITS OF CM/S\nNPTS= 2, DT= .01\n1 2\n', 'UNITS OF G'),
+        ('IN UNITS OF G\nNPTS= 2, DT= .01\n1 x\n', 'no number'),
+    ],
+)
+def test_what_is_no_ground_motion(text: str, said: str, tmp_path: Path) -> None:
+    """One error that says what is wrong."""
+    path = tmp_path / 'record.txt'
+    path.write_text(text)
+    with pytest.raises(ag.InputError, match=said):
+        read_ground_motion(path)
+
+
+def test_names_that_are_none(tmp_path: Path) -> None:
+    """No file, no seed, a scale that is none."""
+    for given in (tmp_path / 'none.at2', 'artificial:x'):
+        with pytest.raises(ag.InputError):
+            read_ground_motion(given)
+    with pytest.raises(ag.InputError, match='scale'):
+        artificial(1).scaled(0.0)
+    with pytest.raises(ag.InputError, match='seed'):
+        artificial(-1)
