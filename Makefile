@@ -55,9 +55,18 @@ bench: $(ROS_STAMP) ## speed, side by side with peers; results in out/bench
 reproduce: $(VENV_STAMP) ## the paper beside our numbers; report in out/reproduce
 	@$(BIN)/python -m studies.chen --force --out out/reproduce $(REPRODUCE_ARGS)
 
-docs: $(VENV_STAMP) ## renew docs/messages.md and the table of docs/effects.md
+# Its tools are installed by this target alone.
+.venv/docs: $(VENV_STAMP)
+	@echo 'docs: installing sphinx and what runs the notebooks'
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt --editable '.[docs]'
+	@touch $@
+
+# -W: a link that leads nowhere, and a notebook that fails, end the build.
+docs: .venv/docs ## renew generated tables; guides, API, executed notebooks as a site in out/docs
 	@$(BIN)/python scripts/write_message_reference.py
 	@$(BIN)/python scripts/write_effect_table.py
+	@$(BIN)/python -m sphinx -W --keep-going -q -b html docs out/docs
+	@echo 'docs: out/docs/index.html'
 
 clean: ## remove everything that make has made
 	rm -rf .venv build install log out *.egg-info
