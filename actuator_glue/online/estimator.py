@@ -154,7 +154,7 @@ class Estimator:
             return None
         window = self._waiting.pop(0)
         memory, model = self._memory, self._model_for(window)
-        record = window.record
+        record, prior = window.record, self._knowledge.prior(window, model.effects)
         archive, afresh = None, True
         if (
             memory.archive is not None
@@ -162,8 +162,13 @@ class Estimator:
             and (memory.epoch == window.epoch)
         ):
             seed = (self.settings.seed, record.first_index, 2)
-            archive = starting_points(model, memory.model, memory.archive, seed)
             afresh = model != memory.model
+            known, points = memory.model.names, memory.archive
+            if afresh and prior is not None:
+                # Where another model ended is further away than what was known before either.
+                known = prior.names
+                points = prior.points(len(points), np.random.default_rng((*seed, 1)))
+            archive = starting_points(model, known, points, seed)
         job = Job(
             window=window,
             settings=self.settings,
@@ -172,7 +177,7 @@ class Estimator:
             afresh=afresh,
             stop_at=None if self.schedule is None else self.schedule.done[_key(window)][1],
             frozen=self._judged(window),
-            prior=self._knowledge.prior(window),
+            prior=prior,
         )
         ahead = self._ahead.between(window.end, job.forecast[1], record.period)
         self.running = replace(job, ahead=ahead)
@@ -182,6 +187,9 @@ class Estimator:
         """Take the result of the running job, or its first part, all that the next one needs."""
         self.running = None
         window, memory = result.window, self._memory
+        if result.failure:
+            # A replay leaves such windows out: nothing may depend on them.
+            return [Failed(window.number, window.record.first_index, result.failure)]
         if result.archive is not None:
             memory.archive, memory.model, memory.epoch = result.archive, result.model, window.epoch
         memory.frozen = [
@@ -190,8 +198,6 @@ class Estimator:
         if result.frozen is not None:
             memory.frozen.append(result.frozen)
             del memory.frozen[:-MAX_FROZEN]
-        if result.failure:
-            return [Failed(window.number, window.record.first_index, result.failure)]
         return [*self._knowledge.learn(window, result.learned, result.conflict)]
 
     def abandon(self, reason: str) -> list[Event]:

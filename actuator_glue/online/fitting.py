@@ -35,14 +35,14 @@ def batch(wanted: int) -> int:
 
 
 def starting_points(
-    model: ModelChoice, before: ModelChoice, archive: Array, seed: tuple[int, ...]
+    model: ModelChoice, before: tuple[str, ...], archive: Array, seed: tuple[int, ...]
 ) -> Array | None:
     """Return points to start from after the model changed, shape (m, p).
 
-    Parameters both models have keep their values; new ones are spread around their starting
-    value by a tenth of it, or over the prior. None where nothing is shared.
+    Parameters that are in `before`, the archive's columns, keep their values; new ones are spread
+    around their starting value by a tenth of it, or over the prior. None where nothing is shared.
     """
-    if model.names == before.names:
+    if model.names == before:
         return np.clip(archive, *model.bounds)
     rng = np.random.default_rng(seed)
     lower, upper = model.bounds
@@ -53,8 +53,8 @@ def starting_points(
             spread = 0.1 * min(max(abs(start), 1e-3 * width), width)
             points[:, j] = start + spread * rng.uniform(-1.0, 1.0, len(points))
     for j, name in enumerate(model.names):
-        if name in before.names:
-            points[:, j] = archive[:, before.names.index(name)]
+        if name in before:
+            points[:, j] = archive[:, before.index(name)]
     return np.clip(points, lower, upper)
 
 

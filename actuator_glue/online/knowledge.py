@@ -27,7 +27,8 @@ class Knowledge:
 
     A window's samples are counted from `settle` on. Its sequential prior is the posterior of the
     newest window that ended before that, drifted by the time between their middles: each
-    sample is counted once along the chain of windows that led there.
+    sample is counted once along the chain of windows that led there. With another model it
+    begins again: what was learned was learned with a model that was found wanting.
 
     Args:
         settings: of the estimator; `prior` says which prior is wanted.
@@ -36,21 +37,28 @@ class Knowledge:
 
     def __init__(self, settings: EstimatorSettings, carried: Carried | None) -> None:
         self._settings = settings
-        self._first = carried if settings.prior != 'box' else None
+        self._given = carried if settings.prior != 'box' else None
+        self._first = self._given
         self._drift = settings.drifts()
         self._began_ns: int | None = None
         self._learned: list[_Learned] = []
-        self._epoch = -1
+        self._under: tuple[int, tuple[str, ...]] | None = None
         self._tested_ns: int | None = None
         independent = 3600.0 / max(settings.window - settings.settle, settings.hop)
         self._test = SequentialTest(independent, settings.false_alarms)
 
-    def prior(self, window: Window) -> Carried | None:
-        """Return what is known before a window; None where it is no more than the box."""
+    def prior(self, window: Window, effects: tuple[str, ...]) -> Carried | None:
+        """Return what is known before a window; None where it is no more than the box.
+
+        Args:
+            window: the window.
+            effects: of the model that it will be fitted with.
+        """
         if self._settings.prior == 'box':
             return None
-        if window.epoch != self._epoch:
-            self._epoch, self._learned, self._tested_ns = window.epoch, [], None
+        if self._under != (window.epoch, effects):
+            self._under = window.epoch, effects
+            self._first, self._learned, self._tested_ns = self._given, [], None
             self._test.restart()
         start, middle, _ = self._times(window)
         if self._began_ns is None:

@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from actuator_glue.arguments import Folder, add_force, claim_outputs, number
 from actuator_glue.errors import InputError
@@ -60,6 +61,13 @@ def parser() -> argparse.ArgumentParser:
         'none)',
     )
     add('--seed', type=int, default=1, help='seed of noise and sampler (%(default)s)')
+    add(
+        '--calibration',
+        type=Path,
+        metavar='FILE',
+        help='what an earlier `calibrate --save` knew of the actuator of --data (simulator: two '
+        'short tests tell it)',
+    )
     add('--no-diagnosis', action='store_true', help='leave the diagnosis out')
     return found
 
@@ -80,12 +88,15 @@ def run(args: argparse.Namespace) -> int:
     end_in_order()
     demonstration.prepare(folder)
     own_domain()
-    settings = {'window': args.window, 'hop': args.hop, 'seed': args.seed}
+    settings: dict[str, Any] = {'window': args.window, 'hop': args.hop, 'seed': args.seed}
     settings['time_budget'] = min(0.5, args.hop)
     diagnose = not args.no_diagnosis
     console = demonstration.terminal()
     started = time.monotonic()
     with Display(console) as display:
+        known = demonstration.known(source, args.calibration, folder, display, args.seed)
+        if known is not None:
+            settings |= {'prior': 'sequential', 'calibration': str(known.resolve())}
         demonstration.stream(source, settings, folder, display, diagnose=diagnose)
         outcome = demonstration.finish(source, folder, display, args.seed, diagnose=diagnose)
     outcome.seconds = time.monotonic() - started
@@ -100,6 +111,8 @@ def _source(args: argparse.Namespace, folder: Path) -> sources.Source:
         return sources.laboratory(args.data, args.channels, args.stiffness, args.hold)
     if args.channels is not None:
         raise InputError('--channels belongs to --data FILE')
+    if args.calibration is not None:
+        raise InputError('--calibration belongs to --data FILE')
     effect = '' if args.effect == 'none' else args.effect
     sealed = folder / 'truth.json'
     return sources.simulator(args.seconds, args.rate, args.stiffness, effect, sealed, args.seed)

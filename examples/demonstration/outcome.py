@@ -6,15 +6,20 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from rich import box
 from rich.console import Console
 from rich.table import Table
 
 from actuator_glue.diagnosis.result import DiagnosisData
+from actuator_glue.inference.choice import choose_model
 from actuator_glue.io.bag_reader import decoded
+from actuator_glue.model.parameters import NAMES
 from actuator_glue.online.job import WindowResult
-from actuator_glue.online.playback import items, replay
+from actuator_glue.online.playback import items, replay, stream
 from actuator_glue.online.published import Comparison, compare, published
+from actuator_glue.online.settings import EstimatorSettings
+from actuator_glue.records import Array
 from actuator_glue.report.bag_content import Content
 from actuator_glue.workers.reports import Reports
 
@@ -49,6 +54,22 @@ def replay_bag(bag: Path) -> Comparison:
         return compare((r for r in results if isinstance(r, WindowResult)), live)
 
 
+def from_the_box(content: Content) -> list[WindowResult]:
+    """Estimate some windows of a recording as if nothing were known before them.
+
+    With the model of the last window, ten or so of them.
+    """
+    last = content.posteriors[-1]
+    length = int(last.samples) * float(last.period)
+    record = content.record
+    hop = max(1.0, (len(record) * record.period - length) / 10.0)
+    settings = EstimatorSettings(
+        window=max(length, hop), hop=hop, settle=min(0.5, 0.1 * length), time_budget=min(0.5, hop)
+    )
+    found = replay(stream(record), settings, choose_model(list(last.effects)))
+    return [r for r in found if isinstance(r, WindowResult)]
+
+
 @dataclass(slots=True)
 class SessionOutcome:
     """A finished run.
@@ -58,6 +79,7 @@ class SessionOutcome:
         sent: samples published by the source.
         content: the bag.
         comparison: the replay held against the live run.
+        truth: true parameters of Eq. (2) where they are known, shape (4,).
         diagnosis: what the model lacks, None where nobody asked.
         seconds: time from the first process to the last picture [s].
     """
@@ -66,6 +88,7 @@ class SessionOutcome:
     sent: int
     content: Content
     comparison: Comparison
+    truth: Array | None = None
     diagnosis: DiagnosisData | None = None
     seconds: float = float('nan')
 
@@ -89,6 +112,17 @@ class SessionOutcome:
                 'prior_dominated': bool(last.prior_dominated[i]),
             }
             for i, name in enumerate(last.parameter_names)
+        }
+
+    def truth_inside(self) -> dict[str, float] | None:
+        """Return in which share of the last model's windows the truth is within 1.96 sd."""
+        posteriors = self.content.posteriors
+        if self.truth is None or not posteriors:
+            return None
+        same = [p for p in posteriors if list(p.effects) == list(posteriors[-1].effects)]
+        return {
+            name: float(np.mean([abs(p.mean[j] - true) <= 1.96 * p.stddev[j] for p in same]))
+            for j, (name, true) in enumerate(zip(NAMES, self.truth, strict=True))
         }
 
     @property
@@ -120,6 +154,7 @@ class SessionOutcome:
                 for kind in ('total', 'parameter')
             },
             'moments': self.moments(),
+            'truth_inside_95': self.truth_inside(),
             'replay_identical': self.comparison.identical,
             'replay': {
                 'windows': self.comparison.windows,
@@ -146,6 +181,9 @@ class SessionOutcome:
                 f'actuator  {1e3 * found.headline_delay:.2f} ms delay, amplitude '
                 f'{found.headline_amplitude:.3f} at {found.headline_frequency:g} Hz'
             )
+        if (inside := self.truth_inside()) is not None:
+            shares = ', '.join(f'{name} {share:.0%}' for name, share in inside.items())
+            console.print(f'truth     inside the 95 % interval of the last model: {shares}')
         found = self.comparison
         answer = 'identical, bit for bit' if found.identical else 'NOT identical'
         console.print(f'replay    {answer} ({found.windows} posteriors, {found.bands} bands)')

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,9 @@ from matplotlib.figure import Figure
 
 from actuator_glue.diagnosis.result import DiagnosisData, Trace
 from actuator_glue.errors import InputError
+from actuator_glue.model.parameters import BASE
+from actuator_glue.online.job import WindowResult
+from actuator_glue.records import Array
 from actuator_glue.report import style
 from actuator_glue.report.bag_content import Content
 from actuator_glue.report.diagnosis_figures import stretches
@@ -50,6 +54,48 @@ def live(content: Content, path: Path) -> Path:
             va='top',
         )
     figure.suptitle('Forecasts before and after the model was augmented, live')
+    return style.save(figure, path)
+
+
+@style.styled
+def carried(
+    content: Content, boxed: Sequence[WindowResult], path: Path, truth: Array | None
+) -> Path:
+    """Draw each window's 95 % interval of Eq. (2)'s parameters, from the box and with the prior.
+
+    Args:
+        content: the bag of a run whose windows began with what was known before.
+        boxed: some of its windows, estimated from the box.
+        path: where the picture goes.
+        truth: true parameters of a simulated actuator, shape (4,).
+    """
+    first, period = content.record.first_index, content.record.period
+    figure = style.new_figure(4.6)
+    for j, (axes, parameter) in enumerate(zip(figure.subplots(2, 2).flat, BASE, strict=True)):
+        for number, result in enumerate(boxed):
+            draws = result.frozen.draws[:, j] if result.frozen is not None else np.empty(0)
+            axes.plot(
+                2 * [(result.window.end - first) * period],
+                np.quantile(draws, (0.025, 0.975)),
+                color=style.COMMAND,
+                lw=6,
+                alpha=0.5,
+                solid_capstyle='butt',
+                label='from the box' if number == 0 else None,
+            )
+        ends = [(int(p.index) + int(p.samples) - first) * period for p in content.posteriors]
+        middle = np.array([p.mean[j] for p in content.posteriors])
+        half = 1.96 * np.array([p.stddev[j] for p in content.posteriors])
+        axes.fill_between(ends, middle - half, middle + half, color=style.BAND, label='carried on')
+        if truth is not None:
+            axes.axhline(truth[j], ls='--', color=style.TRUTH, label='truth')
+        for start, _ in _changes(content):
+            axes.axvline((start - first) * period, ls=':', color=style.TRUTH)
+        axes.set(ylabel=style.label(parameter.name, parameter.unit), ylim=(0.0, None))
+        if j > 1:
+            axes.set_xlabel('time [s]')
+    figure.legend(*axes.get_legend_handles_labels(), loc='outside lower center', ncols=3)
+    figure.suptitle('95 % of each window: from the box, and with what was known before it')
     return style.save(figure, path)
 
 

@@ -13,8 +13,8 @@ from rich.console import Console
 from actuator_glue.api.diagnosis import diagnose as diagnose_records
 from actuator_glue.errors import InputError
 from actuator_glue.report import bag_content, estimate_figures
-from examples.demonstration import pictures
-from examples.demonstration.outcome import SessionOutcome, replay_bag
+from examples.demonstration import pictures, pretests
+from examples.demonstration.outcome import SessionOutcome, from_the_box, replay_bag
 from examples.demonstration.processes import Node, Nodes
 from examples.demonstration.progress import Display
 from examples.demonstration.sources import Source
@@ -25,7 +25,7 @@ DRAIN_SECONDS = 15.0  # for the last window to be computed after the last sample
 POLL_SECONDS = 0.25
 STAGES = 8  # of a diagnosis, about
 # What a run leaves in its folder; only these are removed by the next one.
-LEAVINGS = ('bag', 'nodes', 'summary.json', 'truth.json')
+LEAVINGS = ('bag', 'nodes', 'calibration.npz', 'summary.json', 'truth.json')
 
 
 def prepare(folder: Path) -> None:
@@ -47,6 +47,29 @@ def prepare(folder: Path) -> None:
         (folder / 'nodes').mkdir()
     except OSError as error:
         raise InputError(f'{folder}: cannot be written ({error.strerror})') from error
+
+
+def known(
+    source: Source, calibration: Path | None, folder: Path, display: Display, seed: int
+) -> Path | None:
+    """Return the calibration that the estimator begins with; None where nothing is known.
+
+    Raises:
+        InputError: the records of the two short tests cannot be calibrated or saved.
+    """
+    if source.truth is None:
+        return calibration
+    stage = display.stage('two short tests, calibrated', total=1)
+    path = pretests.calibrate(
+        source.truth,
+        float(source.parameters['specimen_stiffness']),
+        float(source.parameters['rate']),
+        seed,
+        folder / 'calibration.npz',
+        lambda share: display.advance(stage, share),
+    )
+    display.advance(stage, 1)
+    return path
 
 
 def stream(
@@ -141,14 +164,19 @@ def finish(
     content = bag_content.read(folder / 'bag')
     comparison = replay_bag(folder / 'bag')
     display.advance(stage, 1)
-    stage = display.stage('drawing', total=3)
+    stage = display.stage('drawing', total=4)
     estimate_figures.bands(content, folder / 'bands.png')
     display.advance(stage, 1)
     estimate_figures.parameters(content, folder / 'parameters.png', source.truth)
     display.advance(stage, 2)
     pictures.live(content, folder / 'live.png')
     display.advance(stage, 3)
-    outcome = SessionOutcome(source.title, _sent(source, folder), content, comparison)
+    if (folder / 'calibration.npz').exists():
+        pictures.carried(content, from_the_box(content), folder / 'prior.png', source.truth)
+    display.advance(stage, 4)
+    outcome = SessionOutcome(
+        source.title, _sent(source, folder), content, comparison, source.truth
+    )
     if diagnose:
         _diagnose(outcome, folder, display, seed)
     return outcome

@@ -257,6 +257,28 @@ def test_few_windows_wait_live():
     assert estimator.next_job().window.number == 9
 
 
+def test_nothing_depends_on_a_window_that_failed():
+    """A replay leaves it out: its bands must be scored by the next window, live as well."""
+    items = list(stream(record(6.0), 50))
+    live, told = Estimator(SETTINGS, choose_model(), live=True), []
+    for item in items:
+        live.setup(item) if isinstance(item, StreamSetup) else live.push(item)
+        while (job := live.next_job()) is not None:
+            result = run(job)
+            if job.window.number in (3, 4):
+                result = WindowResult(job.window, SETTINGS, job.model, failure='out of time')
+            else:
+                told.append(result)
+            live.finish(result)
+    done = {
+        (r.window.record.first_index, r.window.record.start_ns): (r.window.number, r.evaluations)
+        for r in told
+    }
+    again = results(items, schedule=Schedule(done))
+    assert len(again) == len(told) > 4
+    assert all(same(one, other) for one, other in zip(told, again, strict=True))
+
+
 def test_windows_that_are_late_are_dropped_but_never_the_newest():
     estimator = Estimator(SETTINGS, choose_model(), live=True)
     for item in stream(record(3.5), 700):
