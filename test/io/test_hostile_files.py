@@ -1,0 +1,231 @@
+"""Files that somebody damaged or made up: one clear error, soon, and little memory.
+
+Each file is a good one of its format with bytes changed, cut, repeated or blown up.
+"""
+
+import os
+import random
+import resource
+import time
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import h5py
+import numpy as np
+import openpyxl
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from nptdms import ChannelObject, TdmsWriter
+from scipy.io import savemat
+
+from actuator_glue.effects import read_effects
+from actuator_glue.errors import InputError
+from actuator_glue.io.bag_records import write_record
+from actuator_glue.io.bag_writer import BagWriter
+from actuator_glue.io.channel_map import parse_channel_map, read_channel_map
+from actuator_glue.io.load import load_records
+from actuator_glue.io.look import look
+from actuator_glue.records import Record
+
+COUNT = 300
+RNG = np.random.default_rng(0)
+COLUMNS = {
+    'time_s': np.arange(COUNT) * 1e-3,
+    'command_mm': RNG.standard_normal(COUNT),
+    'measured_mm': RNG.standard_normal(COUNT),
+}
+SECONDS = 5.0  # for one file of a few kilobytes, on a computer with other work
+MEGABYTES = 300  # beyond what the process had
+LONG_RUN = int(os.environ.get('ACTUATOR_GLUE_FUZZ', '2000'))  # files per format of the long run
+
+MAP = """
+rate: 1000
+command: {column: 1, unit: mm, scale: 2}
+measured: {column: measured_mm, unit: mm}
+stiffness: 250e3
+"""
+EFFECTS = """
+bent-sensor:
+  sensor: y = y + bend*y**2
+  parameters:
+    bend: {unit: 1/m, bounds: [-50, 50], neutral: 0, meaning: even part}
+"""
+TOPICS = parse_channel_map(
+    {r: {'column': f'/samples.{r}[0]', 'unit': 'mm'} for r in ('command', 'measured')}, 'map'
+)
+
+
+def csv(path: Path) -> None:
+    """Write delimited text with a line of units."""
+    rows = np.column_stack(list(COLUMNS.values())).tolist()
+    lines = ['time,command,measured', 's,mm,mm', *(','.join(map(repr, row)) for row in rows)]
+    path.write_text('\n'.join(lines))
+
+
+def mat(path: Path) -> None:
+    """Write a MATLAB file of version 7."""
+    savemat(path, {'test': COLUMNS, 'matrix': np.zeros((40, 3))}, do_compression=True)
+
+
+def hdf5(path: Path) -> None:
+    """Write an HDF5 file with compression and attributes."""
+    with h5py.File(path, 'w') as file:
+        for name, values in COLUMNS.items():
+            file.create_dataset(f'run/{name}', data=values, compression='gzip')
+            file[f'run/{name}'].attrs['units'] = 'mm'
+
+
+def tdms(path: Path) -> None:
+    """Write a TDMS file of three segments."""
+    with TdmsWriter(path) as writer:
+        for part in (slice(0, 100), slice(100, 101), slice(101, COUNT)):
+            writer.write_segment(
+                [
+                    ChannelObject('run', n, v[part], {'unit_string': 'mm'})
+                    for n, v in COLUMNS.items()
+                ]
+            )
+
+
+def parquet(path: Path) -> None:
+    """Write a Parquet file of three groups."""
+    pq.write_table(pa.table(COLUMNS), path, row_group_size=100)
+
+
+def excel(path: Path) -> None:
+    """Write a workbook."""
+    book = openpyxl.Workbook()
+    book.active.append(list(COLUMNS))
+    for row in np.column_stack(list(COLUMNS.values()))[:50].tolist():
+        book.active.append(row)
+    book.save(path)
+
+
+def mcap(path: Path) -> None:
+    """Write a bag's file."""
+    record = Record(
+        COLUMNS['command_mm'] * 1e-3, COLUMNS['measured_mm'] * 1e-3, 1e-3, stiffness=0.0
+    )
+    folder = path.parent / f'{path.stem}_bag'
+    with BagWriter(folder) as writer:
+        write_record(writer, record, block=16)
+    next(folder.glob('*.mcap')).rename(path)
+
+
+def read_all(path: Path) -> None:
+    """Read a file as every command might."""
+    for use in (load_records, look, lambda p: load_records(p, channels=TOPICS)):
+        with suppress(InputError):
+            use(path)
+
+
+def read_map(path: Path) -> None:
+    """Read a channel map."""
+    read_channel_map(path)
+
+
+FORMATS: dict[str, tuple[str, Callable[[Path], object], Callable[[Path], object]]] = {
+    'csv': ('.csv', csv, read_all),
+    'mat': ('.mat', mat, read_all),
+    'hdf5': ('.h5', hdf5, read_all),
+    'tdms': ('.tdms', tdms, read_all),
+    'parquet': ('.parquet', parquet, read_all),
+    'excel': ('.xlsx', excel, read_all),
+    'mcap': ('.mcap', mcap, read_all),
+    'map': ('.yaml', lambda p: p.write_text(MAP), read_map),
+    'effects': ('.yaml', lambda p: p.write_text(EFFECTS), read_effects),
+}
+
+
+@pytest.fixture(scope='module')
+def good(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    """Good files of every format, which are read."""
+    folder = tmp_path_factory.mktemp('good')
+    found = {}
+    for name, (suffix, make, use) in FORMATS.items():
+        path = folder / f'{name}{suffix}'
+        make(path)
+        if use is read_all:
+            (record,) = load_records(path)
+            assert len(record) in (50, COUNT)
+        use(path)
+        found[name] = path.read_bytes()
+    return found
+
+
+def damaged(content: bytes, seed: int) -> bytes:
+    """Return bytes that are changed, cut, repeated, or numbers blown up, at a few places."""
+    chance = random.Random(seed)
+    data = bytearray(content)
+    for _ in range(chance.choice((1, 1, 2, 4, 16))):
+        # Heads and ends decide most: half of all changes are there.
+        edge = chance.choice((64, 512, len(data)))
+        at = chance.randrange(max(min(edge, len(data)), 1))
+        at = max(len(data) - 1 - at, 0) if chance.random() < 0.4 else at
+        kind = chance.randrange(7)
+        if kind == 0:
+            data[at : at + 1] = bytes([chance.randrange(256)])
+        elif kind == 1:
+            data[at : at + 4] = chance.choice((b'\xff' * 4, b'\x00' * 4, b'\x7f\xff\xff\xff'))
+        elif kind == 2:
+            data[at : at + 8] = chance.choice((b'\xff' * 8, b'\x00' * 7 + b'\x40', b'\x01' * 8))
+        elif kind == 3:
+            del data[at : at + chance.choice((1, 8, 200))]
+        elif kind == 4:
+            data = data[: at + 1]
+        elif kind == 5:
+            data[at:at] = data[at : at + chance.choice((1, 16, 300))]
+        else:
+            data[at:at] = chance.choice(
+                (b'&a *a ', b'[' * 50, b'{' * 50, b'9' * 40, b'1e999', b'\n')
+            )
+    return bytes(data)
+
+
+def check(name: str, content: bytes, path: Path) -> None:
+    """Read a file; nothing but InputError comes out, soon, and memory stays."""
+    use = FORMATS[name][2]
+    path.write_bytes(content)
+    begin = time.process_time()
+    try:
+        use(path)
+    except InputError as error:
+        assert str(error).isprintable()
+    assert time.process_time() - begin < SECONDS
+
+
+@pytest.mark.parametrize('name', FORMATS)
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(seed=st.integers(0, 2**32))
+def test_damage_is_one_clear_error(
+    tmp_path: Path, good: dict[str, bytes], name: str, seed: int
+) -> None:
+    """Sixty files of every format; hypothesis keeps those that failed."""
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    check(name, damaged(good[name], seed), tmp_path / f'file{FORMATS[name][0]}')
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < MEGABYTES * 1024
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(7200)
+@pytest.mark.parametrize('name', FORMATS)
+def test_damage_in_the_long_run(
+    tmp_path: Path, good: dict[str, bytes], name: str, rng_seed: int
+) -> None:
+    """Thousands of files of every format; ACTUATOR_GLUE_FUZZ says how many."""
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    for seed in range(LONG_RUN):
+        content = damaged(good[name], rng_seed + seed)
+        try:
+            check(name, content, tmp_path / f'file{FORMATS[name][0]}')
+        except BaseException:
+            (tmp_path / f'failed{FORMATS[name][0]}').write_bytes(content)
+            print(f'{name}: seed {rng_seed + seed}')
+            raise
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < MEGABYTES * 1024
