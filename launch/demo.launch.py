@@ -28,6 +28,7 @@ ARGUMENTS = {
         '',
         'file of the truth about the effect, empty for ~/.ros/actuator_glue/truth_DATE-TIME.json',
     ),
+    'view': ('false', 'a page that shows everything, on 127.0.0.1'),
     'apply': ('true', 'go on with the augmented model once something is found missing'),
 }
 
@@ -55,14 +56,16 @@ def stream(given):
 
 
 def nodes(given):
-    """Return the nodes; the stream waits for the three that must not miss its first sample."""
+    """Return the nodes; the stream waits for those that must not miss its first sample."""
     name, parameters = stream(given)
     wanted = [
         ('recorder', {'bag': given['bag']}),
         ('estimator', {}),
         ('diagnoser', {'apply': truth(given['apply'])}),
-        (name, parameters | {'wait_for': 3, 'exit_at_end': True}),
     ]
+    if truth(given['view']):
+        wanted.append(('viewer', {'open': True}))
+    wanted.append((name, parameters | {'wait_for': len(wanted), 'exit_at_end': True}))
     return [node(given, name, more, given['namespace']) for name, more in wanted]
 
 

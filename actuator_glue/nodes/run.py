@@ -9,15 +9,22 @@ from actuator_glue.nodes import signals
 
 
 def _run(node: str) -> int:
-    """Run a node of the suite; return the exit code."""
+    """Run a node, or several in one process; return the exit code."""
     signals.end_at_once()
     module = importlib.import_module(f'actuator_glue.nodes.{node}')
     return int(module.main())
 
 
-_NODES = (
-    'actuator_sim', 'diagnoser', 'estimator', 'lab_bridge', 'recorder', 'replay', 'viewer',
-)  # fmt: skip
-actuator_sim, diagnoser, estimator, lab_bridge, recorder, replay, viewer = (
-    partial(_run, node) for node in _NODES
+actuator_sim, diagnoser, estimator, lab_bridge, recorder, replay, suite, viewer = (
+    partial(_run, node)
+    for node in (
+        'actuator_sim',
+        'diagnoser',
+        'estimator',
+        'lab_bridge',
+        'recorder',
+        'replay',
+        'suite',
+        'viewer',
+    )
 )

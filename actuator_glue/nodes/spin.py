@@ -17,45 +17,80 @@ from actuator_glue.nodes.base import SUCCESS, SuiteNode
 from actuator_glue.nodes.executor import Executor
 from actuator_glue.nodes.signals import Stop
 
+# How long the others go on when a stream of the same process has ended [s]: the last windows.
+LINGER = 5.0
+
 
 def main(make: Callable[[], SuiteNode], args: Sequence[str] | None = None) -> int:
     """Run a node until SIGINT, SIGTERM or its own end; return the exit code."""
+    return together([make], args)
+
+
+def together(makes: Sequence[Callable[[], SuiteNode]], args: Sequence[str] | None = None) -> int:
+    """Run nodes in one process until a signal or the end of one of them; return the exit code.
+
+    Args:
+        makes: make the nodes, started in this order and ended in the opposite one.
+        args: the command line; None for the process's own.
+    """
     stop = Stop()
     transport.choose()
     rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    nodes: list[SuiteNode] = []
     try:
-        node = make()
+        for make in makes:
+            nodes.append(make())
     except InputError as error:
         print(f'error: {error}', file=sys.stderr)
         rclpy.try_shutdown()
         return 2
     executor = Executor()
-    executor.add_node(node)
-    stop.wake = node.wake
-    code = 0
-    if node.parameters['autostart'] and not stop.is_set():
-        started = node.trigger_configure() == SUCCESS and node.trigger_activate() == SUCCESS
-        if not started:
-            code = 2
-            stop.set()
+    for node in nodes:
+        executor.add_node(node)
+    stop.wake = nodes[0].wake
+    code = 0 if all(_begin(node, stop) for node in nodes) else 2
+    if code:
+        stop.set()
     # What is there now stays: the garbage collector need not go through it while samples wait.
     gc.collect()
     gc.freeze()
-    while not stop.is_set() and not node.finished and rclpy.ok():
+    _spin(executor, nodes, stop)
+    for node in reversed(nodes):
+        _end(node)
+        executor.remove_node(node)
+        node.destroy_node()
+    rclpy.try_shutdown()
+    stop.done()
+    return code
+
+
+def _begin(node: SuiteNode, stop: Stop) -> bool:
+    """Start a node that is to start by itself; return whether that went well."""
+    if stop.is_set() or not node.parameters['autostart']:
+        return True
+    return bool(node.trigger_configure() == SUCCESS and node.trigger_activate() == SUCCESS)
+
+
+def _spin(executor: Executor, nodes: Sequence[SuiteNode], stop: Stop) -> None:
+    end = float('inf')
+    while not stop.is_set() and rclpy.ok():
+        if any(node.finished for node in nodes):
+            linger = LINGER if len(nodes) > 1 else 0.0
+            end = min(end, time.monotonic() + linger)
+        if time.monotonic() >= end:
+            return
         try:
-            executor.spin_once()
+            executor.spin_once(None if end == float('inf') else 0.1)
         except ExternalShutdownException:
-            break
+            return
         except Exception as error:
             # E.g. a packet that cannot be decoded, or a transition asked for in a wrong state.
-            node.complain_of_bug(error)
+            nodes[0].complain_of_bug(error)
+
+
+def _end(node: SuiteNode) -> None:
     if node.state in ('unconfigured', 'inactive', 'active'):
         node.trigger_shutdown()
     else:
         # Shut down by a service: the answer must leave before the node that gives it is gone.
         time.sleep(0.3)
-    executor.remove_node(node)
-    node.destroy_node()
-    rclpy.try_shutdown()
-    stop.done()
-    return code

@@ -18,6 +18,7 @@ WAYS = {
         {'data': 'x.csv'},
         {'source': 'udp://127.0.0.1:5005'},
         {'replay': 'bag'},
+        {'view': 'true'},
     ),
     'four': ({}, {'sources': 'udp://a:1,udp://a:2,udp://a:3,udp://a:4'}, {'diagnose': 'true'}),
 }
@@ -43,7 +44,8 @@ def test_a_launch_file_names_what_exists(file, way):
 def test_every_stream_can_be_launched():
     ways = [launched('demo', **way)[0] for way in WAYS['demo']]
     streams = [nodes[-1].executable for nodes in ways]
-    assert streams == ['actuator_sim', 'lab_bridge', 'lab_bridge', 'replay']
+    assert streams == ['actuator_sim', 'lab_bridge', 'lab_bridge', 'replay', 'actuator_sim']
+    assert [n.parameters[1].get('wait_for') for n in ways[-1]][-1] == 4
     found = {n.executable for nodes in ways for n in nodes}
     assert found == set(parameter_file.NODES)
 
