@@ -9,7 +9,7 @@ ROS_STAMP := install/stamp
 ROS := . install/setup.bash &&
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test coverage test-slow lint bench reproduce docs clean
+.PHONY: help setup demo test coverage test-slow lint bench soak reproduce docs clean
 
 help: ## show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 20
@@ -51,6 +51,9 @@ lint: $(VENV_STAMP) ## ruff and mypy --strict
 
 bench: $(ROS_STAMP) ## speed, side by side with peers; results in out/bench
 	@$(ROS) $(BIN)/python -m benchmarks --out out/bench $(BENCH_ARGS)
+
+soak: $(ROS_STAMP) ## half an hour of all nodes with random faults; result in out/soak (SOAK_ARGS='--minutes 5')
+	@$(ROS) $(BIN)/python -m benchmarks.soak --out out/soak $(SOAK_ARGS)
 
 reproduce: $(VENV_STAMP) ## the paper beside our numbers; report in out/reproduce
 	@$(BIN)/python -m studies.chen --force --out out/reproduce $(REPRODUCE_ARGS)

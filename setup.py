@@ -7,7 +7,14 @@ from setuptools import setup
 NAME = 'actuator_glue'
 LAUNCHED = [
     (f'share/{NAME}/{folder}', [p.as_posix() for p in sorted(Path(folder).glob('*.*'))])
-    for folder in ('launch', 'config', 'config/channels', 'config/layouts', 'config/partitions')
+    for folder in (
+        'launch',
+        'config',
+        'config/channels',
+        'config/layouts',
+        'config/partitions',
+        'config/security',
+    )
 ]
 
 setup(

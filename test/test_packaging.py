@@ -24,7 +24,16 @@ MESSAGES = [p for p in INTERFACES if p.suffix == '.msg']
 # Parts of Diagnosis, never published alone.
 PARTS = {'Effect', 'Candidate'}
 PROJECT = tomllib.loads((ROOT / 'pyproject.toml').read_text(encoding='utf-8'))
-NODES = ('actuator_sim', 'estimator', 'recorder', 'replay', 'lab_bridge', 'diagnoser', 'viewer', 'suite')
+NODES = (
+    'actuator_sim',
+    'estimator',
+    'recorder',
+    'replay',
+    'lab_bridge',
+    'diagnoser',
+    'viewer',
+    'suite',
+)
 
 FIELD = re.compile(r'^(?P<type>[a-zA-Z][\w/]*)(?P<array>\[[^]]*\])?\s+(?P<name>[a-z][a-z0-9_]*)\b')
 CONSTANT = re.compile(r'^\w+\s+[A-Z][A-Z0-9_]*\s*=')

@@ -114,6 +114,10 @@ class EstimatorNode(WorkingNode):
         self._setups.settle()
         block = wire.block(message)
         self.samples.add(len(block))
+        if block.index and not self.estimator.tally.blocks:
+            self.complain(
+                'start', f'begins anew at sample {block.index}: nothing is known of those before'
+            )
         self._tell(self.estimator.push(block))
         if self.estimator.test is None:
             self.complain(
@@ -176,6 +180,8 @@ class EstimatorNode(WorkingNode):
             return
         if answer.kind in (DIED, FAILED):
             self._tell(self.estimator.abandon(answer.payload))
+        if answer.kind == DIED:
+            self.get_logger().info('the estimate goes on from its last window')
         if answer.kind == FAILED:
             self.complain('internal error', str(answer.payload), ERROR)
         elif answer.kind != DIED and self.estimator.running is not None:

@@ -112,6 +112,10 @@ class Nodes:
         self._nodes.append(node)
         return node
 
+    def forget(self, node: Node) -> None:
+        """Let go of a node that was ended on purpose."""
+        self._nodes.remove(node)
+
     def check(self) -> None:
         """Say so if a node has died.
 

@@ -135,6 +135,7 @@ def test_a_worker_that_is_killed_after_a_warning_is_replaced(start, probe):
     probe.until(lambda: 'nothing on test_setup' in probe.faults['estimator'], 15, 'a warning')
     os.kill(worker_of(estimator), signal.SIGKILL)
     probe.until(lambda: 'the worker process ended' in probe.faults['estimator'], 15)
+    probe.until(lambda: 'goes on from its last window' in estimator.text, 10)
     probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 120, 'compiled again')
     probe.setup(index=probe.index)
     assert probe.setup_out.wait_for_all_acked(Duration(seconds=20.0))

@@ -8,8 +8,9 @@ import pytest
 from launching_fake import LAUNCH, Noted, launched
 from ros_nodes import recorded
 
-from actuator_glue.nodes import base, parameter_file
+from actuator_glue.nodes import base, parameter_file, viewer
 
+KNOWN = parameter_file.NODES | {'viewer': viewer.SPECS}
 FILES = sorted(path.name.partition('.')[0] for path in LAUNCH.glob('*.launch.py'))
 # What each file can be asked to do.
 WAYS = {
@@ -35,7 +36,7 @@ def launch(monkeypatch):
 def test_a_launch_file_names_what_exists(file, way):
     nodes, _, _ = launched(file, **way)
     for node in nodes:
-        specs = {s.name: s for s in (*base.COMMON, *parameter_file.NODES[node.executable])}
+        specs = {s.name: s for s in (*base.COMMON, *KNOWN[node.executable])}
         for name, value in node.parameters[1].items():
             if name != 'use_sim_time':
                 assert type(value) is type(specs[name].default), (node.executable, name)
@@ -47,7 +48,7 @@ def test_every_stream_can_be_launched():
     assert streams == ['actuator_sim', 'lab_bridge', 'lab_bridge', 'replay', 'actuator_sim']
     assert [n.parameters[1].get('wait_for') for n in ways[-1]][-1] == 4
     found = {n.executable for nodes in ways for n in nodes}
-    assert found == set(parameter_file.NODES)
+    assert found == set(KNOWN)
 
 
 @pytest.mark.parametrize('file', FILES)

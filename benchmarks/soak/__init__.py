@@ -1,0 +1,1 @@
+"""A long test with faults at random moments: `make soak`."""

@@ -1,0 +1,179 @@
+"""What a soak left in its bag: which faults were told, when the bands were back, what was lost."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from actuator_glue.io.bag_reader import messages
+from actuator_glue.io.messages import deserialize
+
+# A band counts as good from here on; it is one of 95 %.
+GOOD = 0.85
+# A fault is told within this time [s]; a jump of a clock takes three stretches of a second.
+TOLD_SECONDS = 15.0
+WINDOW = 5.0  # s
+
+
+@dataclass(slots=True)
+class Fault:
+    """One fault.
+
+    Attributes:
+        kind: which.
+        time: when it began, wall clock [s].
+        seconds: how long it lasted [s].
+        told: whether it showed on /diagnostics.
+        back: from its end to the first good band after the last bad one [s]; NaN for never.
+    """
+
+    kind: str
+    time: float
+    seconds: float
+    told: bool = False
+    back: float = float('nan')
+
+
+# Node and key whose value grows, or whose text appears.
+SHOWN = {
+    'drop_out': ('lab_bridge', 'lost'),
+    'nan_burst': ('lab_bridge', 'not finite'),
+    'clock_jump': ('lab_bridge', 'clock steps'),
+    'restart': ('lab_bridge', 'restarts'),
+    'disorder': ('lab_bridge', 'duplicates'),
+    'garbage': ('lab_bridge', 'malformed'),
+    'spike': ('estimator', 'rms error (m)'),
+    'estimator_killed': ('estimator', 'start (last)'),
+    'worker_killed': ('estimator', 'worker (count)'),
+    'recorder_stalled': ('recorder', ''),
+}
+
+
+@dataclass(slots=True)
+class Content:
+    """What was read from a bag.
+
+    Attributes:
+        reports: time and values of every report, by node.
+        bands: time of publication and coverage of every scored band.
+        indices: running index of every block, and how many samples it has.
+    """
+
+    reports: dict[str, list[tuple[float, dict[str, str]]]]
+    bands: list[tuple[float, float]]
+    indices: list[tuple[int, int]]
+
+
+def read(bag: Path) -> Content:
+    """Return what a bag holds of a soak."""
+    content = Content({}, [], [])
+    for found in messages(bag):
+        kind = found.type.rpartition('/')[2]
+        when = found.publish_time * 1e-9
+        if kind == 'DiagnosticArray':
+            for status in deserialize(found.type, found.data).status:
+                values = {v.key: v.value for v in status.values}
+                content.reports.setdefault(status.name.strip('/'), []).append((when, values))
+        elif kind == 'PredictionBand':
+            band = deserialize(found.type, found.data)
+            if band.scored and band.kind == 'total':
+                content.bands.append((when, float(band.widest_coverage)))
+        elif kind == 'SampleBlock':
+            block = deserialize(found.type, found.data)
+            content.indices.append((int(block.index), len(block.command)))
+    content.bands.sort()
+    return content
+
+
+def judge(faults: Sequence[Fault], content: Content) -> None:
+    """Fill in whether each fault was told, and when the bands were back."""
+    for number, fault in enumerate(faults):
+        following = faults[number + 1].time if number + 1 < len(faults) else float('inf')
+        fault.told = _told(fault, content)
+        end = fault.time + fault.seconds
+        after = [(t, c) for t, c in content.bands if end < t < following]
+        bad = [t for t, c in after if c < GOOD]
+        since = bad[-1] if bad else end
+        good = [t for t, c in after if c >= GOOD and t > since]
+        fault.back = good[0] - end if good else float('nan')
+
+
+def _told(fault: Fault, content: Content) -> bool:
+    node, key = SHOWN[fault.kind]
+    reports = content.reports.get(node, [])
+    if fault.kind == 'recorder_stalled':
+        # A node that stands still says nothing: that is seen.
+        times = [t for t, _ in reports]
+        gaps = [b - a for a, b in itertools.pairwise(times) if b > fault.time > a - 5.0]
+        return bool(gaps) and max(gaps) > 2.0
+    before = [v.get(key, '') for t, v in reports if t <= fault.time]
+    after = [v.get(key, '') for t, v in reports if fault.time < t < fault.time + TOLD_SECONDS]
+    if fault.kind == 'spike':
+        usual = np.median([float(v) for v in before if v] or [np.nan])
+        return any(v and float(v) > 3.0 * usual for v in after)
+    if fault.kind == 'estimator_killed':
+        later = [v.get(key, '') for t, v in reports if t > fault.time]
+        return any('begins anew' in v for v in later)
+    was = _number(before[-1]) if before else 0.0
+    return any(_number(v) > was for v in after)
+
+
+def _number(text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        return 0.0
+
+
+def slopes(
+    memory: Sequence[tuple[float, dict[str, float]]], warm: float
+) -> dict[str, tuple[float, float]]:
+    """Return growth [MB/h] and its standard error of each node after the warm-up.
+
+    Args:
+        memory: time since the start [s] and resident memory of each node [MB].
+        warm: what is left out at the start [s].
+    """
+    found: dict[str, tuple[float, float]] = {}
+    for name in memory[0][1]:
+        points = np.array([(t, m[name]) for t, m in memory if t > warm and name in m])
+        if len(points) < 10:
+            continue
+        hours = points[:, 0] / 3600.0
+        fit, covariance = np.polyfit(hours, points[:, 1], 1, cov=True)
+        found[name] = float(fit[0]), float(np.sqrt(covariance[0, 0]))
+    return found
+
+
+def whole(content: Content) -> int:
+    """Return how many samples the bag lacks beyond the gaps that the bridge itself has told."""
+    reports = content.reports.get('lab_bridge', [])
+    told = _number(reports[-1][1].get('lost', '0')) if reports else 0.0
+    missing, expected = 0, None
+    for index, count in content.indices:
+        if expected is not None and index > expected:
+            missing += index - expected
+        expected = index + count
+    return max(0, round(missing - told))
+
+
+def summary(content: Content) -> dict[str, Any]:
+    """Return what the nodes reported last."""
+    last = {node: reports[-1][1] for node, reports in content.reports.items()}
+    keys = (
+        'windows',
+        'windows dropped',
+        'deadlines missed',
+        'latency median (s)',
+        'latency p99 (s)',
+    )
+    estimator = {key: last.get('estimator', {}).get(key) for key in keys}
+    return {
+        'estimator': estimator,
+        'worst write lag (s)': last.get('recorder', {}).get('worst bag write lag (s)'),
+    }

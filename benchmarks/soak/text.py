@@ -1,0 +1,50 @@
+"""The result of a soak for people: one table, and a headline made of the same numbers."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from benchmarks.soak.judge import WINDOW
+
+GROWTH = 1.0  # MB per hour
+
+
+def report(found: dict[str, Any]) -> tuple[str, bool]:
+    """Return the report, and whether everything held that is asked for."""
+    faults = found['faults']
+    told = sum(f['told'] for f in faults)
+    # Two windows, and the time that the second may be computed.
+    limit = 2.0 * WINDOW + 1.0
+    back = sum(f['back'] <= limit for f in faults)
+    growing = {
+        name: (slope, error)
+        for name, (slope, error) in found['memory_MB_per_h'].items()
+        if slope - 2.0 * error > GROWTH
+    }
+    missing = found['samples_missing_in_the_bag']
+    lines = [
+        f'{found["minutes"]:g} minutes at 1 kHz, {len(faults)} faults, seed {found["seed"]}, '
+        f'{found["cores"]} cores, load {found["load_before_and_after"][0]:.1f} before and '
+        f'{found["load_before_and_after"][1]:.1f} after.',
+        '',
+        f'- told on /diagnostics: {told} of {len(faults)}',
+        f'- bands good again within two windows ({limit:g} s): {back} of {len(faults)}',
+        f'- samples missing in the bag beyond the gaps that were told: {missing}',
+        f'- estimator: {found["estimator"]}',
+        f'- worst bag write lag: {found["worst write lag (s)"]} s',
+        '',
+        '| fault | times | told | bands back: worst, s |',
+        '|---|---|---|---|',
+    ]
+    for kind in sorted({f['kind'] for f in faults}):
+        own = [f for f in faults if f['kind'] == kind]
+        worst = max((math.inf if math.isnan(f['back']) else f['back']) for f in own)
+        shown = 'not before the next fault' if math.isinf(worst) else f'{worst:.1f}'
+        lines.append(f'| {kind} | {len(own)} | {sum(f["told"] for f in own)} | {shown} |')
+    lines += ['', '| node and its children | growth, MB/h | standard error |', '|---|---|---|']
+    for name, (slope, error) in found['memory_MB_per_h'].items():
+        lines.append(f'| {name} | {slope:+.2f} | {error:.2f} |')
+    passed = told == back == len(faults) and not growing and not missing
+    verdict = 'Everything held.' if passed else 'Not everything held: see the numbers below.'
+    return '\n'.join([f'**{verdict}**', '', *lines]) + '\n', passed

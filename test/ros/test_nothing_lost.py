@@ -1,0 +1,106 @@
+"""Killed nodes and full disks: what was recorded is kept, and what begins anew says so."""
+
+import resource
+import signal
+import time
+
+import numpy as np
+import pytest
+from actuator_glue_msgs.msg import SampleBlock
+from rclpy.qos import QoSProfile
+from ros_nodes import QUICK, RATE, recorded
+
+from actuator_glue.io.bag_reader import decoded, messages, summarise
+from actuator_glue.io.recover import recover
+
+# What a kill may cost [s].
+LOST = 0.5
+
+
+def killed_at_random(start, probe, tmp_path, times, seed):
+    """Kill a recorder again and again in the middle of a stream; each bag is mended and whole."""
+    rng = np.random.default_rng(seed)
+    heard = {}
+
+    def hear(message):
+        heard[message.index] = (time.monotonic(), bytes(message.measured))
+
+    probe.create_subscription(SampleBlock, 'samples', hear, QoSProfile(depth=2000))
+    simulator = start('actuator_sim', rate=1000.0, repeat=True, rest=0.0, block=10)
+    probe.until(lambda: heard, 60, 'samples')
+    worst = 0.0
+    for number in range(times):
+        bag = tmp_path / f'bag_{number}'
+        recorder = start('recorder', name=f'recorder_{number}', bag=str(bag))
+        file = bag / f'bag_{number}_0.mcap'
+        probe.until(lambda file=file: file.exists() and file.stat().st_size > 20_000, 60)
+        probe.for_a_while(float(rng.uniform(0.0, 1.0)))
+        recorder.process.send_signal(signal.SIGKILL)
+        killed = time.monotonic()
+        recorder.process.wait()
+        probe.for_a_while(0.1)
+        cut = []
+        before = [(m.topic, m.log_time, m.data) for m in messages(bag, note=cut.append)]
+        mended = recover(bag)
+        whole = [(m.topic, m.log_time, m.data) for m in messages(bag)]
+        assert whole == before and mended.messages == len(whole)
+        assert (bag / 'metadata.yaml').exists() and summarise(bag).finished
+        blocks = [m for _, m in decoded(bag, ('SampleBlock',))]
+        index = [m.index for m in blocks]
+        assert np.array_equal(np.diff(index), np.full(len(index) - 1, 10))
+        assert all(bytes(m.measured) == heard[m.index][1] for m in blocks)
+        late = max(i for i, (when, _) in heard.items() if when <= killed)
+        worst = max(worst, (late - index[-1]) / 1000.0)
+        assert worst <= LOST, f'{late - index[-1]} samples are missing after a kill'
+        heard = {i: known for i, known in heard.items() if i > late - 2000}
+    assert simulator.alive and simulator.end() == 0
+    print(f'{times} kills: {worst:.3f} s missing at most')
+
+
+def test_a_recorder_that_is_killed_loses_half_a_second_at_most(start, probe, tmp_path, rng_seed):
+    killed_at_random(start, probe, tmp_path, 2, rng_seed)
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(3000)
+def test_a_hundred_kills_lose_half_a_second_each_at_most(start, probe, tmp_path, rng_seed):
+    killed_at_random(start, probe, tmp_path, 100, rng_seed)
+
+
+def test_a_full_disk_is_said_and_what_is_there_stays(start, probe, tmp_path):
+    """The largest file allowed shrinks while the recorder runs, as a quota does."""
+    bag = tmp_path / 'bag'
+    recorder = start('recorder', bag=str(bag))
+    simulator = start('actuator_sim', rate=1000.0, repeat=True, wait_for=1)
+    probe.until(lambda: probe.number('recorder', 'messages written') > 200, 60, 'recording')
+    size = (bag / 'bag_0.mcap').stat().st_size
+    resource.prlimit(recorder.process.pid, resource.RLIMIT_FSIZE, (size + 50_000, size + 50_000))
+    probe.until(lambda: 'quota is full' in probe.faults['recorder'], 30, 'a full disk')
+    assert recorder.alive
+    written = probe.number('recorder', 'messages written')
+    probe.for_a_while(2.0)
+    # Nothing more is written, and nothing of what was is touched.
+    assert probe.number('recorder', 'messages written') == written
+    assert recorder.end() == 0 and 'Traceback' not in recorder.text
+    assert simulator.end() == 0
+    assert recover(bag).messages > 200
+    index = recorded(bag)
+    assert np.array_equal(index, np.arange(index[0], index[0] + len(index)))
+
+
+def test_a_folder_that_cannot_be_written_is_said(start):
+    recorder = start('recorder', bag='/proc/none/bag')
+    assert recorder.wait(30) == 2 and 'cannot' in recorder.text
+
+
+def test_an_estimator_that_is_killed_begins_anew_and_says_so(start, probe):
+    simulator = start('actuator_sim', rate=RATE, repeat=True, duration=20.0, wait_for=1)
+    first = start('estimator', **QUICK)
+    probe.until(lambda: probe.number('estimator', 'windows') >= 1, 250, 'windows')
+    assert 'begins anew' not in first.text
+    first.kill()
+    probe.health.clear()
+    second = start('estimator', **QUICK)
+    probe.until(lambda: 'begins anew at sample' in probe.faults['estimator'], 250, 'begins anew')
+    probe.until(lambda: probe.number('estimator', 'windows') >= 1, 60, 'windows')
+    assert second.end() == 0 and simulator.end() == 0
