@@ -17,7 +17,8 @@ from actuator_glue.api.replay_result import (
     WindowParameter,
 )
 from actuator_glue.errors import InputError
-from actuator_glue.io.bag_reader import Summary, decoded, is_bag, summarise
+from actuator_glue.io.bag_reader import decoded, is_bag, summarise
+from actuator_glue.io.bag_samples import topics_of_actuator
 from actuator_glue.io.load import load_records
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.playback import Item, items, stream
@@ -113,7 +114,7 @@ def _open(
 
 def _open_bag(bag: str, namespace: str | None, compare_live: bool) -> _Run:
     summary = summarise(bag)
-    names = _topics(bag, summary, namespace)
+    names = topics_of_actuator(bag, summary, namespace)
     topics = [summary.topics[name] for name in names]
     rejected: list[Rejected] = []
     out = _Run(bag, iter(()), sum(t.count for t in topics))
@@ -133,27 +134,6 @@ def _open_bag(bag: str, namespace: str | None, compare_live: bool) -> _Run:
             )
             out.live = None
     return out
-
-
-def _topics(bag: str, summary: Summary, namespace: str | None) -> list[str]:
-    """Return the topics of one actuator; all of them where the bag has only one."""
-    samples = [t.name for t in summary.topics.values() if t.type.endswith('/SampleBlock')]
-    spaces = [name.rpartition('/')[0] for name in samples]
-    if namespace is not None:
-        wanted = '/' + namespace.strip('/') if namespace.strip('/') else ''
-        if wanted not in spaces:
-            raise InputError(
-                f'{bag}: no samples under {namespace!r}; there are samples under '
-                f'{", ".join(s or "/" for s in spaces) or "nothing"}'
-            )
-    elif len(samples) > 1:
-        raise InputError(
-            f'{bag}: samples of {len(samples)} actuators ({", ".join(samples)}); choose one with '
-            '--namespace'
-        )
-    else:
-        wanted = spaces[0] if spaces else ''
-    return [t for t in summary.topics if t.rpartition('/')[0] == wanted]
 
 
 def _settings(live: Published | None, asked: dict[str, Any]) -> EstimatorSettings:

@@ -8,7 +8,7 @@ import os
 import sys
 import threading
 
-from actuator_glue.cli._output import say
+from actuator_glue.cli._output import note, say
 from actuator_glue.errors import InputError
 
 
@@ -20,6 +20,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--port', type=int, default=8766, metavar='N', help='of 127.0.0.1; 0: any (default 8766)'
+    )
+    parser.add_argument(
+        '--namespace', metavar='/NS', help='which actuator, where there are several'
     )
     parser.add_argument('--open', action='store_true', help='open the page in the browser')
 
@@ -39,7 +42,7 @@ def run(args: argparse.Namespace) -> int:
     from actuator_glue.view.messages import read_bag
     from actuator_glue.view.server import PageServer
 
-    server = PageServer(read_bag(args.bag), args.port)
+    server = PageServer(read_bag(args.bag, args.namespace, note=note), args.port)
     say(f'{args.bag}: {server.url} (Ctrl-C ends)', args)
     sys.stdout.flush()
     if args.open:
@@ -61,5 +64,7 @@ def _live(args: argparse.Namespace) -> int:
             '`. install/setup.bash` after `make setup`'
         )
     options = ['--ros-args', '-p', f'port:={args.port}', '-p', f'open:={str(args.open).lower()}']
+    if args.namespace:
+        options += ['-r', f'__ns:=/{args.namespace.strip("/")}']
     sys.stdout.flush()
     os.execv(sys.executable, [sys.executable, '-m', 'actuator_glue.nodes.viewer', *options])

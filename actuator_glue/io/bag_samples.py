@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from actuator_glue.errors import InputError
-from actuator_glue.io.bag_reader import BagMessage
+from actuator_glue.io.bag_reader import BagMessage, Summary
 from actuator_glue.io.messages import deserialize, full_name, stamp_ns
 from actuator_glue.records import Array, Hold, check_hold, check_period, check_stiffness
 
@@ -97,3 +97,28 @@ def setup(found: BagMessage, path: Path | str) -> BagSetup:
         None if np.isnan(stiffness) else check_stiffness(stiffness, where),
         check_hold(content.hold, where),
     )
+
+
+def topics_of_actuator(bag: Path | str, summary: Summary, namespace: str | None) -> list[str]:
+    """Return the topics of one actuator, that of a namespace or the only one.
+
+    Raises:
+        InputError: no samples there, or several actuators and no namespace.
+    """
+    samples = [t.name for t in summary.topics.values() if t.type.endswith('/SampleBlock')]
+    spaces = [name.rpartition('/')[0] for name in samples]
+    if namespace is not None:
+        wanted = '/' + namespace.strip('/') if namespace.strip('/') else ''
+        if wanted not in spaces:
+            raise InputError(
+                f'{bag}: no samples under {namespace!r}; there are samples under '
+                f'{", ".join(s or "/" for s in spaces) or "nothing"}'
+            )
+    elif len(samples) > 1:
+        raise InputError(
+            f'{bag}: samples of {len(samples)} actuators ({", ".join(samples)}); choose one with '
+            '--namespace'
+        )
+    else:
+        wanted = spaces[0] if spaces else ''
+    return [t for t in summary.topics if t.rpartition('/')[0] == wanted]

@@ -11,8 +11,15 @@ from typing import Any
 import numpy as np
 
 from actuator_glue.errors import InputError
-from actuator_glue.io.bag_reader import as_published, messages
-from actuator_glue.io.bag_records import read_records
+from actuator_glue.io.bag_reader import (
+    Note,
+    as_published,
+    decoded,
+    messages,
+    refuse,
+    summarise,
+)
+from actuator_glue.io.bag_samples import topics_of_actuator
 from actuator_glue.io.messages import deserialize, full_name
 from actuator_glue.view.history import History
 
@@ -29,7 +36,8 @@ TYPES = {
 }
 # Live: a quarter of an hour at 1 kHz, 20 MB. A bag: all of it, up to 1.3 GB.
 LIVE_SAMPLES = 1 << 20
-_MOST_SAMPLES = 1 << 26
+MOST_SAMPLES = 1 << 26
+_LONGEST_GAP = 1 << 22  # samples that a bag lacks and the page leaves empty, an hour at 1 kHz
 _WINDOWS = 20  # scored windows over which the coverage is told
 _NODES = 64
 
@@ -150,23 +158,35 @@ def _number(value: Any) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
-def read_bag(path: Path | str) -> Intake:
-    """Return everything that a bag holds.
+def read_bag(path: Path | str, namespace: str | None = None, *, note: Note = refuse) -> Intake:
+    """Return what a bag holds of one actuator.
+
+    Args:
+        path: bag folder or lone .mcap.
+        namespace: whose topics, where a bag has several actuators.
+        note: called with one line per damage and message that cannot be shown; the default
+            raises it.
 
     Raises:
-        InputError: no bag, no samples, or more than fits into memory.
+        InputError: no bag, no samples, several actuators and no namespace, more samples than are
+            kept.
     """
-    gaps: list[str] = []
-    records = read_records(path, note=gaps.append, gap=gaps.append, warn=gaps.append)
-    samples = sum(len(record) for record in records)
-    if samples > _MOST_SAMPLES:
-        raise InputError(f'{path}: {samples} samples do not fit into a page; cut the bag')
-    intake = Intake(History(samples + len(records)), str(path), live=False)
     names = {_DIAGNOSTICS if n == 'DiagnosticArray' else full_name(n): n for n in TYPES}
-    for found in as_published(messages(path, types=names, note=gaps.append)):
+    topics = {'/diagnostics', *topics_of_actuator(path, summarise(path), namespace)}
+    samples = following = 0
+    streams = 0  # places that gaps and new streams take
+    kinds = {full_name('SampleBlock')}
+    for block in decoded(path, kinds, topics=topics, note=note):
+        samples += len(block[1].measured)
+        missing = block[1].index - following
+        streams += missing if 0 < missing < _LONGEST_GAP else missing != 0
+        following = block[1].index + len(block[1].measured)
+    if not 0 < samples + streams <= MOST_SAMPLES:
+        raise InputError(f'{path}: {samples} samples; a page shows 1 to {MOST_SAMPLES}')
+    intake = Intake(History(samples + streams), str(path), live=False)
+    for found in as_published(messages(path, types=names, topics=topics, note=lambda _: None)):
         try:
-            message = deserialize(found.type, found.data)
-        except InputError:
-            continue  # a message of another version; the rest can be shown
-        intake.take(names[found.type], message)
+            intake.take(names[found.type], deserialize(found.type, found.data))
+        except InputError as error:
+            note(f'{path}: topic {found.topic}: {error}; not shown')
     return intake

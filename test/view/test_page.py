@@ -123,6 +123,29 @@ def test_a_bag_with_a_time_slider() -> None:
         server.close()
 
 
+def test_a_bag_of_several_actuators_and_a_damaged_one(tmp_path: Path) -> None:
+    """One is chosen by its namespace; damage is told, and the rest shown."""
+    from actuator_glue.io.bag_records import write_record
+    from actuator_glue.io.bag_writer import BagWriter
+    from actuator_glue.records import Record
+
+    with BagWriter(tmp_path / 'bag') as writer:
+        for i, name in enumerate(('/east', '/west'), start=1):
+            record = Record(np.arange(100.0) * i * 1e-3, np.arange(100.0) * i * 1e-4, 1e-3)
+            write_record(writer, record, namespace=name)
+    with pytest.raises(InputError, match='--namespace'):
+        read_bag(tmp_path / 'bag')
+    west = read_bag(tmp_path / 'bag', 'west').history
+    np.testing.assert_allclose(west.curves(0, 100, 4000).rows[0], np.arange(100) * 2.0)
+    file = next((tmp_path / 'bag').glob('*.mcap'))
+    file.write_bytes(file.read_bytes()[:-200])
+    with pytest.raises(InputError, match='cut off'):
+        read_bag(file, 'east')
+    told: list[str] = []
+    assert read_bag(file, 'east', note=told.append).history.measured_to == 100
+    assert told
+
+
 def test_who_is_let_in() -> None:
     """Another name, another origin, no origin at the socket, other paths, absurd requests."""
 
