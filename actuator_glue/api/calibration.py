@@ -20,6 +20,7 @@ from actuator_glue.api.calibration_parts import (
 )
 from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.api.compilation import compilation
+from actuator_glue.api.tracking import record_tracking
 from actuator_glue.diagnosis.data import SETTLE
 from actuator_glue.diagnosis.preparation import clean, initial_state
 from actuator_glue.errors import InputError
@@ -182,6 +183,10 @@ def calibrate(
         sources=tuple(CalibratedRecord.of(r) for r in cleaned),
         prior=prior,
         records=tuple(cleaned),
+        tracking=tuple(
+            record_tracking(chains.posterior(), model.names, model.effects, record, initial)
+            for record in cleaned
+        ),
     )
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuator_glue.api import tracking
 from actuator_glue.inference.bands import band
 from actuator_glue.inference.predictive import fit_residual, total_band
 from actuator_glue.model.exact import Initial
@@ -91,6 +92,8 @@ def brief(found: Calibration) -> list[html.Block]:
     blocks: list[html.Block] = [html.Note(line) for line in found.problems]
     blocks.append(html.Table(HEADER, moment_rows(found), moments_title(found)))
     blocks.append(html.Text(error_line(found)))
+    for of in found.tracking:
+        blocks.append(html.Table(tracking.HEADER, of.rows(), of.title))
     return [*blocks, *(html.Note(line) for line in found.notes)]
 
 

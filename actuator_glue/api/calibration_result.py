@@ -11,6 +11,7 @@ import numpy as np
 from actuator_glue.api import store
 from actuator_glue.api.calibration_parts import CalibratedRecord, FitError, Marginal, PriorUse
 from actuator_glue.api.result import Result
+from actuator_glue.api.tracking import RecordTracking
 from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.inference.carried import Carried
 from actuator_glue.model.effects import CATALOGUE
@@ -53,6 +54,7 @@ class Calibration(Result):
         compile_seconds: compilation, which only the first use of an installation pays.
         sources: the records, described.
         records: the records themselves as they were fitted; empty after `load`.
+        tracking: how the actuator follows the command of each record.
     """
 
     schema: ClassVar[str] = 'actuator_glue.calibration/1'
@@ -78,6 +80,7 @@ class Calibration(Result):
     sources: tuple[CalibratedRecord, ...]
     prior: PriorUse | None = None
     records: tuple[Record, ...] = ()
+    tracking: tuple[RecordTracking, ...] = ()
 
     @property
     def model_effects(self) -> tuple[str, ...]:
@@ -144,6 +147,7 @@ class Calibration(Result):
             'initial': self.initial,
             'settle_s': self.settle,
             'records': [asdict(s) for s in self.sources],
+            'tracking': [asdict(t) for t in self.tracking],
         }
 
     def save(self, path: Path | str) -> Path:

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from actuator_glue.api.calibration_result import Calibration
+from actuator_glue.api.spread import spread
 from actuator_glue.api.stability import AtFrequency, DelayMargin, StabilityResult
-from actuator_glue.api.virtual_test import VirtualResult, check_criteria, run, spread, summarise
+from actuator_glue.api.virtual_test import VirtualResult, check_criteria, run, summarise
 from actuator_glue.errors import InputError
 from actuator_glue.hybrid import sampled, stability
 from actuator_glue.hybrid.actuator import nonlinear

@@ -6,7 +6,8 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from actuator_glue.api.result import Result
-from actuator_glue.api.virtual_test import Spread, VirtualResult
+from actuator_glue.api.spread import Spread
+from actuator_glue.api.virtual_test import VirtualResult
 from actuator_glue.hybrid.margin import Margins, psi
 from actuator_glue.hybrid.stability import Share
 from actuator_glue.records import Array

@@ -12,8 +12,9 @@ from actuator_glue.report import html, style
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from actuator_glue.api.spread import Spread
     from actuator_glue.api.stability import StabilityResult
-    from actuator_glue.api.virtual_test import Spread, VirtualResult
+    from actuator_glue.api.virtual_test import VirtualResult
     from actuator_glue.hybrid.stability import Share
 
 HEADER = ('quantity', 'unit', 'mean', 'sd', '2.5 %', '97.5 %')

@@ -10,23 +10,13 @@ from typing import Any
 
 import numpy as np
 
+from actuator_glue.api.spread import Spread, spread
 from actuator_glue.errors import InputError
 from actuator_glue.hybrid.stability import Share, share
 from actuator_glue.hybrid.virtual import Responses, VirtualTest, joined
 from actuator_glue.records import Array
 
 CRITERIA = {'drift': 'm', 'displacement': 'm', 'force': 'N'}
-
-
-@dataclass(frozen=True, slots=True)
-class Spread:
-    """Distribution of a number over the draws: mean, standard deviation, 95 % limits."""
-
-    mean: float
-    stddev: float
-    lower: float
-    median: float
-    upper: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,14 +75,6 @@ class VirtualResult:
             'j2_percentile_95': self.j2_percentile_95,
             'failures': [asdict(f) for f in self.failures],
         }
-
-
-def spread(values: Array) -> Spread:
-    """Return mean, standard deviation and 95 % limits of values (m,)."""
-    lower, median, upper = np.quantile(values, (0.025, 0.5, 0.975))
-    return Spread(
-        float(values.mean()), float(values.std()), float(lower), float(median), float(upper)
-    )
 
 
 def check_criteria(criteria: Mapping[str, float]) -> None:

@@ -171,6 +171,7 @@ def _show(found: Calibration, args: argparse.Namespace) -> None:
         moment_rows,
         moments_title,
     )
+    from actuator_glue.api.tracking import HEADER as TRACKING
 
     for line in found.problems:
         say(line, args)
@@ -182,6 +183,8 @@ def _show(found: Calibration, args: argparse.Namespace) -> None:
         columns = (*columns, 'mostly')
     table(moments_title(found), columns, rows, args)
     say(error_line(found), args)
+    for of in found.tracking:
+        table(of.title, TRACKING, of.rows(), args)
     say(f'{found.evaluations} evaluations in {found.seconds:.1f} s', args)
     if found.compile_seconds > 0.5:
         say(f'{found.compile_seconds:.1f} s of compilation besides, once per installation', args)

@@ -82,6 +82,36 @@ def criteria(target: Array, measured: Array, period: float) -> Criteria:
     )
 
 
+def energy_error(target: Array, measured: Array, force: Array, stiffness: float) -> Array:
+    """Return the energy error over input and strain energy at each sample, (n,).
+
+    The hybrid simulation error monitor (HSEM, Mosqueda et al. 2007): work of the force on what the
+    measured displacement misses of the target, over the largest work done along the target so far
+    plus the largest strain energy. Negative where the actuator lags: energy goes into the test.
+
+    Args:
+        target: displacement asked for, (n,) [m].
+        measured: displacement reached, (n,) [m].
+        force: of the specimen, (n,) [N].
+        stiffness: of the specimen [N/m].
+
+    Raises:
+        InputError: as `_checked`, a force of another length, a stiffness that is not positive.
+    """
+    target, measured = _checked(target, measured)
+    force = np.asarray(force, np.float64)
+    if force.shape != target.shape or not np.isfinite(force).all():
+        raise InputError(f'force has shape {force.shape}; give one finite value a sample')
+    if not 0.0 < stiffness < np.inf:
+        raise InputError(f'stiffness {stiffness:g} N/m: strain energy needs a positive one')
+    mean = 0.5 * (force[1:] + force[:-1])
+    lost = np.concatenate([[0.0], np.cumsum(mean * np.diff(target - measured))])
+    work = np.concatenate([[0.0], np.cumsum(mean * np.diff(target))])
+    strain = 0.5 * force**2 / stiffness
+    whole = np.maximum.accumulate(np.abs(work)) + np.maximum.accumulate(strain)
+    return np.asarray(np.divide(lost, whole, out=np.zeros_like(lost), where=whole > 0.0))
+
+
 def _checked(target: Array, measured: Array) -> tuple[Array, Array]:
     """Return both as arrays.
 

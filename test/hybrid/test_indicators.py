@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 
 from actuator_glue.errors import InputError
-from actuator_glue.hybrid.indicators import criteria, frequency_evaluation, tracking_indicator
+from actuator_glue.hybrid.indicators import (
+    criteria,
+    energy_error,
+    frequency_evaluation,
+    tracking_indicator,
+)
 
 PERIOD = 1e-3
 TIME = PERIOD * np.arange(4000)
@@ -34,3 +39,27 @@ def test_rows_that_cannot_be_compared() -> None:
     for wrong in (np.zeros(4000), TIME[:10], np.full(4000, np.nan)):
         with pytest.raises(InputError):
             criteria(wrong, TIME, PERIOD)
+
+
+@pytest.mark.parametrize('lag', [0.05, -0.08])
+def test_energy_error_of_an_elastic_specimen(lag: float) -> None:
+    """Each cycle of a late sine feeds in pi k A^2 sin(lag), of work and strain energy so far."""
+    k, amplitude, cycles = 2e5, 0.003, 4
+    t = np.linspace(0.0, 2.0 * np.pi * cycles, 40_001)
+    target, measured = amplitude * np.sin(t), amplitude * np.sin(t - lag)
+    found = energy_error(target, measured, k * measured, k)
+    lost = -cycles * np.pi * k * amplitude**2 * np.sin(lag)
+    work = np.concatenate(
+        [[0.0], np.cumsum(0.5 * k * (measured[1:] + measured[:-1]) * np.diff(target))]
+    )
+    whole = np.abs(work).max() + 0.5 * k * amplitude**2
+    assert found[-1] == pytest.approx(lost / whole, rel=1e-3)
+    assert not energy_error(target, target, k * target, k).any()
+
+
+def test_energy_error_refuses() -> None:
+    """A force of another length, no stiffness."""
+    x = np.sin(np.arange(100.0))
+    for force, k in ((x[:50], 1.0), (x, 0.0), (x * np.nan, 1.0)):
+        with pytest.raises(InputError):
+            energy_error(x, x, force, k)

@@ -1,0 +1,122 @@
+"""How an actuator follows its command, in the numbers of hybrid testing."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from actuator_glue.api.spread import Spread, spread
+from actuator_glue.hybrid.actuator import actuator, nonlinear, table_of
+from actuator_glue.hybrid.indicators import (
+    criteria,
+    energy_error,
+    frequency_evaluation,
+    tracking_indicator,
+)
+from actuator_glue.hybrid.stability import tracking
+from actuator_glue.model.exact import Initial
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Array, Record, source_name
+
+FREQUENCIES = (1.0, 5.0, 10.0)  # Hz
+_DRAWS = 100
+HEADER = ('number', 'unit', 'measured', 'median', '2.5 %', '97.5 %')
+# Name in JSON: text, unit and factor for people.
+SHOWN = {
+    'bandwidth_hz': ('bandwidth (-3 dB)', 'Hz', 1.0),
+    'fei_amplitude': ('FEI amplitude', '-', 1.0),
+    'fei_delay_s': ('FEI delay', 'ms', 1e3),
+    'J1_s': ('J1, lag of the cross-correlation', 'ms', 1e3),
+    'J2': ('J2, rms error', '%', 100.0),
+    'J3': ('J3, peak error', '%', 100.0),
+    'ti_m2': ('TI at the end', 'mm^2', 1e6),
+    'hsem': ('HSEM at the end', '%', 100.0),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class RecordTracking:
+    """How the actuator follows the command of one record.
+
+    Attributes:
+        source: the record.
+        predicted: each number over the draws.
+        measured: the same of the record itself, where it has it.
+    """
+
+    source: str
+    predicted: dict[str, Spread]
+    measured: dict[str, float]
+
+    @property
+    def title(self) -> str:
+        """Title of its table."""
+        return f'Tracking of {self.source or "the record"}'
+
+    def rows(self) -> list[tuple[str, ...]]:
+        """Return a row of text for each number, under HEADER."""
+        out = []
+        for name, of in self.predicted.items():
+            text, unit, factor = _shown(name)
+            seen = self.measured.get(name)
+            told = '' if seen is None else f'{factor * seen:.4g}'
+            numbers = (f'{factor * v:.4g}' for v in (of.median, of.lower, of.upper))
+            out.append((text, unit, told, *numbers))
+        return out
+
+
+def record_tracking(
+    draws: Array, names: Sequence[str], effects: Sequence[str], record: Record, initial: Initial
+) -> RecordTracking:
+    """Return the tracking numbers of draws (m, p) over a record, and the record's own.
+
+    Delay, amplitude and bandwidth are those of the linear part of the model; the others come from
+    simulating draws with all their effects.
+    """
+    structure = Structure(effects)
+    rows = np.linspace(0, len(draws) - 1, min(_DRAWS, len(draws))).astype(np.intp)
+    some = table_of(draws[rows], names, structure)  # without parameters of the likelihood
+    stiffness = np.full(len(some), record.known_stiffness())
+    found = tracking(actuator(some, structure.names, effects, stiffness), FREQUENCIES)
+    predicted: dict[str, Any] = {}
+    if not nonlinear(effects):
+        for i, f in enumerate(FREQUENCIES):
+            predicted[f'delay_at_{f:g}_hz_s'] = spread(found.delay[:, i])
+            predicted[f'amplitude_at_{f:g}_hz'] = spread(found.amplitude[:, i])
+        predicted['bandwidth_hz'] = spread(found.bandwidth)
+    moved = structure.simulate(some, record, initial=initial)
+    moved = moved[np.isfinite(moved).all(axis=1)]
+    if np.ptp(record.command) > 0.0 and len(moved):
+        drawn = [_numbers(record, x) for x in moved]
+        predicted |= {n: spread(np.array([d[n] for d in drawn])) for n in drawn[0]}
+        measured = _numbers(record, record.measured)
+    else:
+        measured = {}
+    return RecordTracking(source_name(record.source), predicted, measured)
+
+
+def _numbers(record: Record, moved: Array) -> dict[str, float]:
+    target, period = record.command, record.period
+    index, j = frequency_evaluation(target, moved, period), criteria(target, moved, period)
+    out = {
+        'fei_amplitude': index.amplitude,
+        'fei_delay_s': index.delay,
+        'J1_s': j.j1,
+        'J2': j.j2,
+        'J3': j.j3,
+        'ti_m2': float(tracking_indicator(target, moved)[-1]),
+    }
+    k = record.known_stiffness()
+    if k > 0.0:
+        out['hsem'] = float(energy_error(target, moved, k * moved, k)[-1])
+    return out
+
+
+def _shown(name: str) -> tuple[str, str, float]:
+    if name in SHOWN:
+        return SHOWN[name]
+    what, _, hz, *_ = name.split('_')
+    return f'{what} at {hz} Hz', *(('ms', 1e3) if what == 'delay' else ('-', 1.0))

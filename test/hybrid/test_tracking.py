@@ -1,0 +1,51 @@
+"""The tracking numbers of a calibration: known actuators, and what calibrate hands out."""
+
+import json
+
+import numpy as np
+import pytest
+
+import actuator_glue as ag
+from actuator_glue.api.tracking import record_tracking
+
+NAMES = ('beta_1', 'alpha_1_beta_0', 'alpha_2', 'alpha_3')
+THETA = np.array([133.65, 1.1005e9, 2.4927e5, 0.006])
+
+
+def test_a_pure_delay_is_told_as_one() -> None:
+    """The piston repeats the command ten samples later, but for what Eq. (2) makes of it."""
+    sine = ag.Command('sine', rate=1000.0, duration=20.0, high=2.0)
+    record = ag.simulate(
+        sine, stiffness=250e3, theta=THETA, effects={'delay': {'delay': 0.01}},
+        sensors=ag_sensors(),
+    )  # fmt: skip
+    draws = np.tile([*THETA, 0.01], (8, 1))
+    found = record_tracking(draws, (*NAMES, 'delay'), ('delay',), record, 'rest')
+    plain = record_tracking(draws[:, :4], NAMES, (), record, 'rest')
+    for name in ('delay_at_1_hz_s', 'fei_delay_s', 'J1_s'):
+        late = found.predicted[name].median - plain.predicted[name].median
+        assert late == pytest.approx(0.01, abs=1.1e-3 if name == 'J1_s' else 2e-4)
+    assert found.predicted['hsem'].median < plain.predicted['hsem'].median < 0.0
+    for name, value in found.measured.items():
+        assert value == pytest.approx(found.predicted[name].median, rel=1e-6, abs=1e-12)
+
+
+def ag_sensors() -> object:
+    """Sensors without noise."""
+    from actuator_glue.api.simulation import Sensors
+
+    return Sensors(noise=0.0, force_noise=0.0)
+
+
+def test_calibrate_hands_them_out() -> None:
+    """One set a record, intervals that hold the record's own number, JSON and report."""
+    record = ag.simulate(ag.Command(rate=200.0, duration=20.0), stiffness=250e3, seed=3)
+    found = ag.calibrate(record, evaluations=24_000, seed=5)
+    (of,) = found.tracking
+    for name in ('J2', 'fei_amplitude', 'fei_delay_s'):
+        band = of.predicted[name]
+        assert band.lower <= band.median <= band.upper
+        assert of.measured[name] == pytest.approx(band.median, rel=0.02)
+    told = json.loads(json.dumps(found.to_json()['tracking']))[0]
+    assert told['predicted']['J2']['median'] == of.predicted['J2'].median
+    assert any('bandwidth' in row[0] for row in of.rows())
