@@ -34,7 +34,7 @@ NOT_RUN = {
     r'actuator-glue send': 'needs a receiver: test/streams, test/ros',
     r'actuator-glue doctor': 'asks what this computer is: test/cli',
     r'ssh|eval|tshark|openssl|head|printf|python3? ': 'tools of the system, told as examples',
-    r'[A-Z_]+=': 'settings of the environment',
+    r'(export )?[A-Z_]+=': 'settings of the environment',
 }
 # Commands that estimate: a minute each, run with the slow tests.
 LONG = {'calibrate', 'diagnose', 'replay', 'rths', 'plot', 'simulate'}
@@ -61,6 +61,17 @@ def blocks(*languages: str) -> list[Block]:
         for match in FENCE.finditer(page.read_text('utf-8'))
     ]
     return [block for block in found if block.language in languages]
+
+
+def indented() -> list[Block]:
+    """Return the commands of ours that stand in blocks by indentation."""
+    return [
+        Block(page, 'sh', match[0])
+        for page in PAGES
+        for match in re.finditer(
+            r'(?:^ {4}actuator-glue .*\n)+', page.read_text('utf-8'), re.MULTILINE
+        )
+    ]
 
 
 def name(value: object) -> str:
@@ -99,6 +110,15 @@ def test_links_lead_somewhere(page: Path) -> None:
         assert not heading or heading in anchors(target), f'{page.name}: {link}'
 
 
+def test_every_page_is_on_the_site() -> None:
+    """Some toctree names it; `make docs` would end otherwise."""
+    docs = ROOT / 'docs'
+    trees = [b.text for b in blocks('{toctree}')]
+    named = {line for text in trees for line in text.split() if not line.startswith(':')}
+    pages = {p.relative_to(docs).with_suffix('').as_posix() for p in docs.rglob('*.md')}
+    assert pages - {'index'} <= named
+
+
 def test_every_block_has_a_language_that_is_known() -> None:
     """What is in a block decides how it is tested."""
     known = {'sh', 'python', 'yaml', 'matlab', '', '{toctree}', '{eval-rst}'}
@@ -113,7 +133,7 @@ def test_yaml_is_yaml(block: Block) -> None:
     assert isinstance(yaml.safe_load(block.text), dict)
 
 
-@pytest.mark.parametrize('block', blocks('sh'), ids=name)
+@pytest.mark.parametrize('block', [*blocks('sh'), *indented()], ids=name)
 def test_commands_exist_with_their_options(block: Block) -> None:
     """Every command of ours is parsed; of others it is said why no test runs them."""
     for words in commands(block):
