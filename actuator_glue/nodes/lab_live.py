@@ -107,9 +107,9 @@ class LiveSource:
         self._announce()
         self._node.introduce()
         # What came while nobody was ready is of the time before the stream.
-        while self._listener.receive(0.0):
-            pass
         last = time.monotonic()
+        while self._listener.receive(0.0) and time.monotonic() - last < SILENT:
+            pass
         while True:
             batches = self._listener.receive(0.1)
             now = time.monotonic()
@@ -118,6 +118,7 @@ class LiveSource:
             if found:
                 last = now
             elif now - last > SILENT:
+                last = now  # to be told once a second
                 self._node.complain('silence', f'nothing arrives from {self._address}')
             self._tell()
             yield Step(0.0, partial(self._publish, found))
