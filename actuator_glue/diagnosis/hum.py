@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage, signal
 
-from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.data import Data, Mask
 from actuator_glue.records import Array
 
 _CLEAR = 60.0  # of the median power, 40 times the mean: one in 10^6 records of noise
@@ -73,9 +73,15 @@ def amplitudes(error: Array, time: Array, frequency: float) -> Array:
     return np.asarray(np.linalg.solve(basis @ basis.T, basis @ error))
 
 
-def _peaks(values: Array, period: float) -> tuple[Array, Array]:
-    """Frequencies and power over the local median, zero outside the usable band."""
-    spectrum = np.abs(np.fft.rfft(signal.detrend(values) * np.hanning(len(values)))) ** 2
+def _peaks(error: Array, mask: Mask, period: float) -> tuple[Array, Array]:
+    """Frequencies and power over the local median, zero outside the usable band.
+
+    The counted samples (N,) stand at their own times among the others, which are zero: spliced
+    together, a line would change its phase at every seam.
+    """
+    values = np.zeros(len(mask))
+    values[mask] = signal.detrend(error)
+    spectrum = np.abs(np.fft.rfft(values * np.hanning(len(values)))) ** 2
     level = ndimage.median_filter(spectrum, 201, mode='reflect') + 1e-300
     f = np.fft.rfftfreq(len(values), period)
     inside = (f > _LOWEST) & (f < 0.48 / period)
@@ -105,8 +111,8 @@ def find(data: Data, errors: Array) -> Line | None:
     parts = data.split(errors)
     rows = zip(data.records, data.masks, parts, data.periods, strict=True)
     for record, mask, error, period in rows:
-        f, ratio = _peaks(error, period)
-        ratio[_of_command(f, record.command[mask], period)] = 0.0
+        f, ratio = _peaks(error, mask, period)
+        ratio[_of_command(f, record.command, period)] = 0.0
         at = int(np.argmax(ratio))
         if ratio[at] > best[0]:
             best = (float(ratio[at]), float(f[at]))
