@@ -22,6 +22,7 @@ from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.api.compilation import compilation
 from actuator_glue.api.tracking import record_tracking
 from actuator_glue.diagnosis.data import SETTLE
+from actuator_glue.diagnosis.despike import despiked
 from actuator_glue.diagnosis.preparation import clean, initial_state
 from actuator_glue.errors import InputError
 from actuator_glue.inference.at_bound import pressed
@@ -124,6 +125,8 @@ def calibrate(
         options.initial == 'auto' and all(initial_state(r) == 'rest' for r in cleaned)
     ):
         initial = 'rest'
+    cleaned, found = despiked(cleaned, [initial] * len(cleaned))
+    notes += found
     settle = options.settle
     if settle is None:
         settle = SETTLE if initial == 'measured' else 0.0

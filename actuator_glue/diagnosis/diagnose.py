@@ -140,8 +140,15 @@ def diagnose(
         seconds=clock() - start if clock else math.nan,
         at_bound=held_at,
         sampling=tuple(
-            {'source': r.source, 'rate_hz': whole.rate, 'fitted_rate_hz': r.rate}
-            for r, whole in zip(prepared.fit.records, prepared.fit.recorded, strict=True)
+            {
+                'source': r.source,
+                'rate_hz': whole.rate,
+                'fitted_rate_hz': r.rate,
+                'impulse_samples': impulses,
+            }
+            for r, whole, impulses in zip(
+                prepared.fit.records, prepared.fit.recorded, prepared.impulses, strict=True
+            )
         ),
     )
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from actuator_glue.diagnosis.data import Data, Model
 from actuator_glue.model.parameters import BASE
+from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 
 _P = len(BASE)
@@ -205,3 +206,10 @@ def base_starts(data: Data) -> Array:
                 # d2 s^2 + ... + n0 with n0 = omega^2 d2
                 starts.append([beta, omega**2 * stiff, stiff, 0.3])
     return np.array(starts)
+
+
+def base_fit(data: Data) -> Fit:
+    """Fit Eq. (2) from a grid of starts."""
+    model, starts = Structure(()), base_starts(data)
+    sums = sum_of_squares(data.target - data.simulate(model, starts))
+    return fit(data, model, starts[np.argsort(sums)[:4]], iterations=60)

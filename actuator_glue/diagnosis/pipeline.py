@@ -55,7 +55,17 @@ class Conclusion:
 
 
 def conclude(prepared: Prepared, settings: Thresholds, each: Each, tell: Progress) -> Conclusion:
-    """Search for what the model lacks and decide; nothing looks at the held-out part."""
+    """Search for what the model lacks and decide; nothing looks at the held-out part.
+
+    Where impulses show beside what was found, they are taken out and all is done again.
+    """
+    first = _conclude(prepared, settings, each, tell)
+    final = first.found.final
+    clean = prepared.without_impulses(final.model, final.fit.theta)
+    return first if clean is prepared else _conclude(clean, settings, each, tell)
+
+
+def _conclude(prepared: Prepared, settings: Thresholds, each: Each, tell: Progress) -> Conclusion:
     tell('base fit', 0.0)
     search = Search(prepared.fit, mean_effects(), each)
     line = hum.find(prepared.fit, search.base().error)
@@ -132,4 +142,8 @@ def with_the_right_hold(
 def _linear(data: Data) -> Data:
     whole = tuple(replace(r, hold='linear') for r in data.recorded)
     pairs = zip(whole, data.factors, strict=True)
-    return replace(data, records=tuple(decimated(r, n) for r, n in pairs), recorded=whole)
+    records = (decimated(r, n) for r, n in pairs)
+    same = zip(records, data.records, strict=True)
+    return replace(
+        data, records=tuple(replace(r, measured=d.measured) for r, d in same), recorded=whole
+    )

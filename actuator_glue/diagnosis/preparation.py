@@ -8,12 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import ndimage
 
-from actuator_glue.diagnosis import decimate
+from actuator_glue.diagnosis import decimate, despike
 from actuator_glue.diagnosis.checks import check, refuse_repeats, where
-from actuator_glue.diagnosis.data import SETTLE, Data, Mask
+from actuator_glue.diagnosis.data import SETTLE, Data, Mask, Model
 from actuator_glue.errors import InputError
 from actuator_glue.model.exact import Initial
-from actuator_glue.records import Record
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Array, Record
 
 _SHORTEST = 5.0  # s
 _MOVED = 2e-3  # of its largest excursion: a command within it has not begun
@@ -35,11 +36,26 @@ class Prepared:
         fit: what every decision is made on.
         held: what is looked at once, after all decisions.
         notes: what was done to the records, for people.
+        impulses: per fitting record, how many samples were replaced (see diagnosis/despike.py).
     """
 
     fit: Data
     held: Data
     notes: tuple[str, ...]
+    impulses: tuple[int, ...]
+
+    def without_impulses(self, model: Model, theta: Array) -> Prepared:
+        """Take out what is an impulse beside a model; the same object where nothing is."""
+        fit, counts, notes = despike.without_impulses(self.fit, model, theta)
+        if self.held.records is self.fit.records:
+            held = replace(self.held, records=fit.records)
+        else:
+            held, _, told = despike.without_impulses(self.held, model, theta)
+            notes += told
+        if not notes:
+            return self
+        both = tuple(a + b for a, b in zip(self.impulses, counts, strict=False))
+        return Prepared(fit, held, (*notes, *self.notes), both)
 
 
 def rest_samples(record: Record) -> int:
@@ -161,11 +177,15 @@ def prepare(records: Sequence[Record], holdout: Sequence[Record]) -> Prepared:
             Data(tuple(every[s]), tuple(masks[s]), initials[s], recorded[s], origins[s])
             for s in parts
         )
-        return Prepared(fit, held, tuple(notes))
+        return _despiked(Prepared(fit, held, tuple(notes), (0,) * n))
     notes.append('every fourth block of each record held out')
     both = [
         tuple(m & side(_folds(r)) for m, r in zip(masks, every, strict=True))
         for side in (np.logical_not, np.asarray)
     ]
     fit, held = (Data(tuple(every), side, initials, recorded, origins) for side in both)
-    return Prepared(fit, held, tuple(notes))
+    return _despiked(Prepared(fit, held, tuple(notes), (0,) * n))
+
+
+def _despiked(prepared: Prepared) -> Prepared:
+    return prepared.without_impulses(Structure(()), despike.trimmed(prepared.fit))

@@ -11,7 +11,7 @@ import numpy as np
 
 from actuator_glue.diagnosis import global_search
 from actuator_glue.diagnosis.data import Data, Model
-from actuator_glue.diagnosis.fit import Fit, base_starts, fit, rms, sum_of_squares
+from actuator_glue.diagnosis.fit import Fit, base_fit, fit, rms
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.screening import screen, signatures
 from actuator_glue.diagnosis.stretches import Part, stretches
@@ -102,11 +102,8 @@ class Search:
     _descended: set[tuple[frozenset[str], tuple[str, ...]]] = field(default_factory=set)
 
     def base(self) -> Fit:
-        """Fit Eq. (2) from a grid of starts."""
-        model = Structure(())
-        starts = base_starts(self.data)
-        sums = sum_of_squares(self.data.target - self.data.simulate(model, starts))
-        best = fit(self.data, model, starts[np.argsort(sums)[:4]], iterations=60)
+        """Fit Eq. (2)."""
+        best = base_fit(self.data)
         self._tried[frozenset()] = best
         return best
 

@@ -1,0 +1,96 @@
+"""Records without their impulses, which get no leverage on any fit, and are told."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from actuator_glue.diagnosis import decimate
+from actuator_glue.diagnosis.checks import where
+from actuator_glue.diagnosis.data import SETTLE, Data, Model
+from actuator_glue.diagnosis.fit import base_fit, fit
+from actuator_glue.diagnosis.impulses import Impulses, beyond, find
+from actuator_glue.model.exact import Initial
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Array, Record
+
+_TRIMS = 2  # refits without what stood out of the last
+
+
+def trimmed(data: Data) -> Array:
+    """Return parameters of Eq. (2) (4,) that gross errors of the measured channel do not bend.
+
+    Least trimmed squares: what stands out of the residual is left out of the next refit.
+    """
+    model, found = Structure(()), base_fit(data).theta
+    for _ in range(_TRIMS):
+        errors = [
+            record.measured - model.simulate(found, record, initial=initial)
+            for record, initial in zip(data.records, data.initials, strict=True)
+        ]
+        rows = zip(data.masks, errors, data.periods, strict=True)
+        masks = tuple(mask & ~beyond(e, period) for mask, e, period in rows)
+        if all(np.array_equal(a, b) for a, b in zip(masks, data.masks, strict=True)):
+            break
+        found = fit(replace(data, masks=masks), model, found).theta
+    return found
+
+
+def without_impulses(
+    data: Data, model: Model, theta: Array
+) -> tuple[Data, tuple[int, ...], list[str]]:
+    """Look for impulses in the residual of a model and take them out.
+
+    Returns:
+        The data with what the samples around impulses say in their place, how many samples of
+        each record that are, and what was done, for people.
+    """
+    records, counts, notes = [], [], []
+    for i, (record, initial) in enumerate(zip(data.records, data.initials, strict=True)):
+        output = model.simulate(theta[None], record, initial=initial, origin=data.origins[i])[0]
+        speed = np.abs(np.gradient(output, record.period))
+        found = find(record.measured - output, speed, record.period)
+        counts.append(len(found.samples))
+        if found.count:
+            measured = record.measured.copy()
+            measured[found.samples] -= found.sizes
+            notes.append(f'{where(record, i + 1)}: {_told(found, record)}')
+            record = replace(record, measured=measured)
+        records.append(record)
+    return replace(data, records=tuple(records)), tuple(counts), notes
+
+
+def _told(found: Impulses, record: Record) -> str:
+    up = float(np.mean(found.sizes > 0.0))
+    side = ', all to one side' if up in (0.0, 1.0) and found.count > 4 else ''
+    return (
+        f'{found.count} impulse{"s" if found.count > 1 else ""} ({len(found.samples)} of '
+        f'{len(record)} samples, up to {1e6 * float(np.abs(found.sizes).max()):.0f} um{side}) '
+        'are no motion: what the samples around them say stands in their place'
+    )
+
+
+def despiked(
+    records: Sequence[Record], initials: Sequence[Initial]
+) -> tuple[list[Record], list[str]]:
+    """Take impulses out of records, at the rate they were sampled with.
+
+    Args:
+        records: checked records of one actuator.
+        initials: per record, the state it starts from.
+
+    Returns:
+        The records and what was done, for people.
+    """
+    slow = [decimate.decimated(r, decimate.factor(r)) for r in records]
+    masks = [np.ones(len(r), dtype=np.bool_) for r in slow]
+    for record, mask, initial in zip(slow, masks, initials, strict=True):
+        if initial == 'measured' and record.duration > 2.0 * SETTLE:
+            mask[: round(SETTLE / record.period)] = False
+    whole = replace(Data.whole(slow), masks=tuple(masks), initials=tuple(initials))
+    theta = trimmed(whole)
+    as_given = replace(Data.whole(records), initials=tuple(initials))
+    data, _, notes = without_impulses(as_given, Structure(()), theta)
+    return list(data.records), notes

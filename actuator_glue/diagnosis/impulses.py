@@ -1,0 +1,151 @@
+"""Impulses in a measured channel: single samples or short runs that no motion explains.
+
+Every sample of a model's residual is predicted from its neighbours on both sides. An impulse (an
+additive outlier, Fox 1972; Chen & Liu 1993) exceeds by far the noise of that prediction and the
+residual around it, and leaves only noise behind when the prediction takes its place. A kink that
+the model lacks does not: it stands out of the residual by little.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import linalg, ndimage, stats
+
+from actuator_glue.records import Array
+
+_REACH = 6  # samples to either side
+_ROWS = 40_000  # of a record that the interpolator is fitted to
+_BLOCK = 1.0  # s in which the noise has one size
+_BEYOND = 6.0  # times the noise: one Gaussian sample in 10^9
+_LONGEST = 40  # samples of one impulse
+_SURE = 3.5  # standard deviations
+_MOST = 0.05  # of all samples: what is more frequent is no accident, and stays
+
+
+@dataclass(frozen=True)
+class Impulses:
+    """What was found in one record.
+
+    Attributes:
+        samples: which samples, (m,).
+        sizes: by how much each was off, (m,) [m].
+        count: impulses; one may last several samples.
+    """
+
+    samples: NDArray[np.intp]
+    sizes: Array
+    count: int
+
+
+_NONE = Impulses(np.empty(0, dtype=np.intp), np.empty(0), 0)
+
+
+def _filter(error: Array) -> Array:
+    """Return the taps (2 reach + 1,) of the error of predicting a residual from its neighbours."""
+    inner = np.arange(_REACH, len(error) - _REACH)
+    at = inner[:: max(1, len(inner) // _ROWS)]
+    rows = error[at[:, None] + np.delete(np.arange(-_REACH, _REACH + 1), _REACH)]
+    keep = np.ones(len(at), dtype=np.bool_)
+    weights = np.zeros(2 * _REACH)
+    for _ in range(3):  # impulses must not bend the prediction
+        weights = linalg.lstsq(rows[keep], error[at[keep]], cond=1e-12)[0]
+        off = np.abs(error[at] - rows @ weights)
+        largest = np.maximum(off, np.abs(rows).max(axis=1))
+        keep = largest <= _BEYOND * 1.4826 * float(np.median(np.abs(error)))
+        if keep.sum() < 10 * _REACH:
+            break
+    return np.insert(-weights, _REACH, 1.0)
+
+
+def _noise(error: Array, period: float) -> Array:
+    """Return the robust size of a prediction's error at every sample, (n,) [m]."""
+    size = min(len(error), max(64, round(_BLOCK / period)))
+    count = len(error) // size
+    edges = np.linspace(0, len(error), count + 1).astype(int)
+    levels = np.array([np.median(np.abs(e)) for e in np.split(np.abs(error), edges[1:-1])])
+    # Motion that begins is no impulse; a channel at rest on its grid has no noise to be beyond.
+    levels = np.maximum(ndimage.maximum_filter1d(levels, 3), np.median(np.abs(error)))
+    return np.repeat(1.4826 * levels, np.diff(edges))
+
+
+def beyond(residual: Array, period: float) -> NDArray[np.bool_]:
+    """Which samples of a residual (n,) [m] stand out of those around them."""
+    off = np.abs(residual - np.median(residual))
+    return np.asarray(off > _BEYOND * _noise(residual, period))
+
+
+def _clusters(at: NDArray[np.intp]) -> Iterator[tuple[int, int]]:
+    """Yield first and last of neighbours, none of which the next cluster's errors reach."""
+    for group in np.split(at, np.flatnonzero(np.diff(at) > 2 * _REACH) + 1):
+        yield int(group[0]), int(group[-1])
+
+
+def _explained(error: Array, noise: Array, taps: Array) -> tuple[list[int], Array] | None:
+    """Return samples (and by how much each is off) that leave noise; None if few do not.
+
+    Args:
+        error: of the prediction around what is suspect (w,) [m].
+        noise: its size without impulses (w,) [m].
+        taps: of the prediction's error (2 reach + 1,).
+    """
+    chosen: list[int] = []
+    places = np.arange(len(error))
+    sizes, left = np.empty(0), error
+    while (np.abs(left) > _BEYOND * noise).any():
+        if len(chosen) == _LONGEST:
+            return None
+        pull = np.abs(np.convolve(left, taps, mode='same'))
+        pull[chosen] = -1.0
+        pull[:_REACH] = pull[-_REACH:] = -1.0
+        chosen.append(int(np.argmax(pull)))
+        offsets = places[:, None] - np.array(chosen) + _REACH
+        inside = (offsets >= 0) & (offsets < len(taps))
+        basis = np.where(inside, taps[np.clip(offsets, 0, len(taps) - 1)], 0.0)
+        sizes = np.linalg.lstsq(basis, error, rcond=None)[0]
+        left = error - basis @ sizes
+    order = np.argsort(chosen)
+    return [chosen[i] for i in order], sizes[order]
+
+
+def find(residual: Array, speed: Array, period: float) -> Impulses:
+    """Return the impulses of a residual.
+
+    None where they are too many to be accidents, or come with the motion.
+
+    Args:
+        residual: of a model that was fitted, (n,) [m].
+        speed: of the motion, (n,) [m/s].
+        period: time between samples [s].
+    """
+    if len(residual) < 40 * _REACH:
+        return _NONE
+    taps = _filter(residual)[::-1]  # `convolve` reverses them
+    error = np.asarray(np.convolve(residual, taps, 'same'), dtype=np.float64)
+    error[:_REACH] = error[-_REACH:] = 0.0
+    noise, whole = _noise(error, period), _noise(residual, period)
+    suspect = np.flatnonzero(np.abs(error) > _BEYOND * noise)
+    if not len(suspect) or len(suspect) > 2 * _REACH * _MOST * len(residual):
+        return _NONE
+    samples, sizes, starts = [], [], []
+    for first, last in _clusters(suspect):
+        part = slice(max(0, first - 2 * _REACH), min(len(error), last + 2 * _REACH + 1))
+        found = _explained(error[part], noise[part], taps)
+        if found is None or np.abs(found[1]).max() < _BEYOND * whole[part].max():
+            continue
+        samples += [part.start + i for i in found[0]]
+        sizes += list(found[1])
+        runs = np.flatnonzero(np.diff(found[0], prepend=-2) > 1)
+        starts += [part.start + found[0][i] for i in runs]
+    if not samples or len(samples) > _MOST * len(residual) or _with_motion(starts, speed):
+        return _NONE
+    return Impulses(np.array(samples, dtype=np.intp), np.array(sizes), len(starts))
+
+
+def _with_motion(starts: list[int], speed: Array) -> bool:
+    """Whether impulses come when the piston is fast: accidents do not know how fast it is."""
+    rank = stats.rankdata(speed)[starts] / len(speed)
+    return bool((rank.mean() - 0.5) * np.sqrt(12.0 * len(starts)) > _SURE)

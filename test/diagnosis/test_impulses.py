@@ -1,0 +1,97 @@
+"""Spikes and drop-outs of a channel: found, counted, told, and without leverage."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from actuator_glue.diagnosis import impulses
+from actuator_glue.diagnosis.despike import despiked, trimmed
+from actuator_glue.diagnosis.fit import base_fit
+from actuator_glue.diagnosis.preparation import prepare
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Array, Record
+
+RATE = 256.0
+THETA = np.array([235.0, 5.0e10, 4.23e6, 3.3])
+T = np.arange(int(24 * RATE)) / RATE
+SWEEP = 2e-3 * np.sin(np.pi * (10.0 / 24.0) * T**2)
+NOISE = 3e-6
+
+
+def healthy(seed: int, command: Array = SWEEP, effects: tuple[str, ...] = (), *own: float):  # type: ignore[no-untyped-def]
+    """Return a record of a machine and its noise-free response."""
+    bare = Record(command, np.zeros(len(T)), 1 / RATE, stiffness=250e3)
+    x = Structure(effects).simulate(np.array([*THETA, *own]), bare)
+    noise = NOISE * np.random.default_rng(seed).standard_normal(len(T))
+    return replace(bare, measured=x + noise), x
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_clean_channels_have_none(seed: int) -> None:
+    """Gaussian noise is never beyond six times itself."""
+    record, _ = healthy(seed)
+    clean, notes = despiked([record], ['rest'])
+    assert notes == []
+    assert clean[0] is record
+
+
+@pytest.mark.parametrize('one_sided', [True, False])
+def test_spikes_are_taken_out_and_told(one_sided: bool) -> None:
+    """One sample in a hundred, 20 to 40 um; what stands in their place is the motion."""
+    record, x = healthy(1)
+    rng = np.random.default_rng(2)
+    at = rng.choice(np.arange(20, len(T) - 20), len(T) // 100, replace=False)
+    size = rng.uniform(25e-6, 40e-6, len(at)) * (
+        1.0 if one_sided else rng.choice([-1, 1], len(at))
+    )
+    y = record.measured.copy()
+    y[at] += size
+    clean, notes = despiked([replace(record, measured=y)], ['rest'])
+    left = clean[0].measured - x
+    assert np.abs(left).max() < 8 * NOISE
+    assert left.std() == pytest.approx(NOISE, rel=0.05)
+    assert f'({len(at)} of {len(T)} samples' in notes[0]
+    assert ('all to one side' in notes[0]) is one_sided
+
+
+def test_drop_outs_do_not_bend_the_fit() -> None:
+    """Readings of zero for up to 40 ms amid a motion of millimetres."""
+    record, x = healthy(3)
+    y, rng = record.measured.copy(), np.random.default_rng(4)
+    for at in rng.integers(200, len(T) - 200, 6):
+        y[at : at + rng.integers(2, 10)] = 0.0
+    given = replace(record, measured=y)
+    prepared = prepare([given], [])
+    bent, found = base_fit(prepare([record], []).fit).theta, base_fit(prepared.fit).theta
+    assert found[0] == pytest.approx(bent[0], rel=0.01)
+    assert 10 < prepared.impulses[0] < 60
+    assert np.abs(prepared.fit.records[0].measured - x).max() < 50e-6
+    assert trimmed(prepared.fit)[0] == pytest.approx(THETA[0], rel=0.02)
+
+
+@pytest.mark.parametrize(
+    ('effect', 'sizes'),
+    [
+        ('backlash', (5e-5,)),
+        ('stribeck-friction', (100.0, 1.5, 0.01)),
+        ('valve-deadband', (2e-4,)),
+    ],
+)
+@pytest.mark.parametrize('steps', [False, True])
+def test_what_the_model_lacks_is_no_impulse(
+    effect: str, sizes: tuple[float, ...], steps: bool
+) -> None:
+    """Kinks and bursts of a motion come with the motion."""
+    command = 1e-3 * np.sign(np.sin(np.pi * T)) if steps else SWEEP
+    record, _ = healthy(5, command, (effect,), *sizes)
+    clean, _ = despiked([record], ['rest'])
+    changed = clean[0].measured != record.measured
+    assert changed.mean() < 1e-3
+
+
+def test_too_many_are_no_accidents() -> None:
+    """What is off in a tenth of the samples is left as it is."""
+    noise = NOISE * np.random.default_rng(6).standard_normal(4000)
+    noise[::10] += 1e-4
+    assert impulses.find(noise, np.ones(4000), 1e-3).count == 0
