@@ -99,7 +99,12 @@ def test_what_lives_in_single_samples_is_found(effect: str, size: float) -> None
     (seen,) = [e for e in found.effects if e.name == effect]
     assert next(iter(seen.parameters.values())).mean == pytest.approx(size, rel=0.1)
     assert found.to_json()['sampling'] == [
-        {'source': 'fast', 'rate_hz': 2000.0, 'fitted_rate_hz': pytest.approx(2000.0 / 6)}
+        {
+            'source': 'fast',
+            'rate_hz': 2000.0,
+            'fitted_rate_hz': pytest.approx(2000.0 / 6),
+            'impulse_samples': 0,
+        }
     ]
 
 
