@@ -21,6 +21,7 @@ from actuator_glue.records import Array, Hold, Record, check_stiffness
 
 BLOCK = 4096  # samples simulated at a time
 NOISE = 1e-5  # m, of the displacement sensor where nothing else is asked for
+EFFECTS_FORM = 'effects are written NAME, or NAME:PARAMETER=VALUE,PARAMETER=VALUE, joined by +'
 SHAPES = ('sweep', 'sine', 'noise', 'earthquake')
 
 Effects = Mapping[str, Mapping[str, float]] | Sequence[str]
@@ -179,6 +180,33 @@ def _benchmark(rate: float, hold: Hold, seed: int, sensors: Sensors) -> Plant:
     return benchmark_plant.benchmark_plant(
         period=1.0 / rate, hold=hold, seed=seed, displacement=spec
     )
+
+
+def named_effects(text: str) -> dict[str, dict[str, float]]:
+    """Return the effects of a text in EFFECTS_FORM, and the parameters it gives of each.
+
+    Raises:
+        InputError: unknown effect or parameter, or a value that is no number.
+    """
+    found: dict[str, dict[str, float]] = {}
+    for part in filter(None, (piece.strip() for piece in text.split('+'))):
+        name, _, given = (piece.strip() for piece in part.partition(':'))
+        (entry,) = Structure((name,)).entries
+        known = [p.name for p in entry.parameters]
+        values = found[name] = {}
+        for pair in filter(None, given.split(',')):
+            key, _, value = (piece.strip() for piece in pair.partition('='))
+            try:
+                values[key] = float(value)
+            except ValueError:
+                raise InputError(
+                    f'effect {name}: {pair!r} is no PARAMETER=VALUE; {EFFECTS_FORM}'
+                ) from None
+            if key not in known:
+                raise InputError(
+                    f'effect {name} has no parameter {key!r}; it has {", ".join(known)}'
+                )
+    return found
 
 
 def sizes(

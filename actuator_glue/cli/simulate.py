@@ -123,7 +123,7 @@ def _test(
         command,
         stiffness=stiffness,
         theta=args.theta,
-        effects=dict(map(_parse_effect, args.effect)),
+        effects=_effects(args),
         sensors=_sensors(args),
         plant=args.plant,
         hold=args.hold,
@@ -144,11 +144,10 @@ def _unseen(
 ) -> list[str]:
     from actuator_glue.api.visibility import unseen
 
-    effects = dict(map(_parse_effect, args.effect))
     return unseen(
         command,
         stiffnesses,
-        effects,
+        _effects(args),
         theta=args.theta,
         sensors=_sensors(args),
         hold=args.hold,
@@ -163,8 +162,7 @@ def _truth(
     from actuator_glue.model.effects import CATALOGUE
 
     samples = samples_of(command)
-    effects = dict(map(_parse_effect, args.effect))
-    structure, theta = sizes(samples, command.rate, stiffness, effects, args.theta)
+    structure, theta = sizes(samples, command.rate, stiffness, _effects(args), args.theta)
     return {
         'schema': 'actuator_glue.truth/1',
         'plant': args.plant,
@@ -223,15 +221,7 @@ def _command(args: argparse.Namespace) -> Command | Record:
     return Record(samples, samples, 1.0 / rate)
 
 
-def _parse_effect(text: str) -> tuple[str, dict[str, float]]:
-    name, _, rest = text.partition(':')
-    values = {}
-    for item in filter(None, rest.split(',')):
-        key, sign, value = item.partition('=')
-        try:
-            values[key.strip()] = float(value)
-        except ValueError:
-            sign = ''
-        if not sign:
-            raise InputError(f'--effect {text}: {item!r} is not PARAMETER=VALUE')
-    return name.strip(), values
+def _effects(args: argparse.Namespace) -> dict[str, dict[str, float]]:
+    from actuator_glue.api.simulation import named_effects
+
+    return named_effects('+'.join(args.effect))

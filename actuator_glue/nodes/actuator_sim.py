@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from actuator_glue.api.simulation import EFFECTS_FORM, SHAPES, Command, named_effects, sizes
 from actuator_glue.errors import InputError
 from actuator_glue.model import commands
 from actuator_glue.model.benchmark_plant import benchmark_plant
@@ -22,11 +23,11 @@ from actuator_glue.nodes import folders, own_effects, spin, streamer, undeclared
 from actuator_glue.nodes.blocks import BlockPublisher
 from actuator_glue.nodes.pacer import Step
 from actuator_glue.nodes.parameters import Parameters, Spec
-from actuator_glue.records import Array, Record
+from actuator_glue.records import Array
 
 # Parameters of the simulated actuator: near the paper's, not equal to any table's.
 _TRUE = {'beta_1': 134.0, 'alpha_1_beta_0': 1.1e9, 'alpha_2': 2.5e5, 'alpha_3': 0.5}
-COMMANDS = ('sweep', 'sine', 'noise', 'earthquake', 'file')
+COMMANDS = (*SHAPES, 'file')
 
 SPECS = (
     Spec('actuator', 'actuator', 'name of the actuator', read_only=True),
@@ -55,7 +56,7 @@ SPECS = (
     Spec(
         'undeclared_effect',
         '',
-        f'effects of the plant, told to nobody; {undeclared.FORM}',
+        f'effects of the plant, told to nobody; {EFFECTS_FORM}',
         secret=True,
     ),
     own_effects.SPEC,
@@ -81,7 +82,7 @@ class SimulatorNode(streamer.Streamer):
         """Refuse combinations that cannot be simulated."""
         own_effects.load(values)
         if values['undeclared_effect'] != Parameters.HIDDEN:
-            given = undeclared.parse(values['undeclared_effect'])
+            given = named_effects(values['undeclared_effect'])
             if given and values['plant'] != 'paper':
                 raise InputError("undeclared effects need plant 'paper'")
         if values['command'] == 'file' and not values['command_file']:
@@ -115,24 +116,18 @@ class SimulatorNode(streamer.Streamer):
         values = self._values
         if values['plant'] == 'benchmark':
             return benchmark_plant(period=1.0 / values['rate'], seed=values['seed'])
-        theta = np.array([values[p.name] for p in BASE])
-        truth: dict[str, dict[str, float]] = {}
-        if values['undeclared_effect']:
-            record = Record(
-                command=self.command[:200_000],
-                measured=self.command[:200_000],
-                period=1.0 / values['rate'],
-                stiffness=values['specimen_stiffness'],
-            )
-            truth = undeclared.sizes(undeclared.parse(values['undeclared_effect']), theta, record)
-        if truth or values['sealed_file']:
-            self._seal(truth, theta)
-        structure = Structure(truth)
-        full = structure.neutral(theta)
-        full[len(BASE) :] = [v for effect in truth.values() for v in effect.values()]
+        structure, theta = sizes(
+            self.command[:200_000],
+            values['rate'],
+            values['specimen_stiffness'],
+            named_effects(values['undeclared_effect']),
+            [values[p.name] for p in BASE],
+        )
+        if structure.effects or values['sealed_file']:
+            self._seal(structure, theta)
         moving = Stream(
             structure,
-            full,
+            theta,
             stiffness=values['specimen_stiffness'],
             period=1.0 / values['rate'],
             hold=values['hold'],
@@ -145,12 +140,12 @@ class SimulatorNode(streamer.Streamer):
             seed=values['seed'],
         )
 
-    def _seal(self, truth: dict[str, dict[str, float]], theta: Array) -> None:
+    def _seal(self, structure: Structure, theta: Array) -> None:
         if self._sealed is None:
             given = self._values['sealed_file']
             self._sealed = Path(given) if given else folders.unnamed('truth', '.json')
             self.get_logger().info(f'the truth is sealed in {self._sealed}')
-        undeclared.seal(self._sealed, truth, theta)
+        undeclared.seal(self._sealed, structure, theta)
 
     # Below runs in the pacer's thread.
 
@@ -202,21 +197,22 @@ class SimulatorNode(streamer.Streamer):
 
 
 def _command(values: Mapping[str, Any]) -> Array:
-    rate, kind, duration = values['rate'], values['command'], values['duration']
-    amplitude, low, high = values['amplitude'], values['frequency_start'], values['frequency_end']
+    rate, kind = values['rate'], values['command']
     if kind == 'file':
         from actuator_glue.io.load import load_records
 
         record = load_records(values['command_file'], channels=values['channels'] or None)[0]
         command = commands.recorded(record, rate)
-    elif kind == 'sweep':
-        command = commands.sweep(rate, duration, low, high, amplitude)
-    elif kind == 'sine':
-        command = commands.sine(rate, duration, high, amplitude)
-    elif kind == 'noise':
-        command = commands.noise(rate, duration, low, high, amplitude, seed=values['seed'])
     else:
-        command = commands.earthquake(rate, duration, amplitude, seed=values['seed'])
+        command = Command(
+            kind,
+            rate,
+            values['duration'],
+            values['amplitude'],
+            values['frequency_start'],
+            values['frequency_end'],
+            values['seed'],
+        ).samples()
     rest = np.full(round(values['rest'] * rate), command[0])
     return np.concatenate([rest, command])
 
