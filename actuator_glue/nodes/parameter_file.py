@@ -14,6 +14,7 @@ from actuator_glue.nodes import (
     lab_bridge,
     recorder,
     replay,
+    viewer,
 )
 from actuator_glue.nodes.parameters import Spec
 
@@ -24,6 +25,7 @@ NODES = {
     'replay': replay.SPECS,
     'lab_bridge': lab_bridge.SPECS,
     'diagnoser': diagnoser.SPECS,
+    'viewer': viewer.SPECS,
 }
 HEAD = """\
 # Every parameter of every node, with its default. Copy this file and keep what you change:
