@@ -84,9 +84,14 @@ def statistics(data: Data, error: Array) -> dict[str, float]:
         'trend': 0.0,
     }
     rows = zip(
-        data.records, data.masks, data.split(error), data.split(data.target - error),
-        data.times, data.periods, strict=True,
-    )  # fmt: skip
+        data.records,
+        data.masks,
+        data.split(error),
+        data.split(data.target - error),
+        data.times,
+        data.periods,
+        strict=True,
+    )
     for record, mask, e, y, t, period in rows:
         out['ljung_box_p'] = min(out['ljung_box_p'], ljung_box(e))
         u = record.command[mask] - record.command[mask].mean()

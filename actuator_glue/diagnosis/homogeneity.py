@@ -44,11 +44,7 @@ def agreement(trial: Trial, scorer: Scorer) -> dict[str, Homogeneity]:
     by the block-clustered (sandwich) variance (Liang and Zeger 1986), never deflated.
     """
     error, jac = scorer.whiten(trial.fit.error), scorer.whiten(trial.fit.jacobian)
-    edges = [
-        (int(a), int(b))
-        for part in scorer.data.parts
-        for a, b in _halves(part)
-    ]  # fmt: skip
+    edges = [(int(a), int(b)) for part in scorer.data.parts for a, b in _halves(part)]
     model = trial.structure
     out = {}
     for effect in model.entries:

@@ -21,19 +21,33 @@ _PRODUCTS: Final = {
     'command': ('u |u|', 'u u u', 'u u', 'u |v|', '|x| v', 'v |v|', 'v v v'),
     'valve': ('e |e|', 'e e e', 'e e', 'e |x|'),
     'flow': (
-        'q x', 'q x x', 'q |x|', 'q |q|', 'q q q', 'q f', 'q f f',
-        'f |f|', 'f f f', 'f f',
+        'q x',
+        'q x x',
+        'q |x|',
+        'q |q|',
+        'q q q',
+        'q f',
+        'q f f',
+        'f |f|',
+        'f f f',
+        'f f',
     ),
     'force': ('v |v|', 'v v v', 'v v', '|v|', 'v x x', 'v |x|', 'x |x|', 'x x'),
     'specimen': ('k x |x|', 'k x x', 'k v', 'k v |v|'),
     'sensor': ('y |y|', 'y y y', 'y y', '|y|'),
-}  # fmt: skip
+}
 # Places whose signal may be rounded off towards its ends.
 _SATURATES: Final = ('command', 'valve', 'flow', 'sensor')
 _DIMENSIONS: Final = {
-    'u': (0, 1, 0), 'e': (0, 1, 0), 'x': (0, 1, 0), 'y': (0, 1, 0), 'v': (0, 1, -1),
-    'q': (1, 0, -1), 'f': (1, 0, 0), 'k': (1, -1, 0),
-}  # fmt: skip
+    'u': (0, 1, 0),
+    'e': (0, 1, 0),
+    'x': (0, 1, 0),
+    'y': (0, 1, 0),
+    'v': (0, 1, -1),
+    'q': (1, 0, -1),
+    'f': (1, 0, 0),
+    'k': (1, -1, 0),
+}
 LEARNED: Final = 'learned'  # source of such an effect
 _LARGEST = 0.5  # of the signal at the test's stroke and speed
 _SHARPEST = 5.0  # times a saturation may be overdriven
@@ -66,9 +80,15 @@ def _sizes(scale: Scale) -> dict[str, float]:
     stroke, speed = scale.stroke, scale.velocity
     error = float(scale.theta[0] / max(scale.theta[1], 1e-9)) * scale.oil * speed
     return {
-        'u': stroke, 'x': stroke, 'y': stroke, 'v': speed, 'e': error, 'q': scale.oil * speed,
-        'f': scale.stiffness * stroke, 'k': scale.stiffness,
-    }  # fmt: skip
+        'u': stroke,
+        'x': stroke,
+        'y': stroke,
+        'v': speed,
+        'e': error,
+        'q': scale.oil * speed,
+        'f': scale.stiffness * stroke,
+        'k': scale.stiffness,
+    }
 
 
 def _signal(place: str, sizes: dict[str, float]) -> float:

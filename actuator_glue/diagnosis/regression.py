@@ -81,9 +81,14 @@ def _motions(x: Array, command: Array, period: float, stiffness: float) -> dict[
     out = {'1': np.ones_like(x), 't': t}
     for name, c in (('x', x), ('v', v), ('e', e)):
         out |= {
-            name: c, f'|{name}|': np.abs(c), f'{name}^2': c**2, f'{name}|{name}|': c * np.abs(c),
-            f'{name}^3': c**3, f'sign {name}': np.tanh(50.0 * c), f't {name}': t * c,
-        }  # fmt: skip
+            name: c,
+            f'|{name}|': np.abs(c),
+            f'{name}^2': c**2,
+            f'{name}|{name}|': c * np.abs(c),
+            f'{name}^3': c**3,
+            f'sign {name}': np.tanh(50.0 * c),
+            f't {name}': t * c,
+        }
     out |= {'x v': x * v, 'x^2 v': x**2 * v, 'x v^2': x * v**2, 'x e': x * e}
     if stiffness > 0.0:
         out |= {'k x': x, 'k x^2': x**2, 'k x^3': x**3, 'k sign v': np.tanh(50.0 * v)}
@@ -107,8 +112,11 @@ def library(data: Data, theta: Array) -> dict[str, Array]:
         for name, raw in motions.items():
             passed = _passed(model, theta, record, stroke * raw)
             rate = np.gradient(passed, record.period)
-            for text, c in ((name, stroke * raw), (f'loop({name})', passed),
-                            (f'd/dt loop({name})', rate)):  # fmt: skip
+            for text, c in (
+                (name, stroke * raw),
+                (f'loop({name})', passed),
+                (f'd/dt loop({name})', rate),
+            ):
                 parts.setdefault(text, []).append(np.asarray(c)[mask])
     return {name: np.concatenate(parts.pop(name)) for name in list(parts)}
 

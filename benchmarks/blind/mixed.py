@@ -123,6 +123,17 @@ def build(seed: int) -> Case:
         measured.append(y + noise(rng, len(y), colour) + common)
         commands.append(u + common if spiky == 3 else u)
     return Case(
-        seed, kind, names, theta, plant.RATE, stiffness, commands, measured, clean, left(clean),
-        float(colour), sizes | ({'onset': onset[1]} if onset[0] else {}), shares,
-    )  # fmt: skip
+        seed,
+        kind,
+        names,
+        theta,
+        plant.RATE,
+        stiffness,
+        commands,
+        measured,
+        clean,
+        left(clean),
+        float(colour),
+        sizes | ({'onset': onset[1]} if onset[0] else {}),
+        shares,
+    )

@@ -15,8 +15,10 @@ def bash(*words: str, shell: str = 'bash') -> list[str]:
     ask = f'COMP_WORDS=({line}); COMP_CWORD={len(words)}; _actuator_glue; '
     done = subprocess.run(
         ['bash', '-c', script(shell) + ask + 'printf "%s\\n" "${COMPREPLY[@]}"'],
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     assert not done.stderr
     return done.stdout.split()
 

@@ -39,12 +39,21 @@ class Browser:
         self._profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         self._process = subprocess.Popen(
             [
-                PROGRAM, '--headless=new', '--no-sandbox', '--disable-gpu', '--hide-scrollbars',
-                '--disable-dev-shm-usage', '--window-size=1300,800', '--remote-debugging-port=0',
-                '--remote-allow-origins=*', f'--user-data-dir={self._profile.name}', 'about:blank',
+                PROGRAM,
+                '--headless=new',
+                '--no-sandbox',
+                '--disable-gpu',
+                '--hide-scrollbars',
+                '--disable-dev-shm-usage',
+                '--window-size=1300,800',
+                '--remote-debugging-port=0',
+                '--remote-allow-origins=*',
+                f'--user-data-dir={self._profile.name}',
+                'about:blank',
             ],
-            stderr=subprocess.PIPE, text=True,
-        )  # fmt: skip
+            stderr=subprocess.PIPE,
+            text=True,
+        )
         self._session = aiohttp.ClientSession()
         port = Path(self._profile.name, 'DevToolsActivePort')
         for _ in range(600):

@@ -22,20 +22,36 @@ def band(first: int, count: int, *, half: float = 0.4e-3) -> Any:
     """Return the scored total band about it."""
     median = block(first, count).measured
     return Message(
-        kind='total', levels=[0.5, 0.95], index=first, median=median, scored=True, forecast=True,
+        kind='total',
+        levels=[0.5, 0.95],
+        index=first,
+        median=median,
+        scored=True,
+        forecast=True,
         lower=np.concatenate([median - half / 3, median - half]),
         upper=np.concatenate([median + half / 3, median + half]),
-        widest_coverage=0.94, widest_level=0.95, widest_width=2 * half,
-    )  # fmt: skip
+        widest_coverage=0.94,
+        widest_level=0.95,
+        widest_width=2 * half,
+    )
 
 
 def posterior(window: int, mean: float = 123.4) -> Any:
     """Return a posterior of one parameter."""
     return Message(
-        window=window, parameter_names=['beta_1'], units=['1/s'], mean=[mean], stddev=[2.5],
-        prior_dominated=[False], effects=['backlash'], rhat_max=1.01, ess_min=900.0,
-        converged=True, nrmse=0.02, seconds=0.3,
-    )  # fmt: skip
+        window=window,
+        parameter_names=['beta_1'],
+        units=['1/s'],
+        mean=[mean],
+        stddev=[2.5],
+        prior_dominated=[False],
+        effects=['backlash'],
+        rhat_max=1.01,
+        ess_min=900.0,
+        converged=True,
+        nrmse=0.02,
+        seconds=0.3,
+    )
 
 
 def response() -> Any:
@@ -59,9 +75,12 @@ def health(name: str = '/estimator', level: bytes = b'\1', message: str = 'R-hat
 def setup() -> Any:
     """Return a TestSetup."""
     return Message(
-        actuator='north', header=Message(frame_id=''), specimen_stiffness=250e3, rate=RATE,
+        actuator='north',
+        header=Message(frame_id=''),
+        specimen_stiffness=250e3,
+        rate=RATE,
         source='a test',
-    )  # fmt: skip
+    )
 
 
 def intake(seconds: float, *, capacity: int = 1 << 17, live: bool = True) -> Intake:

@@ -106,10 +106,18 @@ def test_a_band_of_another_stream_does_no_harm() -> None:
 
 @pytest.mark.parametrize(
     'text',
-    ['', '[]', '{}', '{"stop": "x", "span": 1, "points": 100}', '[' * 900,
-     '{"stop": NaN, "span": 1, "points": 100}', '{"stop": 1, "span": 1e9, "points": 100}',
-     '{"stop": 1, "span": 1, "points": -1}', '{"stop": 1, "span": 1, "points": Infinity}'],
-)  # fmt: skip
+    [
+        '',
+        '[]',
+        '{}',
+        '{"stop": "x", "span": 1, "points": 100}',
+        '[' * 900,
+        '{"stop": NaN, "span": 1, "points": 100}',
+        '{"stop": 1, "span": 1e9, "points": 100}',
+        '{"stop": 1, "span": 1, "points": -1}',
+        '{"stop": 1, "span": 1, "points": Infinity}',
+    ],
+)
 def test_requests_that_are_none(text: str) -> None:
     """Whatever a page sends, nothing but InputError comes out."""
     with pytest.raises(InputError):

@@ -18,9 +18,15 @@ from actuator_glue.view.server import PageServer
 SESSION = Path(__file__).resolve().parents[2] / 'bags' / 'session'
 browser = pytest.mark.skipif(PROGRAM is None, reason='no Chromium on this computer')
 SHOWN = (
-    'north', '250 kN/m', 'beta_1', '123.4', '94 % inside the 95 % band', 'delay 31.2 ms',
-    'missing: backlash', '/estimator: R-hat high',
-)  # fmt: skip
+    'north',
+    '250 kN/m',
+    'beta_1',
+    '123.4',
+    '94 % inside the 95 % band',
+    'delay 31.2 ms',
+    'missing: backlash',
+    '/estimator: R-hat high',
+)
 BAND = (190, 213, 233)  # the band's blue over white
 
 
