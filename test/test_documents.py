@@ -243,6 +243,13 @@ def test_python_runs(page: Path, laboratory: Path) -> None:
             exec(compile(block.text, page.name, 'exec'), names)
 
 
+def program(path: Path) -> list[str]:
+    """Return the cells of code of a notebook, without what only notebooks know."""
+    cells = json.loads(path.read_text('utf-8'))['cells']
+    code = [''.join(cell['source']) for cell in cells if cell['cell_type'] == 'code']
+    return [re.sub(r'^%.*$', '', source, flags=re.MULTILINE) for source in code]
+
+
 @pytest.mark.parametrize('path', NOTEBOOKS, ids=name)
 def test_notebooks_are_stored_without_outputs(path: Path) -> None:
     """Outputs are made when the site is built; code compiles."""
@@ -250,7 +257,7 @@ def test_notebooks_are_stored_without_outputs(path: Path) -> None:
         if cell['cell_type'] == 'code':
             assert not cell['outputs']
             assert cell['execution_count'] is None
-            ast.parse(''.join(cell['source']))
+    assert all(ast.parse(source) for source in program(path))
 
 
 @pytest.mark.slow
@@ -260,13 +267,11 @@ def test_notebooks_run_in_half_a_minute(path: Path, monkeypatch: pytest.MonkeyPa
     """Each from its first cell to its last; the second run, when all is compiled, is timed."""
     mpl.use('Agg')
     monkeypatch.chdir(path.parent)
-    cells = json.loads(path.read_text('utf-8'))['cells']
-    program = [''.join(c['source']) for c in cells if c['cell_type'] == 'code']
     seconds = 0.0
     for _ in range(2):
         names: dict[str, object] = {}
         begin = time.process_time()
-        for source in program:
+        for source in program(path):
             exec(compile(source, path.name, 'exec'), names)
         seconds = time.process_time() - begin
         with suppress(InputError, KeyError):

@@ -116,6 +116,56 @@ def test_a_bag_of_other_topics(tmp_path: Path, capsys: pytest.CaptureFixture[str
     assert 'messages/s' in capsys.readouterr().out
 
 
+def test_a_labview_measurement_file(tmp_path: Path) -> None:
+    """Header of a .lvm with its marks, blanks where there is no comment."""
+    command, measured, _ = channels()
+    head = 'LabVIEW Measurement\t\nSeparator\tTab\nDate\t2026/05/01\n***End_of_Header***\t\n\t\n'
+    head += 'Channels\t2\t\t\nSamples\t4000\t4000\t\n***End_of_Header***\t\t\t\n'
+    head += 'X_Value\tTarget\tActual\tComment'
+    path = write(tmp_path / 'a.lvm', head, [TIME, command, measured], '\t')
+    found = looked(tmp_path, path)
+    assert found['channels']['command']['column'] == 'Target'
+    (record,) = load_records(path, channels=parse_channel_map(yaml.safe_load(found['map']), 'map'))
+    np.testing.assert_allclose(record.measured, measured * 1e-3, atol=1e-9)
+
+
+@pytest.mark.parametrize('suffix', ['.h5', '.parquet', '.tdms', '.xlsx'])
+def test_formats_with_columns_of_other_names(tmp_path: Path, suffix: str) -> None:
+    """Every format is looked at, and read through what is proposed."""
+    command, measured, force = channels()
+    named = {'Time': TIME, 'Setpoint': command, 'LVDT': measured, 'Load': force}
+    path = tmp_path / f'a{suffix}'
+    if suffix == '.h5':
+        import h5py
+
+        with h5py.File(path, 'w') as file:
+            for name, values in named.items():
+                file[f'run/{name}'] = values
+    elif suffix == '.parquet':
+        import pyarrow as pa
+        import pyarrow.parquet as pq
+
+        pq.write_table(pa.table(named), path)
+    elif suffix == '.tdms':
+        from nptdms import ChannelObject, TdmsWriter
+
+        with TdmsWriter(path) as writer:
+            writer.write_segment([ChannelObject('run', n, v) for n, v in named.items()])
+    else:
+        import openpyxl
+
+        book = openpyxl.Workbook()
+        book.active.append(list(named))
+        for row in np.column_stack(list(named.values())).tolist():
+            book.active.append(row)
+        book.save(path)
+    found = looked(tmp_path, path)
+    roles = {role: str(g['column']).rpartition('/')[2] for role, g in found['channels'].items()}
+    assert roles == {'time': 'Time', 'command': 'Setpoint', 'measured': 'LVDT', 'force': 'Load'}
+    (record,) = load_records(path, channels=parse_channel_map(yaml.safe_load(found['map']), 'map'))
+    np.testing.assert_allclose(record.command, command * 1e-3, rtol=1e-12)
+
+
 def test_a_file_that_needs_no_map(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """It is told so, and nothing is asked of the reader."""
     command, measured, _ = channels()
