@@ -9,6 +9,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from actuator_glue.api.provenance import provenance
 from actuator_glue.api.result import Result
 from actuator_glue.diagnosis import diagnose as core
 from actuator_glue.diagnosis.estimate import Json
@@ -127,14 +128,16 @@ def diagnose(
     if not 0.0 < false_alarms < 1.0:
         raise InputError(f'false_alarms {false_alarms:g} is no probability between 0 and 1')
     given = [records] if isinstance(records, Record) else list(records)
+    held = [holdout] if isinstance(holdout, Record) else list(holdout or ())
     with ThreadPoolExecutor(jobs) as pool:
         found = core.diagnose(
             given,
-            holdout,
+            held,
             seed=seed,
             each=pool.map,
             progress=progress,
             settings=Thresholds(false_alarms=false_alarms),
             clock=time.perf_counter,
         )
-    return Diagnosis(**{f.name: getattr(found, f.name) for f in fields(found)})
+    values = {f.name: getattr(found, f.name) for f in fields(found)}
+    return Diagnosis(**{**values, 'provenance': provenance([*given, *held], seed)})

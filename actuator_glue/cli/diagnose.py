@@ -7,6 +7,8 @@ the held-out records do not bear out what the fitting records say. 2: the input 
 from __future__ import annotations
 
 import argparse
+import shlex
+import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -103,6 +105,8 @@ def run(args: argparse.Namespace) -> int:
             progress=tell,
             false_alarms=args.false_alarms,
         )
+    command = shlex.join(['actuator-glue', *sys.argv[1:]])
+    found = replace(found, provenance={'command': command, **found.provenance})
     _show(found, args)
     write_json(found.to_json(), args.json)
     if args.report is not None:

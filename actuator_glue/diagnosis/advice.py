@@ -9,24 +9,16 @@ from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.estimate import Estimate, Json
 from actuator_glue.diagnosis.homogeneity import Homogeneity
 from actuator_glue.diagnosis.model_selection import Selection
+from actuator_glue.diagnosis.next_experiment import Experiment
 from actuator_glue.diagnosis.regression import Surrogate
 from actuator_glue.diagnosis.result import HeldOutError
 from actuator_glue.diagnosis.verdict import misses
 from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.model.effects import CATALOGUE
 
-# The experiment that separates two groups of effects (issue: second amplitude, down-sweep, ...).
-_EXPERIMENT = {
-    'lag': 'a sweep to a higher frequency (a delay does not roll off, a lag does)',
-    'offset': 'a record with leakage to feel it: high stiffness held at a constant offset',
-    'lost-motion': 'a second amplitude (0.5 mm): play keeps its width',
-    'friction': 'a slow triangle wave at a second amplitude; the force channel shows it directly',
-    'gain': 'a second specimen stiffness, and a static step',
-    'flow-time': 'a down-sweep: time and frequency then run against each other',
-}
 # Above this a posterior's spread may be off by a tenth and more.
 _CONVERGED = 1.2
-_OTHERWISE = 'a second amplitude, a down-sweep or a record with another specimen stiffness'
+_TELLING = 4.0  # nats, as where names count as tied
 
 
 def _where(row: Json) -> str:
@@ -45,17 +37,15 @@ def of(
     found: Selection,
     generic: Surrogate,
     stretches: dict[str, Homogeneity],
+    experiments: Sequence[Experiment],
 ) -> tuple[str, ...]:
-    """Advice for a decision."""
+    """Advice for a decision; `experiments` tell tied names apart, best first."""
     out = []
     entries = {e.name: e for e in decision.final.structure.entries}
     for name in decision.names:
         tied = [r.name for r in found.rivals[name] if r.tied and r.name != name]
         if tied:
-            group = entries[name].group
-            same = all(CATALOGUE[t].group == group for t in tied)
-            way = _EXPERIMENT.get(group, _OTHERWISE) if same else _OTHERWISE
-            out.append(f'{name} cannot be told from {", ".join(tied)} here; record {way}')
+            out.append(f'{name} cannot be told from {", ".join(tied)} here')
         out += [
             f'{r.name}, which is {name} at {r.limit[0]} = {_neutral(r.name):g}, is not excluded: '
             f'{r.limit[0]} may be as far as {r.limit[1]:.3g} (95 %)'
@@ -69,6 +59,7 @@ def of(
                 f'{name} does not agree across the halves of the records ({sizes} {unit}): its '
                 'size changes with time, frequency or stiffness, or it stands for something else'
             )
+    out += _next(experiments)
     own = decision.final.own
     if own is not None:
         out.append(
@@ -110,6 +101,16 @@ def _neutral(richer: str) -> float:
     """Value at which a richer form is the effect it holds."""
     holds = CATALOGUE[richer].holds
     return holds[2] if holds else 0.0
+
+
+def _next(experiments: Sequence[Experiment]) -> list[str]:
+    """Say which test would tell tied names apart, and what the least telling one would bring."""
+    if not experiments:
+        return []
+    best, last = experiments[0], experiments[-1]
+    if best.nats < _TELLING:
+        return [f'no test of the menu would tell tied names apart; the best is {best.sentence()}']
+    return [f'to tell tied names apart record {best.sentence()}; least telling: {last.sentence()}']
 
 
 def unidentified(data: Data, estimates: dict[str, Estimate]) -> tuple[str, ...]:

@@ -11,34 +11,30 @@ import numpy as np
 
 from actuator_glue.diagnosis import (
     advice,
+    findings,
     homogeneity,
     learned_term,
-    per_record_settings,
     posterior,
+    response,
     verdict,
 )
-from actuator_glue.diagnosis.completeness import Decision
 from actuator_glue.diagnosis.detect import alarm_of
 from actuator_glue.diagnosis.estimate import Estimate
-from actuator_glue.diagnosis.finding import Candidate, Finding
 from actuator_glue.diagnosis.fit import Space
-from actuator_glue.diagnosis.homogeneity import Homogeneity
-from actuator_glue.diagnosis.measurement import Measured
-from actuator_glue.diagnosis.model_selection import Selection
+from actuator_glue.diagnosis.next_experiment import Experiment, ranked
 from actuator_glue.diagnosis.pipeline import (
+    Conclusion,
     Progress,
     conclude,
     with_learned_terms,
     with_the_right_hold,
 )
 from actuator_glue.diagnosis.preparation import prepare
-from actuator_glue.diagnosis.ranking import standard_error, weights
 from actuator_glue.diagnosis.result import DiagnosisData
-from actuator_glue.diagnosis.search import Each, Trial
+from actuator_glue.diagnosis.search import Each
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.verify import Side, traces, verify
 from actuator_glue.inference.at_bound import Pressed, pressed
-from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Record
 
@@ -103,7 +99,12 @@ def diagnose(
     )
     space = Space(after.model, max(r.duration for r in data.records))
     estimates, held_at = _estimates(space, after), _pressed(space, after)
-    effects = _findings(decision, found, estimates, stretches)
+    experiments = _experiments(result)
+    sizes = result.selection.search.scale()
+    decision = replace(
+        decision, certainty=verdict.certainty(decision.certainty, error, found.material)
+    )
+    effects = findings.of(decision, found, estimates, stretches)
     learned = learned_term.described(decision.final, data, estimates)
     moved = any(e.noise is None for e in effects)
     judged = verdict.conclude(decision.verdict, moved, error, found.material)
@@ -112,13 +113,13 @@ def diagnose(
         verdict=judged,
         effects=effects,
         error=error,
-        candidates=_candidates(found, result.seen),
+        candidates=findings.candidates(found, result.seen),
         coverage=coverage,
         alarm=alarm_of(found, result.seen, decision, data, seed, settings.false_alarms),
         advice=(
             *advice.at_bound(held_at, estimates),
             *(term.sentence() for term in learned),
-            *advice.of(decision, found, result.generic, stretches),
+            *advice.of(decision, found, result.generic, stretches, experiments),
             *advice.contradicted(error, found.material),
             *advice.unidentified(data, estimates),
             *advice.unconverged(rhat),
@@ -127,6 +128,14 @@ def diagnose(
         base={p.name: estimates[p.name] for p in BASE},
         structure=decision.final.effects,
         learned=learned,
+        base_before={
+            n: e for n, e in _estimates(Space(before.model, 0.0), before).items() if n in estimates
+        },
+        responses=tuple(
+            response.of(after.model, after.theta, after.draws[:: len(after.draws) // 32], sizes, k)
+            for k in sorted({r.known_stiffness() for r in data.records})
+        ),
+        experiments=experiments,
         names=tuple(p.name for p in after.model.parameters),
         posterior=after.draws,
         rhat=rhat,
@@ -151,6 +160,23 @@ def diagnose(
             )
         ),
     )
+
+
+def _experiments(result: Conclusion) -> tuple[Experiment, ...]:
+    """Rank tests by what they would tell about names that these records leave tied."""
+    final, search = result.decision.final, result.selection.search
+    if final.own is not None:
+        return ()
+    rivals = []
+    for name in result.decision.names:
+        rest = [n for n in final.effects if n != name]
+        for rival in result.found.rivals[name]:
+            trial = search.known((*rest, rival.name)) if rival.tied else None
+            if trial is not None and rival.name != name:
+                rivals.append(trial)
+    if not rivals:
+        return ()
+    return ranked(final, rivals, result.scorer, search.scale(), result.decision.noise)
 
 
 def _pressed(space: Space, side: Side) -> tuple[Pressed, ...]:
@@ -178,98 +204,3 @@ def _estimates(space: Space, side: Side) -> dict[str, Estimate]:
             parameter.unit, parameter.neutral, bool(known[i]), (float(lower[i]), float(upper[i])),
         )  # fmt: skip
     return out
-
-
-def _measured_estimates(effect: Measured) -> dict[str, Estimate]:
-    rows = zip(CATALOGUE[effect.name].parameters, effect.values, effect.stddev, strict=True)
-    return {
-        p.name: Estimate(v, s, v - 1.96 * s, v + 1.96 * s, p.unit, p.neutral) for p, v, s in rows
-    }
-
-
-def _findings(
-    decision: Decision,
-    found: Selection,
-    estimates: dict[str, Estimate],
-    stretches: dict[str, Homogeneity],
-) -> tuple[Finding, ...]:
-    out = []
-    entries = {e.name: e for e in decision.final.structure.entries}
-    for name in decision.names:
-        described = learned_term.is_learned(entries[name])
-        # A learned term describes; there is no cause by its name that might be true.
-        rivals = tuple(
-            replace(r, probability=decision.certainty * r.probability) for r in found.rivals[name]
-        )
-        tied = [r for r in rivals if r.tied]
-        own = {p.name: estimates[p.name] for p in entries[name].parameters}
-        first = next(iter(own.values()))
-        gained = found.removed[name]
-        out.append(
-            Finding(
-                name=name,
-                alternatives=tuple(r.name for r in tied if r.name != name),
-                probability=math.nan
-                if described
-                else next(r.probability for r in rivals if r.name == name),
-                place=entries[name].place,
-                parameters=own,
-                error_without=float(np.sqrt(found.final.mean_square + gained**2)),
-                error_with=found.final.fit.rms,
-                evidence=found.evidence[name],
-                plausible=_excludes_neutral(first),
-                agrees_across_windows=stretches[name].agree,
-                windows=stretches[name].values,
-                records=_records_of(decision.final, name),
-                rivals=() if described else rivals,
-            )
-        )
-    for effect in decision.measured:
-        total = float(np.sqrt(found.final.mean_square))
-        out.append(
-            Finding(
-                name=effect.name,
-                alternatives=(),
-                probability=math.nan,
-                place=CATALOGUE[effect.name].place,
-                parameters=_measured_estimates(effect),
-                error_without=total,
-                error_with=total,
-                evidence=effect.nats,
-                noise=effect.rms,
-            )
-        )
-    return tuple(
-        sorted(out, key=lambda f: f.error_with**2 - f.error_without**2 - (f.noise or 0.0) ** 2)
-    )
-
-
-def _records_of(trial: Trial, name: str) -> tuple[str, ...]:
-    """Records that alone have an effect; none where all have it."""
-    if not isinstance(trial.own, per_record_settings.OneRecord) or trial.own.own != name:
-        return ()
-    return (trial.own.records[0].source or 'one record',)
-
-
-def _excludes_neutral(estimate: Estimate) -> bool:
-    if estimate.neutral is None:
-        return True
-    return not estimate.lower <= estimate.neutral <= estimate.upper
-
-
-def _candidates(found: Selection, seen: tuple[Measured, ...]) -> tuple[Candidate, ...]:
-    base = found.base.scores
-    known = weights(np.stack([*(t.scores for t in found.singles), base]))
-    rows = [
-        Candidate(
-            t.added, float((t.scores - base).sum()), t.fit.rms, float(w),
-            standard_error(t.scores - base),
-        )
-        for t, w in zip(found.singles, known, strict=False)
-    ]  # fmt: skip
-    base_rms = found.base.fit.rms
-    rows += [
-        Candidate(m.name, m.nats, float(np.sqrt(max(0.0, base_rms**2 - m.rms**2))), math.nan)
-        for m in seen
-    ]
-    return tuple(sorted(rows, key=lambda c: c.error))

@@ -19,13 +19,12 @@ _MOST = 2  # learned terms
 _REFITS = 4  # per structure and turn
 
 
-def learned(selection: ModelSelection, found: Selection, limit: float) -> Selection | None:
+def learned(selection: ModelSelection, found: Selection) -> Selection | None:
     """Go on from a selection with learned terms.
 
     Args:
         selection: the model selection that ended with `found`.
         found: what the catalogue explains.
-        limit: structure that may remain [m].
 
     Returns:
         The selection with learned terms, or None where none is worth it.
@@ -45,7 +44,7 @@ def learned(selection: ModelSelection, found: Selection, limit: float) -> Select
         best = better
         selection.renoise(best)
         best = search.trial(best.effects, best.added)
-        if selection.left(best) < limit:
+        if selection.left(best) < selection.material:
             break
     if best is found.final:
         return None

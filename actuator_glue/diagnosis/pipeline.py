@@ -83,10 +83,10 @@ def _conclude(prepared: Prepared, settings: Thresholds, each: Each, tell: Progre
 
 
 def with_learned_terms(result: Conclusion) -> Conclusion:
-    """Describe by learned terms what the catalogue leaves unexplained."""
-    if result.decision.verdict != 'unexplained' or result.found.final.own is not None:
+    """Describe by learned terms material structure that the catalogue leaves."""
+    if result.decision.left < result.found.material or result.found.final.own is not None:
         return result
-    found = learning.learned(result.selection, result.found, result.decision.limit)
+    found = learning.learned(result.selection, result.found)
     if found is None:
         return result
     return _conclusion(result.prepared, result.selection, found, result.line)

@@ -10,6 +10,8 @@ from actuator_glue.diagnosis.estimate import Estimate, Json, number
 from actuator_glue.diagnosis.finding import Candidate, Finding
 from actuator_glue.diagnosis.headline import headline
 from actuator_glue.diagnosis.learned_term import LearnedTerm
+from actuator_glue.diagnosis.next_experiment import Experiment
+from actuator_glue.diagnosis.response import Response
 from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.json_value import JsonObject, json_fields, json_value
 from actuator_glue.model.effects import CATALOGUE, Effect
@@ -132,6 +134,10 @@ class DiagnosisData:
         at_bound: parameters that their bounds hold.
         sampling: per record its source, its rate as recorded and as fitted [Hz].
         learned: terms among the effects that were learned from these records.
+        base_before: posterior of Eq. (2)'s parameters without any addition.
+        responses: frequency response of the augmented model at each stiffness.
+        experiments: tests that would tell tied names apart, best first; none where none are tied.
+        provenance: how it was made: command line, seed, version, hashes, date.
     """
 
     verdict: Verdict
@@ -154,6 +160,10 @@ class DiagnosisData:
     at_bound: tuple[Pressed, ...] = ()
     sampling: tuple[Json, ...] = ()
     learned: tuple[LearnedTerm, ...] = ()
+    base_before: dict[str, Estimate] = field(default_factory=dict)
+    responses: tuple[Response, ...] = ()
+    experiments: tuple[Experiment, ...] = ()
+    provenance: dict[str, str] = field(default_factory=dict)
 
     def to_json(self) -> Json:
         """Return the object of schema `actuator_glue.diagnosis/1` (curves and draws left out)."""
@@ -168,6 +178,9 @@ class DiagnosisData:
             'coverage': {'before': number(self.coverage[0]), 'after': number(self.coverage[1])},
             'alarm': self.alarm.to_json(),
             'base': {name: p.to_json() for name, p in self.base.items()},
+            'base_before': {name: p.to_json() for name, p in self.base_before.items()},
+            'responses': [r.to_json() for r in self.responses],
+            'experiments': [e.to_json() for e in self.experiments],
             'rhat': number(self.rhat),
             'sampling': list(self.sampling),
             'at_bound': [p.to_json() for p in self.at_bound],
@@ -177,6 +190,7 @@ class DiagnosisData:
             'remaining': self.remaining,
             'advice': list(self.advice),
             'seconds': number(self.seconds),
+            'provenance': self.provenance,
         }
 
     def entry(self, name: str) -> Effect:

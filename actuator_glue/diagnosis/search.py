@@ -121,6 +121,11 @@ class Search:
         found = self._tried[frozenset(effects)]
         return Trial(self.structure(*effects), added, found, self.scorer.block_scores(found))
 
+    def known(self, effects: Iterable[str]) -> Trial | None:
+        """Return a structure that was refitted, or None."""
+        names = tuple(effects)
+        return self.trial(names) if frozenset(names) in self._tried else None
+
     def add(self, current: Trial, name: str) -> Trial:
         """Refit `current` with one more effect."""
         model = self.structure(*current.effects, name)
@@ -181,7 +186,9 @@ class Search:
             rows.append(seen if own is part else seen[:, part.rows])
         every = np.concatenate(rows)
         jacobian = self._tried[frozenset()].jacobian[:, part.rows]
-        return every[np.isfinite(every).all(axis=1)], jacobian, self.scorer.of_part(part)
+        # A metre of response: it diverged.
+        alive = np.nan_to_num(np.abs(every), nan=np.inf).max(axis=1) < 1.0
+        return every[alive], jacobian, self.scorer.of_part(part)
 
     def screen(self, current: Trial, name: str) -> tuple[float, Array]:
         """Project the residual on an effect's signatures (see diagnosis/screening.py).

@@ -38,3 +38,16 @@ def conclude(verdict: Verdict, moved: bool, error: HeldOutError, material: float
     if verdict == 'unexplained' or not misses(error, material):
         return verdict
     return 'unexplained' if moved and error.removed_ci[0] > 0.0 else 'undecided'
+
+
+def certainty(fitted: float, error: HeldOutError, material: float) -> float:
+    """Return what the names' probabilities are multiplied with, in [0, 1].
+
+    Args:
+        fitted: by the fitting part.
+        error: held-out error; where it shows more than noise, names explain at most their share.
+        material: smallest error that matters [m].
+    """
+    if not misses(error, material):
+        return fitted
+    return min(fitted, max(0.0, min(1.0, error.removable_removed)))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.records import source_name
 from actuator_glue.report import diagnosis_figures as figures
+from actuator_glue.report.diagnosis_summary import closing, summary
 from actuator_glue.report.html import Block, Note, Page, Picture, Section, Table, Text
 
 
@@ -112,7 +113,6 @@ def _effects(found: DiagnosisData) -> Section:
             f'({", ".join(s["features"])}) {_um(s["error"])} um.'
         )
     )
-    blocks += [Note(line) for line in found.advice]
     return Section('What is missing', blocks)
 
 
@@ -189,5 +189,6 @@ def brief(found: DiagnosisData) -> list[Block]:
 
 def page(found: DiagnosisData) -> Page:
     """Return the report of a diagnosis."""
-    sections = [_error(found), _effects(found), _residual(found), _records(found)]
+    evidence = [_error(found), _effects(found), _residual(found), _records(found)]
+    sections = [summary(found), *evidence, *closing(found)]
     return Page('Diagnosis', found.summary(), sections)

@@ -8,6 +8,9 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from actuator_glue.diagnosis.finding import Rival
+from actuator_glue.diagnosis.next_experiment import Experiment
+from actuator_glue.diagnosis.response import Response, Sine
 from actuator_glue.diagnosis.result import (
     Alarm,
     Candidate,
@@ -181,3 +184,35 @@ def test_paths_stand_in_one_table() -> None:
     same = replace(found, effects=(), structure=(), verdict='none')
     page = render(page_of(same))
     assert 'nothing was added' in page
+
+
+def test_first_page_says_what_came_out_and_what_to_do() -> None:
+    """Verdict, certainty, errors, response, equation, tests to come; glossary, provenance."""
+    sine = Sine(5.0, 1e-3, 0.9, (0.89, 0.91), -20.0, (-21.0, -19.0), 0.0111, (0.011, 0.0112))
+    rivals = (
+        Rival('backlash', 0.0, 0.0, 0.0, True, 0.7),
+        Rival('valve-deadband', 3.0, 2.0, 1e-6, True, 0.2),
+    )
+    found = diagnosis(6e-5)
+    finding = replace(found.effects[0], rivals=rivals, probability=0.7)
+    base = {'beta_1': Estimate(128.0, 1.0, 126.0, 130.0, '1/s')}
+    found = replace(
+        found, effects=(finding,), base=base, base_before=base,
+        responses=(Response(250e3, (sine,), 12.3),),
+        experiments=(Experiment('a down-sweep', 5e-4, 0.0, 42.0),),
+        provenance={'seed': '7', 'sha256 of a.csv': 'abc'},
+    )  # fmt: skip
+    text = re.sub(r'<[^>]+>', ' ', render(page_of(found)))
+    assert text.index('removable error removed') < text.index('sham effect of equal size')
+    for shown in ('70 %', 'valve-deadband 20 %', '10 %', 'a down-sweep', '42', '126 to 130'):
+        assert shown in text
+    for shown in (
+        '0.900',
+        '-20.0',
+        '11.10',
+        '12.3',
+        'sha256 of a.csv',
+        'Glossary',
+        'beta_1 = 128',
+    ):
+        assert shown in text

@@ -12,6 +12,5 @@ EFFECT = term(
     group='saturation',
     signature='odd harmonics above an onset in the velocity of the command',
     source='Jelali & Kroll 2003',
-    searched=False,
     check=False,
 )

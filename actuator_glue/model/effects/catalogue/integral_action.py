@@ -12,6 +12,5 @@ EFFECT = term(
     group='integral',
     signature='linear; no static error, overshoot at low frequency; weak, it passes for a gain',
     source='Jelali & Kroll 2003 (PI control)',
-    searched=False,
     check=False,
 )

@@ -15,6 +15,5 @@ EFFECT = term(
     group='sensor-curve',
     signature='harmonics that do not depend on frequency; relative size grows with A and A^2',
     source='IEEE Std 1057-2017 (integral nonlinearity)',
-    searched=False,
     check=False,
 )

@@ -12,6 +12,5 @@ EFFECT = term(
     group='lost-motion',
     signature='minor loops: the valve answers a reversal late',
     source='Merritt 1967; Tao & Kokotovic 1996 (play operator)',
-    searched=False,
     check=False,
 )

@@ -1,0 +1,116 @@
+"""Findings of a decision: sizes, rivals, probabilities, errors with and without."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from actuator_glue.diagnosis import learned_term, per_record_settings
+from actuator_glue.diagnosis.completeness import Decision
+from actuator_glue.diagnosis.estimate import Estimate
+from actuator_glue.diagnosis.finding import Candidate, Finding
+from actuator_glue.diagnosis.homogeneity import Homogeneity
+from actuator_glue.diagnosis.measurement import Measured
+from actuator_glue.diagnosis.model_selection import Selection
+from actuator_glue.diagnosis.ranking import standard_error, weights
+from actuator_glue.diagnosis.search import Trial
+from actuator_glue.model.effects import CATALOGUE
+
+
+def _measured_estimates(effect: Measured) -> dict[str, Estimate]:
+    rows = zip(CATALOGUE[effect.name].parameters, effect.values, effect.stddev, strict=True)
+    return {
+        p.name: Estimate(v, s, v - 1.96 * s, v + 1.96 * s, p.unit, p.neutral) for p, v, s in rows
+    }
+
+
+def of(
+    decision: Decision,
+    found: Selection,
+    estimates: dict[str, Estimate],
+    stretches: dict[str, Homogeneity],
+) -> tuple[Finding, ...]:
+    """Return the additions of a decision with sizes, rivals and errors, most removed first."""
+    out = []
+    entries = {e.name: e for e in decision.final.structure.entries}
+    for name in decision.names:
+        described = learned_term.is_learned(entries[name])
+        # A learned term describes; there is no cause by its name that might be true.
+        rivals = tuple(
+            replace(r, probability=decision.certainty * r.probability) for r in found.rivals[name]
+        )
+        tied = [r for r in rivals if r.tied]
+        own = {p.name: estimates[p.name] for p in entries[name].parameters}
+        first = next(iter(own.values()))
+        gained = found.removed[name]
+        out.append(
+            Finding(
+                name=name,
+                alternatives=tuple(r.name for r in tied if r.name != name),
+                probability=math.nan
+                if described
+                else next(r.probability for r in rivals if r.name == name),
+                place=entries[name].place,
+                parameters=own,
+                error_without=float(np.sqrt(found.final.mean_square + gained**2)),
+                error_with=found.final.fit.rms,
+                evidence=found.evidence[name],
+                plausible=_excludes_neutral(first),
+                agrees_across_windows=stretches[name].agree,
+                windows=stretches[name].values,
+                records=_records_of(decision.final, name),
+                rivals=() if described else rivals,
+            )
+        )
+    for effect in decision.measured:
+        total = float(np.sqrt(found.final.mean_square))
+        out.append(
+            Finding(
+                name=effect.name,
+                alternatives=(),
+                probability=math.nan,
+                place=CATALOGUE[effect.name].place,
+                parameters=_measured_estimates(effect),
+                error_without=total,
+                error_with=total,
+                evidence=effect.nats,
+                noise=effect.rms,
+            )
+        )
+    return tuple(
+        sorted(out, key=lambda f: f.error_with**2 - f.error_without**2 - (f.noise or 0.0) ** 2)
+    )
+
+
+def _records_of(trial: Trial, name: str) -> tuple[str, ...]:
+    """Records that alone have an effect; none where all have it."""
+    if not isinstance(trial.own, per_record_settings.OneRecord) or trial.own.own != name:
+        return ()
+    return (trial.own.records[0].source or 'one record',)
+
+
+def _excludes_neutral(estimate: Estimate) -> bool:
+    if estimate.neutral is None:
+        return True
+    return not estimate.lower <= estimate.neutral <= estimate.upper
+
+
+def candidates(found: Selection, seen: tuple[Measured, ...]) -> tuple[Candidate, ...]:
+    """Return every effect tried at the first turn and those of the measurement, best first."""
+    base = found.base.scores
+    known = weights(np.stack([*(t.scores for t in found.singles), base]))
+    rows = [
+        Candidate(
+            t.added, float((t.scores - base).sum()), t.fit.rms, float(w),
+            standard_error(t.scores - base),
+        )
+        for t, w in zip(found.singles, known, strict=False)
+    ]  # fmt: skip
+    base_rms = found.base.fit.rms
+    rows += [
+        Candidate(m.name, m.nats, float(np.sqrt(max(0.0, base_rms**2 - m.rms**2))), math.nan)
+        for m in seen
+    ]
+    return tuple(sorted(rows, key=lambda c: c.error))

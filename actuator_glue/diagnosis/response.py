@@ -1,0 +1,159 @@
+"""What the model does to a sine: gain, phase, delay and bandwidth, as a control engineer asks.
+
+The model has effects that are not linear, so that it is run: sines of the amplitude that the test
+reached at that frequency, and the first harmonic of what comes out (describing function).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from actuator_glue.diagnosis.data import Model
+from actuator_glue.diagnosis.estimate import Json, number
+from actuator_glue.model.effects import Scale
+from actuator_glue.records import Array, Record
+
+FREQUENCIES = (1.0, 2.0, 5.0, 10.0)  # Hz
+_HIGHEST = 60.0  # Hz
+_GRID = 16
+_RATE = 50.0  # samples per period, at least
+_SLOWEST = 256.0  # samples per second, at least
+_SETTLE = 2.0  # s
+_PERIODS = 3
+_HALF_POWER = 1.0 / math.sqrt(2.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Sine:
+    """Answer to one frequency.
+
+    Attributes:
+        frequency: [Hz].
+        amplitude: of the command [m].
+        gain: amplitude of the displacement over it, with its 95 % interval.
+        gain_ci: (lower, upper).
+        phase: lead [degrees].
+        phase_ci: (lower, upper).
+        delay: -phase over frequency [s].
+        delay_ci: (lower, upper).
+    """
+
+    frequency: float
+    amplitude: float
+    gain: float
+    gain_ci: tuple[float, float]
+    phase: float
+    phase_ci: tuple[float, float]
+    delay: float
+    delay_ci: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Response:
+    """Frequency response of a model under one stiffness.
+
+    Attributes:
+        stiffness: of the specimen [N/m].
+        sines: answers at `FREQUENCIES`.
+        bandwidth: frequency at which the gain falls below 0.71 of that at 1 Hz for good [Hz];
+            NaN where it does not below 60 Hz.
+    """
+
+    stiffness: float
+    sines: tuple[Sine, ...]
+    bandwidth: float
+
+    def to_json(self) -> Json:
+        """Return the JSON object."""
+        rows = [
+            {
+                'frequency_hz': s.frequency,
+                'amplitude': s.amplitude,
+                'gain': number(s.gain),
+                'gain_ci': [number(v) for v in s.gain_ci],
+                'phase_deg': number(s.phase),
+                'phase_ci': [number(v) for v in s.phase_ci],
+                'delay_s': number(s.delay),
+                'delay_ci': [number(v) for v in s.delay_ci],
+            }
+            for s in self.sines
+        ]
+        return {'stiffness': self.stiffness, 'bandwidth_hz': number(self.bandwidth), 'at': rows}
+
+
+def of(model: Model, theta: Array, draws: Array, scale: Scale, stiffness: float) -> Response:
+    """Return the response of a model.
+
+    Args:
+        model: Eq. (2) with effects.
+        theta: best parameters (p,).
+        draws: posterior draws (m, p), for the intervals.
+        scale: stroke and speed of the test: no sine exceeds either.
+        stiffness: of the specimen [N/m].
+    """
+    table = np.concatenate([theta[None], draws])
+    sines = []
+    for hertz in FREQUENCIES:
+        size = _amplitude(scale, hertz)
+        answer = _harmonic(model, table, size, hertz, stiffness)
+        gain, phase = np.abs(answer), np.angle(answer)
+        # Phases run away from the best one's by less than half a turn.
+        phase = phase[0] + np.angle(np.exp(1j * (phase - phase[0])))
+        if phase[0] > 0.5 * math.pi:
+            phase = phase - 2.0 * math.pi
+        turns = np.degrees(phase)
+        delay = -phase / (2.0 * math.pi * hertz)
+        sines.append(
+            Sine(
+                hertz, size, float(gain[0]), _interval(gain[1:]), float(turns[0]),
+                _interval(turns[1:]), float(delay[0]), _interval(delay[1:]),
+            )
+        )  # fmt: skip
+    return Response(stiffness, tuple(sines), _bandwidth(model, theta, scale, stiffness))
+
+
+def _interval(values: Array) -> tuple[float, float]:
+    if not len(values):
+        return math.nan, math.nan
+    low, high = np.nanquantile(values, [0.025, 0.975])
+    return float(low), float(high)
+
+
+def _amplitude(scale: Scale, hertz: float) -> float:
+    return min(scale.stroke, scale.velocity / (2.0 * math.pi * hertz))
+
+
+def _harmonic(model: Model, table: Array, size: float, hertz: float, stiffness: float) -> Array:
+    """Complex gain (m,) of the first harmonic of a sine."""
+    period = 1.0 / max(_SLOWEST, _RATE * hertz)
+    before = math.ceil(_SETTLE * hertz)
+    per = round(1.0 / hertz / period)
+    period = 1.0 / hertz / per
+    time = np.arange((before + _PERIODS) * per) * period
+    turn = np.exp(-2j * math.pi * hertz * time)
+    record = Record(-size * turn.imag, np.zeros(len(time)), period, stiffness, hold='linear')
+    out = np.atleast_2d(model.simulate(table, record))[:, -_PERIODS * per :]
+    last = turn[-_PERIODS * per :]
+    with np.errstate(all='ignore'):
+        return np.asarray(2j * (out @ last) / (_PERIODS * per) / size)
+
+
+def _bandwidth(model: Model, theta: Array, scale: Scale, stiffness: float) -> float:
+    grid = np.geomspace(FREQUENCIES[0], _HIGHEST, _GRID)
+    gains = np.array(
+        [
+            abs(_harmonic(model, theta[None], _amplitude(scale, f), float(f), stiffness)[0])
+            for f in grid
+        ]
+    )
+    level = _HALF_POWER * gains[0]
+    above = np.flatnonzero(gains >= level)
+    last = int(above[-1]) if len(above) else 0
+    if last == _GRID - 1 or not np.isfinite(gains).all():
+        return math.nan
+    a, b = np.log(gains[last]), np.log(max(gains[last + 1], 1e-12))
+    share = (a - math.log(level)) / max(a - b, 1e-12)
+    return float(np.exp(np.log(grid[last]) + share * np.log(grid[last + 1] / grid[last])))

@@ -1,0 +1,145 @@
+"""First and last pages of a diagnosis report: what came out, what to do; words, provenance."""
+
+from __future__ import annotations
+
+import math
+
+from actuator_glue.diagnosis.estimate import Estimate
+from actuator_glue.diagnosis.result import DiagnosisData
+from actuator_glue.report.html import Block, Note, Section, Table, Text
+
+_MEANS = {
+    'none': 'Nothing material is missing.',
+    'missing-effect': 'The additions named are the whole story, as far as these records go.',
+    'unexplained': 'Material structure remains beside what is named.',
+    'undecided': 'Fitting and held-out records contradict each other.',
+}
+_WORDS = (
+    ('Eq. (2)', 'the linear model of the actuator with four parameters, without additions'),
+    ('free-run error', 'measured displacement less the simulation, which never sees it'),
+    ('held out', 'records or stretches that decided nothing and were looked at once'),
+    ('removable error', 'what exceeds the noise: squared error less squared noise'),
+    ('noise', 'what no function of the command can explain'),
+    ('nats', 'gain in log-likelihood out of sample; 4.6 nats are odds of 100 to 1'),
+    ('or', 'names that these records cannot tell apart'),
+    ('none of these', 'nothing, or something that the catalogue does not hold'),
+    (
+        'sham',
+        'the best of as many effects that cannot be there as were tried: what chance does',
+    ),
+    ('gain, phase, delay', 'first harmonic of the displacement over that of a sine of command'),
+    ('bandwidth', 'frequency from which on the gain stays below 0.71 of that at 1 Hz'),
+    ('95 % interval', 'posterior of the parameter; block bootstrap of an error'),
+)
+
+
+def _um(value: float) -> str:
+    return f'{1e6 * value:.1f}'
+
+
+def _range(pair: tuple[float, float], scale: float, digits: int = 1) -> str:
+    if not all(map(math.isfinite, pair)):
+        return 'not known'
+    return f'{scale * pair[0]:.{digits}f} to {scale * pair[1]:.{digits}f}'
+
+
+def _certainty(found: DiagnosisData) -> list[Block]:
+    """How sure the names are."""
+    rows = []
+    for e in found.effects:
+        shown = [r for r in e.rivals if r.tied and r.name != e.name]
+        others = ', '.join(f'{r.name} {100 * r.probability:.0f} %' for r in shown)
+        known = math.isfinite(e.probability)
+        sure = f'{100 * e.probability:.0f} %' if known else 'a description, or noise: no name'
+        rows.append([e.name, sure, others or '-', f'{100 * e.none:.0f} %' if known else '-'])
+    if not rows:
+        return []
+    header = ['effect', 'probability', 'or', 'none of these']
+    return [Table(header, rows, 'How sure the names are.', prose=True)]
+
+
+def _error(found: DiagnosisData) -> Table:
+    e = found.error
+    removed = f'{100 * e.removable_removed:.0f} % ({_range(e.removed_ci, 100.0, 0)} %)'
+    rows = [
+        ['before: Eq. (2), refitted', _um(e.before), _range(e.before_ci, 1e6), ''],
+        ['after: with the additions', _um(e.after), _range(e.after_ci, 1e6), removed],
+        ['noise', _um(e.noise_floor), '', ''],
+    ]
+    header = ['held-out data', 'rms [um]', '95 % interval [um]', 'removable error removed']
+    return Table(header, rows, 'Free-run error before and after.')
+
+
+def _estimate(p: Estimate | None) -> str:
+    if p is None:
+        return '-'
+    text = f'{p.mean:.4g} ({p.lower:.4g} to {p.upper:.4g})'
+    return text if p.identified else f'{text}, not identified'
+
+
+def _parameters(found: DiagnosisData) -> Table:
+    rows = [
+        [name, p.unit, _estimate(found.base_before.get(name)), _estimate(p)]
+        for name, p in found.base.items()
+    ]
+    header = ['parameter', 'unit', 'before', 'after']
+    return Table(header, rows, "Eq. (2)'s parameters, means and 95 % intervals.")
+
+
+def _response(found: DiagnosisData) -> list[Block]:
+    rows = []
+    for r in found.responses:
+        width = f'{r.bandwidth:.1f}' if math.isfinite(r.bandwidth) else 'above 60'
+        rows += [
+            [
+                f'{r.stiffness / 1e3:g}', f'{s.frequency:g}', f'{1e3 * s.amplitude:.2g}',
+                f'{s.gain:.3f} ({_range(s.gain_ci, 1.0, 3)})',
+                f'{s.phase:.1f} ({_range(s.phase_ci, 1.0)})',
+                f'{1e3 * s.delay:.2f} ({_range(s.delay_ci, 1e3, 2)})',
+                width,
+            ]
+            for s in r.sines
+        ]  # fmt: skip
+    if not rows:
+        return []
+    header = ['k [kN/m]', 'f [Hz]', 'sine [mm]', 'gain', 'phase [deg]', 'delay [ms]', 'band [Hz]']
+    return [Table(header, rows, 'What the augmented model does to sines, and its bandwidth.')]
+
+
+def equation(found: DiagnosisData) -> str:
+    """Return the model's equation with its additions, in words that a program could take."""
+    lines = ["q' = -beta_1 q + alpha_1_beta_0 e, f' = q - alpha_2 v - alpha_3 f, e = u - x"]
+    lines += [f'{e.place}: {found.entry(e.name).equation}' for e in found.effects if not e.noise]
+    values = {n: p for e in found.effects for n, p in e.parameters.items() if not e.noise}
+    sizes = ', '.join(f'{n} = {p.mean:.4g} {p.unit}' for n, p in (found.base | values).items())
+    return '; '.join(lines) + (f'; with {sizes}' if sizes else '')
+
+
+def summary(found: DiagnosisData) -> Section:
+    """Return verdict, how sure, what next, errors, parameters, response and equation."""
+    blocks: list[Block] = [Text(f'{found.verdict}: {_MEANS[found.verdict]}')]
+    blocks += _certainty(found)
+    blocks += [Note(line) for line in found.advice]
+    if found.experiments:
+        rows = [
+            [e.text, f'{1e3 * e.amplitude:.2g}', f'{e.stiffness / 1e3:g}', f'{e.nats:.3g}']
+            for e in found.experiments[:5]
+        ]
+        header = ['test', 'amplitude [mm]', 'k [kN/m]', 'nats expected']
+        blocks.append(Table(header, rows, 'Tests that would tell tied names apart.', prose=True))
+    blocks.append(_error(found))
+    if found.base:
+        blocks.append(_parameters(found))
+    blocks += _response(found)
+    blocks.append(Text(f'Model: {equation(found)}'))
+    return Section('In short', blocks)
+
+
+def closing(found: DiagnosisData) -> list[Section]:
+    """Return the glossary and how the report was made."""
+    out = [Section('Glossary', [Table(['word', 'meaning'], _WORDS, 'Words.', prose=True)])]
+    if found.provenance:
+        rows = list(found.provenance.items())
+        table = Table(['', 'value'], rows, 'How this was made.', prose=True)
+        out.append(Section('Provenance', [table]))
+    return out
