@@ -29,9 +29,9 @@ class Decision:
         measured: measurement effects, named as findings.
         noise: rms of what no structure explains [m].
         left: rms structure that remains, without what measurement effects cause [m].
-        certainty: what the names' probabilities are multiplied with: 1 where next to nothing
-            remains, else the share of the structure that they explain and a generic regression
-            does not explain better.
+        certainty: what the names' probabilities are multiplied with: what the catalogue's own
+            lapses leave, and, where structure remains, the share of it that they explain and a
+            generic regression does not explain better.
         limit: rms structure above which a model counts as unexplained [m].
         remaining: where the rest sits, for the JSON.
     """
@@ -82,7 +82,8 @@ def decide(
         measured=seen,
         noise=found.noise,
         left=left,
-        certainty=_certainty(found, left, surrogate) if verdict == 'unexplained' else 1.0,
+        certainty=(1.0 - settings.outside)
+        * (_certainty(found, left, surrogate) if verdict == 'unexplained' else 1.0),
         limit=limit,
         remaining={'left': left, 'limit': limit, **remaining(data, final.fit.error)},
     )

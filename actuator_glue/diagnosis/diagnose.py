@@ -99,6 +99,7 @@ def diagnose(
     )
     space = Space(after.model, max(r.duration for r in data.records))
     estimates, held_at = _estimates(space, after), _pressed(space, after)
+    plain = Space(before.model, max(r.duration for r in data.records))
     experiments = _experiments(result)
     sizes = result.selection.search.scale()
     decision = replace(
@@ -128,9 +129,7 @@ def diagnose(
         base={p.name: estimates[p.name] for p in BASE},
         structure=decision.final.effects,
         learned=learned,
-        base_before={
-            n: e for n, e in _estimates(Space(before.model, 0.0), before).items() if n in estimates
-        },
+        base_before={n: e for n, e in _estimates(plain, before).items() if n in estimates},
         responses=tuple(
             response.of(after.model, after.theta, after.draws[:: len(after.draws) // 32], sizes, k)
             for k in sorted({r.known_stiffness() for r in data.records})

@@ -97,7 +97,7 @@ def _menu(data: Data, scale: Scale) -> Iterable[tuple[Record, Experiment]]:
     for share in (1.0, 0.25):
         size = share * stroke
         top = min(20.0, max(2.0, speed / (2.0 * np.pi * size)))
-        up = commands.sweep(_RATE, _DURATION, size, 0.1, top)
+        up = commands.sweep(_RATE, _DURATION, 0.1, top, size)
         shaking = commands.earthquake(_RATE, _DURATION, size, seed=_SEED)
         triangle = size * (2.0 / np.pi) * np.arcsin(np.sin(2.0 * np.pi * 0.1 * time))
         for text, command in (

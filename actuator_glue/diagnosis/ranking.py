@@ -22,6 +22,7 @@ _DRAWS = 2000
 _SEED = 0
 _BEYOND = 2.0  # standard errors
 _NORMAL_95 = 1.959964
+_NOT_NEAR = 0.1  # of the best's weight: excess beyond the tolerance
 _SAME = 0.5  # of what the best removes: a rival that removes less is none
 
 
@@ -68,6 +69,7 @@ def compare(
     """
     whole = removed(rest, best)
     known = weights(np.stack([t.scores for t in (best, *trials, rest)]))
+    known = _tolerant(known, [removed(t, best) for t in trials], settings.tie_share * whole)
     out = [Rival(name, 0.0, 0.0, 0.0, True, float(known[0]))]
     for trial, weight in zip(trials, known[1:], strict=False):
         nats = max(0.0, evidence(best.scores, trial.scores))
@@ -82,6 +84,18 @@ def compare(
         tied = near and removed(rest, trial) > _SAME * whole and not idle
         out.append(Rival(trial.added, nats, stderr, excess, tied, float(weight), limit))
     return tuple(sorted(out, key=lambda r: (r.nats, r.name != name)))
+
+
+def _tolerant(known: Array, excess: Sequence[float], tolerance: float) -> Array:
+    """Let rivals that leave as good as the same error share the best's weight (K + 2,).
+
+    The catalogue's equations are not the machine's: differences well below the share at which
+    two effects count as tied are its form's, whatever the nats.
+    """
+    near = np.exp(-2.0 * (np.array(excess) / max(tolerance, 1e-15)) ** 2)
+    out = known.copy()
+    out[1:-1] = np.maximum(out[1:-1], known[0] * np.where(near > _NOT_NEAR, near, 0.0))
+    return np.asarray(out / out.sum())
 
 
 def _limit(trial: Trial, name: str, scorer: Scorer) -> tuple[str, float] | None:

@@ -22,6 +22,8 @@ class Thresholds:
         left_share: and above this share of the structure found at first remains;
         beaten_noise, beaten_share: as left_noise and left_share, where a generic surrogate
             explains more than the names do (0.28 of the noise is found in noise alone).
+        outside: probability that a name stands for something the catalogue does not hold though
+            nothing remains: 5 of 111 blind cases (docs/diagnosis.md).
         most: most effects added.
         beam: structures carried on from one size to the next.
         evaluations: likelihood evaluations of the posterior; 0 takes the Laplace approximation.
@@ -39,6 +41,7 @@ class Thresholds:
     left_share: float = 0.3
     beaten_noise: float = 0.3
     beaten_share: float = 0.15
+    outside: float = 0.05
     most: int = 6
     beam: int = 3
     tried: int = 5

@@ -1,12 +1,15 @@
 """Rankings: weights from block scores, their class of none, and the level of false alarms."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import stats
 
-from actuator_glue.diagnosis import false_alarms
+from actuator_glue.diagnosis import false_alarms, ranking, verdict
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.ranking import standard_error, weights
+from actuator_glue.diagnosis.result import HeldOutError
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.records import Record
 
@@ -52,3 +55,19 @@ def test_the_best_of_many_candidates_by_chance() -> None:
     same = np.repeat(signatures[:1], 40, axis=0)
     alone = false_alarms.threshold(same, base, scorer, 0.01)
     assert alone == pytest.approx(0.5 * stats.chi2.isf(0.01, 1), rel=0.05)
+
+
+def test_names_that_are_tied_by_size_share_the_probability() -> None:
+    """What is told as 'cannot be told apart' is not told as certain: 80 nats, 1 % of the error."""
+    known = ranking._tolerant(np.array([1.0, 1e-30, 0.0]), [1e-8], 1e-6)
+    assert known == pytest.approx([0.5, 0.5, 0.0], abs=1e-3)
+    apart = ranking._tolerant(np.array([1.0, 1e-30, 0.0]), [3e-6], 1e-6)
+    assert apart == pytest.approx([1.0, 0.0, 0.0])
+
+
+def test_held_out_records_that_contradict_lower_the_certainty() -> None:
+    """Names that leave three times the noise where nothing was fitted are not certain."""
+    error = HeldOutError(95e-6, (0, 1), 31e-6, (0, 1), 10e-6, 0.9, (0.8, 1.0), 95e-6)
+    assert verdict.certainty(0.95, error, 5e-6) == pytest.approx(0.9)
+    good = replace(error, after=11e-6, removable_removed=0.99)
+    assert verdict.certainty(0.95, good, 5e-6) == 0.95
