@@ -61,7 +61,7 @@ def test_delay_and_lag_are_told_apart_by_fast_sweeps() -> None:
     delay, lag = (search.polish(search.add(search.trial(()), n)) for n in search.names)
     search.scorer = Scorer.of(data, splits_of(data, delay.fit.error))
     tests = ranked(delay, [lag], search.scorer, search.scale(), 1e-5)
-    assert max(e.amplitude for e in tests) == pytest.approx(2e-3, rel=0.01)
+    assert max(e.amplitude for e in tests) == pytest.approx(2e-3, rel=0.1)
     nats = {(e.text.split()[1], e.amplitude, e.stiffness): e.nats for e in tests}
     assert 'sweep' in tests[0].text
     slow = max(v for (text, _, _), v in nats.items() if text == 'slow')
