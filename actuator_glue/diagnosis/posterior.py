@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass, fields
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.diagnosis.data import Data, Model, chunks
-from actuator_glue.diagnosis.fit import Fit, Space
+from actuator_glue.diagnosis.fit import Fit, Space, jacobian
+from actuator_glue.diagnosis.fit import fit as fit_to
 from actuator_glue.diagnosis.identifiable import coordinates
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.inference import posterior
@@ -20,7 +23,40 @@ from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array
 
 _P = len(BASE)
+_STEPS = 8  # from the least-squares fit to the optimum of the likelihood
 _HALVINGS = 40  # bring any point of it inside the bounds of the prior
+
+
+@dataclass(frozen=True)
+class Whitened(Data):
+    """The same samples, whitened: least squares on them is most likely."""
+
+    scorer: Scorer
+
+    @cached_property
+    def target(self) -> Array:
+        """As `Data.target`, whitened."""
+        pairs = zip(self.records, self.masks, strict=True)
+        return self.scorer.whiten(np.concatenate([r.measured[mask] for r, mask in pairs]))
+
+    def simulate(self, model: Model, theta: Array) -> Array:
+        """As `Data.simulate`, whitened."""
+        return self.scorer.whiten(super().simulate(model, theta))
+
+
+def most_likely(data: Data, model: Model, found: Fit, scorer: Scorer) -> Fit:
+    """Go on from the least-squares fit to the optimum of the likelihood that is sampled.
+
+    Under slow noise they are up to 12 nats apart; a covariance of the likelihood belongs to its
+    own optimum. What is simulated and compared stays the least-squares fit: where structure
+    remains, it is nearer in the error itself.
+    """
+    white = Whitened(**{f.name: getattr(data, f.name) for f in fields(Data)}, scorer=scorer)
+    best = fit_to(white, model, found.theta, iterations=_STEPS)
+    space = Space(model, max(r.duration for r in data.records))
+    output = data.simulate(model, best.theta[None])
+    jac = jacobian(data, model, space, best.z[None], output)[0]
+    return Fit(best.theta, data.target - output[0], jac, best.z)
 
 
 def laplace(scorer: Scorer, fit: Fit, slopes: Array) -> tuple[Array, float]:
@@ -67,13 +103,14 @@ def sample(
     Args:
         data: the fitting part.
         model: the structure.
-        fit: its best fit.
+        fit: its least-squares fit.
         scorer: whitening filters of the noise.
         rng: random numbers.
         evaluations: likelihood evaluations; 0 returns draws of the Laplace approximation, and
             not-a-number for R-hat.
         progress: called with the share done.
     """
+    fit = most_likely(data, model, fit, scorer)
     space = Space(model, max(r.duration for r in data.records))
     around = coordinates(space, model, data, fit.z)
     phi = around.forward(fit.theta[None])[0]

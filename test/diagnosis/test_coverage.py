@@ -1,0 +1,48 @@
+"""Intervals of reported sizes hold the truth as often as they say."""
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from actuator_glue.diagnosis import posterior
+from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.fit import fit
+from actuator_glue.diagnosis.score import Scorer, splits_of
+from actuator_glue.model import commands
+from actuator_glue.model.parameters import TABLE_2
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Record
+
+RATE = 128.0
+
+
+@pytest.mark.slow
+def test_intervals_under_slow_noise_hold_the_truth() -> None:
+    """95 % intervals of 20 machines with half of the noise below 1 Hz.
+
+    Of 140 intervals 133 are expected; fewer than 124 come by chance in less than one of a hundred
+    runs, even if those of a machine went together in threes. Around the least-squares fit, which
+    is up to 17 nats from the optimum of the likelihood, they were 84 % of 280.
+    """
+    model, rng = Structure(('gain', 'delay', 'backlash')), np.random.default_rng(5)
+    inside = []
+    for _ in range(20):
+        base = TABLE_2 * np.exp(0.2 * rng.standard_normal(4))
+        sizes = [1.0 + 0.02 * rng.standard_normal(), rng.uniform(1e-3, 6e-3)]
+        theta = np.concatenate([base, sizes, [rng.uniform(1e-5, 4e-5)]])
+        records = []
+        for k in (0.0, 250e3):
+            u = commands.sweep(RATE, 30.0, 0.1, 8.0, 2e-3)
+            slow = signal.lfilter([1.0], [1.0, -0.97], rng.standard_normal(len(u) + 500))[500:]
+            noise = rng.standard_normal(len(u)) + slow / slow.std()
+            y = model.simulate(theta, Record(u, 0.0 * u, 1.0 / RATE, k))
+            records.append(Record(u, y + 7.1e-6 * noise, 1.0 / RATE, k))
+        data = Data.whole(records)
+        found = fit(data, model, theta)
+        scorer = Scorer.of(data, splits_of(data, found.error))
+        draws, _ = posterior.sample(
+            data, model, found, scorer, rng=rng, evaluations=0, progress=lambda share: None
+        )
+        low, high = np.quantile(draws, [0.025, 0.975], axis=0)
+        inside.append((low <= theta) & (theta <= high))
+    assert np.mean(inside) >= 124 / 140
