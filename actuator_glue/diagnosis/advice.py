@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from actuator_glue.diagnosis.completeness import Decision
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.estimate import Estimate, Json
 from actuator_glue.diagnosis.homogeneity import Homogeneity
+from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.model_selection import Selection
 from actuator_glue.diagnosis.next_experiment import Experiment
 from actuator_glue.diagnosis.regression import Surrogate
@@ -59,6 +62,7 @@ def of(
                 f'{name} does not agree across the halves of the records ({sizes} {unit}): its '
                 'size changes with time, frequency or stiffness, or it stands for something else'
             )
+    out += _nearest(decision, found)
     out += _next(experiments)
     own = decision.final.own
     if own is not None:
@@ -101,6 +105,21 @@ def _neutral(richer: str) -> float:
     """Value at which a richer form is the effect it holds."""
     holds = CATALOGUE[richer].holds
     return holds[2] if holds else 0.0
+
+
+def _nearest(decision: Decision, found: Selection) -> list[str]:
+    """Say which name comes nearest to each learned term."""
+    out, left = [], found.final.fit.rms
+    for name in decision.names:
+        named = [r for r in found.rivals[name] if r.name in CATALOGUE]
+        if is_learned(decision.final.structure.entries[decision.final.effects.index(name)]):
+            for r in sorted(named, key=lambda r: r.excess)[:1]:
+                out.append(
+                    f'the name nearest to {name} is {r.name}, which leaves '
+                    f'{1e6 * float(np.hypot(left, r.excess)):.1f} um in its place instead of '
+                    f'{1e6 * left:.1f} um'
+                )
+    return out
 
 
 def _next(experiments: Sequence[Experiment]) -> list[str]:

@@ -14,6 +14,7 @@ from actuator_glue.api import diagnosis as module
 from actuator_glue.api.diagnosis import Diagnosis
 from actuator_glue.cli.main import main
 from actuator_glue.diagnosis import diagnose as core
+from actuator_glue.diagnosis import pipeline
 from actuator_glue.diagnosis.learned_forms import forms
 from actuator_glue.diagnosis.learned_term import LearnedTerm
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -57,9 +58,12 @@ def machine(
 
 @pytest.fixture(scope='module')
 def found() -> Diagnosis:
-    """The diagnosis of a cubic transducer, 0.2 mm at 2 mm."""
+    """The diagnosis of a cubic transducer, 0.2 mm at 2 mm, by a catalogue that lacks its name."""
     records = machine(0, 1.0, 2e-4, PLANTS[1], 1, 128.0, 24.0)
-    plain = core.diagnose(records[:2], records[2], settings=replace(QUICK, most=1))
+    names = tuple(n for n in pipeline.mean_effects() if n != 'sensor-curve')
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pipeline, 'mean_effects', lambda: names)
+        plain = core.diagnose(records[:2], records[2], settings=replace(QUICK, most=1))
     return Diagnosis(**{f.name: getattr(plain, f.name) for f in fields(plain)})
 
 
@@ -77,6 +81,7 @@ def test_a_cubic_transducer_is_described(found: Diagnosis) -> None:
     assert -2.6e-3 < low < -1.8e-3 < 1.8e-3 < high < 2.6e-3
     assert f'a learned term learned-sensor-y3 ({term.numbers})' in found.summary()
     assert f'95 % {size.lower:.4g} to {size.upper:.4g}' in found.advice[0]
+    assert any('the name nearest to learned-sensor-y3 is' in line for line in found.advice)
     content = json.loads(json.dumps(found.to_json()))
     assert content['effects'][0]['probability'] is None
     assert content['learned'][0]['expression'] == term.numbers
