@@ -15,6 +15,7 @@ from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.hum import Line
 from actuator_glue.records import Array, Record
 
+_ROUNDING = 1e-6  # of a step: values are written with so many digits
 _CLEAR_STEP = 60.0  # of the median power, as for a line in time (lines.py)
 
 
@@ -58,11 +59,15 @@ def quantisation(data: Data) -> Measured | None:
     steps = [grid(r) for r in data.records]
     if min(steps) <= 0.0:
         return None
-    step = float(np.median(steps))
-    evidence = float(sum(len(r) for r in data.records)) * 0.5
-    return Measured(
-        'quantisation', step / np.sqrt(12.0), evidence, (step,), (1e-3 * step / np.sqrt(12.0),)
-    )
+    step, nats, knowledge = float(np.median(steps)), 0.0, 0.0
+    for record, own in zip(data.records, steps, strict=True):
+        values = record.measured - record.measured.min()
+        counts = np.round(values / own)
+        off = np.maximum(np.abs(values / own - counts), _ROUNDING)
+        # Values off the grid by no more than that, against anywhere between its lines.
+        nats += len(values) * float(np.log(0.5 / off.max()))
+        knowledge += float(np.sum((counts - counts.mean()) ** 2) / np.mean((own * off) ** 2))
+    return Measured('quantisation', step / np.sqrt(12.0), nats, (step,), (knowledge**-0.5,))
 
 
 def staircase(data: Data, errors: Array) -> Measured | None:

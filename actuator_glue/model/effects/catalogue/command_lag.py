@@ -12,6 +12,6 @@ EFFECT = term(
     group='lag',
     signature='linear; as a delay with a slight roll-off',
     source='Horiuchi et al. 1999',
-    searched=False,
+    searched=False,  # to a linear loop it is the lag of a sensor, which is
     check=False,
 )
