@@ -28,7 +28,8 @@ def table(found: Result) -> str:
             '| sampler | ESS/s | ours / theirs | ESS per 1000 evaluations | evaluations to '
             'R-hat 1.01 | ESS/s with lfilter | setting |',
             '|---|---|---|---|---|---|---|',
-            f'| actuator_glue | {_number(ours["ess_per_second"])} | 1 | '
+            '| actuator_glue, DREAM(ZS) with an adaptive independence move | '
+            f'{_number(ours["ess_per_second"])} | 1 | '
             f'{_number(ours["ess_per_1000_evaluations"])} | '
             f'{_number(ours["evaluations_to_rhat_1p01"])} | | {ours["setting"]} |',
         ]
