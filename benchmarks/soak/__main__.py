@@ -24,7 +24,7 @@ import numpy as np
 from benchmarks.soak import judge, text
 from benchmarks.soak.wire import RATE, STIFFNESS, Wire
 from examples.demonstration.domain import own_domain
-from examples.demonstration.processes import Node, Nodes
+from examples.demonstration.processes import Node, Nodes, end_in_order
 
 WIRE = ('drop_out', 'nan_burst', 'spike', 'clock_jump', 'restart', 'disorder', 'garbage')
 NODES = ('estimator_killed', 'worker_killed', 'recorder_stalled')
@@ -144,6 +144,9 @@ class Soak:
         self.begin('estimator')
         log = self.running['estimator'].log
         while 'listening to samples' not in log.read_text(errors='replace'):
+            self.nodes.check()
+            if time.monotonic() - begun > READY_SECONDS:
+                raise SystemExit('the estimator was not ready again in time')
             time.sleep(0.2)
         return time.monotonic() - begun
 
@@ -167,6 +170,7 @@ class Soak:
 def main() -> int:
     """Run, judge, write; 1 where a fault was not told or a band did not come back in time."""
     args = parser().parse_args()
+    end_in_order()
     own_domain()
     shutil.rmtree(args.out / 'bag', ignore_errors=True)
     args.out.mkdir(parents=True, exist_ok=True)
