@@ -62,16 +62,18 @@ class Content:
         reports: time and values of every report, by node.
         bands: time of publication and coverage of every scored band.
         indices: running index of every block, and how many samples it has.
+        delays: from the sending of each block to the recorder's callback [s].
     """
 
     reports: dict[str, list[tuple[float, dict[str, str]]]]
     bands: list[tuple[float, float]]
     indices: list[tuple[int, int]]
+    delays: list[float]
 
 
 def read(bag: Path) -> Content:
     """Return what a bag holds of a soak."""
-    content = Content({}, [], [])
+    content = Content({}, [], [], [])
     for found in messages(bag):
         kind = found.type.rpartition('/')[2]
         when = found.publish_time * 1e-9
@@ -86,6 +88,7 @@ def read(bag: Path) -> Content:
         elif kind == 'SampleBlock':
             block = deserialize(found.type, found.data)
             content.indices.append((int(block.index), len(block.command)))
+            content.delays.append((found.log_time - found.publish_time) * 1e-9)
     content.bands.sort()
     return content
 
@@ -172,8 +175,9 @@ def summary(content: Content) -> dict[str, Any]:
         'latency median (s)',
         'latency p99 (s)',
     )
-    estimator = {key: last.get('estimator', {}).get(key) for key in keys}
+    median, late = np.quantile(content.delays or [np.nan], (0.5, 0.99))
     return {
-        'estimator': estimator,
-        'worst write lag (s)': last.get('recorder', {}).get('worst bag write lag (s)'),
+        'estimator': {key: last.get('estimator', {}).get(key) for key in keys},
+        'worst_write_lag_s': last.get('recorder', {}).get('worst bag write lag (s)'),
+        'callback_delay_s': {'median': float(median), 'p99': float(late)},
     }

@@ -31,8 +31,12 @@ def report(found: dict[str, Any]) -> tuple[str, bool]:
         f'- told on /diagnostics: {told} of {len(faults)}',
         f'- bands good again within two windows ({limit:g} s): {back} of {len(faults)}',
         f'- samples missing in the bag beyond the gaps that were told: {missing}',
-        f'- estimator: {found["estimator"]}',
-        f'- worst bag write lag: {found["worst write lag (s)"]} s',
+        f'- from the sending of a block to the callback of the recorder: median '
+        f'{1e3 * found["callback_delay_s"]["median"]:.2f} ms, p99 '
+        f'{1e3 * found["callback_delay_s"]["p99"]:.1f} ms (stalls of the recorder included)',
+        f'- worst bag write lag: {found["worst_write_lag_s"]} s',
+        '- estimator at the end: '
+        + ', '.join(f'{name} {value}' for name, value in found['estimator'].items()),
         '',
         '| fault | times | told | bands back: worst, s |',
         '|---|---|---|---|',

@@ -1,0 +1,81 @@
+"""What a soak is judged by: a fault not told, a band that stays bad, memory that grows."""
+
+import numpy as np
+
+from benchmarks.soak import judge, text
+from benchmarks.soak.judge import Content, Fault
+
+
+def content(bands=(), **reports):
+    """Content of a bag, reports once a second."""
+    return Content({n: list(r) for n, r in reports.items()}, list(bands), [], [])
+
+
+def test_a_fault_counts_as_told_when_its_count_grows():
+    quiet = [(float(t), {'lost': '5'}) for t in range(100)]
+    loud = [(float(t), {'lost': '5' if t < 53 else '9'}) for t in range(100)]
+    for reports, told in ((quiet, False), (loud, True)):
+        fault = Fault('drop_out', 50.0, 1.0)
+        judge.judge([fault], content(lab_bridge=reports))
+        assert fault.told is told
+
+
+def test_a_band_is_back_after_the_last_bad_one():
+    bands = [(float(t), 0.5 if 52 <= t < 58 else 0.95) for t in range(100)]
+    fault, never = Fault('spike', 50.0, 1.0), Fault('spike', 200.0, 1.0)
+    judge.judge([fault, never], content(bands))
+    assert fault.back == 7.0 and np.isnan(never.back)
+    # One that is bad only after the next fault is that one's.
+    first, second = Fault('spike', 50.0, 1.0), Fault('spike', 55.0, 0.0)
+    judge.judge([first, second], content([(51.5, 0.95), *[b for b in bands if b[0] > 55.0]]))
+    assert first.back == 0.5 and second.back == 3.0
+
+
+def test_a_recorder_that_stands_still_is_seen_by_its_silence():
+    reports = [(float(t), {}) for t in range(100) if not 50 < t < 54]
+    stalled, not_stalled = (
+        Fault('recorder_stalled', 50.5, 3.0),
+        Fault('recorder_stalled', 20.5, 3.0),
+    )
+    judge.judge([not_stalled, stalled], content(recorder=reports))
+    assert stalled.told and not not_stalled.told
+
+
+def test_memory_that_grows_is_told_per_hour():
+    rng = np.random.default_rng(1)
+    memory = [
+        (float(t), {'grows': 100 + t / 600 + 0.01 * rng.standard_normal(), 'rests': 50.0})
+        for t in range(1800)
+    ]
+    found = judge.slopes(memory, 300.0)
+    assert abs(found['grows'][0] - 6.0) < 0.1 and abs(found['rests'][0]) < 1e-6
+
+
+def result(**more):
+    """What a run leaves, all well unless told otherwise."""
+    return {
+        'minutes': 1.0,
+        'seed': 1,
+        'cores': 2,
+        'load_before_and_after': [0.0, 0.0],
+        'faults': [{'kind': 'spike', 'told': True, 'back': 3.0}],
+        'memory_MB_per_h': {'recorder': (0.1, 0.1)},
+        'samples_missing_in_the_bag': 0,
+        'estimator': {},
+        'worst_write_lag_s': '0.1',
+        'callback_delay_s': {'median': 1e-4, 'p99': 1e-3},
+        **more,
+    }
+
+
+def test_the_headline_says_what_the_numbers_say():
+    assert text.report(result())[1]
+    for bad in (
+        {'faults': [{'kind': 'spike', 'told': False, 'back': 3.0}]},
+        {'faults': [{'kind': 'spike', 'told': True, 'back': 30.0}]},
+        {'faults': [{'kind': 'spike', 'told': True, 'back': float('nan')}]},
+        {'memory_MB_per_h': {'recorder': (9.0, 0.1)}},
+        {'samples_missing_in_the_bag': 1},
+    ):
+        page, passed = text.report(result(**bad))
+        assert not passed and page.startswith('**Not everything held')
