@@ -14,7 +14,8 @@ from actuator_glue.hybrid.actuator import actuator, nonlinear, table_of
 from actuator_glue.hybrid.compensator import Compensator
 from actuator_glue.hybrid.partition import Partition
 from actuator_glue.hybrid.sampled import Plants, numerical, plants, reference
-from actuator_glue.hybrid.virtual_kernel import LANES, Course, Found, Lanes
+from actuator_glue.hybrid.virtual_kernel import LANES
+from actuator_glue.hybrid.virtual_lanes import Course, Found, Lanes
 from actuator_glue.model.effects import run
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array

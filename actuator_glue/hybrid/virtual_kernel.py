@@ -6,13 +6,14 @@ Everything is an array with one column per lane, and a lane is one draw of the p
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.hybrid import adaptation
 from actuator_glue.hybrid.sampled import Numerical
+from actuator_glue.hybrid.virtual_lanes import Course, Found, Lanes
 from actuator_glue.jit import njit
 from actuator_glue.model.effects import kernel, stages
 from actuator_glue.model.effects import rows as r
@@ -20,71 +21,6 @@ from actuator_glue.model.effects.terms import machine
 from actuator_glue.records import Array
 
 LANES = r.LANES
-
-
-class Lanes(NamedTuple):
-    """What differs between the lanes of a block.
-
-    Attributes:
-        reference: transition matrix of the whole structure, (s, s, LANES).
-        ground: what the ground adds to it, (s, LANES).
-        specimen: stiffness, damping, mass, (3, LANES).
-        step, command, speed: linear actuators (`sampled.Plants`), (p, p, LANES), (p, LANES) twice.
-        shown: row of the recorded displacement, (p,).
-        table: effects' kernel table, (rows.SIZE + registers,); (0,) for linear actuators.
-        lag: of the command, with effects, (LANES,) [samples].
-    """
-
-    reference: Array
-    ground: Array
-    specimen: Array
-    step: Array
-    command: Array
-    speed: Array
-    shown: Array
-    table: Array
-    lag: Array
-
-
-class Course(NamedTuple):
-    """What all lanes share.
-
-    Attributes:
-        ground: ground acceleration at each sample, (n,) [m/s^2].
-        period: sample period [s].
-        noise: standard deviation of displacement and force sensor, (2,) [m, N].
-        stride: every how many samples the response is kept.
-        adaptive: whether the compensator adapts.
-        smoothing: `adaptation.smoothing`.
-    """
-
-    ground: Array
-    period: float
-    noise: Array
-    stride: int
-    adaptive: bool
-    smoothing: Array
-
-
-class Found(NamedTuple):
-    """What a block leaves.
-
-    Attributes:
-        target, moved: target and displacement of the piston at each sample, (LANES, n) [m].
-        sums: of squares of each floor's error and of the reference, (2, floors, LANES).
-        peaks: of each floor's error, reference, displacement and drift, (4, floors, LANES) [m].
-        force: peak of the specimen's force, (LANES,) [N].
-        response: displacement of the floors, (n / stride, floors, LANES) [m].
-        whole: the same of the reference.
-    """
-
-    target: Array
-    moved: Array
-    sums: Array
-    peaks: Array
-    force: Array
-    response: Array
-    whole: Array
 
 
 @njit
