@@ -235,7 +235,7 @@ def test_python_runs(page: Path, laboratory: Path) -> None:
     names: dict[str, object] = {'ag': ag}
     found = [b for b in blocks('python') if b.page == page]
     if any('posterior.npz' in b.text for b in found):
-        ag.calibrate([ag.load('free.csv'), ag.load('clamped.csv')], evaluations=8000).save(
+        ag.calibrate([ag.load('free.csv'), ag.load('clamped.csv')], evaluations=30_000).save(
             'posterior.npz'
         )
     for block in found:
