@@ -34,6 +34,7 @@ _STAGES = {
     'effect 6': 0.7,
     'one record': 0.74,
     'other hold': 0.74,
+    'onset': 0.742,
     'learned term': 0.745,
     'posterior before': 0.75,
     'posterior': 0.78,

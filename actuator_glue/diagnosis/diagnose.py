@@ -26,6 +26,7 @@ from actuator_glue.diagnosis.pipeline import (
     Conclusion,
     Progress,
     conclude,
+    since_onset,
     with_learned_terms,
     with_the_right_hold,
 )
@@ -72,7 +73,8 @@ def diagnose(
     held = [holdout] if isinstance(holdout, Record) else list(holdout or ())
     tell('check', 0.0)
     first = conclude(prepare(records, held), settings, each, tell)
-    result = with_learned_terms(with_the_right_hold(first, settings, each, tell))
+    first = with_the_right_hold(first, settings, each, tell)
+    result = with_learned_terms(since_onset(first, settings, each, tell))
     prepared, data, scorer = result.prepared, result.data, result.scorer
     found, decision = result.found, result.decision
     stretches = homogeneity.agreement(decision.final, scorer)
@@ -119,6 +121,7 @@ def diagnose(
         alarm=alarm_of(found, result.seen, decision, data, seed, settings.false_alarms),
         advice=(
             *advice.at_bound(held_at, estimates),
+            *([result.onset.sentence()] if result.onset else []),
             *(term.sentence() for term in learned),
             *advice.of(decision, found, result.generic, stretches, experiments),
             *advice.contradicted(error, found.material),
@@ -135,6 +138,7 @@ def diagnose(
             for k in sorted({r.known_stiffness() for r in data.records})
         ),
         experiments=experiments,
+        onset=result.onset,
         names=tuple(p.name for p in after.model.parameters),
         posterior=after.draws,
         rhat=rhat,

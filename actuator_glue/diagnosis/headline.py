@@ -36,6 +36,11 @@ def _noise(found: DiagnosisData) -> str:
 def headline(found: DiagnosisData) -> str:
     """Return the verdict in one line, never more than the held-out part bears out."""
     names = ', '.join(_named(e, found) for e in found.effects if e.noise is None)
+    enough = 'the model is enough'
+    if found.onset is not None:
+        when = f' since {found.onset.time:.1f} s of {source_name(found.onset.source)}'
+        names += when if names else ''
+        enough += f'{when}, where its parameters changed'
     before, after = 1e6 * found.error.before, 1e6 * found.error.after
     change = f'held-out error {before:.1f} -> {after:.1f} um' if names else (
         f'held-out error {after:.1f} um'
@@ -49,4 +54,4 @@ def headline(found: DiagnosisData) -> str:
         if not names:
             return f'the model is not enough and no addition is supported: {change}; {rest}'
         return f'added, but not the whole story: {names}; {change}; {rest}'
-    return f'missing: {names}; {change}' if names else f'the model is enough: {change}'
+    return f'missing: {names}; {change}' if names else f'{enough}: {change}'

@@ -5,13 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
-from actuator_glue.diagnosis import hum, learning, per_record_settings, recorded, regression
+from actuator_glue.diagnosis import (
+    hum,
+    learning,
+    onset,
+    per_record_settings,
+    recorded,
+    regression,
+)
 from actuator_glue.diagnosis.completeness import Decision, decide
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.decimate import decimated
 from actuator_glue.diagnosis.hum import Line
 from actuator_glue.diagnosis.measurement import Measured
 from actuator_glue.diagnosis.model_selection import ModelSelection, Selection
+from actuator_glue.diagnosis.onset import Onset
 from actuator_glue.diagnosis.preparation import Prepared
 from actuator_glue.diagnosis.regression import Surrogate
 from actuator_glue.diagnosis.score import Scorer, evidence
@@ -41,6 +49,7 @@ class Conclusion:
         generic: the regression beside them.
         decision: the verdict.
         selection: what chose `found`, to go on from.
+        onset: when the effects appeared, where all this is about the data since then.
     """
 
     prepared: Prepared
@@ -52,6 +61,7 @@ class Conclusion:
     generic: Surrogate
     decision: Decision
     selection: ModelSelection
+    onset: Onset | None = None
 
 
 def conclude(prepared: Prepared, settings: Thresholds, each: Each, tell: Progress) -> Conclusion:
@@ -82,6 +92,32 @@ def _conclude(prepared: Prepared, settings: Thresholds, each: Each, tell: Progre
     return result if own is None else _conclusion(prepared, selection, own, line)
 
 
+def since_onset(first: Conclusion, settings: Thresholds, each: Each, tell: Progress) -> Conclusion:
+    """Ask whether what is missing was not there from the beginning.
+
+    Taken where Eq. (2) alone up to a moment, and what is found in the data since then, leave
+    materially less than effects that act all the time.
+    """
+    if first.decision.verdict == 'none' or first.found.final.own is not None:
+        return first
+    moment = onset.change(first.data, first.found.base.fit, first.scorer)
+    quiet = None if moment is None else onset.quiet_before(moment, first.data)
+    if moment is None or quiet is None:
+        return first
+    before, base = quiet
+    tell('onset', 0.0)
+    second = conclude(first.prepared.since(moment), settings, each, tell)
+    final = second.found.final
+    nats = settings.nats + len(base.theta)
+    sides = before, moment.split(first.data)[1]
+    rivals = first.found.final, final
+    if not onset.explains(sides, base, rivals, nats, second.found.material):
+        return first
+    return replace(
+        second, onset=onset.dated(first.data, moment, base, final, second.decision.noise)
+    )
+
+
 def with_learned_terms(result: Conclusion) -> Conclusion:
     """Describe by learned terms material structure that the catalogue leaves."""
     if result.decision.left < result.found.material or result.found.final.own is not None:
@@ -89,7 +125,8 @@ def with_learned_terms(result: Conclusion) -> Conclusion:
     found = learning.learned(result.selection, result.found)
     if found is None:
         return result
-    return _conclusion(result.prepared, result.selection, found, result.line)
+    learned = _conclusion(result.prepared, result.selection, found, result.line)
+    return replace(learned, onset=result.onset)
 
 
 def _conclusion(

@@ -11,6 +11,7 @@ from scipy import ndimage
 from actuator_glue.diagnosis import decimate, despike
 from actuator_glue.diagnosis.checks import check, refuse_repeats, where
 from actuator_glue.diagnosis.data import SETTLE, Data, Mask, Model
+from actuator_glue.diagnosis.onset import Moment
 from actuator_glue.errors import InputError
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
@@ -37,17 +38,19 @@ class Prepared:
         held: what is looked at once, after all decisions.
         notes: what was done to the records, for people.
         impulses: per fitting record, how many samples were replaced (see diagnosis/despike.py).
+        folded: the held-out part are stretches of the fitting records.
     """
 
     fit: Data
     held: Data
     notes: tuple[str, ...]
     impulses: tuple[int, ...]
+    folded: bool
 
     def without_impulses(self, model: Model, theta: Array) -> Prepared:
         """Take out what is an impulse beside a model; the same object where nothing is."""
         fit, counts, notes = despike.without_impulses(self.fit, model, theta)
-        if self.held.records is self.fit.records:
+        if self.folded:
             held = replace(self.held, records=fit.records)
         else:
             held, _, told = despike.without_impulses(self.held, model, theta)
@@ -55,7 +58,15 @@ class Prepared:
         if not notes:
             return self
         both = tuple(a + b for a, b in zip(self.impulses, counts, strict=False))
-        return Prepared(fit, held, (*notes, *self.notes), both)
+        return Prepared(fit, held, (*notes, *self.notes), both, self.folded)
+
+    def since(self, moment: Moment) -> Prepared:
+        """Leave out what came before a moment; other records held out are taken to be later."""
+        fit = moment.split(self.fit)[1]
+        held = moment.split(self.held)[1] if self.folded else self.held
+        pairs = zip(self.fit.recorded, self.impulses, strict=True)
+        kept = tuple(n for r, n in pairs if any(r is k for k in fit.recorded))
+        return replace(self, fit=fit, held=held, impulses=kept)
 
 
 def rest_samples(record: Record) -> int:
@@ -177,14 +188,14 @@ def prepare(records: Sequence[Record], holdout: Sequence[Record]) -> Prepared:
             Data(tuple(every[s]), tuple(masks[s]), initials[s], recorded[s], origins[s])
             for s in parts
         )
-        return _despiked(Prepared(fit, held, tuple(notes), (0,) * n))
+        return _despiked(Prepared(fit, held, tuple(notes), (0,) * n, False))
     notes.append('every fourth block of each record held out')
     both = [
         tuple(m & side(_folds(r)) for m, r in zip(masks, every, strict=True))
         for side in (np.logical_not, np.asarray)
     ]
     fit, held = (Data(tuple(every), side, initials, recorded, origins) for side in both)
-    return _despiked(Prepared(fit, held, tuple(notes), (0,) * n))
+    return _despiked(Prepared(fit, held, tuple(notes), (0,) * n, True))
 
 
 def _despiked(prepared: Prepared) -> Prepared:

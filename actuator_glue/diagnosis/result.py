@@ -11,6 +11,7 @@ from actuator_glue.diagnosis.finding import Candidate, Finding
 from actuator_glue.diagnosis.headline import headline
 from actuator_glue.diagnosis.learned_term import LearnedTerm
 from actuator_glue.diagnosis.next_experiment import Experiment
+from actuator_glue.diagnosis.onset import Onset
 from actuator_glue.diagnosis.response import Response
 from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.json_value import JsonObject, json_fields, json_value
@@ -138,6 +139,8 @@ class DiagnosisData:
         responses: frequency response of the augmented model at each stiffness.
         experiments: tests that would tell tied names apart, best first; none where none are tied.
         provenance: how it was made: command line, seed, version, hashes, date.
+        onset: when the effects appeared, where they were not there from the beginning; sizes and
+            errors are then those of the data since.
     """
 
     verdict: Verdict
@@ -164,6 +167,7 @@ class DiagnosisData:
     responses: tuple[Response, ...] = ()
     experiments: tuple[Experiment, ...] = ()
     provenance: dict[str, str] = field(default_factory=dict)
+    onset: Onset | None = None
 
     def to_json(self) -> Json:
         """Return the object of schema `actuator_glue.diagnosis/1` (curves and draws left out)."""
@@ -186,6 +190,7 @@ class DiagnosisData:
             'at_bound': [p.to_json() for p in self.at_bound],
             'structure': list(self.structure),
             'learned': [term.to_json() for term in self.learned],
+            'onset': self.onset.to_json() if self.onset else None,
             'surrogate': self.surrogate,
             'remaining': self.remaining,
             'advice': list(self.advice),

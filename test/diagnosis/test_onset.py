@@ -1,0 +1,73 @@
+"""What appears while a test runs is found, dated, and told from what acts all the time."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from actuator_glue.diagnosis.diagnose import diagnose
+from actuator_glue.diagnosis.result import DiagnosisData
+from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Record
+
+RATE = 128.0
+THETA = np.array([235.0, 5.0e10, 4.23e6, 3.3])
+T = np.arange(int(36 * RATE)) / RATE
+# Three sweeps up and down between 0.5 and 10 Hz.
+COMMAND = 2e-3 * np.sin(2 * np.pi * (0.5 * T + 1.25 * (1.0 - np.cos(2.0 * np.pi * T / 12.0))))
+
+
+def diagnosed(effect: str, size: float, at: float, growth: float = 0.0) -> DiagnosisData:
+    """Diagnose a machine in which an effect appears, at once or slowly."""
+    bare = Record(COMMAND, np.zeros(len(T)), 1 / RATE, stiffness=250e3, source='run.csv')
+    off = Structure(()).simulate(THETA, bare)
+    on = Structure((effect,)).simulate(np.array([*THETA, size]), bare)
+    share = np.clip((T - at) / growth, 0.0, 1.0) if growth else (at <= T)
+    noise = 3e-6 * np.random.default_rng(1).standard_normal(len(T))
+    record = replace(bare, measured=off + share * (on - off) + noise)
+    return diagnose([record], settings=Thresholds(evaluations=0))
+
+
+def test_an_effect_that_appears_at_half_time_is_dated() -> None:
+    """It is named from the data since then; all it leaves there is noise."""
+    found = diagnosed('coulomb-friction', 2500.0, 14.0)
+    assert found.verdict == 'missing-effect'
+    assert found.effects[0].name == 'coulomb-friction'
+    assert found.onset is not None
+    assert found.onset.lower <= 14.0 <= found.onset.upper
+    assert found.onset.upper - found.onset.lower < 0.5
+    assert found.onset.growth == 0.0
+    assert found.error.after < 4e-6
+    told = json.loads(json.dumps(found.to_json()))['onset']
+    assert told['kind'] == 'jump'
+    assert told['effects'] == ['coulomb-friction']
+    assert 'since 14.0 s of run.csv' in found.summary()
+
+
+@pytest.mark.slow
+def test_slow_growth_is_told_from_a_jump() -> None:
+    """Backlash that grows for ten seconds; its size is that at the end."""
+    found = diagnosed('backlash', 6e-5, 12.0, 10.0)
+    assert found.onset is not None
+    assert found.onset.time == pytest.approx(12.0, abs=1.0)
+    assert found.onset.growth == pytest.approx(10.0, abs=2.5)
+    assert found.effects[0].name == 'backlash'
+    assert found.effects[0].parameters['backlash'].mean == pytest.approx(6e-5, rel=0.05)
+
+
+@pytest.mark.slow
+def test_a_changed_machine_is_no_missing_effect() -> None:
+    """A few milliseconds of delay are other parameters of Eq. (2): told, and when."""
+    found = diagnosed('delay', 4e-3, 20.0)
+    assert found.onset is not None
+    assert found.onset.time == pytest.approx(20.0, abs=0.5)
+    assert found.onset.effects == ()
+    assert 'where its parameters changed' in found.summary()
+
+
+@pytest.mark.parametrize('at', [0.0, 100.0])
+def test_what_acts_all_the_time_or_never_has_no_onset(at: float) -> None:
+    """A sweep that shows an effect only when it is fast does not make it appear."""
+    assert diagnosed('coulomb-friction', 2500.0, at).onset is None
