@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from actuator_glue.diagnosis.result import HeldOutError, Verdict
+    from actuator_glue.diagnosis.result import DiagnosisData, HeldOutError, Verdict
 
 # Held-out errors beyond this many times the noise say that the fitting records lack something.
 _BEYOND = 2.0
@@ -51,3 +51,19 @@ def certainty(fitted: float, error: HeldOutError, material: float) -> float:
     if not misses(error, material):
         return fitted
     return min(fitted, max(0.0, min(1.0, error.removable_removed)))
+
+
+def against(found: DiagnosisData) -> str:
+    """Say why an estimator should not go on with the augmented model; empty where it may.
+
+    Additions of one record only are no property of the machine; what the held-out part does not
+    bear out would make forecasts worse.
+    """
+    own = [e.name for e in found.effects if e.records]
+    if found.verdict not in ('missing-effect', 'unexplained') or not found.structure:
+        return 'nothing is supported that could be added'
+    if own:
+        return f'{", ".join(own)} acts in one record only'
+    if not found.error.removed_ci[0] > 0.0:
+        return 'the error that it removes in the held-out part does not exclude zero'
+    return ''

@@ -11,6 +11,7 @@ from actuator_glue_msgs.action import Diagnose
 from actuator_glue_msgs.srv import SetModel
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 
+from actuator_glue.diagnosis.verdict import against
 from actuator_glue.errors import InputError
 from actuator_glue.nodes import diagnosing, own_effects, spin, topics
 from actuator_glue.nodes.health import ERROR
@@ -19,7 +20,7 @@ from actuator_glue.nodes.messages import publish
 from actuator_glue.nodes.parameters import Spec
 from actuator_glue.nodes.working import WorkingNode
 from actuator_glue.online import wire
-from actuator_glue.online.alarm import CoverageAlarm
+from actuator_glue.online.alarm import CoverageAlarm, SwapWatch
 from actuator_glue.online.collect import Collector
 from actuator_glue.online.stream import Event, Rejected, Restarted
 from actuator_glue.workers.worker import DIED, FAILED, PROGRESS, Answer
@@ -75,6 +76,7 @@ class DiagnoserNode(WorkingNode):
         values = self.parameters.values()
         self.collector = Collector(values['keep'])
         self.alarm = CoverageAlarm(values['coverage_limit'], values['coverage_windows'])
+        self.swaps = SwapWatch()
         self._last = float('-inf')
         self._pending = False
         self.every(0.2, self._check)
@@ -131,10 +133,14 @@ class DiagnoserNode(WorkingNode):
                 self.complain('bad input', event.message)
             elif isinstance(event, Restarted):
                 self.alarm.reset()
+                self.swaps.reset()
 
     def _band(self, message: Any) -> None:
         if not message.scored or message.kind != message.NOISE:
             return
+        ratio = self.swaps.update(message.rms_error)
+        if ratio:
+            self._take_back(ratio)
         if self.alarm.update(message.widest_coverage):
             self._pending = True
             self.complain(
@@ -209,10 +215,13 @@ class DiagnoserNode(WorkingNode):
         head = wire.Head(self.get_clock().now().nanoseconds, outcome.actuator)
         publish(self._diagnosis, head, diagnosing.fields(outcome))
         self.get_logger().info(outcome.message)
-        if request.apply and outcome.diagnosis.structure:
+        why_not = against(outcome.diagnosis)
+        if request.apply and not why_not:
             self._apply(outcome)
-        else:
-            self._finish(outcome)
+            return
+        if request.apply:
+            self.get_logger().info(f'the estimator goes on as it is: {why_not}')
+        self._finish(outcome)
 
     def _apply(self, outcome: diagnosing.Outcome) -> None:
         diagnosis = outcome.diagnosis
@@ -232,6 +241,7 @@ class DiagnoserNode(WorkingNode):
             elif response.success:
                 self.get_logger().info(f'estimator: {response.message}')
                 self.alarm.reset()
+                self.swaps.swapped()
                 outcome.applied = True
             else:
                 self.complain('set_model', f'the estimator refuses: {response.message}')
@@ -240,6 +250,17 @@ class DiagnoserNode(WorkingNode):
         self._swap = self._model_client.call_async(diagnosing.augmented(diagnosis))
         self._swap.add_done_callback(self.guarded(answered))
         self._swap_end = time.monotonic() + ANSWER_SECONDS
+
+    def _take_back(self, ratio: float) -> None:
+        """Have the estimator go back to Eq. (2), for the augmented model forecasts worse."""
+        self.complain(
+            'swap',
+            f'forecasts err {ratio:.2f} times as much as before the model was augmented: back to '
+            'Eq. (2)',
+        )
+        if self._model_client.service_is_ready():
+            self._model_client.call_async(SetModel.Request())
+            self.alarm.reset()
 
     def _check(self) -> None:
         """Give up what is cancelled, and waiting for an answer that was lost."""

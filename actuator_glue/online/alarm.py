@@ -1,4 +1,4 @@
-"""When the estimator's coverage breaks: the model lacks something, or has begun to."""
+"""When the model lacks something, or has begun to, and whether another one was any better."""
 
 from __future__ import annotations
 
@@ -45,3 +45,55 @@ class CoverageAlarm:
         """Begin anew: the model or the test has changed."""
         self._seen.clear()
         self._raised = False
+
+
+class SwapWatch:
+    """Whether forecasts have become worse since the model was swapped.
+
+    Args:
+        count: bands before and after the swap that are compared.
+        settle: bands after the swap that are still those of the old model, or of a new one that
+            has seen little.
+        worse: ratio of the medians of their errors from which on they count as worse.
+    """
+
+    def __init__(self, count: int = 8, settle: int = 4, worse: float = 1.1) -> None:
+        self.worse, self._settle = worse, settle
+        self._before: deque[float] = deque(maxlen=count)
+        self._after: deque[float] = deque(maxlen=count)
+        self._wait = -1  # bands to be passed over; negative without a swap
+
+    def swapped(self) -> None:
+        """Begin to compare; without enough bands before the swap there is nothing to say."""
+        self._after.clear()
+        self._wait = self._settle if len(self._before) == self._before.maxlen else -1
+
+    def reset(self) -> None:
+        """Begin anew: the test has changed."""
+        self._before.clear()
+        self._after.clear()
+        self._wait = -1
+
+    def update(self, error: float) -> float:
+        """Take the rms error of one more band [m].
+
+        Returns:
+            The ratio of errors after to before where the swap has made them worse, else 0; it is
+            told once.
+        """
+        if not np.isfinite(error):
+            return 0.0
+        if self._wait < 0:
+            self._before.append(error)
+            return 0.0
+        if self._wait > 0:
+            self._wait -= 1
+            return 0.0
+        self._after.append(error)
+        if len(self._after) < (self._after.maxlen or 1):
+            return 0.0
+        before = float(np.median(self._before))
+        ratio = float(np.median(self._after)) / before if before > 0.0 else 0.0
+        self._before, self._wait = deque(self._after, self._after.maxlen), -1
+        self._after.clear()
+        return ratio if ratio > self.worse else 0.0

@@ -1,6 +1,7 @@
 """A headline says no more than the held-out part bears out, in text, JSON and exit code."""
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +11,7 @@ from actuator_glue.api import diagnosis as module
 from actuator_glue.cli.main import main
 from actuator_glue.diagnosis.finding import Finding
 from actuator_glue.diagnosis.result import Alarm, DiagnosisData, HeldOutError, Verdict
-from actuator_glue.diagnosis.verdict import conclude
+from actuator_glue.diagnosis.verdict import against, conclude
 
 NONE = np.empty((0, 4))
 
@@ -126,3 +127,15 @@ def test_the_headline_follows_the_held_out_part(
     assert (content['summary'], content['verdict']) == (says, found.verdict)
     assert code == (0 if complete else 1)
     assert content['complete'] is complete
+
+
+def test_only_what_the_held_out_part_bears_out_is_applied() -> None:
+    """And what is a property of the machine: of all records."""
+    effect = finding('backlash')
+    good = replace(diagnosis('missing-effect', 40e-6, 10e-6, effect), structure=('backlash',))
+    assert against(good) == ''
+    assert 'one record' in against(replace(good, effects=(replace(effect, records=('a',)),)))
+    doubtful = replace(good.error, removed_ci=(-0.1, 0.5))
+    assert 'exclude zero' in against(replace(good, error=doubtful))
+    assert against(replace(good, verdict='undecided'))
+    assert against(diagnosis('none', 10e-6, 10e-6))

@@ -11,7 +11,7 @@ from scipy.stats import norm
 from actuator_glue.inference.predictive import ResidualModel, total_band
 from actuator_glue.model import linear, ridge
 from actuator_glue.normal import below
-from actuator_glue.online.alarm import CoverageAlarm
+from actuator_glue.online.alarm import CoverageAlarm, SwapWatch
 from actuator_glue.online.collect import PIECE, Collector
 from actuator_glue.online.forecast import sensor_noise
 from actuator_glue.online.mixture import mixture_band
@@ -123,3 +123,22 @@ def test_the_collector_gives_back_the_record():
     assert found.stiffness == whole.stiffness and found.start_ns == whole.start_ns
     collector.forget()
     assert collector.records() == []
+
+
+def test_a_swap_that_makes_forecasts_worse_is_told_once():
+    """Errors before against errors after; bands right after the swap are nobody's."""
+    watch = SwapWatch(count=4, settle=2)
+    assert [watch.update(1.0) for _ in range(6)] == [0.0] * 6
+    watch.swapped()
+    told = [watch.update(e) for e in (9.0, 9.0, 1.5, 1.4, 1.5, 1.6, 1.5)]
+    assert told == [0.0] * 5 + [1.5, 0.0]
+    watch.swapped()
+    assert not any(watch.update(1.0) for _ in range(10))
+
+
+def test_a_swap_without_a_past_is_not_judged():
+    """Nor is an error that is not known."""
+    watch = SwapWatch(count=4, settle=0)
+    watch.update(float('nan'))
+    watch.swapped()
+    assert not any(watch.update(5.0) for _ in range(10))
