@@ -64,12 +64,12 @@ def blocks(*languages: str) -> list[Block]:
 
 
 def indented() -> list[Block]:
-    """Return the commands of ours that stand in blocks by indentation."""
+    """Return the commands of ours that stand in blocks by indentation; a synopsis is none."""
     return [
         Block(page, 'sh', match[0])
         for page in PAGES
         for match in re.finditer(
-            r'(?:^ {4}actuator-glue .*\n)+', page.read_text('utf-8'), re.MULTILINE
+            r'(?:^ {4}actuator-glue (?!.*\.\.\.).*\n)+', page.read_text('utf-8'), re.MULTILINE
         )
     ]
 
