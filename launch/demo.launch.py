@@ -6,6 +6,7 @@ ros2 launch actuator_glue demo.launch.py
 ros2 launch actuator_glue demo.launch.py data:=test.csv stiffness:=250e3
 ros2 launch actuator_glue demo.launch.py source:=udp://127.0.0.1:5005 layout:=speedgoat.yaml
 ros2 launch actuator_glue demo.launch.py replay:=out/tuesday
+ros2 launch actuator_glue demo.launch.py partition:=benchmark_case_1
 ros2 launch actuator_glue demo.launch.py effect:=backlash namespace:=east
 """
 
@@ -29,6 +30,10 @@ ARGUMENTS = {
         'file of the truth about the effect, empty for ~/.ros/actuator_glue/truth_DATE-TIME.json',
     ),
     'view': ('false', 'a page that shows everything, on 127.0.0.1'),
+    'partition': (
+        '',
+        'hybrid test whose stability is watched: a file, sdof, benchmark_case_1, ...',
+    ),
     'apply': ('true', 'go on with the augmented model once something is found missing'),
 }
 
@@ -66,6 +71,8 @@ def nodes(given):
     if truth(given['view']):
         wanted.append(('viewer', {'open': True}))
     wanted.append((name, parameters | {'wait_for': len(wanted), 'exit_at_end': True}))
+    if given['partition']:
+        wanted.append(('margin', {'partition': given['partition']}))
     return [node(given, name, more, given['namespace']) for name, more in wanted]
 
 

@@ -31,6 +31,7 @@ NODES = (
     'replay',
     'lab_bridge',
     'diagnoser',
+    'margin',
     'viewer',
     'suite',
 )

@@ -66,6 +66,8 @@ class StabilityResult(Result):
         tracking: delay and amplitude at the frequencies asked for.
         sensitivity: rank correlation of the margin with each parameter.
         most_sensitive: the parameter of the largest one; None where the margin does not vary.
+        effect_cost_s: how much of the margin each linear effect of the model costs; of those with
+            a limit with and without it.
         compensator: 'none', or what it is.
         virtual: what the draws did under a ground motion; None where none was given.
         draws: how many were used.
@@ -90,6 +92,7 @@ class StabilityResult(Result):
     tracking: tuple[AtFrequency, ...]
     sensitivity: dict[str, float]
     most_sensitive: str | None
+    effect_cost_s: dict[str, Spread]
     compensator: str
     virtual: VirtualResult | None
     draws: int
@@ -130,6 +133,7 @@ class StabilityResult(Result):
                 'bandwidth_hz': asdict(self.bandwidth_hz),
                 'tracking': [asdict(t) for t in self.tracking],
                 'sensitivity': self.sensitivity,
+                'effect_cost_s': {n: asdict(s) for n, s in self.effect_cost_s.items()},
                 'most_sensitive': self.most_sensitive,
                 **({} if self.virtual is None else self.virtual.to_json()['indicators']),
             },

@@ -46,6 +46,8 @@ def rows(found: StabilityResult) -> list[tuple[str, ...]]:
         return (name, unit, *(f'{scale * v:.4g}' for v in numbers))
 
     out = [row('delay margin left', 'ms', found.margin_s, 1e3)] if found.margin_s else []
+    for effect, cost in found.effect_cost_s.items():
+        out.append(row(f'... of it {effect} costs', 'ms', cost, 1e3))
     out.append(row('rightmost root, real part', '1/s', found.growth_per_s))
     out.append(row('actuator bandwidth (-3 dB)', 'Hz', found.bandwidth_hz))
     if found.virtual is not None:

@@ -57,7 +57,13 @@ class EstimatorNode(WorkingNode):
         self.employ(warm_up)
         self._out = {
             topic: self.publisher(topic)
-            for topic in (topics.POSTERIOR, topics.BAND, topics.RESPONSE, topics.ESTIMATOR_SETUP)
+            for topic in (
+                topics.POSTERIOR,
+                topics.DRAWS,
+                topics.BAND,
+                topics.RESPONSE,
+                topics.ESTIMATOR_SETUP,
+            )
         }
         self._service = self.create_service(SetModel, '~/set_model', self._set_model)
 
@@ -196,6 +202,7 @@ class EstimatorNode(WorkingNode):
         self.windows.add()
         actuator = result.window.record.actuator
         publish(self._out[topics.POSTERIOR], *wire.posterior(result, seconds))
+        publish(self._out[topics.DRAWS], *wire.draws(result))
         for prediction in (*result.scored, *result.forecast):
             publish(self._out[topics.BAND], *wire.prediction(prediction, actuator))
         publish(self._out[topics.RESPONSE], *wire.response(result))

@@ -12,6 +12,7 @@ from actuator_glue.nodes import (
     configuration,
     diagnoser,
     lab_bridge,
+    margin,
     recorder,
     replay,
     viewer,
@@ -25,6 +26,7 @@ NODES = {
     'replay': replay.SPECS,
     'lab_bridge': lab_bridge.SPECS,
     'diagnoser': diagnoser.SPECS,
+    'margin': margin.SPECS,
     'viewer': viewer.SPECS,
 }
 HEAD = """\

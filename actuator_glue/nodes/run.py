@@ -15,13 +15,14 @@ def _run(node: str) -> int:
     return int(module.main())
 
 
-actuator_sim, diagnoser, estimator, lab_bridge, recorder, replay, suite, viewer = (
+actuator_sim, diagnoser, estimator, lab_bridge, margin, recorder, replay, suite, viewer = (
     partial(_run, node)
     for node in (
         'actuator_sim',
         'diagnoser',
         'estimator',
         'lab_bridge',
+        'margin',
         'recorder',
         'replay',
         'suite',

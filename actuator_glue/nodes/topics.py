@@ -10,9 +10,11 @@ from actuator_glue_msgs.msg import (
     Diagnosis,
     EstimatorSetup,
     FrequencyResponseBand,
+    PosteriorDraws,
     PosteriorMoments,
     PredictionBand,
     SampleBlock,
+    StabilityMargin,
     TestSetup,
 )
 from diagnostic_msgs.msg import DiagnosticArray
@@ -56,6 +58,8 @@ TEST_SETUP = Topic('test_setup', TestSetup, _reliable(10, latched=True))
 ESTIMATOR_SETUP = Topic('estimator_setup', EstimatorSetup, _reliable(10, latched=True))
 DIAGNOSIS = Topic('diagnosis', Diagnosis, _reliable(1, latched=True))
 POSTERIOR = Topic('posterior', PosteriorMoments, _reliable(50))
+DRAWS = Topic('posterior_draws', PosteriorDraws, _reliable(50))
+MARGIN = Topic('stability_margin', StabilityMargin, _reliable(50))
 BAND = Topic('prediction_band', PredictionBand, _reliable(200))
 RESPONSE = Topic('frequency_response', FrequencyResponseBand, _reliable(50))
 DIAGNOSTICS = Topic('/diagnostics', DiagnosticArray, _reliable(50))
@@ -67,8 +71,10 @@ RECORDED = (
     PREVIEW,
     SAMPLES,
     POSTERIOR,
+    DRAWS,
     BAND,
     RESPONSE,
+    MARGIN,
     DIAGNOSIS,
     DIAGNOSTICS,
 )

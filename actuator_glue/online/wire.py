@@ -24,6 +24,7 @@ from actuator_glue.records import Array
 
 Fields = dict[str, Any]
 _NAN = float('nan')
+DRAWS = 200  # of a window's posterior, in a message
 
 
 class Head(NamedTuple):
@@ -198,6 +199,26 @@ def posterior(result: WindowResult, seconds: float) -> tuple[Head, Fields]:
         if name in ('beta_1', 'alpha_1_beta_0', 'alpha_2', 'alpha_3'):
             fields[f'{name}_mean'] = float(mean)
             fields[f'{name}_stddev'] = float(stddev)
+    return Head(record.stamp_ns(len(record) - 1), record.actuator), fields
+
+
+def draws(result: WindowResult) -> tuple[Head, Fields]:
+    """Return header and fields of a PosteriorDraws: some draws, evenly spread over the posterior.
+
+    Args:
+        result: a result that has a posterior.
+    """
+    assert result.frozen is not None and result.ess is not None
+    record, posterior = result.window.record, result.frozen.draws
+    rows = np.linspace(0, len(posterior) - 1, min(DRAWS, len(posterior))).astype(np.intp)
+    fields: Fields = {
+        'window': result.window.number,
+        'effects': list(result.model.effects),
+        'parameter_names': list(result.model.names),
+        'values': posterior[rows].ravel(),
+        'ess_min': float(result.ess.min()),
+        'converged': result.converged,
+    }
     return Head(record.stamp_ns(len(record) - 1), record.actuator), fields
 
 

@@ -110,6 +110,16 @@ def test_margin_is_the_delay_that_makes_the_draw_unstable(effects: tuple[str, ..
         assert ag.rths(late, calibration, draws=3).p_unstable.value == value
 
 
+def test_a_delay_costs_its_length() -> None:
+    """Materiality in terms of the margin: 4 ms of transport delay cost 4 ms of it."""
+    found = ag.rths(structure(0.2), posterior(0.01, ('delay',)), draws=50)
+    assert found.margin_s is not None and found.margin_s.lower > 0.0
+    cost = found.effect_cost_s['delay']
+    assert cost.median == pytest.approx(0.004, rel=0.02)
+    told = found.to_json()['indicators']['effect_cost_s']['delay']
+    assert told['median'] == cost.median
+
+
 def test_tracking_is_that_of_scipy() -> None:
     """Delay and amplitude at a frequency, bandwidth, of nearly one draw."""
     found = ag.rths('sdof', posterior(1e-12), draws=2, frequencies=(5.0,))

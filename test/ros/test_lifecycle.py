@@ -25,6 +25,10 @@ def needed(node, tmp_path):
         return {'bag': str(bags[0]), 'wait_for': 99}
     if node == 'recorder':
         return {'bag': str(tmp_path / 'bag')}
+    if node == 'margin':
+        return {'partition': 'sdof'}
+    if node == 'viewer':
+        return {'port': 0}
     return {'wait_for': 99} if node == 'actuator_sim' else {}
 
 
@@ -91,6 +95,9 @@ def test_the_parameter_file_is_the_code_s():
         ('lab_bridge', {'specimen_stiffness': -0.5}, 'is negative'),
         ('replay', {'bag': 'no-such'}, 'neither a bag nor an .mcap'),
         ('recorder', {'bag': '/proc/none'}, 'cannot'),
+        ('margin', {}, 'no hybrid test is given'),
+        ('margin', {'partition': 'nowhere.yaml'}, 'nowhere.yaml'),
+        ('margin', {'partition': 'sdof', 'clear_below': 0.5}, 'clear_below'),
     ],
 )
 def test_bad_parameters_end_with_2_and_one_clear_message(node, parameters, told, start):

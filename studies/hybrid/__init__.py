@@ -1,0 +1,1 @@
+"""The prediction of `rths` put to the test on simulated actuators."""
