@@ -9,7 +9,7 @@ ROS_STAMP := install/stamp
 ROS := . install/setup.bash &&
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test coverage test-slow lint bench soak reproduce docs clean
+.PHONY: help setup demo test coverage test-slow lint bench soak reproduce study-rths docs clean
 
 help: ## show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 20
@@ -57,6 +57,9 @@ soak: $(ROS_STAMP) ## half an hour of all nodes with random faults; result in ou
 
 reproduce: $(VENV_STAMP) ## the paper beside our numbers; report in out/reproduce
 	@$(BIN)/python -m studies.chen --force --out out/reproduce $(REPRODUCE_ARGS)
+
+study-rths: $(VENV_STAMP) ## predicted stability against simulated hybrid tests, an hour; out/study-rths
+	@$(BIN)/python -m studies.hybrid --force --out out/study-rths $(STUDY_ARGS)
 
 # Its tools are installed by this target alone.
 .venv/docs: $(VENV_STAMP)

@@ -55,16 +55,7 @@ class EstimatorNode(WorkingNode):
         self.settings = configuration.settings(values)
         self._carried = configuration.carried(values)
         self.employ(warm_up)
-        self._out = {
-            topic: self.publisher(topic)
-            for topic in (
-                topics.POSTERIOR,
-                topics.DRAWS,
-                topics.BAND,
-                topics.RESPONSE,
-                topics.ESTIMATOR_SETUP,
-            )
-        }
+        self._out = {topic: self.publisher(topic) for topic in topics.ESTIMATED}
         self._service = self.create_service(SetModel, '~/set_model', self._set_model)
 
     def do_activate(self) -> None:

@@ -16,6 +16,7 @@ NODES = {
     'recorder': 'RecorderNode',
     'estimator': 'EstimatorNode',
     'diagnoser': 'DiagnoserNode',
+    'margin': 'MarginNode',
     'viewer': 'ViewerNode',
     'actuator_sim': 'SimulatorNode',
     'lab_bridge': 'LabBridgeNode',

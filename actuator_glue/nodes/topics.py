@@ -64,6 +64,8 @@ BAND = Topic('prediction_band', PredictionBand, _reliable(200))
 RESPONSE = Topic('frequency_response', FrequencyResponseBand, _reliable(50))
 DIAGNOSTICS = Topic('/diagnostics', DiagnosticArray, _reliable(50))
 
+# What the estimator says.
+ESTIMATED = (POSTERIOR, DRAWS, BAND, RESPONSE, ESTIMATOR_SETUP)
 # What waits on several topics is taken in this order: a set-up before the samples that it is for.
 RECORDED = (
     TEST_SETUP,

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 import actuator_glue as ag
-from actuator_glue.api.simulation import Sensors
 from studies.hybrid import library
 
 STATIC_GAIN = 1.0261  # of the benchmark's plant
@@ -65,7 +64,7 @@ def partition(seed: int) -> ag.Partition:
 
 
 def pre_tests(theta: np.ndarray, stiffness: float, seed: int) -> list[ag.Record]:
-    """Return two noisy tests up to 10 Hz, the piston free and against a spring of known stiffness."""
+    """Return two noisy tests to 10 Hz, the piston free and against a spring of known stiffness."""
     names = library.Structure(EFFECTS).names
     values = dict(zip(names, theta, strict=True))
     effects = {
@@ -80,7 +79,7 @@ def pre_tests(theta: np.ndarray, stiffness: float, seed: int) -> list[ag.Record]
             stiffness=k,
             theta=theta[:4],
             effects=effects,
-            sensors=Sensors(noise=16e-6),
+            sensors=library.Sensors(noise=16e-6),
             seed=(seed, i),
         )
         for i, k in enumerate((0.0, stiffness))
