@@ -25,6 +25,11 @@ def test_a_band_is_back_after_the_last_bad_one():
     fault, never = Fault('spike', 50.0, 1.0), Fault('spike', 200.0, 1.0)
     judge.judge([fault, never], content(bands))
     assert fault.back == 7.0 and np.isnan(never.back)
+    # Where no band comes there is none that is good.
+    hole = [b for b in bands if not 52 <= b[0] < 58]
+    fault = Fault('spike', 50.0, 1.0)
+    judge.judge([fault], content([(51.5, 0.95), *hole]))
+    assert fault.back == 7.0
     # One that is bad only after the next fault is that one's.
     first, second = Fault('spike', 50.0, 1.0), Fault('spike', 55.0, 0.0)
     judge.judge([first, second], content([(51.5, 0.95), *[b for b in bands if b[0] > 55.0]]))

@@ -189,6 +189,7 @@ def main() -> int:
         'cores': os.cpu_count(),
         'faults': [asdict(f) for f in soak.faults],
         'memory_MB_per_h': judge.slopes(soak.memory, 0.25 * 60.0 * args.minutes),
+        'memory_MB': [{'seconds': t, **m} for t, m in soak.memory[::10]],
         'samples_missing_in_the_bag': judge.whole(content),
         **judge.summary(content),
     }

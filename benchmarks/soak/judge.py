@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +18,7 @@ GOOD = 0.85
 # A fault is told within this time [s]; a jump of a clock takes three stretches of a second.
 TOLD_SECONDS = 15.0
 WINDOW = 5.0  # s
+HOLE = 2.5  # s, bands come every second
 
 
 @dataclass(slots=True)
@@ -47,7 +48,7 @@ SHOWN = {
     'restart': ('lab_bridge', 'restarts'),
     'disorder': ('lab_bridge', 'duplicates'),
     'garbage': ('lab_bridge', 'malformed'),
-    'spike': ('estimator', 'rms error (m)'),
+    'spike': ('estimator', 'windows failed'),
     'estimator_killed': ('estimator', 'start (last)'),
     'worker_killed': ('estimator', 'worker (count)'),
     'recorder_stalled': ('recorder', ''),
@@ -100,8 +101,10 @@ def judge(faults: Sequence[Fault], content: Content) -> None:
         fault.told = _told(fault, content)
         end = fault.time + fault.seconds
         after = [(t, c) for t, c in content.bands if end < t < following]
-        bad = [t for t, c in after if c < GOOD]
-        since = bad[-1] if bad else end
+        times = [end, *(t for t, _ in after)]
+        # No band for longer than two hops is as bad as a bad one.
+        holes = [b - 1e-6 for a, b in pairwise(times) if b - a > HOLE]
+        since = max([end, *holes, *(t for t, c in after if c < GOOD)])
         good = [t for t, c in after if c >= GOOD and t > since]
         fault.back = good[0] - end if good else float('nan')
 
@@ -112,13 +115,10 @@ def _told(fault: Fault, content: Content) -> bool:
     if fault.kind == 'recorder_stalled':
         # A node that stands still says nothing: that is seen.
         times = [t for t, _ in reports]
-        gaps = [b - a for a, b in itertools.pairwise(times) if b > fault.time > a - 5.0]
+        gaps = [b - a for a, b in pairwise(times) if b > fault.time > a - 5.0]
         return bool(gaps) and max(gaps) > 2.0
     before = [v.get(key, '') for t, v in reports if t <= fault.time]
     after = [v.get(key, '') for t, v in reports if fault.time < t < fault.time + TOLD_SECONDS]
-    if fault.kind == 'spike':
-        usual = np.median([float(v) for v in before if v] or [np.nan])
-        return any(v and float(v) > 3.0 * usual for v in after)
     if fault.kind == 'estimator_killed':
         later = [v.get(key, '') for t, v in reports if t > fault.time]
         return any('begins anew' in v for v in later)
