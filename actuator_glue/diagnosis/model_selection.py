@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from actuator_glue.diagnosis import false_alarms
 from actuator_glue.diagnosis.finding import Rival
-from actuator_glue.diagnosis.ranking import compare, removed
+from actuator_glue.diagnosis.ranking import compare, removed, spokesman
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.search import Search, Trial
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -134,7 +134,7 @@ class ModelSelection:
     def concluded(self, current: Trial, base: Trial, singles: Sequence[Trial]) -> Selection:
         """Check each member against none and against its rivals, and say what it is worth."""
         current = self.pruned(current)
-        current, rivals = self.settle(current)
+        current, rivals = self.spoken(*self.settle(current))
         gains, nats = {}, {}
         for name in current.effects:
             rest = self.search.without(current, name)
@@ -172,6 +172,29 @@ class ModelSelection:
             # The last members stay, so that the rivals told are theirs.
             if best is current or attempt == _SWAPS - 1:
                 break
+            current = best
+        return current, rivals
+
+    def spoken(
+        self, current: Trial, rivals: dict[str, tuple[Rival, ...]]
+    ) -> tuple[Trial, dict[str, tuple[Rival, ...]]]:
+        """Let the kind that most of the weight agrees on speak for what is tied."""
+        groups = {name: effect.group for name, effect in self.search.entries.items()}
+        for name, row in list(rivals.items()):
+            other = spokesman(name, row, groups)
+            rest = [n for n in current.effects if n != name]
+            known = [self.search.known((*rest, r.name)) for r in row]
+            best = self.search.known((*rest, other))
+            if other == name or best is None:
+                continue
+            trials = [
+                replace(t, added=r.name)
+                for t, r in zip(known, row, strict=True)
+                if t is not None and r.name != other
+            ]
+            alone = self.search.without(current, name)
+            rivals = {n: r for n, r in rivals.items() if n != name}
+            rivals[other] = self._rivals(alone, replace(best, added=other), other, trials)
             current = best
         return current, rivals
 

@@ -6,7 +6,7 @@ rival whose deficit is within two standard errors is not excluded, however many 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -96,6 +96,27 @@ def _tolerant(known: Array, excess: Sequence[float], tolerance: float) -> Array:
     out = known.copy()
     out[1:-1] = np.maximum(out[1:-1], known[0] * np.where(near > _NOT_NEAR, near, 0.0))
     return np.asarray(out / out.sum())
+
+
+def spokesman(name: str, rivals: Sequence[Rival], groups: Mapping[str, str]) -> str:
+    """Return the name that speaks for what is tied: of the kind most of the weight agrees on.
+
+    One name may be ahead by a hair of three of another kind that do the same: a lag, say. The
+    best of these is told then, not the outsider.
+
+    Args:
+        name: the best.
+        rivals: its rivals, itself among them, best first.
+        groups: kind of each effect.
+    """
+    tied = [r for r in rivals if r.tied and r.name in groups]
+    kinds = {groups[r.name]: [t for t in tied if groups[t.name] == groups[r.name]] for r in tied}
+    own = kinds.get(groups.get(name, ''), [])
+    for members in kinds.values():
+        heavier = sum(r.probability for r in members) > sum(r.probability for r in own)
+        if len(members) > len(own) > 0 and heavier:
+            return members[0].name
+    return name
 
 
 def _limit(trial: Trial, name: str, scorer: Scorer) -> tuple[str, float] | None:

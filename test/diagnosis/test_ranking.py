@@ -8,6 +8,7 @@ from scipy import stats
 
 from actuator_glue.diagnosis import false_alarms, ranking, verdict
 from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.ranking import standard_error, weights
 from actuator_glue.diagnosis.result import HeldOutError
 from actuator_glue.diagnosis.score import Scorer, splits_of
@@ -71,3 +72,15 @@ def test_held_out_records_that_contradict_lower_the_certainty() -> None:
     assert verdict.certainty(0.95, error, 5e-6) == pytest.approx(0.9)
     good = replace(error, after=11e-6, removable_removed=0.99)
     assert verdict.certainty(0.95, good, 5e-6) == 0.95
+
+
+def test_three_of_a_kind_speak_for_what_is_tied() -> None:
+    """Damping ahead by a hair of three lags is told as a lag; ahead of one, as damping."""
+    groups = dict.fromkeys(('delay', 'sensor-lag', 'valve-lag'), 'lag') | {'damping': 'damping'}
+    names = ('damping', 'valve-lag', 'delay', 'sensor-lag')
+    shares = (0.35, 0.25, 0.2, 0.1)
+    rows = [Rival(n, 0.0, 0.0, 0.0, True, p) for n, p in zip(names, shares, strict=True)]
+    assert ranking.spokesman('damping', rows, groups) == 'valve-lag'
+    assert ranking.spokesman('damping', rows[:2], groups) == 'damping'
+    apart = [rows[0], *(replace(r, tied=False) for r in rows[1:])]
+    assert ranking.spokesman('damping', apart, groups) == 'damping'
