@@ -56,7 +56,7 @@ def test_mts_is_explained_on_currents_it_was_not_fitted_to(fitted: int) -> None:
     records = mts()
     held = [r for i, r in enumerate(records) if i != fitted]
     found = diagnose([records[fitted]], held, jobs=2)
-    # 14 um remain where 6 um are noise: what is found is not said to be everything.
+    # 11 um remain where 6 um are noise: what is found is not said to be everything.
     assert found.verdict in ('missing-effect', 'unexplained')
     names = {n for e in found.effects for n in (e.name, *e.alternatives)}
     assert names & FLOW
