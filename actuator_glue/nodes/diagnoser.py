@@ -17,7 +17,6 @@ from actuator_glue.nodes import diagnosing, own_effects, spin, topics
 from actuator_glue.nodes.health import ERROR
 from actuator_glue.nodes.latched import Newest
 from actuator_glue.nodes.messages import publish
-from actuator_glue.nodes.parameters import Spec
 from actuator_glue.nodes.working import WorkingNode
 from actuator_glue.online import wire
 from actuator_glue.online.alarm import CoverageAlarm, SwapWatch
@@ -25,18 +24,6 @@ from actuator_glue.online.collect import Collector
 from actuator_glue.online.stream import Event, Rejected, Restarted
 from actuator_glue.workers.worker import DIED, FAILED, PROGRESS, Answer
 
-SPECS = (
-    Spec('automatic', True, 'diagnose when the coverage breaks'),
-    Spec('apply', False, 'have the estimator go on with the augmented model'),
-    Spec('coverage_limit', 0.8, 'coverage of the noise band that raises the alarm', '1', 0.0, 1.0),
-    Spec('coverage_windows', 5, 'windows the coverage is averaged over', '1', 1, 1000, True),
-    Spec('minimum', 20.0, 'data needed before a diagnosis by itself', 's', 5.0, 3600.0),
-    Spec('pause', 60.0, 'shortest time between diagnoses by itself', 's', 0.0, 86_400.0),
-    Spec('keep', 180.0, 'samples kept for a diagnosis', 's', 10.0, 3600.0, True),
-    Spec('seed', 1, 'seed of diagnoses by itself', '1', 0, 2**53),
-    own_effects.SPEC,
-    Spec('estimator', 'estimator', 'name of the estimator node', read_only=True),
-)
 # How long the estimator may take to say whether it takes the augmented model [s].
 ANSWER_SECONDS = 10.0
 
@@ -48,7 +35,7 @@ class DiagnoserNode(WorkingNode):
         self._goal: Any = None
         self._request: diagnosing.Request | None = None
         self._swap: Any = None
-        super().__init__('diagnoser', SPECS)
+        super().__init__('diagnoser', diagnosing.SPECS)
 
     def check(self, values: Mapping[str, Any]) -> None:
         """Read the user's own effects."""

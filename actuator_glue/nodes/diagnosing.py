@@ -17,10 +17,25 @@ from actuator_glue.errors import InputError
 from actuator_glue.io.load import load_records
 from actuator_glue.model.commands import noise
 from actuator_glue.model.structure import Structure
+from actuator_glue.nodes import own_effects
 from actuator_glue.nodes.messages import fill
+from actuator_glue.nodes.parameters import Spec
 from actuator_glue.online.wire import Fields, Head
 from actuator_glue.records import Record
 from actuator_glue.workers.worker import Tell
+
+SPECS = (
+    Spec('automatic', True, 'diagnose when the coverage breaks'),
+    Spec('apply', False, 'have the estimator go on with the augmented model'),
+    Spec('coverage_limit', 0.8, 'coverage of the noise band that raises the alarm', '1', 0.0, 1.0),
+    Spec('coverage_windows', 5, 'windows the coverage is averaged over', '1', 1, 1000, True),
+    Spec('minimum', 20.0, 'data needed before a diagnosis by itself', 's', 5.0, 3600.0),
+    Spec('pause', 60.0, 'shortest time between diagnoses by itself', 's', 0.0, 86_400.0),
+    Spec('keep', 180.0, 'samples kept for a diagnosis', 's', 10.0, 3600.0, True),
+    Spec('seed', 1, 'seed of diagnoses by itself', '1', 0, 2**53),
+    own_effects.SPEC,
+    Spec('estimator', 'estimator', 'name of the estimator node', read_only=True),
+)
 
 
 @dataclass(frozen=True, slots=True)
