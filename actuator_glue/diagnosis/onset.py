@@ -107,8 +107,10 @@ def _counted(data: Data) -> float:
     return float(sum(m.sum() * period for m, period in pairs))
 
 
-def change(data: Data, base: Fit, scorer: Scorer) -> Moment | None:
-    """Return where the residual of Eq. (2) changes most: its size, or what parameters it asks for.
+def change(data: Data, base: Fit, scorer: Scorer) -> tuple[Moment, float] | None:
+    """Return where a residual changes most: its size, or what parameters it asks for.
+
+    With it the gain in log likelihood over no change [nats].
 
     Each side has its own parameters, by one Gauss-Newton step, and its own error; the likelihood
     of both is that of two normal variances (Hinkley 1970).
@@ -132,8 +134,10 @@ def change(data: Data, base: Fit, scorer: Scorer) -> Moment | None:
             best, at = float(gain), int(counts[k])
     if at < 0:
         return None
+    none = -len(error) * np.log(_remaining(left[-1]) / len(error))
     index = next(i for i, part in enumerate(data.parts) if part.start <= at < part.stop)
-    return Moment(index, float(data.times[index][at - data.parts[index].start]))
+    time = float(data.times[index][at - data.parts[index].start])
+    return Moment(index, time), 0.5 * (best - float(none))
 
 
 def _remaining(normal: Array) -> float:

@@ -28,6 +28,9 @@ from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.model.effects import CATALOGUE
 
 Progress = Callable[[str, float], None]
+# Share of the squared error that impulses must carry to have swayed a search: two per cent are a
+# hundredth of its size.
+_SWAYING = 0.02
 
 
 def mean_effects() -> tuple[str, ...]:
@@ -67,12 +70,18 @@ class Conclusion:
 def conclude(prepared: Prepared, settings: Thresholds, each: Each, tell: Progress) -> Conclusion:
     """Search for what the model lacks and decide; nothing looks at the held-out part.
 
-    Where impulses show beside what was found, they are taken out and all is done again.
+    Where impulses that could have swayed it show beside what was found, they are taken out and
+    all is done again.
     """
     first = _conclude(prepared, settings, each, tell)
     final = first.found.final
     clean = prepared.without_impulses(final.model, final.fit.theta)
-    return first if clean is prepared else _conclude(clean, settings, each, tell)
+    if clean is prepared:
+        return first
+    taken, error = prepared.fit.target - clean.fit.target, final.fit.error
+    if taken @ taken < _SWAYING * (error @ error):
+        return first
+    return _conclude(clean, settings, each, tell)
 
 
 def _conclude(prepared: Prepared, settings: Thresholds, each: Each, tell: Progress) -> Conclusion:
@@ -98,19 +107,26 @@ def since_onset(first: Conclusion, settings: Thresholds, each: Each, tell: Progr
     Taken where Eq. (2) alone up to a moment, and what is found in the data since then, leave
     materially less than effects that act all the time.
     """
-    if first.decision.verdict == 'none' or first.found.final.own is not None:
+    final = first.found.final
+    if first.decision.verdict == 'none' or final.own is not None:
         return first
-    moment = onset.change(first.data, first.found.base.fit, first.scorer)
-    quiet = None if moment is None else onset.quiet_before(moment, first.data)
-    if moment is None or quiet is None:
+    if first.decision.left < first.found.material:
+        # The answer is complete: only a change of what it found can still be asked for.
+        changed = onset.change(first.data, final.fit, first.scorer)
+        if changed is None or changed[1] < 2.0 * (settings.nats + len(final.fit.theta)):
+            return first
+    changed = onset.change(first.data, first.found.base.fit, first.scorer)
+    quiet = None if changed is None else onset.quiet_before(changed[0], first.data)
+    if changed is None or quiet is None:
         return first
+    moment = changed[0]
     before, base = quiet
     tell('onset', 0.0)
     second = conclude(first.prepared.since(moment), settings, each, tell)
-    final = second.found.final
+    always, final = final, second.found.final
     nats = settings.nats + len(base.theta)
     sides = before, moment.split(first.data)[1]
-    rivals = first.found.final, final
+    rivals = always, final
     if not onset.explains(sides, base, rivals, nats, second.found.material):
         return first
     return replace(
