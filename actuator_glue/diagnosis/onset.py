@@ -13,7 +13,7 @@ import numpy as np
 from actuator_glue.diagnosis.data import SETTLE, Data, Mask, Model
 from actuator_glue.diagnosis.estimate import Json
 from actuator_glue.diagnosis.fit import Fit, base_fit
-from actuator_glue.diagnosis.score import Scorer, pooled, splits_of
+from actuator_glue.diagnosis.score import pooled, splits_of
 from actuator_glue.diagnosis.search import Trial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
@@ -107,15 +107,19 @@ def _counted(data: Data) -> float:
     return float(sum(m.sum() * period for m, period in pairs))
 
 
-def change(data: Data, base: Fit, scorer: Scorer) -> tuple[Moment, float] | None:
+def change(data: Data, error: Array, jac: Array) -> tuple[Moment, float] | None:
     """Return where a residual changes most: its size, or what parameters it asks for.
 
-    With it the gain in log likelihood over no change [nats].
+    With it by how much less is left of its square sum than without a change.
 
     Each side has its own parameters, by one Gauss-Newton step, and its own error; the likelihood
     of both is that of two normal variances (Hinkley 1970).
+
+    Args:
+        data: what counts.
+        error: what a fit leaves (n,), as it is or whitened.
+        jac: its derivatives (p, n), likewise.
     """
-    error, jac = scorer.whiten(base.error), scorer.whiten(base.jacobian)
     size = max(1, round(_STEP / min(data.periods)))
     edges = np.arange(0, len(error), size)
     rows = np.concatenate([jac, error[None]])
@@ -125,19 +129,20 @@ def change(data: Data, base: Fit, scorer: Scorer) -> tuple[Moment, float] | None
     left = np.cumsum(blocks, axis=0)
     counts = np.minimum(np.arange(1, len(edges) + 1) * size, len(error))
     least = _SHORTEST / min(data.periods)
-    best, at = -np.inf, -1
+    best, at, removed = -np.inf, -1, 0.0
     for k in np.flatnonzero((counts > least) & (counts < len(error) - least)):
-        gain = -counts[k] * np.log(_remaining(left[k]) / counts[k])
+        early, late = _remaining(left[k]), _remaining(left[-1] - left[k])
         rest = len(error) - counts[k]
-        gain -= rest * np.log(_remaining(left[-1] - left[k]) / rest)
+        gain = -counts[k] * np.log(early / counts[k]) - rest * np.log(late / rest)
         if gain > best:
             best, at = float(gain), int(counts[k])
+            removed = _remaining(left[-1]) - early - late
     if at < 0:
         return None
-    none = -len(error) * np.log(_remaining(left[-1]) / len(error))
     index = next(i for i, part in enumerate(data.parts) if part.start <= at < part.stop)
     time = float(data.times[index][at - data.parts[index].start])
-    return Moment(index, time), 0.5 * (best - float(none))
+    # The rows were scaled to unit size.
+    return Moment(index, time), removed * float(scale[-1]) ** 2
 
 
 def _remaining(normal: Array) -> float:

@@ -111,11 +111,12 @@ def since_onset(first: Conclusion, settings: Thresholds, each: Each, tell: Progr
     if first.decision.verdict == 'none' or final.own is not None:
         return first
     if first.decision.left < first.found.material:
-        # The answer is complete: only a change of what it found can still be asked for.
-        changed = onset.change(first.data, final.fit, first.scorer)
-        if changed is None or changed[1] < 2.0 * (settings.nats + len(final.fit.theta)):
+        # The answer is complete: only what it found can still have changed, and materially so.
+        changed = onset.change(first.data, final.fit.error, final.fit.jacobian)
+        if changed is None or changed[1] < final.fit.error.size * first.found.material**2:
             return first
-    changed = onset.change(first.data, first.found.base.fit, first.scorer)
+    base_fit, whiten = first.found.base.fit, first.scorer.whiten
+    changed = onset.change(first.data, whiten(base_fit.error), whiten(base_fit.jacobian))
     quiet = None if changed is None else onset.quiet_before(changed[0], first.data)
     if changed is None or quiet is None:
         return first

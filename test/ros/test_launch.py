@@ -19,6 +19,7 @@ WAYS = {
         {'data': 'x.csv'},
         {'source': 'udp://127.0.0.1:5005'},
         {'replay': 'bag'},
+        {'partition': 'benchmark_case_1'},
         {'view': 'true'},
     ),
     'four': ({}, {'sources': 'udp://a:1,udp://a:2,udp://a:3,udp://a:4'}, {'diagnose': 'true'}),
@@ -45,7 +46,8 @@ def test_a_launch_file_names_what_exists(file, way):
 def test_every_stream_can_be_launched():
     ways = [launched('demo', **way)[0] for way in WAYS['demo']]
     streams = [nodes[-1].executable for nodes in ways]
-    assert streams == ['actuator_sim', 'lab_bridge', 'lab_bridge', 'replay', 'actuator_sim']
+    simulated, filed = ['actuator_sim'], ['lab_bridge', 'lab_bridge', 'replay']
+    assert streams == [*simulated, *filed, *simulated, *simulated]
     assert [n.parameters[1].get('wait_for') for n in ways[-1]][-1] == 4
     found = {n.executable for nodes in ways for n in nodes}
     assert found == set(KNOWN)
