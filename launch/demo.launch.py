@@ -70,9 +70,11 @@ def nodes(given):
     ]
     if truth(given['view']):
         wanted.append(('viewer', {'open': True}))
-    wanted.append((name, parameters | {'wait_for': len(wanted), 'exit_at_end': True}))
+    listeners = len(wanted)
     if given['partition']:
         wanted.append(('margin', {'partition': given['partition']}))
+    # The stream is the last one: its end ends the launch.
+    wanted.append((name, parameters | {'wait_for': listeners, 'exit_at_end': True}))
     return [node(given, name, more, given['namespace']) for name, more in wanted]
 
 

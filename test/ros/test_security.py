@@ -28,6 +28,7 @@ def test_the_policy_is_what_a_node_does(node, start, probe, tmp_path):
         'recorder': {'bag': str(tmp_path / 'bag')},
         'replay': {'bag': str(bag), 'results': True, 'clock': True, 'wait_for': 99},
         'actuator_sim': {'wait_for': 99},
+        'margin': {'partition': 'sdof'},
         'lab_bridge': {'file': str(bag), 'wait_for': 99, 'results': 'udp://127.0.0.1:9'},
     }
     process = start(node, **given.get(node, {}))
