@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection
 from typing import Any, NamedTuple
 
@@ -77,7 +78,9 @@ class Worker:
         self._process: Any = context.Process(
             target=_serve, args=(theirs, self._warm, self._nice), daemon=True, name='worker'
         )
-        # It begins with Ctrl-C blocked: its imports shall not be cut, with a traceback each.
+        # It begins with Ctrl-C blocked: its imports shall not be cut, with a traceback each. The
+        # tracker comes first: what starts it unblocks the signal again.
+        resource_tracker.ensure_running()
         masked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
             self._process.start()

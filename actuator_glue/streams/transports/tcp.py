@@ -40,10 +40,18 @@ class TcpListener:
         """Return the samples of all lines that have arrived, a chunk at most."""
         watched = [s for s in (self._server, self._peer) if s is not None]
         ready, _, _ = select.select(watched, [], [], timeout)
-        if self._server in ready:
+        rows = self._read() if self._peer is not None and self._peer in ready else []
+        # A partner that comes back is no second one: first the end of the old connection is read.
+        if self._server in ready and not self._waits():
             self._accept()
-        if self._peer is None or self._peer not in ready:
-            return []
+        return rows
+
+    def _waits(self) -> bool:
+        """Whether something of the connection, maybe its end, is still to be read."""
+        return self._peer is not None and bool(select.select([self._peer], [], [], 0.0)[0])
+
+    def _read(self) -> list[Rows]:
+        assert self._peer is not None
         try:
             data = self._peer.recv(CHUNK)
         except BlockingIOError:
