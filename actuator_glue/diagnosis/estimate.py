@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from actuator_glue.json_value import Json, JsonObject
-from actuator_glue.json_value import json_value as number
 
-__all__ = ['Estimate', 'Json', 'number']
+__all__ = ['Estimate', 'Json']
 
 
 @dataclass(frozen=True, slots=True)

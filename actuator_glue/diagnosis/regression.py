@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.estimate import Json, number
 from actuator_glue.diagnosis.fit import Fit
 from actuator_glue.diagnosis.score import Scorer, evidence
 from actuator_glue.diagnosis.search import Trial
+from actuator_glue.json_value import Json, json_value
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 
@@ -63,10 +63,10 @@ class Surrogate:
             'unit': 'm',
             'parameters': len(self.features),
             'features': list(self.features),
-            'error': number(self.error),
+            'error': json_value(self.error),
             'structure': list(self.structure),
-            'structure_error': number(self.structure_error),
-            'nats': number(self.nats),
+            'structure_error': json_value(self.structure_error),
+            'nats': json_value(self.nats),
             'explained': self.explained,
             'place': self.place,
         }

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_glue.diagnosis.data import Model
-from actuator_glue.diagnosis.estimate import Json, number
+from actuator_glue.json_value import Json, json_value
 from actuator_glue.model.effects import Scale
 from actuator_glue.records import Array, Record
 
@@ -72,16 +72,20 @@ class Response:
             {
                 'frequency_hz': s.frequency,
                 'amplitude': s.amplitude,
-                'gain': number(s.gain),
-                'gain_ci': [number(v) for v in s.gain_ci],
-                'phase_deg': number(s.phase),
-                'phase_ci': [number(v) for v in s.phase_ci],
-                'delay_s': number(s.delay),
-                'delay_ci': [number(v) for v in s.delay_ci],
+                'gain': json_value(s.gain),
+                'gain_ci': [json_value(v) for v in s.gain_ci],
+                'phase_deg': json_value(s.phase),
+                'phase_ci': [json_value(v) for v in s.phase_ci],
+                'delay_s': json_value(s.delay),
+                'delay_ci': [json_value(v) for v in s.delay_ci],
             }
             for s in self.sines
         ]
-        return {'stiffness': self.stiffness, 'bandwidth_hz': number(self.bandwidth), 'at': rows}
+        return {
+            'stiffness': self.stiffness,
+            'bandwidth_hz': json_value(self.bandwidth),
+            'at': rows,
+        }
 
 
 def of(model: Model, theta: Array, draws: Array, scale: Scale, stiffness: float) -> Response:

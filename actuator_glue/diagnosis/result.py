@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
-from actuator_glue.diagnosis.estimate import Estimate, Json, number
+from actuator_glue.diagnosis.estimate import Estimate, Json
 from actuator_glue.diagnosis.finding import Candidate, Finding
 from actuator_glue.diagnosis.headline import headline
 from actuator_glue.diagnosis.learned_term import LearnedTerm
@@ -179,13 +179,16 @@ class DiagnosisData:
             'effects': [e.to_json() for e in self.effects],
             'error': self.error.to_json(),
             'candidates': [c.to_json() for c in self.candidates],
-            'coverage': {'before': number(self.coverage[0]), 'after': number(self.coverage[1])},
+            'coverage': {
+                'before': json_value(self.coverage[0]),
+                'after': json_value(self.coverage[1]),
+            },
             'alarm': self.alarm.to_json(),
             'base': {name: p.to_json() for name, p in self.base.items()},
             'base_before': {name: p.to_json() for name, p in self.base_before.items()},
             'responses': [r.to_json() for r in self.responses],
             'experiments': [e.to_json() for e in self.experiments],
-            'rhat': number(self.rhat),
+            'rhat': json_value(self.rhat),
             'sampling': list(self.sampling),
             'at_bound': [p.to_json() for p in self.at_bound],
             'structure': list(self.structure),
@@ -194,7 +197,7 @@ class DiagnosisData:
             'surrogate': self.surrogate,
             'remaining': self.remaining,
             'advice': list(self.advice),
-            'seconds': number(self.seconds),
+            'seconds': json_value(self.seconds),
             'provenance': self.provenance,
         }
 

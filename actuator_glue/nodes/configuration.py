@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import fields
+from functools import lru_cache
+from pathlib import Path
 from typing import Any
 
 from actuator_glue.api.calibration_result import Calibration
@@ -72,6 +74,12 @@ def settings(values: Mapping[str, Any]) -> EstimatorSettings:
     return EstimatorSettings.from_mapping({n: v for n, v in values.items() if n in known})
 
 
+@lru_cache(maxsize=1)
+def _carried(path: str, changed_ns: int) -> Carried:
+    """Return the draws of a file; parameters are checked far more often than it changes."""
+    return Calibration.load(path).carried()
+
+
 def carried(values: Mapping[str, Any]) -> Carried | None:
     """Return the draws that priors begin with; None where they begin with the box.
 
@@ -86,7 +94,11 @@ def carried(values: Mapping[str, Any]) -> Carried | None:
         return None
     if mode == 'box':
         raise InputError(f"calibration {path} is not used with prior 'box'")
-    found = Calibration.load(path).carried()
+    try:
+        changed_ns = Path(path).stat().st_mtime_ns
+    except OSError:
+        changed_ns = 0  # `load` says what is wrong
+    found = _carried(path, changed_ns)
     model = choose_model(effects(values))
     informative_prior(found, model.names, model.lower, model.upper, None)
     return found

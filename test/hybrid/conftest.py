@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import actuator_glue as ag
-from actuator_glue.api.calibration_result import CalibratedRecord, FitError, Marginal
+from actuator_glue.api.calibration_parts import CalibratedRecord, FitError, Marginal
 from actuator_glue.model.benchmark_plant import BenchmarkParameters
 from actuator_glue.model.structure import Structure
 
