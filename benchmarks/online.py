@@ -19,8 +19,9 @@ from actuator_glue.online import job as window_job
 from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.playback import at_once, items, replay, stream
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.stream import Preview, StreamSetup
+from actuator_glue.online.stream import Preview
 from actuator_glue.records import Record
+from actuator_glue.setups import StreamSetup
 from actuator_glue.workers.reports import Reports
 
 THETA = np.array([134.0, 1.1e9, 2.5e5, 0.5])

@@ -14,7 +14,7 @@ import actuator_glue
 ROOT = Path(actuator_glue.__file__).resolve().parent
 SOURCES = sorted(p for p in ROOT.rglob('*.py'))
 
-BOTTOM = {'errors', 'records', 'jit', 'normal', 'json_value'}
+BOTTOM = {'errors', 'records', 'setups', 'jit', 'normal', 'json_value'}
 CORE = BOTTOM | {'model', 'inference'}
 EVERYTHING = CORE | {
     'online', 'diagnosis', 'report', 'io', 'interfaces', 'workers', 'effects',
@@ -32,6 +32,7 @@ ARROWS = {
     },  # names, imported when used
     'errors': set(),
     'records': {'errors'},
+    'setups': {'records', 'errors'},
     'jit': set(),
     'normal': {'jit'},
     'json_value': set(),
@@ -43,7 +44,7 @@ ARROWS = {
     'diagnosis': CORE,
     'hybrid': CORE,
     'report': CORE | {'online', 'diagnosis', 'io'},
-    'io': {'records', 'errors', 'json_value', 'interfaces', 'hybrid'},
+    'io': {'records', 'setups', 'errors', 'json_value', 'interfaces', 'hybrid'},
     'streams': {'records', 'errors', 'io'},
     'view': {'records', 'errors', 'io', 'interfaces'},
     'workers': CORE | {'online'},
@@ -55,6 +56,7 @@ ARROWS = {
 PURE = (
     'errors',
     'records',
+    'setups',
     'normal',
     'json_value',
     'model',

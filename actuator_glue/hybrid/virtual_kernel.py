@@ -15,7 +15,7 @@ from actuator_glue.hybrid import adaptation
 from actuator_glue.hybrid.sampled import Numerical
 from actuator_glue.hybrid.virtual_lanes import Course, Found, Lanes
 from actuator_glue.jit import njit
-from actuator_glue.model.effects import kernel, stages
+from actuator_glue.model.effects import assembly, kernel, stages
 from actuator_glue.model.effects import rows as r
 from actuator_glue.model.effects.terms import machine
 from actuator_glue.records import Array
@@ -203,7 +203,7 @@ def run_effects(
         ats: coefficients, (3, LANES).
         rng: of the sensors' noise.
         found: receives the response.
-        on: which stages act, (rows.SWITCHES,).
+        on: which stages act, (assembly.SWITCHES,).
         code: effects written as expressions.
         substeps: of a sample.
     """
@@ -211,9 +211,9 @@ def run_effects(
     z, whole, work = np.zeros((s, LANES)), np.zeros((s, LANES)), np.zeros((9 + s, LANES))
     memory = np.zeros((adaptation.ROWS, LANES))
     memory[adaptation.FIRST : adaptation.FIRST + 3] = ats
-    w = np.empty(r.SIZE)  # known to the compiler
-    w[:] = lanes.table[: r.SIZE]
-    g = lanes.table[r.SIZE :].reshape(-1, LANES)
+    w = np.empty(assembly.SIZE)  # known to the compiler
+    w[:] = lanes.table[: assembly.SIZE]
+    g = lanes.table[assembly.SIZE :].reshape(-1, LANES)
     past = 1
     while past < lanes.lag.max() + 4.0:
         past *= 2
@@ -245,7 +245,7 @@ def run_effects(
                 corrected = stages.chains(w, n, 0.0, 0.0)
                 work[0, n] = work[1, n] = corrected
                 if on[r.ON_TRANSDUCER]:
-                    work[1, n] = stages.transducer(w, n, corrected)
+                    work[1, n] = assembly.sensed(w, n, corrected)
 
 
 @njit(nogil=True)

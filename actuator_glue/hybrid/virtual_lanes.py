@@ -16,7 +16,7 @@ class Lanes(NamedTuple):
         specimen: stiffness, damping, mass, (3, LANES).
         step, command, speed: linear actuators (`sampled.Plants`), (p, p, LANES), (p, LANES) twice.
         shown: row of the recorded displacement, (p,).
-        table: effects' kernel table, (rows.SIZE + registers,); (0,) for linear actuators.
+        table: effects' kernel table, (assembly.SIZE + registers,); (0,) for linear actuators.
         lag: of the command, with effects, (LANES,) [samples].
     """
 

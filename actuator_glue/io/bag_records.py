@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from array import array
-from collections.abc import Callable
+from collections import deque
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from actuator_glue.io.bag_metadata import LATCHED
 from actuator_glue.io.bag_reader import (
     TEST_SETUP,
     Note,
+    as_published,
     messages,
     refuse,
     summarise,
@@ -25,6 +27,7 @@ from actuator_glue.io.bag_samples import SAMPLE_BLOCK, BagBlock, BagSetup
 from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.io.messages import header, message
 from actuator_glue.records import Record
+from actuator_glue.setups import Setups, StreamSetup
 
 CLOCK_TOLERANCE = 0.1  # s; a step between two blocks beyond this is a jump, not jitter
 TYPES = (SAMPLE_BLOCK, TEST_SETUP)
@@ -36,7 +39,7 @@ class _Segment:
     """Blocks that follow each other without a gap, under one set-up."""
 
     first: BagBlock
-    setup: BagSetup | None
+    setup: StreamSetup | None
     command: array[float] = field(default_factory=lambda: array('d'))
     measured: array[float] = field(default_factory=lambda: array('d'))
     force: array[float] = field(default_factory=lambda: array('d'))
@@ -69,7 +72,7 @@ class _Segment:
             return f'the clock jumps by {jump:.3g} s {at}'
         return ''
 
-    def same_test(self, block: BagBlock, setup: BagSetup | None) -> bool:
+    def same_test(self, block: BagBlock, setup: StreamSetup | None) -> bool:
         """Whether a block belongs to the same test: it goes on under the same set-up."""
         return (
             block.index == self.next_index
@@ -94,7 +97,7 @@ class _Segment:
         )
 
 
-def _test(setup: BagSetup | None) -> tuple[object, ...]:
+def _test(setup: StreamSetup | None) -> tuple[object, ...]:
     return (setup.stiffness, setup.hold, setup.actuator) if setup else ()
 
 
@@ -118,12 +121,7 @@ def read_records(
     setups = _setups(path, note, warn)
     open_segments: dict[str, _Segment] = {}
     done: list[_Segment] = []
-    every = messages(path, types=TYPES, note=lambda _: None)
-    for position, raw in enumerate(every, start=1):
-        if raw.type != SAMPLE_BLOCK:
-            continue
-        item = bag_samples.samples(raw, path)
-        setup = _setup_of(item, setups, position)
+    for item, setup in _governed(path, setups):
         segment = open_segments.get(item.topic)
         if segment is not None:
             fault = segment.fault_before(item)
@@ -166,41 +164,69 @@ def _nothing(path: Path | str) -> str:
     )
 
 
+def _governed(
+    path: Path | str, setups: list[tuple[int, BagSetup]]
+) -> Iterator[tuple[BagBlock, StreamSetup | None]]:
+    """Yield all samples in their order, each block or part of one with what governs it."""
+    governing: dict[str, _Governing] = {}
+    every = as_published(messages(path, types=TYPES, note=lambda _: None))
+    for place, raw in enumerate(every):
+        if raw.type == SAMPLE_BLOCK:
+            block = bag_samples.samples(raw, path)
+            if block.topic not in governing:
+                governing[block.topic] = _Governing(block.topic, setups)
+            yield from governing[block.topic].parts(block, place)
+
+
 def _setups(path: Path | str, note: Note, warn: Note) -> list[tuple[int, BagSetup]]:
     """Return the usable set-ups with their place among all messages; checks the whole bag.
 
     A set-up that cannot be used is left out, as a live node leaves it out.
     """
     found: list[tuple[int, BagSetup]] = []
-    for position, raw in enumerate(messages(path, types=TYPES, note=note), start=1):
+    every = as_published(messages(path, types=TYPES, note=note))
+    for place, raw in enumerate(every):
         if raw.type == TEST_SETUP:
             try:
-                found.append((position, bag_samples.setup(raw, path)))
+                found.append((place, bag_samples.setup(raw, path)))
             except InputError as error:
                 warn(f'{error}; this set-up is not used')
     return found
 
 
-def _setup_of(
-    block: BagBlock, setups: list[tuple[int, BagSetup]], position: int
-) -> BagSetup | None:
-    """Return the set-up that holds for a block.
+class _Governing:
+    """The set-ups of one topic of samples, in the order of their publication.
 
-    Set-ups and blocks are topics of their own, so a set-up may be recorded a little after the
-    first blocks it holds for; its stamp says from when on it does.
+    Each holds from the sample it names (`Setups`). Topics have no order among each other: one
+    that is recorded after samples for which its stamp says it holds is taken before them.
     """
-    namespace = block.topic.rpartition('/')[0]
-    near = [s for s in setups if s[1].topic.rpartition('/')[0] == namespace] or setups
-    tolerance = round(block.period * 5e8)
-    chosen: BagSetup | None = None
-    for place, setup in near:
-        begins = setup.stamp_ns <= block.stamp_ns + tolerance
-        if place < position:
-            if begins or chosen is None:
-                chosen = setup
-        elif begins and (chosen is None or setup.stamp_ns > chosen.stamp_ns):
-            chosen = setup
-    return chosen or (near[0][1] if near else None)
+
+    def __init__(self, topic: str, setups: list[tuple[int, BagSetup]]) -> None:
+        namespace = topic.rpartition('/')[0]
+        near = [s for s in setups if s[1].topic.rpartition('/')[0] == namespace] or setups
+        # What comes before any set-up is of the first one.
+        self._current = near[0][1].setup if near else None
+        self._left = deque(near)
+        self._setups = Setups()
+        self._stamp_ns = 0
+        self._next: int | None = None
+
+    def parts(self, block: BagBlock, place: int) -> Iterator[tuple[BagBlock, StreamSetup | None]]:
+        """Yield the parts of a block, at some place among the messages, with what governs them."""
+        last = block.stamp_ns + round((len(block.command) - 0.5) * block.period * 1e9)
+        while self._left and (
+            self._left[0][0] < place or self._stamp_ns < self._left[0][1].stamp_ns <= last
+        ):
+            _, taken = self._left.popleft()
+            self._stamp_ns = max(self._stamp_ns, taken.stamp_ns)
+            if self._setups.announce(taken.setup, self._next):
+                self._current = taken.setup
+        if self._next is not None and block.index < self._next:
+            self._setups.forget()
+        for part, begun in self._setups.parts(block.index, len(block.command)):
+            self._current = begun[-1] if begun else self._current
+            yield block.part(part), self._current
+        self._next = block.index + len(block.command)
 
 
 def write_record(

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
-
-import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.bag_reader import BagMessage, Summary
 from actuator_glue.io.messages import deserialize, full_name, stamp_ns
-from actuator_glue.records import Array, Hold, check_hold, check_period, check_stiffness
+from actuator_glue.records import Array, check_period
+from actuator_glue.setups import StreamSetup, from_message
 
 SAMPLE_BLOCK = full_name('SampleBlock')
 
@@ -29,16 +28,25 @@ class BagBlock:
     measured: Array
     force: Array | None
 
+    def part(self, part: slice) -> BagBlock:
+        """Return some of the samples as a block of its own."""
+        return replace(
+            self,
+            stamp_ns=self.stamp_ns + round(part.start * self.period * 1e9),
+            index=self.index + part.start,
+            command=self.command[part],
+            measured=self.measured[part],
+            force=None if self.force is None else self.force[part],
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class BagSetup:
-    """One TestSetup; `stiffness` [N/m] is None where the message says NaN."""
+    """One TestSetup, and the time from which on it holds."""
 
     topic: str
-    actuator: str
     stamp_ns: int
-    stiffness: float | None
-    hold: Hold
+    setup: StreamSetup
 
 
 def _content(found: BagMessage, where: str) -> Any:
@@ -86,17 +94,10 @@ def setup(found: BagMessage, path: Path | str) -> BagSetup:
     """
     where = f'{path}: topic {found.topic}'
     content = _content(found, where)
-    stiffness, rate = float(content.specimen_stiffness), float(content.rate)
-    if not (np.isfinite(rate) and rate > 0.0):
-        raise InputError(f'{where}: rate {rate:g} Hz is not positive')
-    check_period(1.0 / rate, where)
-    return BagSetup(
-        found.topic,
-        content.actuator or content.header.frame_id,
-        stamp_ns(content.header),
-        None if np.isnan(stiffness) else check_stiffness(stiffness, where),
-        check_hold(content.hold, where),
-    )
+    try:
+        return BagSetup(found.topic, stamp_ns(content.header), from_message(content))
+    except InputError as error:
+        raise InputError(f'{where}: {error}') from None
 
 
 def topics_of_actuator(bag: Path | str, summary: Summary, namespace: str | None) -> list[str]:

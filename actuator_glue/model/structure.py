@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from actuator_glue.errors import InputError
 from actuator_glue.model import linear
-from actuator_glue.model.effects import CATALOGUE, Effect, Scale, lti_step, rows, run
+from actuator_glue.model.effects import CATALOGUE, Effect, Scale, assembly, lti_step, rows, run
 from actuator_glue.model.effects.effect import Onset
 from actuator_glue.model.effects.terms import machine
 from actuator_glue.model.effects.terms.program import Written, compiled
@@ -60,8 +60,8 @@ class Structure:
         for effect in self.entries:
             self._columns[effect.name] = slice(first, first + len(effect.parameters))
             first += len(effect.parameters)
-        self._on = np.zeros(rows.SWITCHES, dtype=np.bool_)
-        self._on[[s for effect in self.entries for s in effect.switches]] = True
+        self._on = np.zeros(assembly.SWITCHES, dtype=np.bool_)
+        self._on[[s for e in self.entries if e.stage is not None for s in e.stage.switches]] = True
         self.program = compiled(
             Written(e.expression, e.parameters) for e in self.entries if e.expression is not None
         )
@@ -205,7 +205,7 @@ class Structure:
 
     @property
     def switches(self) -> NDArray[np.bool_]:
-        """Which stages of the kernel act, shape (rows.SWITCHES,)."""
+        """Which stages of the kernel act, shape (assembly.SWITCHES,)."""
         return self._on.copy()
 
     @np.errstate(all='ignore')  # NaN and infinity are the answer where parameters are absurd

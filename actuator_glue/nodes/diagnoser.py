@@ -22,6 +22,7 @@ from actuator_glue.online import wire
 from actuator_glue.online.alarm import CoverageAlarm, SwapWatch
 from actuator_glue.online.collect import Collector
 from actuator_glue.online.stream import Event, Rejected, Restarted
+from actuator_glue.setups import from_message
 from actuator_glue.workers.worker import DIED, FAILED, PROGRESS, Answer
 
 # How long the estimator may take to say whether it takes the augmented model [s].
@@ -74,7 +75,7 @@ class DiagnoserNode(WorkingNode):
         self._setups = Newest(
             self,
             topics.TEST_SETUP,
-            lambda message: self._tell(self.collector.setup(wire.setup(message))),
+            lambda message: self._tell(self.collector.setup(from_message(message))),
         )
         self.subscribe(topics.BAND, self._band)
         self.subscribe(topics.SAMPLES, self._block)

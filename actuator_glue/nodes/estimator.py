@@ -33,6 +33,7 @@ from actuator_glue.online.stream import (
     Restarted,
     Window,
 )
+from actuator_glue.setups import from_message
 from actuator_glue.workers.worker import DIED, FAILED, Answer
 
 
@@ -96,7 +97,7 @@ class EstimatorNode(WorkingNode):
     # Samples in.
 
     def _setup(self, message: Any) -> None:
-        setup = wire.setup(message)
+        setup = from_message(message)
         self._tell(self.estimator.setup(setup))
         if setup.stiffness is None:
             self.complain(

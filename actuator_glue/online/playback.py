@@ -13,8 +13,9 @@ from actuator_glue.online.estimator import Estimator, Schedule
 from actuator_glue.online.job import WindowResult, fit, report
 from actuator_glue.online.sampling import Job, WindowFit
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.stream import Block, Event, Failed, Preview, Rejected, StreamSetup
+from actuator_glue.online.stream import Block, Event, Failed, Preview, Rejected
 from actuator_glue.records import Record
+from actuator_glue.setups import StreamSetup, from_message
 
 Item: TypeAlias = StreamSetup | Block | Preview
 Named: TypeAlias = tuple[str, Any]
@@ -118,7 +119,7 @@ def items(messages: Iterable[Named], rejected: list[Rejected] | None = None) -> 
             yield wire.block(message)
         elif kind == 'TestSetup':
             try:
-                yield wire.setup(message)
+                yield from_message(message)
             except InputError as error:
                 if rejected is not None:
                     rejected.append(Rejected(str(error)))

@@ -12,14 +12,12 @@ from actuator_glue.records import (
     MAX_DISPLACEMENT,
     MAX_FORCE,
     Array,
-    Hold,
     Record,
-    check_stiffness,
 )
+from actuator_glue.setups import MAX_INDEX
 
 # A block is a moment of a test; more than this is a file sent by mistake.
 MAX_BLOCK = 1_000_000
-MAX_INDEX = 2**62
 
 Reason: TypeAlias = Literal['gap', 'stream', 'clock', 'setup', 'bad-input', 'model']
 
@@ -104,50 +102,6 @@ def _check_channel(
         f'{where}: {name} is {values[at]:g} {unit} at sample {index + at}, beyond '
         f'{limit:g} {unit}; check the unit of this channel'
     )
-
-
-@dataclass(frozen=True, slots=True)
-class StreamSetup:
-    """What must be known of a test to use its samples.
-
-    Attributes:
-        stiffness: specimen stiffness k [N/m]; None where it is not known.
-        period: sample period [s].
-        actuator: name of the actuator.
-        hold: how the command runs between its samples.
-        index: running index of the first sample it holds for.
-        source: plant or file, for people.
-
-    Raises:
-        InputError: negative stiffness, absurd period, unknown hold.
-    """
-
-    stiffness: float | None
-    period: float
-    actuator: str = 'actuator'
-    hold: Hold = 'zoh'
-    index: int = 0
-    source: str = ''
-
-    def __post_init__(self) -> None:
-        where = f'test set-up of {self.actuator!r}'
-        if self.stiffness is not None:
-            object.__setattr__(self, 'stiffness', check_stiffness(self.stiffness, where))
-        if not (np.isfinite(self.period) and 1e-6 <= self.period <= 10.0):
-            raise InputError(f'{where}: sample period {self.period:g} s is outside [1e-6, 10] s')
-        if self.hold not in ('zoh', 'linear'):
-            raise InputError(f"{where}: hold {self.hold!r} is unknown; use 'zoh' or 'linear'")
-        if not 0 <= self.index <= MAX_INDEX:
-            raise InputError(f'{where}: the running index {self.index} is outside [0, 2^62]')
-
-    def same_test(self, other: StreamSetup) -> bool:
-        """Whether samples under both set-ups may be fitted together."""
-        return (self.stiffness, self.period, self.actuator, self.hold) == (
-            other.stiffness,
-            other.period,
-            other.actuator,
-            other.hold,
-        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)

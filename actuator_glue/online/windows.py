@@ -14,14 +14,11 @@ from actuator_glue.online.stream import (
     Reason,
     Rejected,
     Restarted,
-    StreamSetup,
     Window,
     check_block,
 )
 from actuator_glue.records import Array, Record
-
-# Nobody streams into hundreds of announced set-ups; a publisher gone wild must not fill memory.
-MAX_ANNOUNCED = 16
+from actuator_glue.setups import Setups, StreamSetup
 
 
 @dataclass(slots=True)
@@ -86,7 +83,7 @@ class SlidingWindows:
         self.settings = settings
         self.tally = Tally()
         self.current: StreamSetup | None = None
-        self._announced: list[StreamSetup] = []
+        self._setups = Setups()
         self._tail: Tail | None = None
         self._window = self._hop = 0
         self._next: int | None = None
@@ -96,13 +93,7 @@ class SlidingWindows:
 
     def setup(self, setup: StreamSetup) -> list[Event]:
         """Take a test set-up; it holds from the sample it names, at once where that is past."""
-        if self._next is not None and setup.index <= self._next:
-            return self._begin(setup)
-        self._announced = [s for s in self._announced if s.index != setup.index]
-        self._announced.append(setup)
-        self._announced.sort(key=lambda s: s.index)
-        del self._announced[MAX_ANNOUNCED:]
-        return []
+        return self._begin(setup) if self._setups.announce(setup, self._next) else []
 
     def push(self, block: Block) -> tuple[list[Event], list[Window]]:
         """Take one block as it came; return what happened and the windows it completes."""
@@ -110,7 +101,7 @@ class SlidingWindows:
         try:
             check_block(block)
             if self._next is None:
-                events += self._announced_until(block.index)
+                events += self._begin_all(self._setups.begun(block.index))
             self._check_period(block)
         except InputError as error:
             self.tally.rejected += 1
@@ -121,14 +112,9 @@ class SlidingWindows:
             return events, []
         events += self._follow(block)
         windows: list[Window] = []
-        position = 0
-        while position < len(block):
-            events += self._announced_until(block.index + position)
-            stop = len(block)
-            if self._announced:
-                stop = min(stop, self._announced[0].index - block.index)
-            self._append(block.part(position, stop), windows)
-            position = stop
+        for part, begun in self._setups.parts(block.index, len(block)):
+            events += self._begin_all(begun)
+            self._append(block.part(part.start, part.stop), windows)
         self.tally.samples += len(block)
         self.tally.blocks += 1
         self._next = block.index + len(block)
@@ -144,12 +130,8 @@ class SlidingWindows:
             self._next += count
             self._stamp_ns += round(count * known * 1e9)
 
-    def _announced_until(self, index: int) -> list[Event]:
-        """Begin the announced set-ups that hold at a sample."""
-        events: list[Event] = []
-        while self._announced and self._announced[0].index <= index:
-            events += self._begin(self._announced.pop(0))
-        return events
+    def _begin_all(self, setups: list[StreamSetup]) -> list[Event]:
+        return [event for setup in setups for event in self._begin(setup)]
 
     def _check_period(self, block: Block) -> None:
         setup = self.current
@@ -165,7 +147,7 @@ class SlidingWindows:
             return []
         if block.index < self._next:
             # Announced set-ups of the old numbering would fire at the wrong samples.
-            self._announced.clear()
+            self._setups.forget()
             message = (
                 f'sample index went back from {self._next} to {block.index}: the stream began '
                 'again, or two publishers share the topic'

@@ -19,7 +19,7 @@ from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.online.forecast import Prediction
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.stream import Block, Preview, StreamSetup
+from actuator_glue.online.stream import Block, Preview
 from actuator_glue.records import Array
 
 Fields = dict[str, Any]
@@ -49,26 +49,6 @@ def block(message: Any) -> Block:
         command=_array(message.command),
         measured=_array(message.measured),
         force=_array(message.force) if len(message.force) else None,
-    )
-
-
-def setup(message: Any) -> StreamSetup:
-    """Return the set-up of a TestSetup.
-
-    Raises:
-        InputError: negative stiffness, absurd rate, unknown hold.
-    """
-    stiffness, rate = float(message.specimen_stiffness), float(message.rate)
-    name = str(message.actuator or message.header.frame_id)
-    if not (np.isfinite(rate) and rate > 0.0):
-        raise InputError(f'test set-up of {name!r}: rate {rate:g} Hz is not positive')
-    return StreamSetup(
-        stiffness=None if np.isnan(stiffness) else stiffness,
-        period=1.0 / rate,
-        actuator=name,
-        hold=message.hold,
-        index=int(message.index),
-        source=str(message.source),
     )
 
 

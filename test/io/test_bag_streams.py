@@ -12,6 +12,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from bag_content import samples, setup
 
 from actuator_glue.errors import InputError
 from actuator_glue.io import messages
@@ -21,33 +22,6 @@ from actuator_glue.io.recover import recover
 from actuator_glue.records import Record
 
 Make = Callable[..., Record]
-
-
-def samples(record: Record, start: int, stop: int) -> object:
-    """Return samples start:stop of a record as a SampleBlock."""
-    return messages.message(
-        'SampleBlock',
-        header=messages.header(record.stamp_ns(start), record.actuator),
-        period=record.period,
-        index=record.first_index + start,
-        command=record.command[start:stop],
-        measured=record.measured[start:stop],
-        force=np.empty(0),
-    )
-
-
-def setup(record: Record, at: int, stiffness: float) -> object:
-    """Return a TestSetup that holds from a sample on."""
-    return messages.message(
-        'TestSetup',
-        header=messages.header(record.stamp_ns(at), record.actuator),
-        actuator=record.actuator,
-        specimen_stiffness=stiffness,
-        rate=record.rate,
-        hold=record.hold,
-        index=at,
-        source='',
-    )
 
 
 def open_bag(path: Path) -> BagWriter:

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import actuator_glue
-from actuator_glue.model.effects import CATALOGUE, balance, scale
+from actuator_glue.model.effects import CATALOGUE, scale
+from actuator_glue.model.effects.catalogue.stribeck_friction import bell
 from actuator_glue.model.parameters import NAMES, TABLE_2
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
@@ -305,6 +306,6 @@ def test_yielding_dissipates() -> None:
 def test_bell_of_falling_friction() -> None:
     """The polynomial stands for the exponential, and keeps what is not a number."""
     square = np.concatenate([np.linspace(0.0, 80.0, 20_001), [1e3, np.inf]])
-    found = np.array([balance.bell(s) for s in square])
+    found = np.array([bell(s) for s in square])
     np.testing.assert_allclose(found, np.exp(-0.5 * square), rtol=0.0, atol=2e-7)
-    assert np.isnan(balance.bell(np.nan))
+    assert np.isnan(bell(np.nan))

@@ -14,7 +14,8 @@ from actuator_glue.online.estimator import Ahead, Estimator, Schedule
 from actuator_glue.online.job import WindowResult, run
 from actuator_glue.online.playback import replay, stream
 from actuator_glue.online.published import differences
-from actuator_glue.online.stream import Block, Dropped, Failed, Preview, StreamSetup
+from actuator_glue.online.stream import Block, Dropped, Failed, Preview
+from actuator_glue.setups import StreamSetup
 
 
 def results(items, **more):

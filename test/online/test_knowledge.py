@@ -17,8 +17,9 @@ from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.job import WindowResult, run
 from actuator_glue.online.playback import replay
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.stream import Block, Contradicted, StreamSetup
+from actuator_glue.online.stream import Block, Contradicted
 from actuator_glue.records import Record
+from actuator_glue.setups import StreamSetup
 
 CALIBRATION = replace(SETTINGS, prior='calibration', drift=0.0)
 SEQUENTIAL = replace(SETTINGS, prior='sequential', drift=0.0)

@@ -18,7 +18,7 @@ from actuator_glue.online.mixture import mixture_band
 from actuator_glue.online.playback import stream
 from actuator_glue.online.response import response_band
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.stream import StreamSetup
+from actuator_glue.setups import StreamSetup
 
 
 @pytest.mark.parametrize('stiffness', [0.0, 250e3])

@@ -207,7 +207,7 @@ def test_announced_set_ups_are_bounded():
     windows.push(block(0, 10))
     for index in range(100, 5100):
         windows.setup(setup(index=index))
-    assert len(windows._announced) <= 16
+    assert len(windows._setups._announced) <= 16
 
 
 @pytest.mark.parametrize(

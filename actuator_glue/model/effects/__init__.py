@@ -7,6 +7,6 @@ from actuator_glue.model.effects.effect import Effect, Place, Scale, scale
 from actuator_glue.model.effects.registry import Registry
 
 # Every effect by its name on the command line; registered ones follow.
-CATALOGUE = Registry(catalogue.found())
+CATALOGUE = Registry(catalogue.ENTRIES)
 
 __all__ = ['CATALOGUE', 'Effect', 'Place', 'Scale', 'scale']

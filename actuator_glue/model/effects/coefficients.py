@@ -12,24 +12,17 @@ from typing import Any, Final
 import numpy as np
 
 from actuator_glue.jit import njit
-from actuator_glue.model.effects import catalogue
+from actuator_glue.model.effects import assembly, catalogue
 from actuator_glue.model.effects import rows as r
-from actuator_glue.model.effects.catalogue.flow_saturation import NO_LIMIT
+from actuator_glue.model.effects.stage import Case
 from actuator_glue.model.parameters import NAMES as BASE
 from actuator_glue.records import Array
-
-# The rise of dry friction follows a change of velocity with this time constant (frictional
-# memory), or with MEMORY_MARGIN rise / ((k + alpha_2) v_s) where that is longer: the steepest
-# fall of the Stribeck curve is 0.86 rise / v_s, and a massless specimen has one velocity only
-# where the memory is longer than 0.86 rise / ((k + alpha_2) v_s).
-FRICTION_MEMORY: Final = 2e-3  # s
-MEMORY_MARGIN: Final = 1.72
 
 # What the compiled step takes of each parameter set.
 NAMES: Final = (
     *BASE,
-    *(p.name for e in catalogue.found() if e.staged for p in e.parameters),
-    *(state for e in catalogue.found() for state in e.states),
+    *(p.name for e in catalogue.ENTRIES if e.stage is not None for p in e.parameters),
+    *(state for e in catalogue.ENTRIES for state in e.states),
 )
 KIND: Final = np.dtype([(name, np.float64) for name in NAMES])
 
@@ -72,22 +65,10 @@ def _exact(a1: float, a0: float, step: float) -> tuple[float, float, float]:
 def _valve(w: Array, n: int, p: Any, step: float) -> None:
     """Valve T q'' + q' + beta_1 q = n0 e by the trapezoidal rule: mean flow over the step."""
     half = 0.5 * step
-    below = 1.0 + p.beta_1 * half + 2.0 * p.valve_lag / step
+    below = 1.0 + p.beta_1 * half + 2.0 * assembly.valve_lag(p) / step
     w[r.VALVE_E + n] = half * p.alpha_1_beta_0 / below
     w[r.VALVE_Q + n] = 1.0 - half * p.beta_1 / below
-    w[r.VALVE_D + n] = p.valve_lag / below
-    w[r.NULL + n], w[r.DEADBAND + n] = p.null_offset, p.deadband
-
-
-@njit
-def _flow(w: Array, n: int, p: Any, step: float) -> None:
-    limit, half = p.saturation_velocity, 0.5 * step
-    w[r.SATURATION + n] = math.inf if limit >= NO_LIMIT else limit * p.alpha_2
-    w[r.ASYMMETRY + n] = p.asymmetry
-    w[r.INVERSE_STALL + n] = p.inverse_stall_force
-    w[r.DROOP + n], w[r.DROOP_HALF + n] = p.droop, half / (p.droop_time + half)
-    w[r.GAIN_DRIFT + n] = p.gain_drift
-    w[r.INVERSE_ALPHA_2 + n] = 1.0 / p.alpha_2
+    w[r.VALVE_D + n] = assembly.valve_lag(p) / below
 
 
 @njit
@@ -97,36 +78,13 @@ def _forces(w: Array, n: int, p: Any, k: float, step: float) -> None:
     w[r.FORCE_F + n] = (2.0 - below) / below
     w[r.FORCE_Q + n] = step / below
     w[r.FORCE_X + n] = p.alpha_2 / below
-    damping = p.damping + p.mass * p.mass_damping
-    w[r.DAMPING_2 + n] = 2.0 * damping / step + 4.0 * p.mass / (step * step)
-    w[r.MASS_4V + n] = 4.0 * p.mass / step
+    damping, mass = assembly.damping(p), assembly.mass(p)
+    w[r.DAMPING_2 + n] = 2.0 * damping / step + 4.0 * mass / (step * step)
+    w[r.MASS_4V + n] = 4.0 * mass / step
     idle = w[r.FORCE_X + n] + w[r.DAMPING_2 + n]
     acting = idle + 0.5 * w[r.FORCE_Q + n] * w[r.VALVE_E + n]
     w[r.ACTING_TOUCHED + n], w[r.IDLE_TOUCHED + n] = 1.0 / (acting + k), 1.0 / (idle + k)
     w[r.ACTING_FREE + n], w[r.IDLE_FREE + n] = 1.0 / acting, 1.0 / idle
-
-
-@njit
-def _friction(w: Array, n: int, p: Any, k: float, step: float) -> None:
-    w[r.COULOMB + n] = p.coulomb_force + p.sliding_force
-    rise, speed = p.sliding_force * (p.breakaway_ratio - 1.0), p.stribeck_velocity
-    memory = max(FRICTION_MEMORY, MEMORY_MARGIN * rise / ((k + p.alpha_2) * speed))
-    w[r.STRIBECK_LAG + n] = math.exp(-step / memory)
-    w[r.STRIBECK_EXTRA + n] = rise * (1.0 - w[r.STRIBECK_LAG + n])
-    w[r.STRIBECK_BEND + n] = 2.0 / (step * step * speed * speed)
-
-
-@njit
-def _specimen(w: Array, n: int, p: Any, k: float) -> None:
-    w[r.STIFFNESS + n], w[r.GAP + n], w[r.HARDENING + n] = k, p.gap, p.hardening
-    # Past the peak of a softening spring (3 |kappa| x^2 = 1) the secant stays.
-    softens = p.hardening < 0.0
-    w[r.HARDENING_CAP + n] = -1.0 / (3.0 * p.hardening) if softens else math.inf
-    w[r.YIELD + n], w[r.INVERSE_YIELD + n] = p.yield_displacement, 1.0 / p.yield_displacement
-    w[r.YIELD_RATIO + n] = p.post_yield_ratio
-    for power in range(5):  # SHARP_1 .. SHARP_16 follow one another
-        share = max(1.0 - abs(p.yield_sharpness - power), 0.0)
-        w[r.SHARP_1 + power * r.LANES + n] = share
 
 
 @njit
@@ -136,7 +94,7 @@ def _chains(w: Array, n: int, p: Any, k: float, step: float) -> None:
     a1 = (p.alpha_3 * k + b1 * oil) / oil
     a0 = (b1 * p.alpha_3 * k + n0) / oil
     position, velocity, ramp = _exact(a1, a0, step)
-    into = p.gain * n0 / oil
+    into = assembly.gain(p) * n0 / oil
     w[r.EXACT_XX + n] = 1.0 - a0 * position
     w[r.EXACT_XV + n] = velocity
     w[r.EXACT_XU + n] = into * position
@@ -156,28 +114,25 @@ def _chains(w: Array, n: int, p: Any, k: float, step: float) -> None:
     dx_u = force_q * from_e / stiff
     w[r.TRAP_XX + n] = 1.0 + dx_x
     w[r.TRAP_XQ + n] = dx_q
-    w[r.TRAP_XU + n] = p.gain * dx_u
+    w[r.TRAP_XU + n] = assembly.gain(p) * dx_u
     w[r.TRAP_QX + n] = -2.0 * from_e * (1.0 + 0.5 * dx_x)
     w[r.TRAP_QQ + n] = 2.0 * from_q - 1.0 - from_e * dx_q
-    w[r.TRAP_QU + n] = p.gain * 2.0 * from_e * (1.0 - 0.5 * dx_u)
+    w[r.TRAP_QU + n] = assembly.gain(p) * 2.0 * from_e * (1.0 - 0.5 * dx_u)
 
 
 @njit
-def _start(w: Array, n: int, p: Any, k: float, step: float, x: float, v: float) -> None:
+def _start(w: Array, n: int, p: Any, case: Case) -> None:
     """The state at the first sample, as if the piston had gone on at this velocity."""
+    k, x, v = case.k, case.x, case.v
     w[r.X + n], w[r.X_EXACT + n], w[r.X_TRAP + n] = x, x, x
-    w[r.PLAY + n], w[r.SENSED + n] = x, x
     w[r.V + n], w[r.V_EXACT + n] = v, v
-    w[r.DX + n], w[r.PLAY_DX + n] = v * step, v * step
-    w[r.BELL + n] = math.exp(-0.5 * w[r.STRIBECK_BEND + n] * (v * step) ** 2)
+    w[r.DX + n] = v * case.step
     # What damps the motion loads the piston.
-    damping = p.damping + p.mass * p.mass_damping
+    damping = assembly.damping(p)
     w[r.R + n] = k * x
     w[r.F + n] = k * x + damping * v
     w[r.Q_TRAP + n] = (k + p.alpha_2) * v + p.alpha_3 * k * x
     w[r.Q + n] = w[r.Q_TRAP + n] + p.alpha_3 * damping * v
-    # Of flow over alpha_2, as the kernel has it.
-    w[r.ENVELOPE + n] = p.envelope * (k + p.alpha_2) / p.alpha_2
 
 
 @njit(nogil=True)
@@ -193,19 +148,19 @@ def fill(
         period: sample period [s].
         x: position at the first sample, (m,) [m].
         v: velocity there, (m,) [m/s].
-        out: (blocks, rows.SIZE); the last block is filled up by repeating the last set.
+        out: (blocks, assembly.SIZE) of zeros; the last block is filled up by repeating the last
+            set.
     """
     for i in range(len(out) * r.LANES):
         w, n, at = out[i // r.LANES], i % r.LANES, min(i, len(parameters) - 1)
         p = parameters[at]
-        w[r.GAIN + n] = p.gain
-        w[r.LAG_SAMPLES + n], w[r.SKEW + n] = p.delay / period, p.clock_skew
+        case = Case(stiffness, step, period, x[at], v[at])
+        w[r.GAIN + n] = assembly.gain(p)
+        w[r.LAG_SAMPLES + n], w[r.SKEW + n] = assembly.delay(p) / period, assembly.skew(p)
+        w[r.NULL + n], w[r.COULOMB + n] = assembly.offset(p), assembly.dry(p)
+        w[r.STIFFNESS + n] = stiffness
         _valve(w, n, p, step)
-        _flow(w, n, p, step)
         _forces(w, n, p, stiffness, step)
-        _friction(w, n, p, stiffness, step)
-        _specimen(w, n, p, stiffness)
         _chains(w, n, p, stiffness, step)
-        w[r.BACKLASH + n], w[r.SENSOR_LAG + n] = p.backlash, p.sensor_lag / step
-        w[r.SENSOR_DECAY + n] = math.exp(-step / p.sensor_lag)
-        _start(w, n, p, stiffness, step, x[at], v[at])
+        _start(w, n, p, case)
+        assembly.fill(w, n, p, case)

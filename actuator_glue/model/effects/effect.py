@@ -8,6 +8,7 @@ from typing import Literal, TypeAlias
 
 import numpy as np
 
+from actuator_glue.model.effects.stage import Stage
 from actuator_glue.model.effects.terms.expression import Expression
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.records import Array, Record
@@ -84,7 +85,7 @@ class Effect:
         starts: sizes from which a fit may start, given the scale of the test; each row holds
             one value per parameter.
         exact: states of the exact simulation it needs beside x and q (lti.py) where it is linear.
-        switches: the kernel's stages it needs (rows.ON_...).
+        stage: what it does in the compiled step.
         onset: what depends on where a record begins, given the record if it begins in motion.
         states: what `onset` gives its stage beside parameters.
         output: post-step on the recorded displacement: (parameters (m, p), time (n, 1),
@@ -109,7 +110,7 @@ class Effect:
     source: str
     starts: Starts
     exact: tuple[int, ...] | None = None
-    switches: tuple[int, ...] = ()
+    stage: Stage | None = None
     onset: Callable[[Record | None], Onset | None] | None = None
     states: tuple[str, ...] = ()
     output: Output | None = None
@@ -123,8 +124,3 @@ class Effect:
     def linear(self) -> bool:
         """Whether it leaves the loop linear, so that the exact simulation (lti.py) has it."""
         return self.exact is not None or self.output is not None or self.variance is not None
-
-    @property
-    def staged(self) -> bool:
-        """Whether the compiled step itself takes its parameters."""
-        return self.output is None and self.variance is None and self.expression is None

@@ -19,8 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.jit import njit
-from actuator_glue.model.effects import balance, lag, stages
+from actuator_glue.model.effects import assembly, balance, command, lag, stages
 from actuator_glue.model.effects import rows as r
+from actuator_glue.model.effects.catalogue import specimen_gap, specimen_yield, stribeck_friction
 from actuator_glue.model.effects.terms import machine, stage
 from actuator_glue.records import Array
 
@@ -61,7 +62,7 @@ def _at_once(w: Array, mean: float, rate: float, flows: bool, gaps: bool) -> Non
         push, oil, stiff = stages.drive(w, n, flow, dflow)
         touched = _touched(w, n, dflow, flows)
         if gaps:
-            dx = balance.gapped(w, n, push, stiff, _free(w, n, dflow, flows), touched)
+            dx = specimen_gap.gapped(w, n, push, stiff, _free(w, n, dflow, flows), touched)
         else:
             dx = balance.proportional(w, n, push, touched)
         stages.finish(w, n, rate, q, dq, push, oil, stiff, dx)
@@ -77,9 +78,9 @@ def _begin(w: Array, mean: float, flows: bool, falls: bool, yields: bool) -> Non
             w[r.IN_Q + n], w[r.IN_DQ + n] = q, dq
         w[r.IN_PUSH + n], w[r.IN_OIL + n], w[r.IN_STIFF + n] = push, oil, stiff
         if falls:
-            balance.first_falling(w, n, push, _touched(w, n, dflow, flows))
+            stribeck_friction.first(w, n, push, _touched(w, n, dflow, flows))
         if yields:
-            w[r.IN_MIDDLE + n], w[r.IN_SOFT + n] = balance.halfway(w, n, w[r.DX + n])
+            specimen_yield.halfway(w, n, w[r.DX + n])
 
 
 @njit
@@ -98,7 +99,7 @@ def _curved(w: Array, rate: float, yields: bool) -> None:
         force, tangent = balance.specimen(w, n, guess, False, yields)
         dx = balance.look(w, n, push, stiff, w[r.COULOMB + n], guess, force, tangent)
         if yields:
-            balance.finish_yield(w, n, dx, False)
+            specimen_yield.finish(w, n, dx, False)
         _end(w, n, rate, dx)
 
 
@@ -112,15 +113,15 @@ def _search(
     for _ in range(program[0, machine.TIMES] if terms else 3 if falls else 2):
         if yields:
             for n in range(r.LANES):
-                moved = balance.passed(w, n, w[r.IN_DX + n], True)
-                w[r.IN_MIDDLE + n], w[r.IN_SOFT + n] = balance.halfway(w, n, moved)
+                moved = specimen_gap.passed(w, n, w[r.IN_DX + n], True)
+                specimen_yield.halfway(w, n, moved)
         if terms:
             stage.force(w, g, program, rate, yields)
         for n in range(r.LANES):
             push, stiff, guess = w[r.IN_PUSH + n], w[r.IN_STIFF + n], w[r.IN_DX + n]
             dry = w[r.COULOMB + n]
             if falls:
-                dry += balance.friction_rise(w, n, guess)
+                dry += stribeck_friction.rise(w, n, guess)
             if terms:
                 # What weakens faster than the oil is stiff is not followed implicitly.
                 least = -0.5 * (stiff + w[r.DAMPING_2 + n])
@@ -131,9 +132,9 @@ def _search(
     for n in range(r.LANES):
         dx = w[r.IN_DX + n]
         if falls:
-            w[r.LEVEL + n] = balance.friction_rise(w, n, dx)
+            w[stribeck_friction.LEVEL + n] = stribeck_friction.rise(w, n, dx)
         if yields:
-            balance.finish_yield(w, n, dx, True)
+            specimen_yield.finish(w, n, dx, True)
         _end(w, n, rate, dx)
 
 
@@ -148,7 +149,7 @@ def substep(
     time: float,
 ) -> None:
     """Carry the nonlinear loop on by one sub-step; `time` is its middle."""
-    flows, falls, gaps = on[r.ON_FLOW], on[r.ON_STRIBECK], on[r.ON_GAP]
+    flows, falls, gaps = on[r.ON_FLOW], on[stribeck_friction.ON], on[specimen_gap.ON]
     if on[r.ON_TERMS]:
         stage.valve(w, g, program, mean, rate, time)
         stages.flow(w, on, time)
@@ -159,7 +160,7 @@ def substep(
         stages.flow(w, on, time)
     if on[r.ON_FORCE]:
         _begin(w, mean, True, False, False)
-        if falls or on[r.ON_YIELD]:
+        if falls or on[specimen_yield.ON]:
             _search(w, g, program, rate, True, True, True)
         else:
             _search(w, g, program, rate, False, False, True)
@@ -181,11 +182,11 @@ def substep(
         else:
             _begin(w, mean, False, True, False)
         for n in range(r.LANES):
-            balance.next_falling(w, n)
+            stribeck_friction.following(w, n)
         for n in range(r.LANES):
-            _end(w, n, rate, balance.last_falling(w, n, w[r.IN_PUSH + n]))
+            _end(w, n, rate, stribeck_friction.last(w, n, w[r.IN_PUSH + n]))
         return
-    yields = on[r.ON_YIELD]
+    yields = on[specimen_yield.ON]
     if flows:
         _begin(w, mean, True, False, True)
     elif yields:
@@ -225,9 +226,9 @@ def advance(
     """Write the sensed displacement at samples begin, begin+1, ... and carry the state on.
 
     Args:
-        table: (SIZE + registers,), read and updated; its states stand at sample begin - 1, or at
-            sample 0 where begin is 0.
-        on: (SWITCHES,) which stages act.
+        table: (assembly.SIZE + registers,), read and updated; its states stand at sample
+            begin - 1, or at sample 0 where begin is 0.
+        on: (assembly.SWITCHES,) which stages act.
         program: instructions of effects written as expressions, which use the registers.
         u: command samples [m]; u[0] is sample `offset` of the stream.
         offset: stream index of u[0].
@@ -238,9 +239,9 @@ def advance(
         displacement: (n, LANES) output, recorded displacement before sensor post-steps [m].
         force: (n, LANES) output, actuator force [N]; (0, LANES) where it is not wanted.
     """
-    w = np.empty(r.SIZE)  # known to the compiler
-    w[:] = table[: r.SIZE]
-    g = table[r.SIZE :].reshape(-1, r.LANES)
+    w = np.empty(assembly.SIZE)  # known to the compiler
+    w[:] = table[: assembly.SIZE]
+    g = table[assembly.SIZE :].reshape(-1, r.LANES)
     places = np.empty(lag.PLACES, np.int32)
     lag.prepare(w, substeps)
     inverse = 1.0 / substeps
@@ -248,8 +249,7 @@ def advance(
     want_force = force.shape[0] > 0
     if begin == 0 and displacement.shape[0] > 0:  # the state as it stands
         for n in range(r.LANES):
-            scheme = w[r.X_EXACT + n] - w[r.X_TRAP + n]
-            displacement[0, n] = w[r.SENSED + n] if on[r.ON_TRANSDUCER] else w[r.X + n] + scheme
+            displacement[0, n] = w[r.X + n]
     for i in range(displacement.shape[0]):
         at = begin + i - 1  # the interval from sample `at` to the sample written now
         for j in range(substeps if at >= 0 else 0):
@@ -260,18 +260,18 @@ def advance(
                 else:
                     lag.held(w, places, u, offset, start, inverse)
             elif linear:
-                mean, slope = stages.linear(u, offset, start, start + inverse)
+                mean, slope = command.linear(u, offset, start, start + inverse)
             else:
-                mean = stages.held(u, at - offset)
+                mean = command.held(u, at - offset)
             substep(w, g, program, on, mean, rate, (at + (j + 0.5) * inverse) * period)
             if on[r.ON_TRANSDUCER]:
                 for n in range(r.LANES):
                     corrected = stages.chains(w, n, mean, slope)
-                    displacement[i, n] = stages.transducer(w, n, corrected)
+                    displacement[i, n] = assembly.sensed(w, n, corrected)
             else:
                 for n in range(r.LANES):
                     displacement[i, n] = stages.chains(w, n, mean, slope)
         if want_force:
             for n in range(r.LANES):
                 force[i, n] = w[r.F + n]
-    table[: r.SIZE] = w
+    table[: assembly.SIZE] = w

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.jit import njit
+from actuator_glue.model.effects import command
 from actuator_glue.model.effects import rows as r
-from actuator_glue.model.effects import stages
 from actuator_glue.records import Array
 
 # Samples fetched per lane: those at both ends of a sub-step, and where the command runs linearly
@@ -114,5 +114,5 @@ def linear(
         share, left, right = w[r.IN_SHARE + n], w[r.IN_U + n], w[r.IN_U_STOP + n]
         first = left + w[r.IN_PART + n] * (w[r.IN_U_NEXT + n] - left)
         end = right + w[r.IN_PART_STOP + n] * (w[r.IN_U_STOP_NEXT + n] - right)
-        mean, slope = stages.kinked(first, right, end, share)
+        mean, slope = command.kinked(first, right, end, share)
         w[r.IN_MEAN + n], w[r.IN_SLOPE + n] = mean, slope

@@ -42,7 +42,7 @@ from actuator_glue.records import Array
 # Parameters of the linear effects, those of Eq. (2) first.
 NAMES: Final = (
     *BASE,
-    *(p.name for e in catalogue.found() if e.exact is not None for p in e.parameters),
+    *(p.name for e in catalogue.ENTRIES if e.exact is not None for p in e.parameters),
 )
 KIND: Final = np.dtype([(name, np.float64) for name in NAMES])
 # Time constants below this do not act: they would move the piston by less than 0.1 nm.

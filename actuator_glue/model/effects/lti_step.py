@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.jit import njit
+from actuator_glue.model.effects.command import held
 from actuator_glue.model.effects.rows import LANES
-from actuator_glue.model.effects.stages import held
 from actuator_glue.records import Array
 
 STATES: Final = 6

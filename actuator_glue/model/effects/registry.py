@@ -55,7 +55,8 @@ class Registry(dict[str, Effect]):
                     f'effect {effect.name!r}: parameter {p.name!r} belongs to {owner[p.name]} '
                     'already; names of parameters are unique, rename it'
                 )
-            if effect.staged and p.name not in coefficients.NAMES:
+            own = effect.expression or effect.output or effect.variance
+            if own is None and p.name not in coefficients.NAMES:
                 raise InputError(
                     f'effect {effect.name!r}: nothing takes parameter {p.name!r}; it needs an '
                     'expression, an output or a variance'

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.jit import njit
-from actuator_glue.model.effects import coefficients, kernel, lti, lti_step, rows
+from actuator_glue.model.effects import assembly, coefficients, kernel, lti, lti_step, rows
 from actuator_glue.model.effects.terms import machine
 from actuator_glue.model.effects.terms.program import Program
 from actuator_glue.records import Array, Record
@@ -46,7 +46,7 @@ def tables(
     period: float,
     start: tuple[float, float],
 ) -> Array:
-    """Return the kernel's tables at the first sample, shape (blocks, rows.SIZE + registers).
+    """Return the kernel's tables at the first sample, shape (blocks, assembly.SIZE + registers).
 
     The last block is filled up by repeating the last parameter set.
 
@@ -70,7 +70,7 @@ def tables(
     blocks = -(-len(total) // rows.LANES)
     x, v = start[0] * one, start[1] * one
     step = period / substeps
-    out = np.zeros((blocks, rows.SIZE + program.registers.size))
+    out = np.zeros((blocks, assembly.SIZE + program.registers.size))
     coefficients.fill(parameters, stiffness, step, period, x, v, out)
     if program.acts(machine.COMMAND, machine.FORCE):
         which = np.minimum(np.arange(blocks * rows.LANES), len(total) - 1)
@@ -81,7 +81,7 @@ def tables(
         registers[:, list(program.memory)] = 0.0 if start == (0.0, 0.0) else np.nan
         for block in registers:
             machine.execute(block, program.code, 1, int(program.code[0, machine.PREPARE]))
-        out[:, rows.SIZE :] = registers.reshape(blocks, -1)
+        out[:, assembly.SIZE :] = registers.reshape(blocks, -1)
     return out
 
 
@@ -97,7 +97,7 @@ def blocks(
 
     Args:
         values: parameters of every compiled stage by name, each (m,).
-        on: switches, (rows.SWITCHES,).
+        on: switches, (assembly.SWITCHES,).
         program: effects written as expressions.
         record: command, period, hold and known stiffness.
         start: position and velocity at the first sample.

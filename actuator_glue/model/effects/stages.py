@@ -6,45 +6,15 @@ choice between two loads would stop the compiler from writing vector code.
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.jit import njit
+from actuator_glue.model.effects import assembly
 from actuator_glue.model.effects import rows as r
 from actuator_glue.records import Array
-
-
-@njit
-def held(u: Array, at: int) -> Any:
-    """Command sample `at`, held constant before the first and after the last one."""
-    return u[min(max(at, 0), u.shape[0] - 1)]
-
-
-@njit
-def kinked(first: Any, kink: Any, last: Any, share: Any) -> Any:
-    """Mean and slope of a command from `first` by `kink` to `last`, in the last `share` of it.
-
-    The slope is that of the ramp with the same first moment: with both, any fractional shift of
-    a command keeps its integral and its centre. A share of zero is no kink.
-    """
-    middle = kink if share > 0.0 else last
-    before, after = (first + middle) * (1.0 - share), (middle + last) * share
-    # 12 times the moment of the triangle by which a kink leaves the straight line.
-    bend = middle - first * share - last * (1.0 - share)
-    return 0.5 * (before + after), last - first + bend * (1.0 - 2.0 * share)
-
-
-@njit
-def linear(u: Array, offset: int, start: float, stop: float) -> Any:
-    """Mean and slope of a linear command over [start, stop] samples (at most one sample long)."""
-    i, k = math.floor(start), math.floor(stop)
-    left, right = held(u, i - offset), held(u, k - offset)
-    first = left + (start - i) * (held(u, i + 1 - offset) - left)
-    last = right + (stop - k) * (held(u, k + 1 - offset) - right)
-    return kinked(first, right, last, (stop - k) / (stop - start) if k > i else 0.0)
 
 
 @njit
@@ -60,34 +30,19 @@ def valve(w: Array, n: int, mean: float) -> Any:
 @njit
 def spool(w: Array, n: int, error: Any, slope: Any) -> Any:
     """Mean spool flow and d(flow)/d(dx) from the control error and its d/d(dx)."""
-    band, acting = w[r.DEADBAND + n], w[r.VALVE_E + n]
-    left = error - min(max(error, -band), band)
+    acting = w[r.VALVE_E + n]
+    left, kept = assembly.error(w, n, error, slope)
     flow = acting * left + w[r.VALVE_Q + n] * w[r.Q + n] + w[r.VALVE_D + n] * w[r.QD + n]
-    return flow, (slope * acting if abs(error) >= band else 0.0)
+    return flow, kept * acting
 
 
 @njit
 def flow(w: Array, on: NDArray[np.bool_], time: float) -> None:
     """Write the flow into the cylinder and its d/d(dx): gain of the orifice, then its limit."""
+    assembly.gains(w, on, time)
     for n in range(r.LANES):
-        side = w[r.ASYMMETRY + n] if w[r.IN_Q + n] > 0.0 else -w[r.ASYMMETRY + n]
-        w[r.IN_GAIN + n] = max(1.0 + w[r.GAIN_DRIFT + n] * time, 0.0) * (1.0 + side)
-    if on[r.ON_PRESSURE]:
-        for n in range(r.LANES):
-            load = (w[r.F + n] + 0.5 * w[r.DF + n]) * w[r.INVERSE_STALL + n]
-            w[r.IN_GAIN + n] *= math.sqrt(max(1.0 - (load if w[r.IN_Q + n] > 0.0 else -load), 0.0))
-    if on[r.ON_DROOP]:
-        for n in range(r.LANES):
-            before = w[r.ENVELOPE + n]
-            speed = abs(w[r.IN_Q + n]) * w[r.INVERSE_ALPHA_2 + n]
-            middle = before + w[r.DROOP_HALF + n] * (speed - before)
-            w[r.IN_GAIN + n] *= math.sqrt(max(1.0 - w[r.DROOP + n] * middle, 0.0))
-            w[r.ENVELOPE + n] = 2.0 * middle - before
-    for n in range(r.LANES):
-        gain, limit = w[r.IN_GAIN + n], w[r.SATURATION + n]
-        through, slope = w[r.IN_Q + n] * gain, w[r.IN_DQ + n] * gain
-        w[r.IN_FLOW + n] = min(max(through, -limit), limit)
-        w[r.IN_DFLOW + n] = slope if abs(through) <= limit else 0.0
+        through, slope = w[r.IN_Q + n] * w[r.IN_GAIN + n], w[r.IN_DQ + n] * w[r.IN_GAIN + n]
+        w[r.IN_FLOW + n], w[r.IN_DFLOW + n] = assembly.limit(w, n, through, slope)
 
 
 @njit
@@ -136,18 +91,3 @@ def chains(w: Array, n: int, mean: float, slope: float) -> Any:
     trap = w[r.TRAP_XX + n] * xt + w[r.TRAP_XQ + n] * qt + w[r.TRAP_XU + n] * u
     w[r.X_EXACT + n], w[r.X_TRAP + n] = exact, trap
     return w[r.X + n] + exact - trap
-
-
-@njit
-def transducer(w: Array, n: int, corrected: Any) -> Any:
-    """Play, then the first-order lag of the parabola through the last three positions."""
-    before, lag = w[r.PLAY + n], w[r.SENSOR_LAG + n]
-    # In this order a position that is not a number goes through.
-    after = min(corrected + w[r.BACKLASH + n], max(corrected - w[r.BACKLASH + n], before))
-    moved = after - before
-    bend = 0.5 * (moved - w[r.PLAY_DX + n])
-    end = after - lag * (moved + bend - 2.0 * lag * bend)
-    first = before - lag * (moved - bend - 2.0 * lag * bend)
-    sensed = end + w[r.SENSOR_DECAY + n] * (w[r.SENSED + n] - first)
-    w[r.SENSED + n], w[r.PLAY + n], w[r.PLAY_DX + n] = sensed, after, moved
-    return sensed

@@ -41,8 +41,12 @@ _FIRST = [
 ]
 
 
-def found() -> tuple[Effect, ...]:
-    """Return the effect of every file here."""
+def _found() -> tuple[Effect, ...]:
     names = sorted(module.name for module in pkgutil.iter_modules(__path__))
     order = (*_FIRST, *(name for name in names if name not in _FIRST))
     return tuple(importlib.import_module(f'{__name__}.{name}').EFFECT for name in order)
+
+
+# The effect of every file here. All are imported together and in this order, whichever is wanted:
+# what the compiled step (njit) has of their rows is the same in every process.
+ENTRIES = _found()

@@ -3,15 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
-from actuator_glue.model.effects import rows
+from actuator_glue.jit import njit
+from actuator_glue.model.effects import rows as r
 from actuator_glue.model.effects.effect import Effect
+from actuator_glue.model.effects.stage import Stage
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.records import Array
 
 
 def _behind(values: Mapping[str, Array], origin: float) -> dict[str, Array]:
     return {'delay': values['delay'] + values['clock_skew'] * origin}
+
+
+@njit
+def _skew(p: Any) -> Any:
+    return p.clock_skew
 
 
 EFFECT = Effect(
@@ -26,5 +34,5 @@ EFFECT = Effect(
     source='Mills 1991 (frequency error of clocks)',
     starts=lambda s: ((5e-5,), (-5e-5,), (3e-4,), (-3e-4,)),
     onset=lambda record: _behind,
-    switches=(rows.ON_LAG,),
+    stage=Stage(adds={'skew': _skew}, shared=(r.ON_LAG,)),
 )

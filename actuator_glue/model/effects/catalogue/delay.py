@@ -2,9 +2,19 @@
 
 from __future__ import annotations
 
-from actuator_glue.model.effects import rows
+from typing import Any
+
+from actuator_glue.jit import njit
+from actuator_glue.model.effects import rows as r
 from actuator_glue.model.effects.effect import Effect
+from actuator_glue.model.effects.stage import Stage
 from actuator_glue.model.parameters import Parameter
+
+
+@njit
+def _delay(p: Any) -> Any:
+    return p.delay
+
 
 EFFECT = Effect(
     name='delay',
@@ -15,6 +25,6 @@ EFFECT = Effect(
     signature='linear; phase error proportional to frequency',
     source='Horiuchi et al. 1999',
     starts=lambda s: ((0.001,), (0.004,), (0.01,)),
-    switches=(rows.ON_LAG,),
     exact=(),
+    stage=Stage(adds={'delay': _delay}, shared=(r.ON_LAG,)),
 )

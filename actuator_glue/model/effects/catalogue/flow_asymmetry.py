@@ -2,9 +2,29 @@
 
 from __future__ import annotations
 
-from actuator_glue.model.effects import rows
+from typing import Any
+
+from actuator_glue.jit import njit
+from actuator_glue.model.effects import rows as r
 from actuator_glue.model.effects.effect import Effect
+from actuator_glue.model.effects.stage import Case, Stage
 from actuator_glue.model.parameters import Parameter
+from actuator_glue.records import Array
+
+(ASYMMETRY,) = r.ROWS.take(1)
+(ON,) = r.SWITCHES.take(1)
+
+
+@njit
+def _fill(w: Array, n: int, p: Any, case: Case) -> None:
+    w[ASYMMETRY + n] = p.asymmetry
+
+
+@njit
+def _gain(w: Array, n: int, time: float) -> Any:
+    side = w[ASYMMETRY + n] if w[r.IN_Q + n] > 0.0 else -w[ASYMMETRY + n]
+    return 1.0 + side
+
 
 EFFECT = Effect(
     name='flow-asymmetry',
@@ -19,5 +39,5 @@ EFFECT = Effect(
     signature='even harmonics and a mean that follows the velocity',
     source='Jelali & Kroll 2003 (single-rod cylinder)',
     starts=lambda s: ((0.03,), (-0.03,), (0.15,), (-0.15,)),
-    switches=(rows.ON_FLOW,),
+    stage=Stage(_fill, gain=_gain, own=ON),
 )

@@ -2,11 +2,32 @@
 
 from __future__ import annotations
 
-from actuator_glue.model.effects import rows
+import math
+from typing import Any
+
+from actuator_glue.jit import njit
+from actuator_glue.model.effects import rows as r
 from actuator_glue.model.effects.effect import Effect
+from actuator_glue.model.effects.stage import Case, Stage
 from actuator_glue.model.parameters import Parameter
+from actuator_glue.records import Array
+
+(LIMIT,) = r.ROWS.take(1)
 
 NO_LIMIT = 2.0  # m/s; at or above it nothing is limited
+
+
+@njit
+def _fill(w: Array, n: int, p: Any, case: Case) -> None:
+    velocity = p.saturation_velocity
+    w[LIMIT + n] = math.inf if velocity >= NO_LIMIT else velocity * p.alpha_2
+
+
+@njit
+def _limit(w: Array, n: int, flow: Any, slope: Any) -> Any:
+    limit = w[LIMIT + n]
+    return min(max(flow, -limit), limit), (slope if abs(flow) <= limit else 0.0)
+
 
 EFFECT = Effect(
     name='flow-saturation',
@@ -27,5 +48,5 @@ EFFECT = Effect(
     signature='odd harmonics above an onset in velocity',
     source='Merritt 1967; Jelali & Kroll 2003',
     starts=lambda s: ((0.95 * s.velocity,), (0.75 * s.velocity,), (0.5 * s.velocity,)),
-    switches=(rows.ON_FLOW,),
+    stage=Stage(_fill, limit=_limit),
 )

@@ -2,9 +2,28 @@
 
 from __future__ import annotations
 
-from actuator_glue.model.effects import rows
+from typing import Any
+
+from actuator_glue.jit import njit
+from actuator_glue.model.effects import rows as r
 from actuator_glue.model.effects.effect import Effect
+from actuator_glue.model.effects.stage import Case, Stage
 from actuator_glue.model.parameters import Parameter
+from actuator_glue.records import Array
+
+(DRIFT,) = r.ROWS.take(1)
+(ON,) = r.SWITCHES.take(1)
+
+
+@njit
+def _fill(w: Array, n: int, p: Any, case: Case) -> None:
+    w[DRIFT + n] = p.gain_drift
+
+
+@njit
+def _gain(w: Array, n: int, time: float) -> Any:
+    return max(1.0 + w[DRIFT + n] * time, 0.0)
+
 
 EFFECT = Effect(
     name='gain-drift',
@@ -19,6 +38,6 @@ EFFECT = Effect(
     signature='parameters trend with time, not with amplitude',
     source='Jelali & Kroll 2003 (viscosity and bulk modulus against temperature)',
     starts=lambda s: ((0.05 / s.duration,), (-0.05 / s.duration,), (0.2 / s.duration,)),
-    switches=(rows.ON_FLOW,),
     record_time=True,
+    stage=Stage(_fill, gain=_gain, own=ON),
 )

@@ -2,9 +2,30 @@
 
 from __future__ import annotations
 
-from actuator_glue.model.effects import rows
+import math
+from typing import Any
+
+from actuator_glue.jit import njit
+from actuator_glue.model.effects import rows as r
 from actuator_glue.model.effects.effect import Effect
+from actuator_glue.model.effects.stage import Case, Stage
 from actuator_glue.model.parameters import Parameter
+from actuator_glue.records import Array
+
+(INVERSE_STALL,) = r.ROWS.take(1)
+(ON,) = r.SWITCHES.take(1)
+
+
+@njit
+def _fill(w: Array, n: int, p: Any, case: Case) -> None:
+    w[INVERSE_STALL + n] = p.inverse_stall_force
+
+
+@njit
+def _gain(w: Array, n: int, time: float) -> Any:
+    load = (w[r.F + n] + 0.5 * w[r.DF + n]) * w[INVERSE_STALL + n]
+    return math.sqrt(max(1.0 - (load if w[r.IN_Q + n] > 0.0 else -load), 0.0))
+
 
 EFFECT = Effect(
     name='pressure-flow',
@@ -21,5 +42,5 @@ EFFECT = Effect(
     starts=lambda s: tuple(
         (share / max(s.stiffness * s.stroke, 0.2 * s.oil * s.stroke),) for share in (0.1, 0.4)
     ),
-    switches=(rows.ON_FLOW, rows.ON_PRESSURE),
+    stage=Stage(_fill, gain=_gain, own=ON),
 )

@@ -2,9 +2,38 @@
 
 from __future__ import annotations
 
-from actuator_glue.model.effects import lti_step, rows
+import math
+from typing import Any
+
+from actuator_glue.jit import njit
+from actuator_glue.model.effects import lti_step
+from actuator_glue.model.effects import rows as r
 from actuator_glue.model.effects.effect import Effect
+from actuator_glue.model.effects.stage import Case, Stage
 from actuator_glue.model.parameters import Parameter
+from actuator_glue.records import Array
+
+LAG, DECAY, SENSED, LAST, LAST_DX = r.ROWS.take(5)
+
+
+@njit
+def _fill(w: Array, n: int, p: Any, case: Case) -> None:
+    w[LAG + n], w[DECAY + n] = p.sensor_lag / case.step, math.exp(-case.step / p.sensor_lag)
+    w[SENSED + n], w[LAST + n], w[LAST_DX + n] = case.x, case.x, case.v * case.step
+
+
+@njit
+def _sensed(w: Array, n: int, y: Any) -> Any:
+    """First-order lag of the parabola through the last three positions."""
+    before, lag = w[LAST + n], w[LAG + n]
+    moved = y - before
+    bend = 0.5 * (moved - w[LAST_DX + n])
+    end = y - lag * (moved + bend - 2.0 * lag * bend)
+    first = before - lag * (moved - bend - 2.0 * lag * bend)
+    sensed = end + w[DECAY + n] * (w[SENSED + n] - first)
+    w[SENSED + n], w[LAST + n], w[LAST_DX + n] = sensed, y, moved
+    return sensed
+
 
 EFFECT = Effect(
     name='sensor-lag',
@@ -17,6 +46,6 @@ EFFECT = Effect(
     signature='linear; as a delay with a slight roll-off',
     source='Jelali & Kroll 2003 (transducers)',
     starts=lambda s: ((0.0005,), (0.002,), (0.008,)),
-    switches=(rows.ON_TRANSDUCER,),
     exact=lti_step.SENSOR,
+    stage=Stage(_fill, sensed=_sensed),
 )

@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
-from actuator_glue.model.effects import rows
+from actuator_glue.jit import njit
+from actuator_glue.model.effects import rows as r
 from actuator_glue.model.effects.effect import Effect
+from actuator_glue.model.effects.stage import Case, Stage
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.records import Array, Record
+
+DROOP, HALF, INVERSE_ALPHA_2, ENVELOPE = r.ROWS.take(4)
+(ON,) = r.SWITCHES.take(1)
 
 
 class _Envelope:
@@ -37,6 +44,24 @@ class _Envelope:
         return {'envelope': np.interp(at, np.log(self._TIMES), self._speeds)}
 
 
+@njit
+def _fill(w: Array, n: int, p: Any, case: Case) -> None:
+    half = 0.5 * case.step
+    w[DROOP + n], w[HALF + n] = p.droop, half / (p.droop_time + half)
+    w[INVERSE_ALPHA_2 + n] = 1.0 / p.alpha_2
+    # Of flow over alpha_2, as in the equation.
+    w[ENVELOPE + n] = p.envelope * (case.k + p.alpha_2) / p.alpha_2
+
+
+@njit
+def _gain(w: Array, n: int, time: float) -> Any:
+    before = w[ENVELOPE + n]
+    speed = abs(w[r.IN_Q + n]) * w[INVERSE_ALPHA_2 + n]
+    middle = before + w[HALF + n] * (speed - before)
+    w[ENVELOPE + n] = 2.0 * middle - before
+    return math.sqrt(max(1.0 - w[DROOP + n] * middle, 0.0))
+
+
 EFFECT = Effect(
     name='supply-droop',
     place='flow',
@@ -57,5 +82,5 @@ EFFECT = Effect(
     ),
     onset=lambda record: None if record is None else _Envelope(record),
     states=('envelope',),
-    switches=(rows.ON_FLOW, rows.ON_DROOP),
+    stage=Stage(_fill, gain=_gain, own=ON),
 )

@@ -1,0 +1,125 @@
+"""Which test set-up governs which samples of a stream."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from actuator_glue.errors import InputError
+from actuator_glue.records import Hold, check_stiffness
+
+MAX_INDEX = 2**62
+# Nobody streams into hundreds of announced set-ups; a publisher gone wild must not fill memory.
+_MOST = 16
+
+
+@dataclass(frozen=True, slots=True)
+class StreamSetup:
+    """What must be known of a test to use its samples.
+
+    Attributes:
+        stiffness: specimen stiffness k [N/m]; None where it is not known.
+        period: sample period [s].
+        actuator: name of the actuator.
+        hold: how the command runs between its samples.
+        index: running index of the first sample it holds for.
+        source: plant or file, for people.
+
+    Raises:
+        InputError: negative stiffness, absurd period, unknown hold.
+    """
+
+    stiffness: float | None
+    period: float
+    actuator: str = 'actuator'
+    hold: Hold = 'zoh'
+    index: int = 0
+    source: str = ''
+
+    def __post_init__(self) -> None:
+        where = f'test set-up of {self.actuator!r}'
+        if self.stiffness is not None:
+            object.__setattr__(self, 'stiffness', check_stiffness(self.stiffness, where))
+        if not (np.isfinite(self.period) and 1e-6 <= self.period <= 10.0):
+            raise InputError(f'{where}: sample period {self.period:g} s is outside [1e-6, 10] s')
+        if self.hold not in ('zoh', 'linear'):
+            raise InputError(f"{where}: hold {self.hold!r} is unknown; use 'zoh' or 'linear'")
+        if not 0 <= self.index <= MAX_INDEX:
+            raise InputError(f'{where}: the running index {self.index} is outside [0, 2^62]')
+
+    def same_test(self, other: StreamSetup) -> bool:
+        """Whether samples under both set-ups may be fitted together."""
+        return (self.stiffness, self.period, self.actuator, self.hold) == (
+            other.stiffness,
+            other.period,
+            other.actuator,
+            other.hold,
+        )
+
+
+def from_message(message: Any) -> StreamSetup:
+    """Return the set-up of a TestSetup.
+
+    Raises:
+        InputError: negative stiffness, absurd rate, unknown hold.
+    """
+    stiffness, rate = float(message.specimen_stiffness), float(message.rate)
+    name = str(message.actuator or message.header.frame_id)
+    if not (np.isfinite(rate) and rate > 0.0):
+        raise InputError(f'test set-up of {name!r}: rate {rate:g} Hz is not positive')
+    return StreamSetup(
+        stiffness=None if np.isnan(stiffness) else stiffness,
+        period=1.0 / rate,
+        actuator=name,
+        hold=message.hold,
+        index=int(message.index),
+        source=str(message.source),
+    )
+
+
+class Setups:
+    """The set-ups of one stream as they come: each holds from the sample it names.
+
+    One that names a sample that has passed holds at once; of two that name the same sample the
+    later one holds.
+    """
+
+    def __init__(self) -> None:
+        self._announced: list[StreamSetup] = []
+
+    def announce(self, setup: StreamSetup, following: int | None) -> bool:
+        """Take a set-up; return whether it holds at once.
+
+        Args:
+            setup: what has come.
+            following: running index of the sample after the last one; None before the first.
+        """
+        if following is not None and setup.index <= following:
+            return True
+        self._announced = [s for s in self._announced if s.index != setup.index]
+        self._announced.append(setup)
+        self._announced.sort(key=lambda s: s.index)
+        del self._announced[_MOST:]
+        return False
+
+    def begun(self, index: int) -> list[StreamSetup]:
+        """Return, once, the announced set-ups that hold at a sample, the last one governs it."""
+        count = sum(s.index <= index for s in self._announced)
+        begun, self._announced = self._announced[:count], self._announced[count:]
+        return begun
+
+    def parts(self, index: int, count: int) -> Iterator[tuple[slice, list[StreamSetup]]]:
+        """Yield the parts of `count` samples from `index` on, and what begins with each."""
+        start = 0
+        while start < count:
+            begun = self.begun(index + start)
+            stop = min([count, *(s.index - index for s in self._announced[:1])])
+            yield slice(start, stop), begun
+            start = stop
+
+    def forget(self) -> None:
+        """Forget what was announced: the stream's numbers begin again."""
+        self._announced.clear()
