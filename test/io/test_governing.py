@@ -19,7 +19,8 @@ from actuator_glue.setups import StreamSetup
 
 def windows(bag: Path) -> list[Window]:
     """Return the windows of a replay."""
-    sliding = SlidingWindows(EstimatorSettings(window=0.05, hop=0.01, settle=0.0, time_budget=0.01))
+    settings = EstimatorSettings(window=0.05, hop=0.01, settle=0.0, time_budget=0.01)
+    sliding = SlidingWindows(settings)
     found: list[Window] = []
     for item in items(decoded(bag, ['SampleBlock', 'TestSetup'])):
         if isinstance(item, StreamSetup):
