@@ -1,11 +1,13 @@
 """How sure a ranking is: rival structures, their distance with its standard error, their weights.
 
-Scores come block by block, so that the spread over blocks says how far a ranking is chance: a
-rival whose deficit is within two standard errors is not excluded, however many nats that is.
+Scores come block by block, so that the spread over blocks says how far a ranking is chance, and
+so do the weights. A rival is tied by its weight alone: what is told as an alternative has a
+probability, and what has none is no alternative.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -20,7 +22,6 @@ from actuator_glue.records import Array
 
 _DRAWS = 2000
 _SEED = 0
-_BEYOND = 2.0  # standard errors
 _NORMAL_95 = 1.959964
 _NOT_NEAR = 0.1  # of the best's weight: excess beyond the tolerance
 _SAME = 0.5  # of what the best removes: a rival that removes less is none
@@ -68,21 +69,26 @@ def compare(
         settings: thresholds.
     """
     whole = removed(rest, best)
-    known = weights(np.stack([t.scores for t in (best, *trials, rest)]))
-    known = _tolerant(known, [removed(t, best) for t in trials], settings.tie_share * whole)
+    scores = weights(np.stack([t.scores for t in (best, *trials, rest)]))
+    excess = [removed(t, best) for t in trials]
+    limits = [_limit(t, name, scorer) for t in trials]
+    # A richer form that gains nothing is no alternative, unless it holds the effect itself.
+    idle = [
+        len(t.fit.theta) > len(best.fit.theta)
+        and best.scores.sum() >= t.scores.sum()
+        and limit is None
+        for t, limit in zip(trials, limits, strict=True)
+    ]
+    alike = [math.inf if i else e for i, e in zip(idle, excess, strict=True)]
+    known = _tolerant(scores, alike, settings.tie_share * whole)
     out = [Rival(name, 0.0, 0.0, 0.0, True, float(known[0]))]
-    for trial, weight in zip(trials, known[1:], strict=False):
+    for i, trial in enumerate(trials):
+        near = known[1 + i] > math.exp(-settings.tie_nats) * known[0]
+        tied = bool(near and removed(rest, trial) > _SAME * whole and not idle[i])
         nats = max(0.0, evidence(best.scores, trial.scores))
         stderr = standard_error(best.scores - trial.scores)
-        excess = removed(trial, best)
-        near = nats < max(settings.tie_nats, _BEYOND * stderr)
-        near = near or excess < settings.tie_share * whole
-        extra = len(trial.fit.theta) - len(best.fit.theta)
-        limit = _limit(trial, name, scorer) if near else None
-        # A richer form that gains nothing is no alternative, unless it holds the effect itself.
-        idle = extra > 0 and best.scores.sum() >= trial.scores.sum() and limit is None
-        tied = near and removed(rest, trial) > _SAME * whole and not idle
-        out.append(Rival(trial.added, nats, stderr, excess, tied, float(weight), limit))
+        limit = limits[i] if near else None
+        out.append(Rival(trial.added, nats, stderr, excess[i], tied, float(known[1 + i]), limit))
     return tuple(sorted(out, key=lambda r: (r.nats, r.name != name)))
 
 

@@ -1,6 +1,8 @@
 """Rankings: weights from block scores, their class of none, and the level of false alarms."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
@@ -12,7 +14,9 @@ from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.ranking import standard_error, weights
 from actuator_glue.diagnosis.result import HeldOutError
 from actuator_glue.diagnosis.score import Scorer, splits_of
-from actuator_glue.records import Record
+from actuator_glue.diagnosis.search import Trial
+from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.records import Array, Record
 
 
 def test_a_rival_within_its_standard_error_keeps_a_probability() -> None:
@@ -64,6 +68,33 @@ def test_names_that_are_tied_by_size_share_the_probability() -> None:
     assert known == pytest.approx([0.5, 0.5, 0.0], abs=1e-3)
     apart = ranking._tolerant(np.array([1.0, 1e-30, 0.0]), [3e-6], 1e-6)
     assert apart == pytest.approx([1.0, 0.0, 0.0])
+
+
+def test_an_alternative_has_a_probability() -> None:
+    """A rival that every block excludes is none, however unevenly the blocks do.
+
+    Two blocks hold nearly all the evidence, so that its standard error is near its sum.
+    """
+
+    def trial(name: str, rms: float, scores: Array) -> Trial:
+        fit = SimpleNamespace(theta=np.zeros(5), z=np.zeros(5))
+        found = SimpleNamespace(added=name, mean_square=rms**2, scores=scores, fit=fit)
+        return cast('Trial', found)
+
+    against = np.full(15, 400.0)
+    against[:2] = 45e3
+    rest = trial('', 40e-6, np.full(15, -10e3) - against)
+    best = trial('backlash', 5e-6, np.zeros(15))
+    far = trial('specimen-hardening', 32e-6, -against)
+    alike = trial('coulomb-friction', 5.2e-6, np.full(15, -20.0))
+    level = cast('Scorer', None)  # none of these is a richer form of another
+    found = ranking.compare(rest, best, 'backlash', [far, alike], level, Thresholds())
+    told = {r.name: r for r in found}
+    assert told['specimen-hardening'].nats < 2.0 * told['specimen-hardening'].stderr
+    assert not told['specimen-hardening'].tied
+    assert told['specimen-hardening'].probability < 1e-6
+    assert told['coulomb-friction'].tied
+    assert told['coulomb-friction'].probability > 0.2
 
 
 def test_held_out_records_that_contradict_lower_the_certainty() -> None:

@@ -1,5 +1,6 @@
 """The policy of SROS 2 allows each node what it does, and nothing that it does not."""
 
+import contextlib
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 
@@ -37,9 +38,22 @@ def test_the_policy_is_what_a_node_does(node, start, probe, tmp_path):
         probe.until(lambda: probe.value(node, 'worker') == 'ready', 250, 'compiled')
         probe.for_a_while(1.0)
 
+    # Discovery goes on after a node has been heard: its name comes with a message of its own.
+    probe.until(lambda: (node, '/') in probe.get_node_names_and_namespaces(), 30, 'discovered')
+
     def names(ask):
         return {name for name, _ in ask(node, '/') if ACTION not in name}
 
+    def complete():
+        publishes = names(probe.get_publisher_names_and_types_by_node)
+        serves = names(probe.get_service_names_and_types_by_node)
+        return publishes >= allowed(node, 'topics', 'publish') and serves >= allowed(
+            node, 'services', 'reply'
+        )
+
+    # What is wrong never completes: then the comparisons below say what is missing.
+    with contextlib.suppress(AssertionError):
+        probe.until(complete, 15)
     published = names(probe.get_publisher_names_and_types_by_node)
     heard = names(probe.get_subscriber_names_and_types_by_node)
     served = names(probe.get_service_names_and_types_by_node)
