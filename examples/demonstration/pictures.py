@@ -91,7 +91,9 @@ def carried(
             axes.axhline(truth[j], ls='--', color=style.TRUTH, label='truth')
         for start, _ in _changes(content):
             axes.axvline((start - first) * period, ls=':', color=style.TRUTH)
-        axes.set(ylabel=style.label(parameter.name, parameter.unit), ylim=(0.0, None))
+        axes.set(ylabel=style.label(parameter.name, parameter.unit))
+        # Of these the box leaves orders of magnitude open.
+        axes.set(yscale='log') if j > 0 else axes.set(ylim=(0.0, None))
         if j > 1:
             axes.set_xlabel('time [s]')
     figure.legend(*axes.get_legend_handles_labels(), loc='outside lower center', ncols=3)

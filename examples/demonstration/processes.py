@@ -36,12 +36,19 @@ def executable(node: str) -> Path:
 
 
 def end_in_order() -> None:
-    """However this process is told to end, let it end as by Ctrl-C: its nodes are then stopped."""
+    """However this process is told to end, let it end as by Ctrl-C: its nodes are then stopped.
+
+    Once only: `make` and a terminal both pass a signal on, and a second one would interrupt
+    the stopping and leave nodes behind.
+    """
+    endings = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
     def leave(number: int, frame: FrameType | None) -> None:
+        for ending in endings:
+            signal.signal(ending, signal.SIG_IGN)
         raise KeyboardInterrupt
 
-    for ending in (signal.SIGTERM, signal.SIGHUP):
+    for ending in endings:
         signal.signal(ending, leave)
 
 

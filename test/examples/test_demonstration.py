@@ -6,6 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -146,26 +147,31 @@ from examples.demonstration import domain
 from examples.demonstration.processes import Nodes, end_in_order
 end_in_order()
 with Nodes() as nodes:
-    node = nodes.start('recorder', {'bag': str(Path(sys.argv[1], 'bag'))}, Path(sys.argv[1]))
-    print(node.process.pid, flush=True)
+    for name in 'ab':
+        folder = Path(sys.argv[1], name)
+        folder.mkdir()
+        node = nodes.start('recorder', {'bag': str(folder / 'bag')}, folder)
+        print(node.process.pid, flush=True)
     time.sleep(60.0)
 """
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize('number', [signal.SIGTERM, signal.SIGHUP])
-def test_whoever_is_ended_ends_its_nodes(tmp_path: Path, number: signal.Signals) -> None:
-    """A node must not outlive the process that started it, however that is told to end."""
+@pytest.mark.parametrize('numbers', [(signal.SIGTERM,) * 2, (signal.SIGHUP, signal.SIGINT)])
+def test_whoever_is_ended_ends_its_nodes(tmp_path: Path, numbers: list[signal.Signals]) -> None:
+    """A node must not outlive the process that started it, however and often that is told."""
     _need_nodes()
     command = [sys.executable, '-c', _HOLDER, str(tmp_path)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL) as holder:
         assert holder.stdout is not None
-        node = int(holder.stdout.readline())
-        os.kill(node, 0)
-        holder.send_signal(number)
+        nodes = [int(holder.stdout.readline()) for _ in 'ab']
+        for number in numbers:
+            holder.send_signal(number)
+            time.sleep(0.02)
         assert holder.wait(30.0) != 0
-    with pytest.raises(ProcessLookupError):
-        os.kill(node, 0)
+    for node in nodes:
+        with pytest.raises(ProcessLookupError):
+            os.kill(node, 0)
 
 
 @pytest.mark.ros
