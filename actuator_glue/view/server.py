@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import threading
-import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 
@@ -158,19 +157,21 @@ class _Page:
     async def send(self) -> None:
         """Send a frame wherever there is something new, as fast as the page takes them."""
         shown: tuple[Wanted, int] | None = None
+        loop, due = asyncio.get_running_loop(), 0.0
         while not self._socket.closed:
+            # What making and sending a frame takes is part of its time.
+            due = max(due + 1.0 / _RATE, loop.time())
             now = (self.wanted, self._intake.history.version)
             # A page that stands still in the past has what it asked for.
             still = shown is not None and now[0] == shown[0] and now[0].stop is not None
-            pause = 1.0 / _RATE
             if now != shown and not still:
                 shown = now
-                begin = time.perf_counter()
+                begin = loop.time()
                 content = frame(self._intake, self.wanted)
                 # A quarter of an hour of samples takes longer: never more than a fifth of a core.
-                pause = max(pause, _SHARE * (time.perf_counter() - begin))
+                due = max(due, loop.time() + _SHARE * (loop.time() - begin))
                 try:
                     await self._socket.send_bytes(content)
                 except (ConnectionError, RuntimeError):  # the page was closed meanwhile
                     return
-            await asyncio.sleep(pause)
+            await asyncio.sleep(max(due - loop.time(), 0.0))
