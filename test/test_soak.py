@@ -1,8 +1,11 @@
 """What a soak is judged by: a fault not told, a band that stays bad, memory that grows."""
 
+import os
+from dataclasses import asdict
+
 import numpy as np
 
-from benchmarks.soak import judge, text
+from benchmarks.soak import judge, memory, text
 from benchmarks.soak.judge import Content, Fault
 
 
@@ -46,14 +49,55 @@ def test_a_recorder_that_stands_still_is_seen_by_its_silence():
     assert stalled.told and not not_stalled.told
 
 
-def test_memory_that_grows_is_told_per_hour():
-    rng = np.random.default_rng(1)
-    memory = [
-        (float(t), {'grows': 100 + t / 600 + 0.01 * rng.standard_normal(), 'rests': 50.0})
-        for t in range(1800)
-    ]
-    found = judge.slopes(memory, 300.0)
-    assert abs(found['grows'][0] - 6.0) < 0.1 and abs(found['rests'][0]) < 1e-6
+def readings(part, megabytes, seconds=1800, process=1, begin=0.0):
+    """What a process of a part takes, by its age in seconds."""
+    return [memory.Reading(begin + t, part, process, megabytes(t)) for t in range(seconds)]
+
+
+def test_memory_that_grows_is_told_per_hour(rng_seed):
+    rng = np.random.default_rng(rng_seed)
+    noise = 0.05 * rng.standard_normal(1800)
+    found = memory.growth(
+        [
+            *readings('grows', lambda t: 100.0 + t / 600 + noise[t]),
+            *readings('rests', lambda t: 50.0 + noise[t]),
+            # As a writer does that begins a new file every five minutes.
+            *readings('saw', lambda t: 50.0 + (t % 300) / 330),
+        ],
+        450.0,
+    )
+    grows, rests, saw = (found[name] for name in ('grows', 'rests', 'saw'))
+    assert abs(grows.slope - 6.0) < 0.3 and grows.lower > 5.0
+    assert abs(rests.slope) < 0.3 and rests.upper < 1.0
+    assert abs(saw.slope) < 1.0
+
+
+def test_each_process_has_its_own_growth():
+    """One that is replaced starts low again; what grows in each still shows, what rests too."""
+    for slope in (0.0, 12.0):
+        runs = [
+            readings('estimator', lambda t, s=slope: 90.0 + s * t / 3600, 400, n, 400.0 * n)
+            for n in range(4)
+        ]
+        found = memory.growth([r for run in runs for r in run], 100.0)['estimator']
+        assert abs(found.slope - slope) < 0.1 and found.processes == 4
+
+
+def test_one_step_is_no_growth():
+    found = memory.growth(readings('node', lambda t: 50.0 + 2.0 * (t > 600)), 450.0)['node']
+    assert abs(found.slope) < 1e-9
+
+
+def test_memory_of_this_process_is_read():
+    before = memory.anonymous(os.getpid())
+    ballast = np.ones(4_000_000)
+    assert 25.0 < memory.anonymous(os.getpid()) - before < 60.0
+    assert np.isnan(memory.anonymous(0)) and ballast.all()
+
+
+def grown(slope, lower, upper):
+    """Growth of a part."""
+    return asdict(memory.Growth(slope, lower, upper, 60.0, 1))
 
 
 def result(**more):
@@ -64,7 +108,7 @@ def result(**more):
         'cores': 2,
         'load_before_and_after': [0.0, 0.0],
         'faults': [{'kind': 'spike', 'told': True, 'back': 3.0}],
-        'memory_MB_per_h': {'recorder': (0.1, 0.1)},
+        'memory': {'recorder': grown(0.1, 0.0, 0.2)},
         'samples_missing_in_the_bag': 0,
         'estimator': {},
         'worst_write_lag_s': '0.1',
@@ -79,7 +123,8 @@ def test_the_headline_says_what_the_numbers_say():
         {'faults': [{'kind': 'spike', 'told': False, 'back': 3.0}]},
         {'faults': [{'kind': 'spike', 'told': True, 'back': 30.0}]},
         {'faults': [{'kind': 'spike', 'told': True, 'back': float('nan')}]},
-        {'memory_MB_per_h': {'recorder': (9.0, 0.1)}},
+        {'memory': {'recorder': grown(9.0, 8.0, 10.0)}},
+        {'memory': {'recorder': grown(0.5, -9.0, 9.0)}},
         {'samples_missing_in_the_bag': 1},
     ):
         page, passed = text.report(result(**bad))

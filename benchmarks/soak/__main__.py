@@ -15,13 +15,13 @@ import socket
 import sys
 import time
 from collections.abc import Callable
-from contextlib import closing, suppress
+from contextlib import closing
 from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
 
-from benchmarks.soak import judge, text
+from benchmarks.soak import judge, memory, text
 from benchmarks.soak.wire import RATE, STIFFNESS, Wire
 from examples.demonstration.domain import own_domain
 from examples.demonstration.processes import Node, Nodes, end_in_order
@@ -29,6 +29,8 @@ from examples.demonstration.processes import Node, Nodes, end_in_order
 WIRE = ('drop_out', 'nan_burst', 'spike', 'clock_jump', 'restart', 'disorder', 'garbage')
 NODES = ('estimator_killed', 'worker_killed', 'recorder_stalled')
 STALL = 3.0  # s
+# Share of the run after which memory is watched: by then every kind of fault has come once.
+WARM = 0.25
 READY_SECONDS = 400.0
 
 
@@ -40,26 +42,6 @@ def parser() -> argparse.ArgumentParser:
     made.add_argument('--every', type=float, default=30.0, help='mean time between faults [s]')
     made.add_argument('--out', type=Path, default=Path('out/soak'), help='folder of the results')
     return made
-
-
-def resident(process: int) -> float:
-    """Return the resident memory of a process and its children [MB]."""
-    total = 0.0
-    with suppress(OSError):
-        status = Path(f'/proc/{process}/status').read_text()
-        total = sum(
-            float(line.split()[1]) for line in status.splitlines() if line.startswith('VmRSS')
-        )
-        return total / 1024.0 + sum(resident(child) for child in children(process))
-    return total
-
-
-def children(process: int) -> list[int]:
-    """Return the children of a process."""
-    with suppress(OSError):
-        tasks = Path(f'/proc/{process}/task').iterdir()
-        return [int(c) for task in tasks for c in (task / 'children').read_text().split()]
-    return []
 
 
 class Soak:
@@ -74,7 +56,7 @@ class Soak:
         self.bag = args.out / 'bag'
         self.rng = np.random.default_rng(args.seed)
         self.faults: list[judge.Fault] = []
-        self.memory: list[tuple[float, dict[str, float]]] = []
+        self.memory: list[memory.Reading] = []
         with closing(socket.socket(type=socket.SOCK_DGRAM)) as probe:
             probe.bind(('127.0.0.1', 0))
             self.port = probe.getsockname()[1]
@@ -89,12 +71,14 @@ class Soak:
         self.begin('recorder', bag=str(self.bag))
         self.begin('estimator')
         self.begin('diagnoser', automatic=False)
+        self.begin('margin', partition='sdof')
+        self.begin('viewer', port=0)
         self.begin(
             'lab_bridge',
             source=f'udp://127.0.0.1:{self.port}',
             rate=RATE,
             specimen_stiffness=STIFFNESS,
-            wait_for=3,
+            wait_for=4,
         )
         until = time.monotonic() + READY_SECONDS
         log = self.running['lab_bridge'].log
@@ -118,9 +102,8 @@ class Soak:
         due = start + 25.0
         order = list(self.rng.permutation([*WIRE, *NODES]))
         while (now := time.monotonic()) < end:
-            self.memory.append(
-                (now - start, {n: resident(p.process.pid) for n, p in self.running.items()})
-            )
+            running = {name: node.process.pid for name, node in self.running.items()}
+            self.memory += memory.read(now - start, running)
             # None so late that nothing could be seen of it any more.
             if now >= due and now < end - 25.0:
                 kind = str(order.pop())
@@ -153,8 +136,8 @@ class Soak:
     def worker_killed(self) -> float:
         """Kill the process that computes; the node starts another."""
         begun = time.monotonic()
-        for child in children(self.running['estimator'].process.pid):
-            if b'spawn_main' in Path(f'/proc/{child}/cmdline').read_bytes():
+        for child in memory.children(self.running['estimator'].process.pid):
+            if memory.computes(child):
                 os.kill(child, signal.SIGKILL)
         return time.monotonic() - begun
 
@@ -181,6 +164,7 @@ def main() -> int:
     loads.append(os.getloadavg()[0])
     content = judge.read(soak.bag)
     judge.judge(soak.faults, content)
+    grown = memory.growth(soak.memory, WARM * 60.0 * args.minutes)
     found = {
         'schema': 'actuator_glue.soak/1',
         'minutes': args.minutes,
@@ -188,8 +172,8 @@ def main() -> int:
         'load_before_and_after': loads,
         'cores': os.cpu_count(),
         'faults': [asdict(f) for f in soak.faults],
-        'memory_MB_per_h': judge.slopes(soak.memory, 0.25 * 60.0 * args.minutes),
-        'memory_MB': [{'seconds': t, **m} for t, m in soak.memory[::10]],
+        'memory': {name: asdict(g) for name, g in grown.items()},
+        'readings': [r for r in soak.memory if int(r.seconds) % 10 == 0],
         'samples_missing_in_the_bag': judge.whole(content),
         **judge.summary(content),
     }

@@ -133,26 +133,6 @@ def _number(text: str) -> float:
         return 0.0
 
 
-def slopes(
-    memory: Sequence[tuple[float, dict[str, float]]], warm: float
-) -> dict[str, tuple[float, float]]:
-    """Return growth [MB/h] and its standard error of each node after the warm-up.
-
-    Args:
-        memory: time since the start [s] and resident memory of each node [MB].
-        warm: what is left out at the start [s].
-    """
-    found: dict[str, tuple[float, float]] = {}
-    for name in memory[0][1]:
-        points = np.array([(t, m[name]) for t, m in memory if t > warm and name in m])
-        if len(points) < 10:
-            continue
-        hours = points[:, 0] / 3600.0
-        fit, covariance = np.polyfit(hours, points[:, 1], 1, cov=True)
-        found[name] = float(fit[0]), float(np.sqrt(covariance[0, 0]))
-    return found
-
-
 def whole(content: Content) -> int:
     """Return how many samples the bag lacks beyond the gaps that the bridge itself has told."""
     reports = content.reports.get('lab_bridge', [])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 from benchmarks.soak.judge import WINDOW
@@ -17,11 +18,6 @@ def report(found: dict[str, Any]) -> tuple[str, bool]:
     # Two windows, and the time that the second may be computed.
     limit = 2.0 * WINDOW + 1.0
     back = sum(f['back'] <= limit for f in faults)
-    growing = {
-        name: (slope, error)
-        for name, (slope, error) in found['memory_MB_per_h'].items()
-        if slope - 2.0 * error > GROWTH
-    }
     missing = found['samples_missing_in_the_bag']
     lines = [
         f'{found["minutes"]:g} minutes at 1 kHz, {len(faults)} faults, seed {found["seed"]}, '
@@ -46,9 +42,24 @@ def report(found: dict[str, Any]) -> tuple[str, bool]:
         worst = max((math.inf if math.isnan(f['back']) else f['back']) for f in own)
         shown = 'not before the next fault' if math.isinf(worst) else f'{worst:.1f}'
         lines.append(f'| {kind} | {len(own)} | {sum(f["told"] for f in own)} | {shown} |')
-    lines += ['', '| node and its children | growth, MB/h | standard error |', '|---|---|---|']
-    for name, (slope, error) in found['memory_MB_per_h'].items():
-        lines.append(f'| {name} | {slope:+.2f} | {error:.2f} |')
-    passed = told == back == len(faults) and not growing and not missing
+    lines += [
+        '',
+        '| process | MB at the end | growth, MB/h (95 %) | below 1 MB/h | started |',
+        '|---|---|---|---|---|',
+    ]
+    for name, part in found['memory'].items():
+        lines.append(
+            f'| {name} | {part["megabytes"]:.0f} | {part["slope"]:+.2f} ({part["lower"]:+.2f} to '
+            f'{part["upper"]:+.2f}) | {judged(part)} | {part["processes"]} |'
+        )
+    bounded = all(judged(part) == 'yes' for part in found['memory'].values())
+    passed = told == back == len(faults) and bounded and not missing
     verdict = 'Everything held.' if passed else 'Not everything held: see the numbers below.'
     return '\n'.join([f'**{verdict}**', '', *lines]) + '\n', passed
+
+
+def judged(part: Mapping[str, float]) -> str:
+    """Return whether the growth of a part is shown to be less than is allowed."""
+    if part['upper'] < GROWTH:
+        return 'yes'
+    return 'no' if part['lower'] > GROWTH else 'not shown'
