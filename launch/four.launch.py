@@ -22,6 +22,11 @@ ARGUMENTS = {
         'specimen stiffnesses [N/m], in the order of the names, or one for all',
     ),
     'duration': ('60.0', 'length of the simulated tests [s]'),
+    'view': ('false', 'a page per actuator on 127.0.0.1, at any free port; each logs its address'),
+    'partitions': (
+        '',
+        'hybrid tests whose stability is watched, in the order of the names, or one for all',
+    ),
     'diagnose': ('false', 'a diagnoser per actuator, too: half a core and 300 MB each'),
 }
 
@@ -44,13 +49,14 @@ def nodes(given):
     names = [name.strip() for name in given['names'].split(',') if name.strip()]
     sources = entries(given, 'sources', len(names))
     stiffnesses = entries(given, 'stiffnesses', len(names))
-    diagnose = truth(given['diagnose'])
+    partitions = entries(given, 'partitions', len(names))
+    diagnose, view = truth(given['diagnose']), truth(given['view'])
     found = []
     for at, name in enumerate(names):
         common = {
             'actuator': name,
             'specimen_stiffness': float(stiffnesses[at]),
-            'wait_for': 2 + diagnose,
+            'wait_for': 2 + diagnose + view,
             'exit_at_end': True,
         }
         if sources:
@@ -67,6 +73,8 @@ def nodes(given):
         bag = str(PurePath(given['bags'], name)) if given['bags'] else ''
         wanted = [('recorder', {'bag': bag}), ('estimator', {}), stream]
         wanted += [('diagnoser', {})] if diagnose else []
+        wanted += [('viewer', {'port': 0})] if view else []
+        wanted += [('margin', {'partition': partitions[at]})] if partitions else []
         found += [node(given, executable, more, name) for executable, more in wanted]
     return found
 

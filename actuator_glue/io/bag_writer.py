@@ -18,10 +18,11 @@ from actuator_glue.io.mcap_file import McapFile, disk_error
 from actuator_glue.io.messages import PACKAGE, message_type, serialize, trimmed
 
 FLUSH_PERIOD = 0.2  # s
-# A file's index is kept in memory until the file is finished (about 0.6 kB per chunk); a new
-# file per gigabyte or per 20 000 flushes (an hour at five per second) bounds it.
+# A file's index is kept in memory until the file is finished, about 0.6 kB per chunk. A new file
+# per gigabyte or per 1500 flushes (five minutes at five per second) keeps that below a megabyte,
+# and of what a killed process leaves only the last file needs mending.
 MAX_FILE_BYTES = 1 << 30
-MAX_FILE_FLUSHES = 20_000
+MAX_FILE_FLUSHES = 1500
 
 
 class BagWriter:

@@ -12,9 +12,15 @@ from actuator_glue.streams.address import Allowed
 from actuator_glue.streams.results import FIELDS, connect
 from actuator_glue.streams.seal import read_key
 
+# What a margin node adds.
+_RISK = ('p_unstable', 'p_unstable_upper')
+
 
 class ResultsOut:
     """Collects what belongs to a window and sends it when its frequency response is there.
+
+    Where a margin node runs, the window is sent again as soon as P(unstable) is known: what a
+    controller acts on comes neither late nor from another window.
 
     Args:
         node: subscribes.
@@ -38,6 +44,7 @@ class ResultsOut:
         self._node.subscribe(topics.POSTERIOR, self._posterior)
         self._node.subscribe(topics.BAND, self._band)
         self._node.subscribe(topics.RESPONSE, self._response)
+        self._node.subscribe(topics.MARGIN, self._margin)
 
     def report(self) -> dict[str, Any]:
         """Return how many results have left."""
@@ -72,6 +79,16 @@ class ResultsOut:
             'phase': float(message.headline_phase),
             'frequency': float(message.headline_frequency),
         }
+        self._send()
+
+    def _margin(self, message: Any) -> None:
+        if message.window != self._values.get('window'):
+            return
+        self._values |= {name: float(getattr(message, name)) for name in _RISK}
+        if 'delay' in self._values:
+            self._send()
+
+    def _send(self) -> None:
         if self._sender.send(self._values):
             self._sent += 1
         else:

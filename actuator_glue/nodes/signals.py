@@ -27,12 +27,16 @@ class Stop:
     for a node that hangs. A SIGTERM after another signal does nothing: launch sends one to nodes
     that are still finishing their work.
 
+    Attributes:
+        reason: name of the signal that came, empty for none.
+
     Python's own handlers run in the main thread only, which waits inside the middleware; the
     wake-up descriptor is written at once, whatever thread the signal reaches.
     """
 
     def __init__(self) -> None:
         self._event = threading.Event()
+        self.reason = ''
         # Makes the executor return to its loop; the node gives it when it is there.
         self.wake: Callable[[], None] = lambda: None
         self._reader, writer = socket.socketpair()
@@ -67,6 +71,7 @@ class Stop:
             now = time.monotonic()
             if first is None:
                 first = now
+                self.reason = signal.Signals(number).name
                 self._event.set()
                 self.wake()
             elif number == signal.SIGINT and now - first > REPEATS_SECONDS:

@@ -55,6 +55,8 @@ def together(makes: Sequence[Callable[[], SuiteNode]], args: Sequence[str] | Non
     gc.collect()
     gc.freeze()
     _spin(executor, nodes, stop)
+    if stop.reason:
+        nodes[0].get_logger().info(f'{stop.reason}: ending')
     for node in reversed(nodes):
         _end(node)
         executor.remove_node(node)

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from actuator_glue.errors import InputError
 from actuator_glue.records import Array
 from actuator_glue.streams.layout import Layout
 
@@ -45,9 +46,17 @@ class Lines:
 
     Args:
         layout: what a line holds.
+
+    Raises:
+        InputError: the layout is one of packets.
     """
 
     def __init__(self, layout: Layout) -> None:
+        if layout.packet or layout.samples > 1:
+            raise InputError(
+                f'{layout.source or "layout"}: a line holds one sample; leave out packet and '
+                'samples, or receive datagrams (udp://)'
+            )
         self._layout = layout
         self.begin()
 

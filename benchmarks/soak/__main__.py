@@ -30,7 +30,7 @@ WIRE = ('drop_out', 'nan_burst', 'spike', 'clock_jump', 'restart', 'disorder', '
 NODES = ('estimator_killed', 'worker_killed', 'recorder_stalled')
 STALL = 3.0  # s
 # Share of the run after which memory is watched: by then every kind of fault has come once.
-WARM = 0.25
+WARM = 0.4
 READY_SECONDS = 400.0
 
 
@@ -102,6 +102,7 @@ class Soak:
         due = start + 25.0
         order = list(self.rng.permutation([*WIRE, *NODES]))
         while (now := time.monotonic()) < end:
+            self._all_there()
             running = {name: node.process.pid for name, node in self.running.items()}
             self.memory += memory.read(now - start, running)
             # None so late that nothing could be seen of it any more.
@@ -114,6 +115,13 @@ class Soak:
                 self.faults.append(judge.Fault(kind, begun, seconds))
                 due = now + seconds + self.args.every * float(self.rng.uniform(0.7, 1.3))
             time.sleep(1.0)
+
+    def _all_there(self) -> None:
+        for name, node in self.running.items():
+            if not node.running:
+                raise SystemExit(
+                    f'{name} ended by itself ({node.process.returncode}):\n{node.last_words()}'
+                )
 
     def _fault(self, kind: str, wire: Wire) -> Callable[[], float]:
         return getattr(self if kind in NODES else wire, kind)  # type: ignore[no-any-return]

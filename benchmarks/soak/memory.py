@@ -68,8 +68,8 @@ def computes(process: int) -> bool:
 
 
 def anonymous(process: int) -> float:
-    """Return the memory of a process that is no file's [MB]; NaN once it has ended."""
-    with suppress(OSError, ValueError):
+    """Return the memory of a process that is no file's [MB]; NaN where it cannot be read."""
+    with suppress(OSError, ValueError, IndexError):
         status = Path(f'/proc/{process}/status').read_text()
         return int(status.partition('RssAnon:')[2].split(maxsplit=1)[0]) / 1024.0
     return math.nan

@@ -22,7 +22,13 @@ WAYS = {
         {'partition': 'benchmark_case_1'},
         {'view': 'true'},
     ),
-    'four': ({}, {'sources': 'udp://a:1,udp://a:2,udp://a:3,udp://a:4'}, {'diagnose': 'true'}),
+    'four': (
+        {},
+        {'sources': 'udp://a:1,udp://a:2,udp://a:3,udp://a:4'},
+        {'diagnose': 'true'},
+        {'view': 'true'},
+        {'partitions': 'sdof'},
+    ),
 }
 EVERY = [(file, way) for file in FILES for way in WAYS[file]]
 
@@ -51,6 +57,16 @@ def test_every_stream_can_be_launched():
     assert [n.parameters[1].get('wait_for') for n in ways[-1]][-1] == 4
     found = {n.executable for nodes in ways for n in nodes}
     assert found == set(KNOWN)
+
+
+def test_four_actuators_are_watched_side_by_side():
+    """Pages at ports of their own, margins in the order of the names; streams wait for pages."""
+    nodes, _, _ = launched('four', view='true', partitions='sdof,sdof,sdof,benchmark_case_1')
+    assert [n.parameters[1]['port'] for n in nodes if n.executable == 'viewer'] == [0] * 4
+    watched = {n.namespace: n.parameters[1] for n in nodes if n.executable == 'margin'}
+    assert watched['west']['partition'] == 'benchmark_case_1' and len(watched) == 4
+    streams = [n for n in nodes if n.executable == 'actuator_sim']
+    assert all(n.parameters[1]['wait_for'] == 3 for n in streams)
 
 
 @pytest.mark.parametrize('file', FILES)

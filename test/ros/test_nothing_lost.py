@@ -15,30 +15,44 @@ from actuator_glue.io.recover import recover
 
 # What a kill may cost [s].
 LOST = 0.5
+# How long a recorder may take until it has recorded three seconds [s]: on a computer that is busy
+# importing alone takes a minute.
+START = 240.0
+
+
+def until_it_records(probe, recorder, file):
+    """Wait until a bag has three seconds; return when it was made, and how long that took."""
+    began = time.monotonic()
+    made = None
+    while not (file.exists() and file.stat().st_size > 120_000):
+        probe.for_a_while(0.1)
+        made = time.monotonic() - began if made is None and file.exists() else made
+        if not recorder.alive or time.monotonic() - began > START:
+            raise AssertionError(f'bag made after {made} s; {probe.health}; {recorder.text}')
+    return made or 0.0, time.monotonic() - began
 
 
 def killed_at_random(start, probe, tmp_path, times, seed):
     """Kill a recorder again and again in the middle of a stream; each bag is mended and whole."""
     rng = np.random.default_rng(seed)
-    heard = {}
+    heard, newest = {}, [0.0]
 
-    def hear(message):
-        heard[message.index] = (time.monotonic(), bytes(message.measured))
+    def hear(message, info):
+        newest[0] = 1e-9 * info['source_timestamp']
+        heard[message.index] = newest[0], bytes(message.measured)
 
     probe.create_subscription(SampleBlock, 'samples', hear, QoSProfile(depth=2000))
     simulator = start('actuator_sim', rate=1000.0, repeat=True, rest=0.0, block=10)
     probe.until(lambda: heard, 60, 'samples')
-    worst = 0.0
+    worst, starts = 0.0, []
     for number in range(times):
         bag = tmp_path / f'bag_{number}'
         recorder = start('recorder', name=f'recorder_{number}', bag=str(bag))
-        file = bag / f'bag_{number}_0.mcap'
-        probe.until(lambda file=file: file.exists() and file.stat().st_size > 120_000, 60)
+        starts.append(until_it_records(probe, recorder, bag / f'bag_{number}_0.mcap'))
         probe.for_a_while(float(rng.uniform(0.0, 1.0)))
         recorder.process.send_signal(signal.SIGKILL)
-        killed = time.monotonic()
+        killed = time.time()
         recorder.process.wait()
-        probe.for_a_while(0.1)
         cut = []
         before = [(m.topic, m.log_time, m.data) for m in messages(bag, note=cut.append)]
         mended = recover(bag)
@@ -49,15 +63,27 @@ def killed_at_random(start, probe, tmp_path, times, seed):
         index = [m.index for m in blocks]
         sizes = [len(m.command) for m in blocks]
         assert np.array_equal(np.diff(index), sizes[:-1])
+        # What the test itself has yet to take from DDS.
+        probe.until(lambda killed=killed: newest[0] > killed, 60, 'what was sent until the kill')
         assert all(bytes(m.measured) == heard[m.index][1] for m in blocks)
-        late = max(i for i, (when, _) in heard.items() if when <= killed)
+        late = max(i for i, (sent, _) in heard.items() if sent <= killed)
         missing = (late - index[-1]) / 1000.0
         worst = max(worst, missing)
-        print(f'kill {number + 1}: {missing:.3f} s missing', flush=True)
+        made, took = starts[-1]
+        print(
+            f'kill {number + 1}: {missing:.3f} s missing; bag made after {made:.1f} s, three '
+            f'seconds recorded after {took:.1f} s',
+            flush=True,
+        )
         assert missing <= LOST
-        heard = {i: known for i, known in heard.items() if i > late - 2000}
+        for old in [i for i in heard if i < late - 2000]:
+            del heard[old]
     assert simulator.alive and simulator.end() == 0
-    print(f'{times} kills: {worst:.3f} s missing at most')
+    made, took = np.max(starts, axis=0)
+    print(
+        f'{times} kills: {worst:.3f} s missing at most; slowest start: bag made after '
+        f'{made:.1f} s, three seconds recorded after {took:.1f} s'
+    )
 
 
 def test_a_recorder_that_is_killed_loses_half_a_second_at_most(start, probe, tmp_path, rng_seed):
@@ -65,7 +91,7 @@ def test_a_recorder_that_is_killed_loses_half_a_second_at_most(start, probe, tmp
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(3000)
+@pytest.mark.timeout(7200)
 def test_a_hundred_kills_lose_half_a_second_each_at_most(start, probe, tmp_path, rng_seed):
     killed_at_random(start, probe, tmp_path, 100, rng_seed)
 

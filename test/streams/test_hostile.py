@@ -141,7 +141,8 @@ def test_no_layout_raises_but_for_its_reason(content):
     size = Packed(found, found.rate or 1000.0).size
     values = Packed(found, found.rate or 1000.0).decoded(bytes(size))
     found.rows(values, 0)
-    Lines(found).decoded([b'1,2,3'])
+    if not found.packet and found.samples == 1:
+        Lines(found).decoded([b'1,2,3'])
 
 
 @given(st.text(max_size=300) | layouts.map(lambda c: yaml.dump(c, allow_unicode=True)))

@@ -132,6 +132,13 @@ def test_lines_by_place_and_by_name():
     assert by_name.decoded([b'a,b,c', b'1,2,3'])[1] == 2
 
 
+def test_lines_have_no_packets():
+    """A layout of datagrams for lines: refused before the stream begins, not at its first line."""
+    for packets in ({'packet': [{'name': 'counter'}]}, {'samples': 10}):
+        with pytest.raises(InputError, match='a line holds one sample'):
+            Lines(layout(BOTH, **packets))
+
+
 def test_lines_bring_back_every_bit():
     lines = Lines(PLAIN)
     rng = np.random.default_rng(1)
