@@ -9,7 +9,9 @@ ROS_STAMP := install/stamp
 ROS := . install/setup.bash &&
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test coverage test-slow lint bench soak reproduce study-rths docs clean
+SAFETY_STAMP := .venv/safety
+
+.PHONY: help setup demo test coverage test-slow lint bench soak fuzz audit reproduce study-rths docs clean
 
 help: ## show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 20
@@ -60,6 +62,17 @@ reproduce: $(VENV_STAMP) ## the paper beside our numbers; report in out/reproduc
 
 study-rths: $(VENV_STAMP) ## predicted stability against simulated hybrid tests, an hour; out/study-rths
 	@$(BIN)/python -m studies.hybrid --force --out out/study-rths $(STUDY_ARGS)
+
+$(SAFETY_STAMP): $(VENV_STAMP)
+	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt --editable '.[safety]'
+	@touch $@
+
+fuzz: $(SAFETY_STAMP) ## 100 000 inputs of every kind, guided by coverage; result in out/fuzz
+	@$(BIN)/python -m benchmarks.fuzz --out out/fuzz $(FUZZ_ARGS)
+
+# --strict: a dependency of which nothing is known is no dependency without vulnerability.
+audit: $(SAFETY_STAMP) ## known vulnerabilities of every pinned dependency; asks PyPI
+	@$(BIN)/pip-audit --strict --no-deps --disable-pip -r constraints.txt
 
 # Its tools are installed by this target alone.
 .venv/docs: $(VENV_STAMP)

@@ -7,6 +7,7 @@ import sys
 import tomllib
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable
+from importlib.metadata import metadata
 from pathlib import Path
 from typing import NamedTuple
 
@@ -146,6 +147,33 @@ def test_every_requirement_is_pinned_once() -> None:
     extras = PROJECT['optional-dependencies'].values()
     required = pip_names([*PROJECT['dependencies'], *(r for extra in extras for r in extra)])
     assert sorted(name.lower() for name, _ in pins) == sorted(required - {'actuator_glue'})
+
+
+# How metadata say what the security page calls a licence.
+LICENCES = {
+    'BSD': 'BSD',
+    'MIT': 'MIT',
+    'Apache 2.0': 'Apache',
+    'PSF': 'Python Software Foundation',
+    'LGPL 3': 'LGPL-3',
+}
+
+
+def test_the_security_page_tells_the_licence_of_what_is_installed() -> None:
+    """Every library of the package and of its extra `lab`; all but one are permissive."""
+    page = (ROOT / 'docs' / 'security.md').read_text(encoding='utf-8')
+    told = {}
+    for line in page.partition('| licence |')[2].partition('\n\n')[0].splitlines()[2:]:
+        licence, names = (cell.strip() for cell in line.strip('|').split('|'))
+        told |= dict.fromkeys(re.sub(r'\(.*?\)', '', names).replace(' ', '').split(','), licence)
+    installed = [*PROJECT['dependencies'], *PROJECT['optional-dependencies']['lab']]
+    assert set(told) == pip_names(installed)
+    for name, licence in told.items():
+        known = metadata(name)
+        fields = (known.get('License-Expression'), known.get('License'))
+        words = ' '.join([*(f or '' for f in fields), *(known.get_all('Classifier') or ())])
+        assert LICENCES[licence] in words, name
+    assert [name for name, licence in told.items() if 'GPL' in licence] == ['nptdms']
 
 
 @pytest.fixture(scope='module')

@@ -173,7 +173,11 @@ class BagWriter:
         self._flushed = time.monotonic()
         if self._file.size >= self._max_file_bytes or self._file.flushes >= MAX_FILE_FLUSHES:
             self._file.finish(self.metadata.serialized())
-            self._file = self._next_file()
+            try:
+                self._file = self._next_file()
+            except InputError as error:
+                self._file.refuse(error)
+                raise
 
     def close(self) -> None:
         """Finish the bag: index, fsync, metadata.yaml in one step; closing twice is harmless.

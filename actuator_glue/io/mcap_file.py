@@ -117,6 +117,10 @@ class McapFile:
             os.fsync(self._raw.fileno())
             self._stream.close()
 
+    def refuse(self, failure: InputError) -> None:
+        """Have everything from now on fail with this."""
+        self._failure = failure
+
     @contextmanager
     def _disk(self) -> Iterator[None]:
         """Turn an error of the disk into one clear message and keep the file readable."""
@@ -152,7 +156,9 @@ def disk_error(path: Path, error: OSError) -> InputError:
     kept = f'; what was written before is kept, `actuator-glue recover {path}` finishes it'
     if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
         return InputError(f'{path}: the disk or the quota is full ({error.strerror}){kept}')
-    if error.errno in (errno.EACCES, errno.EPERM, errno.EROFS):
+    if error.errno == errno.EROFS:
+        return InputError(f'{path}: the disk is read-only{kept}')
+    if error.errno in (errno.EACCES, errno.EPERM):
         return InputError(f'{path}: no permission to write ({error.strerror}); choose another')
     if error.errno in (errno.ENOTDIR, errno.ENAMETOOLONG, errno.EEXIST):
         return InputError(f'{path}: cannot be made ({error.strerror}); choose another name')

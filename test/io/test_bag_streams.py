@@ -252,3 +252,35 @@ def test_a_full_disk_is_one_message_and_keeps_the_rest(tmp_path: Path) -> None:
     (record,) = read_records(tmp_path / 'bag')
     assert len(record) > 5_000
     assert record.command.tobytes() == (np.arange(len(record)) * 1e-6).tobytes()
+
+
+def test_a_next_file_that_cannot_be_made_is_said_again_and_again(
+    tmp_path: Path, record: Record
+) -> None:
+    """What was written stays whole; whoever goes on writing is told each time, not thrown out."""
+    writer = BagWriter(tmp_path / 'bag', flush_period=0.0, max_file_bytes=1)
+    (tmp_path / 'bag' / 'bag_1.mcap').mkdir()
+    for _ in range(3):
+        with pytest.raises(InputError, match=r'bag_?.*cannot be (made|written)'):
+            write_record(writer, record)
+    with pytest.raises(InputError):
+        writer.close()
+    (tmp_path / 'bag' / 'bag_1.mcap').rmdir()
+    assert recover(tmp_path / 'bag').messages > 0
+
+
+def test_a_read_only_disk_is_said(tmp_path: Path) -> None:
+    """In a mount of its own, where this system lets users make one."""
+    script = (
+        'from actuator_glue.io.bag_writer import BagWriter\n'
+        'from actuator_glue.errors import InputError\n'
+        'try: BagWriter("disk/bag")\n'
+        'except InputError as error: print(error)\n'
+    )
+    mount = f"mkdir disk && mount -t tmpfs -o ro tmpfs disk && {sys.executable} -c '{script}'"
+    command = ['unshare', '--map-root-user', '--mount', 'sh', '-c', mount]
+    try:
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError) as error:
+        pytest.skip(f'no mount namespaces here ({error})')
+    assert 'the disk is read-only' in done.stdout
