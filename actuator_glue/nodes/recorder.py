@@ -206,8 +206,8 @@ class RecorderNode(base.SuiteNode):
                     writer.write_raw(item.topic, item.data, item.received, item.published)
                 else:
                     writer.flush_if_due()
-            except InputError as error:
-                self._failed = str(error)
+            except Exception as error:  # the thread outlives whatever disk and messages do
+                self._failed = str(error) or type(error).__name__
             self._waiting_bytes -= len(item.data)
             self._lag = time.monotonic() - item.arrived
             self._worst_lag = max(self._worst_lag, self._lag)
