@@ -186,6 +186,11 @@ def test_every_fault_of_a_wire_is_told_and_no_sample_is_made_up(start, probe, tm
     assert len([1 for _, m in decoded(bag, ('TestSetup',))]) == 2
 
 
+def unpacked(data):
+    """Results by name."""
+    return dict(zip(FIELDS, struct.unpack(f'<{len(FIELDS)}d', data), strict=True))
+
+
 def test_results_go_back_to_the_controller(start, probe, tmp_path):
     """A datagram of doubles per window, and how long the band takes from its last sample."""
     port, given = free_port(), tmp_path / 'given'
@@ -201,6 +206,7 @@ def test_results_go_back_to_the_controller(start, probe, tmp_path):
 
     probe.create_subscription(PredictionBand, 'prediction_band', band, 50)
     estimator = start('estimator', **QUICK)
+    margin = start('margin', partition='sdof')
     bridge = start(
         'lab_bridge',
         source=at,
@@ -217,17 +223,23 @@ def test_results_go_back_to_the_controller(start, probe, tmp_path):
         probe.for_a_while(0.5)
         sender = send(given, at)
         probe.until(lambda: probe.number('lab_bridge', 'results sent') >= 4, 60, 'results')
-        data = controller.recv(1000)
+        controller.settimeout(20.0)
+        values = unpacked(controller.recv(1000))
+        # The same window once more, as soon as P(unstable) is known.
+        risk = values
+        while np.isnan(risk['p_unstable']):
+            before, risk = risk, unpacked(controller.recv(1000))
+    assert all(before[name] == risk[name] for name in ('window', 'time', 'delay', 'beta_1_mean'))
+    assert 0.0 <= risk['p_unstable'] <= risk['p_unstable_upper'] <= 1.0
     probe.until(lambda: probe.number('lab_bridge', 'samples') == len(record), 30, 'all samples')
     assert sender.wait(30) in (0, 1)
-    values = dict(zip(FIELDS, struct.unpack(f'<{len(FIELDS)}d', data), strict=True))
     assert 0.0 < values['delay'] < 0.1 and 0.5 < values['amplitude'] < 1.5
     assert abs(values['time'] - time.time()) < 60
     assert 20.0 < values['beta_1_mean'] < 400.0 and values['beta_1_stddev'] > 0.0
     print(f'last sample to band: median {np.median(late):.3f} s, worst {max(late):.3f} s')
     # A window may be computed for half a second.
     assert np.median(late) < QUICK['time_budget'] + 0.5
-    assert estimator.end() == 0 and bridge.end() == 0
+    assert estimator.end() == 0 and bridge.end() == 0 and margin.end() == 0
 
 
 @pytest.mark.parametrize(
