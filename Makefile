@@ -60,8 +60,8 @@ soak: $(ROS_STAMP) ## half an hour of all nodes with random faults; result in ou
 reproduce: $(VENV_STAMP) ## the paper beside our numbers; report in out/reproduce
 	@$(BIN)/python -m studies.chen --force --out out/reproduce $(REPRODUCE_ARGS)
 
-study-rths: $(VENV_STAMP) ## predicted stability against simulated hybrid tests, an hour; out/study-rths
-	@$(BIN)/python -m studies.hybrid --force --out out/study-rths $(STUDY_ARGS)
+study-rths: $(VENV_STAMP) ## predicted stability against simulated hybrid tests, an hour (stopped, it goes on); out/study-rths
+	@$(BIN)/python -m studies.hybrid --out out/study-rths --workers 2 $(STUDY_ARGS)
 
 $(SAFETY_STAMP): $(VENV_STAMP)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt --editable '.[safety]'

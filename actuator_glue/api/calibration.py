@@ -15,21 +15,19 @@ from actuator_glue.api.calibration_parts import (
     CalibratedRecord,
     FitError,
     Marginal,
-    PriorUse,
     RecordError,
 )
 from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.api.compilation import compilation
+from actuator_glue.api.prior import check_prior, given_prior
 from actuator_glue.api.tracking import record_tracking
 from actuator_glue.diagnosis.data import SETTLE
 from actuator_glue.diagnosis.despike import despiked
 from actuator_glue.diagnosis.preparation import clean, initial_state
 from actuator_glue.errors import InputError
 from actuator_glue.inference.at_bound import pressed
-from actuator_glue.inference.carried import Carried, Drift
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.choice import ModelChoice, choose_model
-from actuator_glue.inference.informative_prior import InformativePrior
 from actuator_glue.inference.moments import moments
 from actuator_glue.inference.posterior import Problem, sample
 from actuator_glue.inference.prior_conflict import conflict
@@ -78,9 +76,7 @@ class CalibrationOptions:
             raise InputError(f'seed {self.seed} is negative')
         if self.settle is not None and self.settle < 0.0:
             raise InputError(f'settle {self.settle:g} s is negative')
-        if not 0.0 <= self.prior_age < np.inf:
-            raise InputError(f'prior_age {self.prior_age:g} s is no time since a calibration')
-        Drift(self.drift)
+        check_prior(self.drift, self.prior_age)
         for name, known in (
             ('likelihood', ('glue', 'gaussian', 'ar1')),
             ('initial', ('auto', 'rest', 'measured')),
@@ -130,6 +126,7 @@ def calibrate(
     settle = options.settle
     if settle is None:
         settle = SETTLE if initial == 'measured' else 0.0
+    given_before = given_prior(options.prior, options.drift, options.prior_age)
     started = time.perf_counter()
     with compilation() as compiled:
         problem = Problem(
@@ -139,7 +136,7 @@ def calibrate(
             shaping_factor=options.shaping_factor,
             initial=initial,
             settle=settle,
-            prior=_carried(options),
+            prior=None if given_before is None else given_before.carried,
         )
         target = problem.target()
         chains = sample(
@@ -157,7 +154,13 @@ def calibrate(
     fit = _fit(model, chains.best, cleaned, initial, settle)
     parameters = _marginals(model, chains)
     at_bound = pressed(chains.posterior(), model.names, *model.bounds)
-    prior = None if target.prior is None else _prior_use(options, target.prior, chains)
+    prior = None
+    if target.prior is not None and given_before is not None:
+        prior = given_before.used(
+            len(target.prior.mixture.log_weights),
+            target.prior.quality(),
+            conflict(target.prior, chains.posterior()).p_value,
+        )
     converged = judgement.converged(parameters)
     return Calibration(
         parameters=parameters,
@@ -187,7 +190,9 @@ def calibrate(
         prior=prior,
         records=tuple(cleaned),
         tracking=tuple(
-            record_tracking(chains.posterior(), model.names, model.effects, record, initial)
+            record_tracking(
+                chains.posterior(), model.names, Structure(model.effects), record, initial
+            )
             for record in cleaned
         ),
     )
@@ -223,29 +228,6 @@ def sampled_model(options: CalibrationOptions) -> ModelChoice:
             raise InputError(f'{parameter.name} cannot be negative; its bounds start at {least:g}')
     model = choose_model(options.effects, options.bounds)
     return model.with_autocorrelation() if options.likelihood == 'ar1' else model
-
-
-def _carried(options: CalibrationOptions) -> Carried | None:
-    """Return what is known before, as it is now."""
-    if options.prior is None:
-        return None
-    earlier = options.prior
-    if not isinstance(earlier, Calibration):
-        earlier = Calibration.load(earlier)
-    return earlier.carried().drifted(Drift(options.drift), options.prior_age)
-
-
-def _prior_use(options: CalibrationOptions, prior: InformativePrior, chains: Chains) -> PriorUse:
-    """Return how the prior described what it came from, and how it stood up to the records."""
-    source = 'a calibration' if isinstance(options.prior, Calibration) else str(options.prior)
-    return PriorUse(
-        source=source,
-        drift=options.drift,
-        age_s=options.prior_age,
-        components=len(prior.mixture.log_weights),
-        quality=prior.quality(),
-        p_value=conflict(prior, chains.posterior()).p_value,
-    )
 
 
 def _marginals(model: ModelChoice, chains: Chains) -> dict[str, Marginal]:

@@ -82,24 +82,3 @@ class CalibratedRecord:
     def of(cls, record: Record) -> CalibratedRecord:
         """Describe a record."""
         return cls(record.source, len(record), record.rate, record.stiffness, record.hold)
-
-
-@dataclass(frozen=True, slots=True)
-class PriorUse:
-    """The informative prior of a calibration, and how it stood up to the records.
-
-    Attributes:
-        source: the calibration it came from.
-        drift: standard deviation of the logarithm of a parameter after an hour [h^-1/2].
-        age_s: time between the calibrations [s].
-        components: normal components it has.
-        quality: energy coefficient between its draws and the mixture, 0 for equal.
-        p_value: prior predictive p-value of the records (Evans and Moshonov 2006).
-    """
-
-    source: str
-    drift: float
-    age_s: float
-    components: int
-    quality: float
-    p_value: float

@@ -92,8 +92,7 @@ def brief(found: Calibration) -> list[html.Block]:
     blocks: list[html.Block] = [html.Note(line) for line in found.problems]
     blocks.append(html.Table(HEADER, moment_rows(found), moments_title(found)))
     blocks.append(html.Text(error_line(found)))
-    for of in found.tracking:
-        blocks.append(html.Table(tracking.HEADER, of.rows(), of.title))
+    blocks += tracking.tables(found.tracking)
     return [*blocks, *(html.Note(line) for line in found.notes)]
 
 

@@ -9,11 +9,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from actuator_glue.api import store
-from actuator_glue.api.calibration_parts import CalibratedRecord, FitError, Marginal, PriorUse
+from actuator_glue.api.calibration_parts import CalibratedRecord, FitError, Marginal
 from actuator_glue.api.result import Result
 from actuator_glue.api.tracking import RecordTracking
 from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.inference.carried import Carried
+from actuator_glue.inference.prior_use import PriorUse
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.records import Array, Record
 

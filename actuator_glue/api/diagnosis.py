@@ -5,14 +5,17 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import fields
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, ClassVar
 
+from actuator_glue.api.prior import given_prior
 from actuator_glue.api.provenance import provenance
 from actuator_glue.api.result import Result
+from actuator_glue.api.tracking import RecordTracking, record_tracking, tables
 from actuator_glue.diagnosis import diagnose as core
 from actuator_glue.diagnosis.estimate import Json
+from actuator_glue.diagnosis.preparation import clean, initial_state
 from actuator_glue.diagnosis.result import SCHEMA, DiagnosisData
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.effects import save_effects
@@ -24,21 +27,32 @@ if TYPE_CHECKING:
     import arviz
     from matplotlib.figure import Figure
 
+    from actuator_glue.api.calibration_result import Calibration
     from actuator_glue.report import html
 
 Progress = Callable[[str, float], None]
 
 
+@dataclass(frozen=True, slots=True)
 class Diagnosis(DiagnosisData, Result):
-    """Verdict, evidence and the augmented model, with its files and pictures."""
+    """Verdict, evidence and the augmented model, with its files and pictures.
 
-    schema = SCHEMA
+    Attributes:
+        tracking: how the augmented model follows the command of each fitted record.
+    """
+
+    schema: ClassVar[str] = SCHEMA
+    tracking: tuple[RecordTracking, ...] = ()
 
     def to_json(self) -> Json:
         """Return the object of schema `actuator_glue.diagnosis/1` (curves and draws left out)."""
         own = CATALOGUE.definitions(self.structure).get('definitions', {})
         own |= {term.name: term.definition for term in self.learned}
-        return {**super().to_json(), **({'definitions': own} if own else {})}
+        return {
+            **DiagnosisData.to_json(self),
+            'tracking': [asdict(of) for of in self.tracking],
+            **({'definitions': own} if own else {}),
+        }
 
     def save_effects(self, path: Path | str) -> Path:
         """Write the learned terms as a file of effects and return its path.
@@ -92,7 +106,7 @@ class Diagnosis(DiagnosisData, Result):
         """Return the report."""
         from actuator_glue.report.diagnosis_report import page
 
-        return page(self)
+        return page(self, tables(self.tracking))
 
 
 def diagnose(
@@ -103,6 +117,9 @@ def diagnose(
     jobs: int = 2,
     progress: Progress | None = None,
     false_alarms: float = 0.01,
+    prior: Calibration | Path | str | None = None,
+    drift: float = 0.02,
+    prior_age: float = 0.0,
 ) -> Diagnosis:
     """Ask whether Eq. (2) explains records and, if not, which effects it lacks.
 
@@ -114,6 +131,11 @@ def diagnose(
         jobs: threads for the refits of candidates; the result does not depend on it.
         progress: called with (stage, share of it done in [0, 1]).
         false_alarms: probability of an addition on a healthy machine.
+        prior: an earlier calibration of the actuator, or the file it was saved to: what it knew
+            of Eq. (2)'s parameters goes into fits and posterior. None for nothing.
+        drift: standard deviation by which the logarithm of each parameter may have moved in an
+            hour since (random walk) [h^-1/2].
+        prior_age: time since that calibration [s].
 
     Returns:
         Verdict, additions with their evidence, error before and after, the augmented model.
@@ -138,6 +160,18 @@ def diagnose(
             progress=progress,
             settings=Thresholds(false_alarms=false_alarms),
             clock=time.perf_counter,
+            prior=given_prior(prior, drift, prior_age),
         )
     values = {f.name: getattr(found, f.name) for f in fields(found)}
-    return Diagnosis(**{**values, 'provenance': provenance([*given, *held], seed)})
+    values['provenance'] = provenance([*given, *held], seed)
+    return Diagnosis(**values, tracking=_tracking(found, clean(given)[0]))
+
+
+def _tracking(found: DiagnosisData, records: Sequence[Record]) -> tuple[RecordTracking, ...]:
+    """Return how the augmented model follows each record; not where one has its own settings."""
+    if set(found.names) != set(found.model.names):
+        return ()
+    return tuple(
+        record_tracking(found.posterior, found.names, found.model, r, initial_state(r))
+        for r in records
+    )

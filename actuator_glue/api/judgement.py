@@ -6,18 +6,14 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from actuator_glue.api.calibration_parts import FitError, Marginal, PriorUse
+from actuator_glue.api.calibration_parts import FitError, Marginal
 from actuator_glue.inference.at_bound import Pressed
+from actuator_glue.inference.prior_use import PriorUse
 from actuator_glue.records import Array, Record
 
 # R-hat above which draws are not yet the posterior (Vehtari et al. 2021).
 CONVERGED = 1.01
 TIED = 0.99  # correlation above which two parameters are only known together
-# Prior predictive p-value below which records and prior do not belong together.
-CONTRADICTED = 1e-3
-# Energy coefficient of a mixture that describes its draws poorly: one of four parameters shifted
-# by half a standard deviation gives 0.013, by a whole one 0.056.
-POOR = 0.02
 MISFIT = 0.1  # share of a record's spread: a model that leaves more does not describe the test
 
 
@@ -55,12 +51,8 @@ def problems(
             f'{offset}; check channels, signs, units and which record has which stiffness, then '
             '`diagnose`'
         )
-    if prior is not None and prior.p_value < CONTRADICTED:
-        told.append(
-            f'the records contradict the prior from {prior.source} (p = {prior.p_value:.2g}): the '
-            'actuator has changed, or a model lacks something; calibrate without it, or allow for '
-            'more --drift'
-        )
+    if prior is not None and prior.contradicted:
+        told.append(prior.contradiction())
     for p in found:
         if p.physical:
             continue
@@ -85,12 +77,7 @@ def remarks(
     """Return what these records cannot tell, and what would."""
     told = []
     if prior is not None:
-        told.append(
-            f'prior from {prior.source}: a mixture of {prior.components} normal(s), '
-            f'energy coefficient {prior.quality:.3f} against its draws'
-            + (f'; above {POOR}, so it describes them poorly' if prior.quality > POOR else '')
-            + f'; prior predictive p-value of the records {prior.p_value:.2g}'
-        )
+        told.append(prior.remark())
     if not met:
         told.append(f'not converged (R-hat above {CONVERGED}); give more evaluations')
     told += [

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from actuator_glue.api.spread import Spread, spread
-from actuator_glue.hybrid.actuator import actuator, nonlinear, table_of
+from actuator_glue.hybrid.actuator import actuator, table_of
 from actuator_glue.hybrid.indicators import (
     criteria,
     energy_error,
@@ -20,6 +20,9 @@ from actuator_glue.hybrid.stability import tracking
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record, source_name
+
+if TYPE_CHECKING:
+    from actuator_glue.report import html
 
 FREQUENCIES = (1.0, 5.0, 10.0)  # Hz
 _DRAWS = 100
@@ -68,27 +71,48 @@ class RecordTracking:
         return out
 
 
-def record_tracking(
-    draws: Array, names: Sequence[str], effects: Sequence[str], record: Record, initial: Initial
-) -> RecordTracking:
-    """Return the tracking numbers of draws (m, p) over a record, and the record's own.
+def tables(tracking: Sequence[RecordTracking]) -> list[html.Block]:
+    """Return a table for each record."""
+    from actuator_glue.report import html
 
-    Delay, amplitude and bandwidth are those of the linear part of the model; the others come from
-    simulating draws with all their effects.
+    return [html.Table(HEADER, of.rows(), of.title) for of in tracking]
+
+
+def record_tracking(
+    draws: Array,
+    names: Sequence[str],
+    structure: Structure,
+    record: Record,
+    initial: Initial,
+    settle: int = 0,
+) -> RecordTracking:
+    """Return the tracking numbers of draws over a record, and the record's own.
+
+    Delay, amplitude and bandwidth are those of a linear model; the others come from simulating
+    draws with all their effects.
+
+    Args:
+        draws: shape (m, p), SI units.
+        names: parameter of each column; those of a likelihood are passed over.
+        structure: the model.
+        record: the test.
+        initial: state at its first sample.
+        settle: samples of its start that only let the initial state be forgotten.
     """
-    structure = Structure(effects)
     rows = np.linspace(0, len(draws) - 1, min(_DRAWS, len(draws))).astype(np.intp)
     some = table_of(draws[rows], names, structure)  # without parameters of the likelihood
     stiffness = np.full(len(some), record.known_stiffness())
-    found = tracking(actuator(some, structure.names, effects, stiffness), FREQUENCIES)
     predicted: dict[str, Any] = {}
-    if not nonlinear(effects):
+    if structure.linear:
+        linear = actuator(some, structure.names, structure.entries, stiffness)
+        found = tracking(linear, FREQUENCIES)
         for i, f in enumerate(FREQUENCIES):
             predicted[f'delay_at_{f:g}_hz_s'] = spread(found.delay[:, i])
             predicted[f'amplitude_at_{f:g}_hz'] = spread(found.amplitude[:, i])
         predicted['bandwidth_hz'] = spread(found.bandwidth)
-    moved = structure.simulate(some, record, initial=initial)
+    moved = structure.simulate(some, record, initial=initial)[:, settle:]
     moved = moved[np.isfinite(moved).all(axis=1)]
+    record = record.slice(settle, len(record))
     if np.ptp(record.command) > 0.0 and len(moved):
         drawn = [_numbers(record, x) for x in moved]
         predicted |= {n: spread(np.array([d[n] for d in drawn])) for n in drawn[0]}

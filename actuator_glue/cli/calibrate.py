@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from actuator_glue.arguments import Output, number
 from actuator_glue.cli._effects_file import add_effects_file, load_effects
 from actuator_glue.cli._output import add_json, note, progress, say, table
+from actuator_glue.cli._prior import add_prior, prior_options
 from actuator_glue.cli._records import add_records, load
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
@@ -76,27 +76,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='prior bounds of a parameter in the unit of the table, as in beta_1=0:800, in place '
         'of those of Table 3 or the catalogue; repeatable',
     )
-    parser.add_argument(
-        '--prior',
-        type=Path,
-        metavar='FILE',
-        help='what an earlier `calibrate --save FILE` of this actuator knew',
-    )
-    parser.add_argument(
-        '--drift',
-        type=number,
-        default=0.02,
-        metavar='RATE',
-        help='how far the logarithm of each parameter may wander in an hour since, standard '
-        'deviation (default 0.02)',
-    )
-    parser.add_argument(
-        '--prior-age',
-        type=number,
-        default=0.0,
-        metavar='HOURS',
-        help='time since that calibration (default 0)',
-    )
+    add_prior(parser)
     parser.add_argument(
         '--save',
         '--draws',
@@ -129,9 +109,7 @@ def run(args: argparse.Namespace) -> int:
         seed=args.seed,
         initial=args.initial,
         settle=args.settle,
-        prior=args.prior,
-        drift=args.drift,
-        prior_age=3600.0 * args.prior_age,
+        **prior_options(args),
     )
     records = load(args)
     with progress('calibrating', args.evaluations) as done:

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from actuator_glue.arguments import Output
 from actuator_glue.cli._effects_file import add_effects_file, load_effects
 from actuator_glue.cli._output import add_json, note, progress, say, table
+from actuator_glue.cli._prior import add_prior, prior_options
 from actuator_glue.cli._records import add_records, load
 from actuator_glue.io.json_file import write_json
 from actuator_glue.records import Record
@@ -71,6 +72,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='P',
         help='probability of an addition on a healthy machine (default 0.01)',
     )
+    add_prior(parser)
     parser.add_argument('--seed', type=int, default=1, metavar='S', help='seed (default 1)')
     parser.add_argument(
         '--jobs', type=int, default=2, metavar='N', help='threads for the refits (default 2)'
@@ -105,6 +107,7 @@ def run(args: argparse.Namespace) -> int:
             jobs=args.jobs,
             progress=tell,
             false_alarms=args.false_alarms,
+            **prior_options(args),
         )
     command = shlex.join(['actuator-glue', *sys.argv[1:]])
     found = replace(found, provenance={'command': command, **found.provenance})

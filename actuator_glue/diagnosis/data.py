@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from actuator_glue.diagnosis.base_prior import BasePrior
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.records import Array, Record
@@ -54,6 +55,7 @@ class Data:
         initials: per record, the state it starts from: 'rest' or 'measured'.
         recorded: the records at the rate they were sampled with; the same where that was kept.
         origins: per record, time of its first sample since the test began [s].
+        prior: what was known of Eq. (2)'s parameters before; None for nothing.
     """
 
     records: tuple[Record, ...]
@@ -61,6 +63,7 @@ class Data:
     initials: tuple[Initial, ...]
     recorded: tuple[Record, ...]
     origins: tuple[float, ...]
+    prior: BasePrior | None = None
 
     @classmethod
     def whole(cls, records: Sequence[Record]) -> Data:

@@ -18,9 +18,10 @@ from actuator_glue.diagnosis import (
     response,
     verdict,
 )
+from actuator_glue.diagnosis.base_prior import BasePrior
 from actuator_glue.diagnosis.detect import alarm_of
 from actuator_glue.diagnosis.estimate import Estimate
-from actuator_glue.diagnosis.fit import Space
+from actuator_glue.diagnosis.fit import UPPER, Space
 from actuator_glue.diagnosis.next_experiment import Experiment, ranked
 from actuator_glue.diagnosis.pipeline import (
     Conclusion,
@@ -36,6 +37,7 @@ from actuator_glue.diagnosis.search import Each
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.verify import Side, traces, verify
 from actuator_glue.inference.at_bound import Pressed, pressed
+from actuator_glue.inference.prior_use import GivenPrior
 from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Record
 
@@ -51,6 +53,7 @@ def diagnose(
     progress: Progress | None = None,
     settings: Thresholds | None = None,
     clock: Clock | None = None,
+    prior: GivenPrior | None = None,
 ) -> DiagnosisData:
     """Diagnose records whose specimen stiffness is known.
 
@@ -63,6 +66,7 @@ def diagnose(
         progress: called with (stage, share done in [0, 1]).
         settings: thresholds.
         clock: gives seconds, for the duration reported (NaN without one).
+        prior: what an earlier calibration knew of Eq. (2)'s parameters.
 
     Raises:
         InputError: stiffness not known, records too short, or nothing moves.
@@ -72,7 +76,8 @@ def diagnose(
     tell = progress or (lambda stage, share: None)
     held = [holdout] if isinstance(holdout, Record) else list(holdout or ())
     tell('check', 0.0)
-    first = conclude(prepare(records, held), settings, each, tell)
+    known = None if prior is None else BasePrior(prior.carried, UPPER)
+    first = conclude(prepare(records, held, known), settings, each, tell)
     first = with_the_right_hold(first, settings, each, tell)
     result = with_learned_terms(since_onset(first, settings, each, tell))
     prepared, data, scorer = result.prepared, result.data, result.scorer
@@ -111,6 +116,10 @@ def diagnose(
     learned = learned_term.described(decision.final, data, estimates)
     moved = any(e.noise is None for e in effects)
     judged = verdict.conclude(decision.verdict, moved, error, found.material)
+    used = None
+    if prior is not None and known is not None:
+        p_value = known.conflict(after.draws).p_value
+        used = prior.used(known.components, known.quality, p_value)
     tell('done', 1.0)
     return DiagnosisData(
         verdict=judged,
@@ -120,6 +129,7 @@ def diagnose(
         coverage=coverage,
         alarm=alarm_of(found, result.seen, decision, data, seed, settings.false_alarms),
         advice=(
+            *([used.contradiction()] if used and used.contradicted else []),
             *advice.at_bound(held_at, estimates),
             *([result.onset.sentence()] if result.onset else []),
             *(term.sentence() for term in learned),
@@ -127,6 +137,7 @@ def diagnose(
             *advice.contradicted(error, found.material),
             *advice.unidentified(data, estimates),
             *advice.unconverged(rhat),
+            *([used.remark()] if used else []),
             *prepared.notes,
         ),
         base={p.name: estimates[p.name] for p in BASE},
@@ -139,6 +150,7 @@ def diagnose(
         ),
         experiments=experiments,
         onset=result.onset,
+        prior=used,
         names=tuple(p.name for p in after.model.parameters),
         posterior=after.draws,
         rhat=rhat,

@@ -19,7 +19,8 @@ from actuator_glue.records import Array
 _P = len(BASE)
 # The prior of Table 3 belongs to the paper's plant; other machines lie outside it.
 _LOG_LOWER = np.log([1.0, 1e5, 1e2, 1e-4])
-_LOG_UPPER = np.log([2e3, 1e14, 1e10, 1e3])
+UPPER = np.array([2e3, 1e14, 1e10, 1e3])
+_LOG_UPPER = np.log(UPPER)
 _DAMPINGS = np.array([1e-2, 1.0, 1e2])
 
 
@@ -102,6 +103,29 @@ def jacobian(data: Data, model: Model, space: Space, z: Array, output: Array) ->
     return out
 
 
+@np.errstate(over='ignore', invalid='ignore')
+def _objective(data: Data, z: Array, sums: Array) -> Array:
+    """Sums of squares (s,) at z (s, p), grown by what a prior says against it.
+
+    Its logarithm times -N/2 is the log posterior density, the noise integrated out.
+    """
+    if data.prior is None:
+        return sums
+    square = (data.prior.pull(z) ** 2).sum(axis=-1)
+    return np.asarray(sums * np.exp(square / data.target.size))
+
+
+def _informed(
+    data: Data, z: Array, jac: Array, error: Array, square: float
+) -> tuple[Array, Array]:
+    """Jacobian (p, N) and error (N,) at z, with rows for a prior in units of the error's rms."""
+    if data.prior is None:
+        return jac, error
+    size = np.sqrt(square / data.target.size)
+    more = size * data.prior.slopes(len(z))
+    return np.hstack([jac, more]), np.concatenate([error, -size * data.prior.pull(z)])
+
+
 @np.errstate(all='ignore')  # a start that diverges proposes nothing worth taking
 def _proposals(jac: Array, error: Array, z: Array, damping: float, space: Space) -> Array:
     """Marquardt steps of one start for several dampings, kept inside the bounds: (d, p)."""
@@ -138,6 +162,8 @@ def fit(
 ) -> Fit:
     """Refit all parameters of a structure by least squares on the free-run error.
 
+    Where the data have a prior, to the most probable parameters.
+
     Args:
         data: counted samples.
         model: structure with p parameters.
@@ -155,6 +181,7 @@ def fit(
     sse = sum_of_squares(error)
     alive = np.isfinite(sse)
     z, output, error, sse = z[alive], output[alive], error[alive], sse[alive]
+    cost = _objective(data, z, sse)
     if not len(z):
         p = len(space.lower)
         first = space.z(np.atleast_2d(starts))[0]
@@ -170,7 +197,7 @@ def fit(
         jac = jacobian(data, model, space, z[rows], output[rows])
         tries = np.stack(
             [
-                _proposals(j, error[r], z[r], damping[r], space)
+                _proposals(*_informed(data, z[r], j, error[r], sse[r]), z[r], damping[r], space)
                 for j, r in zip(jac, rows, strict=True)
             ]
         )
@@ -179,11 +206,12 @@ def fit(
         for i, r in enumerate(rows):
             errors = data.target - tried[i]
             sums = sum_of_squares(errors)
-            best = int(np.argmin(sums))
-            if sums[best] < sse[r]:
-                gain = (sse[r] - sums[best]) / sse[r]
+            costs = _objective(data, tries[i], sums)
+            best = int(np.argmin(costs))
+            if costs[best] < cost[r]:
+                gain = (cost[r] - costs[best]) / cost[r]
                 z[r], output[r] = tries[i, best], tried[i, best]
-                error[r], sse[r] = errors[best], sums[best]
+                error[r], sse[r], cost[r] = errors[best], sums[best], costs[best]
                 damping[r] = min(max(damping[r] * _DAMPINGS[best] * 0.3, 1e-9), 1e6)
                 active[r] = gain > tolerance
             else:
@@ -191,8 +219,8 @@ def fit(
                 active[r] = damping[r] < 1e7
         if iteration >= 4:
             # A start that is far behind the best and no longer moves fast is given up.
-            active &= sse < 1.5 * sse.min()
-    best = int(np.argmin(sse))
+            active &= cost < 1.5 * cost.min()
+    best = int(np.argmin(cost))
     final = jacobian(data, model, space, z[best : best + 1], output[best : best + 1])[0]
     return Fit(space.theta(z[best]), error[best], final, z[best])
 
@@ -205,6 +233,8 @@ def base_starts(data: Data) -> Array:
             for stiff in (2e5, 4e6):
                 # d2 s^2 + ... + n0 with n0 = omega^2 d2
                 starts.append([beta, omega**2 * stiff, stiff, 0.3])
+    if data.prior is not None:
+        starts.append(list(data.prior.theta))
     return np.array(starts)
 
 

@@ -98,6 +98,7 @@ def _of(data: Data, masks: list[Mask]) -> Data:
         tuple(data.initials[i] for i in use),
         tuple(data.recorded[i] for i in use),
         tuple(data.origins[i] for i in use),
+        data.prior,
     )
 
 

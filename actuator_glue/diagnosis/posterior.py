@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
+from actuator_glue.diagnosis.base_prior import BasePrior
 from actuator_glue.diagnosis.data import Data, Model, chunks
 from actuator_glue.diagnosis.fit import Fit, Space, jacobian
 from actuator_glue.diagnosis.fit import fit as fit_to
@@ -31,7 +32,7 @@ _HALVINGS = 40  # bring any point of it inside the bounds of the prior
 class Whitened(Data):
     """The same samples, whitened: least squares on them is most likely."""
 
-    scorer: Scorer
+    scorer: Scorer = field(kw_only=True)
 
     @cached_property
     def target(self) -> Array:
@@ -59,7 +60,9 @@ def most_likely(data: Data, model: Model, found: Fit, scorer: Scorer) -> Fit:
     return Fit(best.theta, data.target - output[0], jac, best.z)
 
 
-def laplace(scorer: Scorer, fit: Fit, slopes: Array) -> tuple[Array, float]:
+def laplace(
+    scorer: Scorer, fit: Fit, slopes: Array, prior: BasePrior | None = None
+) -> tuple[Array, float]:
     """Covariance (p, p) of coordinates at the best fit and the noise inflation.
 
     `slopes` (p, p) are the derivatives of the working coordinates j with respect to these, i.
@@ -70,6 +73,9 @@ def laplace(scorer: Scorer, fit: Fit, slopes: Array) -> tuple[Array, float]:
     jac = slopes @ scorer.whiten(fit.jacobian)
     error = scorer.whiten(fit.error)
     inflation = max(1.0, float(np.mean(error**2)))
+    if prior is not None:
+        known = slopes @ prior.slopes(len(slopes))
+        jac = np.hstack([jac, np.sqrt(inflation) * known])
     scale = np.sqrt(np.maximum(np.einsum('pn,pn->p', jac, jac), 1e-300))
     normal = (jac / scale[:, None]) @ (jac / scale[:, None]).T
     covariance = np.linalg.pinv(normal, rcond=1e-10, hermitian=True) / np.outer(scale, scale)
@@ -114,7 +120,7 @@ def sample(
     space = Space(model, max(r.duration for r in data.records))
     around = coordinates(space, model, data, fit.z)
     phi = around.forward(fit.theta[None])[0]
-    covariance, inflation = laplace(scorer, fit, around.slopes(phi))
+    covariance, inflation = laplace(scorer, fit, around.slopes(phi), data.prior)
     transform = Composed(around, Laplace(phi, covariance, around.widest))
 
     def gaussian(count: int) -> Array:
@@ -135,7 +141,8 @@ def sample(
             error = scorer.whiten(data.target - data.simulate(model, theta[some]))
             sums = np.einsum('mn,mn->m', error, error)
             found[some] = np.where(np.isfinite(sums), -0.5 * sums / inflation, -np.inf)
-        return found
+        # Uniform in the logarithms otherwise.
+        return found if data.prior is None else found + data.prior.log_density(theta)
 
     bounds = space.theta(space.lower), space.theta(space.upper)
     chains = posterior.sample(

@@ -9,6 +9,7 @@ import numpy as np
 from scipy import ndimage
 
 from actuator_glue.diagnosis import decimate, despike
+from actuator_glue.diagnosis.base_prior import BasePrior
 from actuator_glue.diagnosis.checks import check, refuse_repeats, where
 from actuator_glue.diagnosis.data import SETTLE, Data, Mask, Model
 from actuator_glue.diagnosis.onset import Moment
@@ -148,8 +149,12 @@ def _folds(record: Record) -> Mask:
     return np.asarray(block % _FOLD == _FOLD - 1)
 
 
-def prepare(records: Sequence[Record], holdout: Sequence[Record]) -> Prepared:
+def prepare(
+    records: Sequence[Record], holdout: Sequence[Record], prior: BasePrior | None = None
+) -> Prepared:
     """Check, zero, decimate and split records into a fitting and a held-out part.
+
+    Both know the prior, if there is one.
 
     Raises:
         InputError: see `clean`; no record, or one that is too short.
@@ -185,7 +190,7 @@ def prepare(records: Sequence[Record], holdout: Sequence[Record]) -> Prepared:
     if holdout:
         parts = (slice(0, n), slice(n, None))
         fit, held = (
-            Data(tuple(every[s]), tuple(masks[s]), initials[s], recorded[s], origins[s])
+            Data(tuple(every[s]), tuple(masks[s]), initials[s], recorded[s], origins[s], prior)
             for s in parts
         )
         return _despiked(Prepared(fit, held, tuple(notes), (0,) * n, False))
@@ -194,7 +199,7 @@ def prepare(records: Sequence[Record], holdout: Sequence[Record]) -> Prepared:
         tuple(m & side(_folds(r)) for m, r in zip(masks, every, strict=True))
         for side in (np.logical_not, np.asarray)
     ]
-    fit, held = (Data(tuple(every), side, initials, recorded, origins) for side in both)
+    fit, held = (Data(tuple(every), side, initials, recorded, origins, prior) for side in both)
     return _despiked(Prepared(fit, held, tuple(notes), (0,) * n, True))
 
 

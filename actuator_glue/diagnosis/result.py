@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import Literal, TypeAlias
 
 from actuator_glue.diagnosis.estimate import Estimate, Json
@@ -14,6 +14,7 @@ from actuator_glue.diagnosis.next_experiment import Experiment
 from actuator_glue.diagnosis.onset import Onset
 from actuator_glue.diagnosis.response import Response
 from actuator_glue.inference.at_bound import Pressed
+from actuator_glue.inference.prior_use import PriorUse
 from actuator_glue.json_value import JsonObject, json_fields, json_value
 from actuator_glue.model.effects import CATALOGUE, Effect
 from actuator_glue.model.structure import Structure
@@ -141,6 +142,7 @@ class DiagnosisData:
         provenance: how it was made: command line, seed, version, hashes, date.
         onset: when the effects appeared, where they were not there from the beginning; sizes and
             errors are then those of the data since.
+        prior: what was known of Eq. (2)'s parameters before, beside the bounds; None for nothing.
     """
 
     verdict: Verdict
@@ -168,6 +170,7 @@ class DiagnosisData:
     experiments: tuple[Experiment, ...] = ()
     provenance: dict[str, str] = field(default_factory=dict)
     onset: Onset | None = None
+    prior: PriorUse | None = None
 
     def to_json(self) -> Json:
         """Return the object of schema `actuator_glue.diagnosis/1` (curves and draws left out)."""
@@ -194,6 +197,7 @@ class DiagnosisData:
             'structure': list(self.structure),
             'learned': [term.to_json() for term in self.learned],
             'onset': self.onset.to_json() if self.onset else None,
+            'prior': asdict(self.prior) if self.prior else None,
             'surrogate': self.surrogate,
             'remaining': self.remaining,
             'advice': list(self.advice),

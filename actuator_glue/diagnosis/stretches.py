@@ -57,5 +57,6 @@ def stretches(data: Data) -> Part | None:
             origins.append(data.origins[i] + begin * record.period)
             rows.append(place[begin : begin + size][own])
             of.append(i)
-    part = Data(tuple(records), tuple(masks), tuple(initials), tuple(records), tuple(origins))
+    some = tuple(records)
+    part = Data(some, tuple(masks), tuple(initials), some, tuple(origins), data.prior)
     return Part(part, np.concatenate(rows), tuple(of))

@@ -9,7 +9,7 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.hybrid.linear_system import System
-from actuator_glue.model.effects import CATALOGUE, lti
+from actuator_glue.model.effects import CATALOGUE, Effect, lti
 from actuator_glue.model.effects.lti_step import STATES
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
@@ -44,7 +44,7 @@ def table_of(draws: Array, names: Sequence[str], structure: Structure) -> Array:
 
 
 def actuator(
-    draws: Array, names: Sequence[str], effects: Sequence[str], stiffness: Array
+    draws: Array, names: Sequence[str], effects: Sequence[str | Effect], stiffness: Array
 ) -> Actuator:
     """Return each draw's actuator, its linear effects included, all others left out.
 
@@ -72,7 +72,7 @@ def actuator(
         ('damping', _SHORTEST * oil),
         ('mass', _LIGHTEST * oil),
     ):
-        if name != 'damping' or 'payload-inertia' not in effects:
+        if name != 'damping' or 'payload-inertia' not in structure.effects:
             values[name] = np.maximum(values[name], least)
     rows = np.zeros(len(oil), lti.KIND)
     for name in lti.NAMES:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.records import source_name
 from actuator_glue.report import diagnosis_figures as figures
@@ -187,8 +189,10 @@ def brief(found: DiagnosisData) -> list[Block]:
     return [*blocks, *(Note(line) for line in found.advice)]
 
 
-def page(found: DiagnosisData) -> Page:
-    """Return the report of a diagnosis."""
+def page(found: DiagnosisData, tracking: Sequence[Block] = ()) -> Page:
+    """Return the report of a diagnosis; `tracking` tells how it follows its command."""
     evidence = [_error(found), _effects(found), _residual(found), _records(found)]
+    if tracking:
+        evidence.insert(2, Section('How the actuator follows its command', tracking))
     sections = [summary(found), *evidence, *closing(found)]
     return Page('Diagnosis', found.summary(), sections)

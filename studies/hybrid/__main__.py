@@ -1,4 +1,7 @@
-"""Predict the stability of simulated actuators from pre-tests, and run each one's hybrid test."""
+"""Predict the stability of simulated actuators from pre-tests, and run each one's hybrid test.
+
+Stopped, it is gone on with by the same command: each actuator is noted when it is done.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +12,13 @@ from pathlib import Path
 
 import numpy as np
 
-from actuator_glue.arguments import Folder, claim_outputs
 from actuator_glue.errors import InputError
-from studies.hybrid import library
+from studies.hybrid import library, outcomes
 from studies.hybrid.figure import reliability_figure
 from studies.hybrid.findings import Findings, findings
-from studies.hybrid.trial import Outcome, trial
+from studies.hybrid.trial import Outcome, design
 
-MADE = ('results.json', 'reliability.png')
+KEPT, NUMBERS, PICTURE = 'outcomes.jsonl', 'results.json', 'reliability.png'
 
 
 def parser() -> argparse.ArgumentParser:
@@ -24,59 +26,62 @@ def parser() -> argparse.ArgumentParser:
     found = argparse.ArgumentParser(prog='python -m studies.hybrid', description=__doc__)
     found.add_argument(
         '--out',
-        type=Folder,
         default='out/study-rths',
         metavar='DIR',
-        help='folder for results.json and reliability.png (default: %(default)s)',
+        help=f'folder for {KEPT}, {NUMBERS} and {PICTURE} (default: %(default)s)',
     )
-    found.add_argument('--force', action='store_true', help='replace an earlier run')
+    found.add_argument('--force', action='store_true', help='begin anew')
     found.add_argument(
-        '--actuators',
-        type=int,
-        default=300,
-        metavar='N',
-        help='how many; each takes about 10 CPU seconds (default: %(default)s)',
+        '--actuators', type=int, default=300, metavar='N', help='how many (default: %(default)s)'
+    )
+    found.add_argument(
+        '--workers', type=int, default=1, metavar='N', help='processes (default: %(default)s)'
     )
     return found
 
 
-def write(outcomes: list[Outcome], found: Findings, out: Path) -> None:
+def write(done: list[Outcome], found: Findings, out: Path) -> None:
     """Write numbers and figure."""
     content = {
-        'schema': 'studies.hybrid/1',
+        'schema': 'studies.hybrid/2',
+        'design': design(),
         **asdict(found),
-        'actuators': [asdict(one) for one in outcomes],
+        'actuators': [asdict(one) for one in done],
     }
-    library.write_json(content, str(out / MADE[0]))
-    reliability_figure(outcomes, found).savefig(out / MADE[1])
+    library.write_json(content, str(out / NUMBERS))
+    reliability_figure(done, found).savefig(out / PICTURE)
 
 
 def main(argv: list[str] | None = None) -> int:
-    """Run the study; return the exit code."""
+    """Run the study; return 0 where the predictions hold, 1 where they do not."""
     args = parser().parse_args(argv)
     out = Path(args.out)
     try:
-        if args.actuators < 1:
-            raise InputError(f'--actuators {args.actuators}: at least one is needed')
-        claim_outputs(args)
+        if args.actuators < 1 or args.workers < 1:
+            raise InputError('--actuators and --workers: at least one of each is needed')
         out.mkdir(parents=True, exist_ok=True)
-        outcomes = []
-        for seed in range(1, args.actuators + 1):
-            outcomes.append(trial(seed))
-            last = outcomes[-1]
+        if args.force:
+            (out / KEPT).unlink(missing_ok=True)
+        kept = outcomes.Outcomes(out / KEPT)
+        wanted = range(1, args.actuators + 1)
+        for one in outcomes.made([s for s in wanted if s not in kept.known], args.workers):
+            kept.add(one)
+            response = (
+                'diverged' if one.inside is None else f'{100 * one.inside:.0f} % in its band'
+            )
             print(
-                f'{seed}: P(unstable) = {last.predicted:.3f}, '
-                f'{"unstable" if last.unstable else "stable"}, '
-                f'{100 * last.inside:.0f} % of the response in its band',
+                f'{one.seed}: P(unstable) = {one.predicted:.3f}, '
+                f'{"unstable" if one.unstable else "stable"}, response {response}',
                 flush=True,
             )
-        found = findings(outcomes)
-        write(outcomes, found, out)
-    except InputError as error:
+        done = [kept.known[seed] for seed in wanted]
+        found = findings(done)
+        write(done, found, out)
+    except (InputError, OSError) as error:
         print(f'error: {error}', file=sys.stderr)
         return 2
     print(found.text())
-    return 0
+    return 0 if found.reliable and found.covered else 1
 
 
 if __name__ == '__main__':

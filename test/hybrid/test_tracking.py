@@ -7,6 +7,7 @@ import pytest
 
 import actuator_glue as ag
 from actuator_glue.api.tracking import record_tracking
+from actuator_glue.model.structure import Structure
 
 NAMES = ('beta_1', 'alpha_1_beta_0', 'alpha_2', 'alpha_3')
 THETA = np.array([133.65, 1.1005e9, 2.4927e5, 0.006])
@@ -20,14 +21,20 @@ def test_a_pure_delay_is_told_as_one() -> None:
         sensors=ag_sensors(),
     )  # fmt: skip
     draws = np.tile([*THETA, 0.01], (8, 1))
-    found = record_tracking(draws, (*NAMES, 'delay'), ('delay',), record, 'rest')
-    plain = record_tracking(draws[:, :4], NAMES, (), record, 'rest')
+    found = record_tracking(draws, (*NAMES, 'delay'), Structure(['delay']), record, 'rest')
+    plain = record_tracking(draws[:, :4], NAMES, Structure(), record, 'rest')
     for name in ('delay_at_1_hz_s', 'fei_delay_s', 'J1_s'):
         late = found.predicted[name].median - plain.predicted[name].median
         assert late == pytest.approx(0.01, abs=1.1e-3 if name == 'J1_s' else 2e-4)
     assert found.predicted['hsem'].median < plain.predicted['hsem'].median < 0.0
     for name, value in found.measured.items():
         assert value == pytest.approx(found.predicted[name].median, rel=1e-6, abs=1e-12)
+
+    late = record_tracking(draws, (*NAMES, 'delay'), Structure(['delay']), record, 'rest', 5000)
+    assert late.predicted['fei_delay_s'].median == pytest.approx(
+        found.predicted['fei_delay_s'].median, rel=0.01
+    )
+    assert late.predicted['ti_m2'].median < found.predicted['ti_m2'].median
 
 
 def ag_sensors() -> object:

@@ -1,0 +1,39 @@
+"""`--prior` and its age and drift, for commands that can begin with what a calibration knew."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from actuator_glue.arguments import number
+
+
+def add_prior(parser: argparse.ArgumentParser) -> None:
+    """Declare the arguments."""
+    parser.add_argument(
+        '--prior',
+        type=Path,
+        metavar='FILE',
+        help='what an earlier `calibrate --save FILE` of this actuator knew',
+    )
+    parser.add_argument(
+        '--drift',
+        type=number,
+        default=0.02,
+        metavar='RATE',
+        help='how far the logarithm of each parameter may wander in an hour since, standard '
+        'deviation (default 0.02)',
+    )
+    parser.add_argument(
+        '--prior-age',
+        type=number,
+        default=0.0,
+        metavar='HOURS',
+        help='time since that calibration (default 0)',
+    )
+
+
+def prior_options(args: argparse.Namespace) -> dict[str, Any]:
+    """Return the arguments as options of `calibrate` and `diagnose`."""
+    return {'prior': args.prior, 'drift': args.drift, 'prior_age': 3600.0 * args.prior_age}

@@ -1,0 +1,75 @@
+"""An earlier calibration taken as a prior: where it came from, and how it stood up to records."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from actuator_glue.inference.carried import Carried
+
+# Prior predictive p-value below which records and prior do not belong together.
+CONTRADICTED = 1e-3
+# Energy coefficient of a mixture that describes its draws poorly: one of four parameters shifted
+# by half a standard deviation gives 0.013, by a whole one 0.056.
+POOR = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class PriorUse:
+    """The informative prior of a calibration or a diagnosis, and how it stood up to the records.
+
+    Attributes:
+        source: the calibration it came from.
+        drift: standard deviation of the logarithm of a parameter after an hour [h^-1/2].
+        age_s: time since that calibration [s].
+        components: normal components it has.
+        quality: energy coefficient between its draws and the mixture, 0 for equal.
+        p_value: prior predictive p-value of the records (Evans and Moshonov 2006).
+    """
+
+    source: str
+    drift: float
+    age_s: float
+    components: int
+    quality: float
+    p_value: float
+
+    @property
+    def contradicted(self) -> bool:
+        """Whether the records contradict it."""
+        return self.p_value < CONTRADICTED
+
+    def contradiction(self) -> str:
+        """Return what to do where they do."""
+        return (
+            f'the records contradict the prior from {self.source} (p = {self.p_value:.2g}): the '
+            'actuator has changed, or a model lacks something; go without it, or allow for '
+            'more --drift'
+        )
+
+    def remark(self) -> str:
+        """Return how it was used, in one line."""
+        return (
+            f'prior from {self.source}: a mixture of {self.components} normal(s), '
+            f'energy coefficient {self.quality:.3f} against its draws'
+            + (f'; above {POOR}, so it describes them poorly' if self.quality > POOR else '')
+            + f'; prior predictive p-value of the records {self.p_value:.2g}'
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GivenPrior:
+    """What is known now of an actuator that was calibrated before.
+
+    Attributes:
+        carried: draws, drifted to the time of the records.
+        source, drift, age_s: as in `PriorUse`.
+    """
+
+    carried: Carried
+    source: str
+    drift: float
+    age_s: float
+
+    def used(self, components: int, quality: float, p_value: float) -> PriorUse:
+        """Return how it was used."""
+        return PriorUse(self.source, self.drift, self.age_s, components, quality, p_value)
