@@ -85,6 +85,8 @@ def record_tracking(
     record: Record,
     initial: Initial,
     settle: int = 0,
+    frequencies: Sequence[float] = FREQUENCIES,
+    origin: float = 0.0,
 ) -> RecordTracking:
     """Return the tracking numbers of draws over a record, and the record's own.
 
@@ -98,6 +100,8 @@ def record_tracking(
         record: the test.
         initial: state at its first sample.
         settle: samples of its start that only let the initial state be forgotten.
+        frequencies: where delay and amplitude are told [Hz].
+        origin: time of its first sample since the test began [s].
     """
     rows = np.linspace(0, len(draws) - 1, min(_DRAWS, len(draws))).astype(np.intp)
     some = table_of(draws[rows], names, structure)  # without parameters of the likelihood
@@ -105,12 +109,12 @@ def record_tracking(
     predicted: dict[str, Any] = {}
     if structure.linear:
         linear = actuator(some, structure.names, structure.entries, stiffness)
-        found = tracking(linear, FREQUENCIES)
-        for i, f in enumerate(FREQUENCIES):
+        found = tracking(linear, frequencies)
+        for i, f in enumerate(frequencies):
             predicted[f'delay_at_{f:g}_hz_s'] = spread(found.delay[:, i])
             predicted[f'amplitude_at_{f:g}_hz'] = spread(found.amplitude[:, i])
         predicted['bandwidth_hz'] = spread(found.bandwidth)
-    moved = structure.simulate(some, record, initial=initial)[:, settle:]
+    moved = structure.simulate(some, record, initial=initial, origin=origin)[:, settle:]
     moved = moved[np.isfinite(moved).all(axis=1)]
     record = record.slice(settle, len(record))
     if np.ptp(record.command) > 0.0 and len(moved):

@@ -53,6 +53,12 @@ SPECS = (
         choices=CHOICES['contradiction'],
     ),
     Spec('levels', list(EstimatorSettings().levels), 'probability of each band', read_only=True),
+    Spec(
+        'tracking_frequencies',
+        [1.0, 5.0, 10.0],
+        'where delay and amplitude of the actuator are told [Hz]',
+        read_only=True,
+    ),
     Spec('effects', [''], 'effects of the catalogue beyond Eq. (2)', read_only=True),
     own_effects.SPEC,
 )

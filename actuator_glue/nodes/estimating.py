@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import time
+from typing import NamedTuple
 
+from actuator_glue.api.tracking import FREQUENCIES, RecordTracking, record_tracking
+from actuator_glue.model.structure import Structure
 from actuator_glue.online.job import WindowResult, run
 from actuator_glue.online.sampling import Job
 from actuator_glue.workers.warm import warm_windows
@@ -21,10 +24,35 @@ class _Reserve:
     seconds = 0.0
 
 
-def compute(job: Job, deadline: float, tell: Tell) -> WindowResult:
+class Computed(NamedTuple):
+    """A window, and how the actuator followed its command; None without a posterior."""
+
+    result: WindowResult
+    tracking: RecordTracking | None
+
+
+def window_tracking(result: WindowResult, frequencies: tuple[float, ...]) -> RecordTracking | None:
+    """Return how the actuator followed the command of a window; None without a posterior."""
+    if result.frozen is None or result.failure:
+        return None
+    record, settings = result.window.record, result.settings
+    return record_tracking(
+        result.frozen.draws,
+        result.model.names,
+        Structure(result.model.effects),
+        record,
+        'measured',
+        round(settings.settle / record.period),
+        frequencies,
+        record.first_index * record.period,
+    )
+
+
+def compute(job: Job, deadline: float, frequencies: tuple[float, ...], tell: Tell) -> Computed:
     """Compute a job in the worker so that it is done at a monotonic time [s].
 
-    Sampling ends early enough for what follows it, as long as that took lately.
+    Sampling ends early enough for what follows it, as long as that took lately. Delay and
+    amplitude are told at the frequencies [Hz].
     """
     last = time.monotonic()
     kept = ON_THE_WAY + SLACK * job.settings.time_budget
@@ -35,9 +63,10 @@ def compute(job: Job, deadline: float, tell: Tell) -> WindowResult:
         return last > deadline - 1.3 * _Reserve.seconds - kept
 
     result = run(job, expired)
+    tracking = window_tracking(result, frequencies)
     after = time.monotonic() - last
     _Reserve.seconds = max(after, 0.8 * _Reserve.seconds)
-    return result
+    return Computed(result, tracking)
 
 
 def warm_up() -> None:
@@ -45,4 +74,6 @@ def warm_up() -> None:
     for _ in range(2):
         # The first time compiling counts: ten windows would find no time left for sampling.
         _Reserve.seconds = 0.0
-        warm_windows(lambda job: compute(job, time.monotonic() + 60.0, lambda _: None))
+        warm_windows(
+            lambda job: compute(job, time.monotonic() + 60.0, FREQUENCIES, lambda _: None).result
+        )

@@ -14,10 +14,11 @@ from actuator_glue_msgs.srv import SetModel
 from actuator_glue.errors import InputError
 from actuator_glue.inference.choice import ModelChoice, choose_model
 from actuator_glue.nodes import configuration, own_effects, spin, topics
-from actuator_glue.nodes.estimating import compute, warm_up
+from actuator_glue.nodes.estimating import Computed, compute, warm_up
 from actuator_glue.nodes.health import ERROR, Rate
 from actuator_glue.nodes.latched import Newest
 from actuator_glue.nodes.messages import publish
+from actuator_glue.nodes.tracking import publish_tracking
 from actuator_glue.nodes.working import WorkingNode
 from actuator_glue.online import wire
 from actuator_glue.online.estimator import Estimator
@@ -57,6 +58,7 @@ class EstimatorNode(WorkingNode):
         self._carried = configuration.carried(values)
         self.employ(warm_up)
         self._out = {topic: self.publisher(topic) for topic in topics.ESTIMATED}
+        self._frequencies = tuple(values['tracking_frequencies'])
         self._service = self.create_service(SetModel, '~/set_model', self._set_model)
 
     def do_activate(self) -> None:
@@ -165,7 +167,8 @@ class EstimatorNode(WorkingNode):
         arrival = self._arrival.get(job.window.number, now)
         self._arrival = {n: t for n, t in self._arrival.items() if n > job.window.number}
         self._started = arrival
-        self.worker.submit(compute, job, arrival + self.settings.time_budget)
+        deadline = arrival + self.settings.time_budget
+        self.worker.submit(compute, job, deadline, self._frequencies)
 
     def _too_late(self, window: Window, now: float) -> bool:
         """Whether a window could not be published in time any more, or only cut short."""
@@ -186,7 +189,8 @@ class EstimatorNode(WorkingNode):
             self._finish(answer.payload, answer.seconds)
         self._next(time.monotonic())
 
-    def _finish(self, result: WindowResult, seconds: float) -> None:
+    def _finish(self, computed: Computed, seconds: float) -> None:
+        result = computed.result
         self._tell(self.estimator.finish(result))
         if result.failure:
             return
@@ -198,6 +202,8 @@ class EstimatorNode(WorkingNode):
         for prediction in (*result.scored, *result.forecast):
             publish(self._out[topics.BAND], *wire.prediction(prediction, actuator))
         publish(self._out[topics.RESPONSE], *wire.response(result))
+        for complaint in publish_tracking(self._out, computed, self._frequencies):
+            self.complain('tracking', complaint)
         latency = time.monotonic() - self._started
         self.compute.append(seconds)
         self.latency.append(latency)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import actuator_glue_msgs.msg
 from actuator_glue_msgs.msg import (
     CommandPreview,
     Diagnosis,
@@ -62,10 +63,15 @@ DRAWS = Topic('posterior_draws', PosteriorDraws, _reliable(50))
 MARGIN = Topic('stability_margin', StabilityMargin, _reliable(50))
 BAND = Topic('prediction_band', PredictionBand, _reliable(200))
 RESPONSE = Topic('frequency_response', FrequencyResponseBand, _reliable(50))
+# None where the interface package was built before this message: the suite goes on without.
+TRACKING = Topic(
+    'tracking', getattr(actuator_glue_msgs.msg, 'TrackingIndicators', None), _reliable(50)
+)
+_TRACKING = () if TRACKING.type is None else (TRACKING,)
 DIAGNOSTICS = Topic('/diagnostics', DiagnosticArray, _reliable(50))
 
 # What the estimator says.
-ESTIMATED = (POSTERIOR, DRAWS, BAND, RESPONSE, ESTIMATOR_SETUP)
+ESTIMATED = (POSTERIOR, DRAWS, BAND, RESPONSE, *_TRACKING, ESTIMATOR_SETUP)
 # What waits on several topics is taken in this order: a set-up before the samples that it is for.
 RECORDED = (
     TEST_SETUP,
@@ -76,6 +82,7 @@ RECORDED = (
     DRAWS,
     BAND,
     RESPONSE,
+    *_TRACKING,
     MARGIN,
     DIAGNOSIS,
     DIAGNOSTICS,

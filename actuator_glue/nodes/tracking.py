@@ -1,0 +1,58 @@
+"""The tracking numbers of a window as a message."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from actuator_glue.api.tracking import RecordTracking
+from actuator_glue.nodes import topics
+from actuator_glue.nodes.estimating import Computed
+from actuator_glue.nodes.messages import publish
+from actuator_glue.online.job import WindowResult
+from actuator_glue.online.wire import Head
+
+# Field in the message: name in `RecordTracking`.
+_NUMBERS = {
+    'fei_amplitude': 'fei_amplitude',
+    'fei_delay': 'fei_delay_s',
+    'j1': 'J1_s',
+    'j2': 'J2',
+    'j3': 'J3',
+    'ti': 'ti_m2',
+    'hsem': 'hsem',
+}
+_LIMITS = ('lower', 'median', 'upper')
+
+
+def publish_tracking(
+    out: Mapping[topics.Topic, Any], computed: Computed, frequencies: tuple[float, ...]
+) -> Iterator[str]:
+    """Publish what was computed; yield why it cannot be."""
+    if topics.TRACKING not in out:
+        yield 'actuator_glue_msgs is older than this node: build it again (make setup)'
+    elif computed.tracking is not None:
+        fields = message(computed.result, computed.tracking, frequencies)
+        publish(out[topics.TRACKING], *fields)
+
+
+def message(
+    result: WindowResult, found: RecordTracking, frequencies: tuple[float, ...]
+) -> tuple[Head, dict[str, Any]]:
+    """Return header and fields of a TrackingIndicators."""
+    record = result.window.record
+    told = [f for f in frequencies if f'delay_at_{f:g}_hz_s' in found.predicted]
+    fields: dict[str, Any] = {'window': result.window.number, 'frequency': np.array(told)}
+    for limit in _LIMITS:
+        for what, unit in (('delay', '_s'), ('amplitude', '')):
+            values = [getattr(found.predicted[f'{what}_at_{f:g}_hz{unit}'], limit) for f in told]
+            fields[f'{what}_{limit}'] = np.array(values)
+    for name, known in {'bandwidth': 'bandwidth_hz', **_NUMBERS}.items():
+        band = found.predicted.get(known)
+        for limit in _LIMITS:
+            fields[f'{name}_{limit}'] = float(getattr(band, limit, np.nan))
+        if name in _NUMBERS:
+            fields[f'{name}_measured'] = float(found.measured.get(known, np.nan))
+    return Head(record.stamp_ns(len(record) - 1), record.actuator), fields
