@@ -73,7 +73,7 @@ def criteria(target: Array, measured: Array, period: float) -> Criteria:
         InputError: as `_checked`.
     """
     target, measured = _checked(target, measured)
-    lag = int(np.argmax(correlate(measured, target))) - (len(target) - 1)
+    lag = int(np.argmax(correlate(measured, target, method='fft'))) - (len(target) - 1)
     error = measured - target
     return Criteria(
         lag * period,

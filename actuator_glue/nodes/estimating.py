@@ -18,14 +18,24 @@ ON_THE_WAY = 5e-3
 SLACK = 0.08
 
 
+# Draws that the tracking numbers are computed from.
+_DRAWS = 40
+
+
 class _Reserve:
-    """How long a window still takes once its sampling has ended; lives in the worker."""
+    """How long a window still takes once its sampling has ended; lives in the worker.
+
+    Attributes:
+        seconds: without its tracking numbers.
+        tracking: for these alone.
+    """
 
     seconds = 0.0
+    tracking = 0.0
 
 
 class Computed(NamedTuple):
-    """A window, and how the actuator followed its command; None without a posterior."""
+    """A window, and how the actuator followed its command: None without posterior or time."""
 
     result: WindowResult
     tracking: RecordTracking | None
@@ -36,8 +46,9 @@ def window_tracking(result: WindowResult, frequencies: tuple[float, ...]) -> Rec
     if result.frozen is None or result.failure:
         return None
     record, settings = result.window.record, result.settings
+    draws = result.frozen.draws
     return record_tracking(
-        result.frozen.draws,
+        draws[:: max(1, len(draws) // _DRAWS)],
         result.model.names,
         Structure(result.model.effects),
         record,
@@ -51,8 +62,8 @@ def window_tracking(result: WindowResult, frequencies: tuple[float, ...]) -> Rec
 def compute(job: Job, deadline: float, frequencies: tuple[float, ...], tell: Tell) -> Computed:
     """Compute a job in the worker so that it is done at a monotonic time [s].
 
-    Sampling ends early enough for what follows it, as long as that took lately. Delay and
-    amplitude are told at the frequencies [Hz].
+    Sampling ends early enough for what follows it, as long as that took lately. Tracking numbers
+    are computed in time that is left, delay and amplitude at the frequencies [Hz].
     """
     last = time.monotonic()
     kept = ON_THE_WAY + SLACK * job.settings.time_budget
@@ -63,9 +74,13 @@ def compute(job: Job, deadline: float, frequencies: tuple[float, ...], tell: Tel
         return last > deadline - 1.3 * _Reserve.seconds - kept
 
     result = run(job, expired)
+    now = time.monotonic()
+    _Reserve.seconds = max(now - last, 0.8 * _Reserve.seconds)
+    if now > deadline - 1.3 * _Reserve.tracking - ON_THE_WAY:
+        _Reserve.tracking *= 0.9  # one slow moment must not end them for good
+        return Computed(result, None)
     tracking = window_tracking(result, frequencies)
-    after = time.monotonic() - last
-    _Reserve.seconds = max(after, 0.8 * _Reserve.seconds)
+    _Reserve.tracking = max(time.monotonic() - now, 0.8 * _Reserve.tracking)
     return Computed(result, tracking)
 
 
@@ -73,7 +88,7 @@ def warm_up() -> None:
     """Compile and import what windows need, and learn how long they take once that is done."""
     for _ in range(2):
         # The first time compiling counts: ten windows would find no time left for sampling.
-        _Reserve.seconds = 0.0
+        _Reserve.seconds = _Reserve.tracking = 0.0
         warm_windows(
             lambda job: compute(job, time.monotonic() + 60.0, FREQUENCIES, lambda _: None).result
         )

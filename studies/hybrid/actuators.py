@@ -87,21 +87,26 @@ def drawn(seed: int) -> Actuator:
     p = library.BenchmarkParameters().drawn(
         np.random.default_rng(library.stream(seed, 'actuator'))
     )
+    specimen = {'mass': p.mass, 'damping': p.damping, 'stiffness': p.stiffness}
+    ratio = np.random.default_rng(library.stream(seed, 'structure')).uniform(*DAMPING)
+    return Actuator(
+        seed,
+        plant(p),
+        EFFECTS,
+        {name: np.array([value]) for name, value in specimen.items()},
+        damped(ratio),
+    )
+
+
+def plant(p: library.BenchmarkParameters) -> np.ndarray:
+    """Return the benchmark's transfer system as parameters of Eq. (2) with EFFECTS."""
     structure = library.Structure(EFFECTS)
     theta = structure.neutral(np.array([p.beta2 / p.beta1, p.a1_beta0 / p.beta1, p.a2, p.a3]))
     values = {'gain': STATIC_GAIN, 'valve_lag': 1.0 / p.beta1, 'mass': p.mass}
     values['mass_damping'] = p.damping / p.mass
     for name, value in values.items():
         theta[structure.names.index(name)] = value
-    specimen = {'mass': p.mass, 'damping': p.damping, 'stiffness': p.stiffness}
-    ratio = np.random.default_rng(library.stream(seed, 'structure')).uniform(*DAMPING)
-    return Actuator(
-        seed,
-        theta,
-        EFFECTS,
-        {name: np.array([value]) for name, value in specimen.items()},
-        damped(ratio),
-    )
+    return theta
 
 
 def damped(ratio: float) -> ag.Partition:

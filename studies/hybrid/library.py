@@ -2,6 +2,7 @@
 
 import zlib
 
+from actuator_glue.api.calibration_parts import CalibratedRecord, FitError, Marginal
 from actuator_glue.api.simulation import Sensors
 from actuator_glue.hybrid.compensator import Compensator
 from actuator_glue.hybrid.design import Loop
@@ -18,9 +19,12 @@ from actuator_glue.report import style
 
 __all__ = [
     'BenchmarkParameters',
+    'CalibratedRecord',
     'Compensator',
+    'FitError',
     'GroundMotion',
     'Loop',
+    'Marginal',
     'Responses',
     'Sensors',
     'Structure',

@@ -93,7 +93,7 @@ class Story:
 
     @property
     def unstable(self) -> bool:
-        """Whether its hybrid test is unstable: a root grows, or with a nonlinear one it diverges."""
+        """Whether a root of its hybrid test grows; with nonlinear effects, whether it diverges."""
         if library.Structure(self.actuator.effects).linear:
             return self.actuator.grows()
         return bool(self.run.diverged[0])
