@@ -167,8 +167,7 @@ class EstimatorNode(WorkingNode):
         arrival = self._arrival.get(job.window.number, now)
         self._arrival = {n: t for n, t in self._arrival.items() if n > job.window.number}
         self._started = arrival
-        deadline = arrival + self.settings.time_budget
-        self.worker.submit(compute, job, deadline, self._frequencies)
+        self.worker.submit(compute, job, arrival + self.settings.time_budget, self._frequencies)
 
     def _too_late(self, window: Window, now: float) -> bool:
         """Whether a window could not be published in time any more, or only cut short."""
