@@ -66,7 +66,7 @@ class Structure:
             Written(e.expression, e.parameters) for e in self.entries if e.expression is not None
         )
         if self.program.acts(machine.COMMAND, machine.FORCE):
-            self._on[[rows.ON_TERMS, rows.ON_FLOW]] = True
+            self._on[rows.ON_TERMS] = True
             self._on[rows.ON_FORCE] = self.program.acts(machine.FORCE, machine.FORCE)
         self._plain = all(e.variance is not None for e in self.entries)
         self.linear = all(e.linear for e in self.entries)

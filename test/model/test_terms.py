@@ -268,6 +268,6 @@ def test_functions_of_the_machine(op: int, function: np.ufunc, reach: float) -> 
     x = np.random.default_rng(1).uniform(-reach, reach, 31)
     g = np.zeros((m.FIXED + 2, 32))
     g[m.FIXED, :31], g[m.FIXED, 31] = x, np.nan
-    m.execute(g, np.array([[op, m.FIXED + 1, m.FIXED, 0, 0, 0]], np.int32), 0, 1)
+    m.execute(g, np.array([[op, m.FIXED + 1, m.FIXED, 0, 0, 0]], np.uint32), 0, 1)
     np.testing.assert_allclose(g[m.FIXED + 1, :31], function(x), rtol=1e-11, atol=1e-13)
     assert np.isnan(g[m.FIXED + 1, 31])

@@ -117,6 +117,7 @@ def _search(
                 specimen_yield.halfway(w, n, moved)
         if terms:
             stage.force(w, g, program, rate, yields)
+        at, slope = program[machine.SIGNAL, machine.FORCE], program[machine.SLOPE, machine.FORCE]
         for n in range(r.LANES):
             push, stiff, guess = w[r.IN_PUSH + n], w[r.IN_STIFF + n], w[r.IN_DX + n]
             dry = w[r.COULOMB + n]
@@ -125,7 +126,7 @@ def _search(
             if terms:
                 # What weakens faster than the oil is stiff is not followed implicitly.
                 least = -0.5 * (stiff + w[r.DAMPING_2 + n])
-                force, tangent = g[machine.F, n], max(g[machine.D_F, n], least)
+                force, tangent = g[at, n], max(g[slope, n], least)
             else:
                 force, tangent = balance.specimen(w, n, guess, True, yields)
             w[r.IN_DX + n] = balance.look(w, n, push, stiff, dry, guess, force, tangent)
@@ -152,8 +153,10 @@ def substep(
     flows, falls, gaps = on[r.ON_FLOW], on[stribeck_friction.ON], on[specimen_gap.ON]
     if on[r.ON_TERMS]:
         stage.valve(w, g, program, mean, rate, time)
-        stages.flow(w, on, time)
-        stage.flow(w, g, program, rate)
+        if flows:
+            stages.flow(w, on, time)
+        stage.flow(w, g, program, rate, flows)
+        flows = True
     elif flows:
         for n in range(r.LANES):
             w[r.IN_Q + n], w[r.IN_DQ + n] = stages.valve(w, n, mean)

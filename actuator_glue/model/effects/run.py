@@ -80,7 +80,7 @@ def tables(
         # What went before a record that begins in motion is not known.
         registers[:, list(program.memory)] = 0.0 if start == (0.0, 0.0) else np.nan
         for block in registers:
-            machine.execute(block, program.code, 1, int(program.code[0, machine.PREPARE]))
+            program.prepare(block)
         out[:, assembly.SIZE :] = registers.reshape(blocks, -1)
     return out
 

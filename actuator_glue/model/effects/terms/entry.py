@@ -144,7 +144,7 @@ class _Sensor:
         values = {p.name: table[:, j] for j, p in enumerate(self.parameters)}
         for block, registers in enumerate(made.start(values, which)):
             lanes = slice(block * LANES, min((block + 1) * LANES, len(table)))
-            m.execute(registers, made.code, 1, int(made.code[0, m.PREPARE]))
+            made.prepare(registers)
             m.sense(registers, made.code, when, y[:, lanes], out[:, lanes])
         return out
 
@@ -199,18 +199,18 @@ def _tried(
     g[m.STEP], g[m.K] = step, scale.stiffness
     for j, row in enumerate((m.BETA_1, m.ALPHA_1_BETA_0, m.ALPHA_2, m.ALPHA_3)):
         g[row] = scale.theta[j]
-    m.execute(g, made.code, 1, int(made.code[0, m.PREPARE]))
+    made.prepare(g)
     part = program.PART[place]
     first = int(made.code[0, part - 1])
     last = int(made.code[0, part]) if part <= m.FORCE else len(made.code)
-    row = motion[SIGNAL[place]][0]
+    row, left = motion[SIGNAL[place]][0], made.code[m.SIGNAL, part]
     before, after = np.empty((_SAMPLES, 1)), np.empty((_SAMPLES, LANES))
     for i in range(_SAMPLES):
         for register, trace in motion.values():
             g[register] = trace[i]
         before[i] = g[row, 0]
         m.execute(g, made.code, first, last)
-        after[i] = g[row]
+        after[i] = g[left]
     return before, after
 
 

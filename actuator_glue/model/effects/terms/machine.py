@@ -17,19 +17,23 @@ from numpy.typing import NDArray
 from actuator_glue.jit import njit
 from actuator_glue.records import Array
 
-Code = NDArray[np.int32]
+Code = NDArray[np.uint32]
 # An instruction's numbers.
 WIDTH: Final = 6
 COPY, ADD, SUB, MUL, DIV, NEG, ABS, SIGN, SQRT, EXP, LOG, SIN, COS, TANH, ATAN, POW = range(16)
 MIN, MAX, LESS, EQUAL, EDGE, SELECT, LAG, INTEGRAL, PLAY, LIMIT = range(16, 26)
 # Fixed registers: what moves, what of it changes with the increment dx, what holds.
 # NONE stands where an instruction has no operand.
-NONE, T, U, E, Q, F, X, V, Y, D_E, D_Q, D_F, ORIGIN, STEP, D_V_MIDDLE, D_V_END = range(16)
-BETA_1, ALPHA_1_BETA_0, ALPHA_2, ALPHA_3, K = range(16, 21)
-FIXED: Final = 21
-# Where the instructions of each part end, in row 0 of a program; and how often the balance of
-# forces is solved with them.
-PREPARE, COMMAND, VALVE, FLOW, FORCE, TIMES = range(6)
+NONE, T, U, E, Q, F, X, V, Y, D_Q, D_F, ORIGIN, STEP, D_V_MIDDLE, D_V_END = range(15)
+BETA_1, ALPHA_1_BETA_0, ALPHA_2, ALPHA_3, K = range(15, 20)
+FIXED: Final = 20
+# The parts of a program. Its row 0 says where the instructions of each part but the last end, and
+# how often the balance of forces is solved with them (TIMES); rows SIGNAL and SLOPE in which
+# registers a part leaves its signal and d/d(dx); and SIGNAL, PREPARE which of `NEEDS` are read.
+PREPARE, COMMAND, VALVE, FLOW, FORCE, SENSOR = range(6)
+TIMES: Final = SENSOR
+SIGNAL, SLOPE, FIRST = range(1, 4)
+NEEDS_T, NEEDS_Q, NEEDS_F, NEEDS_V, NEEDS_V_END = 1, 2, 4, 8, 16
 
 _strict: Any = partial(njit, fastmath=False)
 
@@ -194,4 +198,4 @@ def sense(g: Array, program: Code, time: Array, y: Array, out: Array) -> None:
             g[T, n] = time[i]
         execute(g, program, first, last)
         for n in range(y.shape[1]):
-            out[i, n] = g[Y, n]
+            out[i, n] = g[program[SIGNAL, SENSOR], n]

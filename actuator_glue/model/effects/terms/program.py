@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from actuator_glue.model.effects.rows import LANES
 from actuator_glue.model.effects.terms import machine as m
 from actuator_glue.model.effects.terms.expression import SIGNAL, Expression
-from actuator_glue.model.effects.terms.instructions import Emitter
+from actuator_glue.model.effects.terms.instructions import Dual, Emitter
 from actuator_glue.model.parameters import NAMES as BASE
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.records import Array
@@ -26,20 +26,21 @@ _PARTS: Final = (('command',), ('valve',), ('flow',), ('specimen', 'piston'), ('
 PART: Final = {place: i + 1 for i, places in enumerate(_PARTS) for place in places}
 _VALUE: Final = {'t': m.T, 'u': m.U, 'e': m.E, 'q': m.Q, 'f': m.F, 'x': m.X, 'v': m.V, 'y': m.Y}
 # d/d(dx) of what depends on the increment where a part is executed: a register, or a number.
-_MIDDLE: Final = {'e': -0.5, 'x': 0.5, 'v': m.D_V_MIDDLE}
-_END: Final = {'f': m.D_F, 'x': 1.0, 'v': m.D_V_END}
-_SLOPE: Final[dict[str, dict[str, int | float]]] = {
-    'command': {},
-    'valve': _MIDDLE,
-    'flow': {**_MIDDLE, 'e': m.D_E, 'q': m.D_Q},
-    'specimen': _END,
-    'piston': _END,
-    'sensor': {},
-}
+_MIDDLE: Final[dict[str, int | float]] = {'x': 0.5, 'v': m.D_V_MIDDLE}
+_END: Final[dict[str, int | float]] = {'x': 1.0, 'v': m.D_V_END}
+_SLOPE: Final = {'valve': _MIDDLE, 'flow': _MIDDLE, 'specimen': _END, 'piston': _END}
+# Signals whose slope counts there, too.
+_FOLLOWED: Final = {'valve': 'e', 'flow': 'eq', 'specimen': 'f', 'piston': 'f'}
+# Signals that are there only if an instruction of some part reads them.
+_NEEDS: Final = (
+    (m.NEEDS_T, m.T, (m.COMMAND, m.FORCE)),
+    (m.NEEDS_Q, m.Q, (m.COMMAND, m.VALVE)),
+    (m.NEEDS_F, m.F, (m.COMMAND, m.FLOW)),
+    (m.NEEDS_V, m.V, (m.COMMAND, m.FLOW)),
+    (m.NEEDS_V_END, m.V, (m.FORCE, m.FORCE)),
+)
 # Functions with a kink.
 _KINKS: Final = {'abs', 'sign', 'min', 'max', 'clip', 'dead', 'sqrt'}
-# Where the slope of a part's signal is left.
-_LEFT: Final = {'valve': m.D_E, 'flow': m.D_Q, 'specimen': m.D_F, 'piston': m.D_F}
 _HOLDS: Final = dict(zip((*BASE, 'k'), range(m.BETA_1, m.K + 1), strict=True))
 
 
@@ -55,7 +56,8 @@ class Program:
     """Instructions of some effects and the registers they work on.
 
     Attributes:
-        code: (1 + instructions, machine.WIDTH); row 0 says where each part but the last ends.
+        code: (machine.FIRST + instructions, machine.WIDTH); see machine.PREPARE for what is in
+            front.
         registers: (rows, LANES) with the constants.
         parameters: register of every parameter.
         memory: registers that remember.
@@ -72,6 +74,10 @@ class Program:
     def acts(self, first: int, last: int) -> bool:
         """Whether the parts first .. last (machine.COMMAND, ...) have instructions."""
         return bool(self.code[0, last] > self.code[0, first - 1])
+
+    def prepare(self, registers: Array) -> None:
+        """Compute what holds during a test, in registers (rows, LANES) of a block."""
+        m.execute(registers, self.code, m.FIRST, int(self.code[0, m.PREPARE]))
 
     def start(self, values: Mapping[str, Array], which: NDArray[np.intp]) -> Array:
         """Return registers (blocks, rows, LANES) with the parameters of every lane.
@@ -107,8 +113,15 @@ class _Builder:
         self._parameters: dict[str, int] = {}
         self._switches: list[tuple[int, tuple[str, ...], tuple[float, ...]]] = []
         self._parts: list[list[tuple[int, ...]]] = []
-        self._left: set[str] = set()
         self._times = 1
+        # Where every signal and its slope are by now.
+        self._signals: dict[str, Dual] = {
+            'u': (m.U, None),
+            'e': (m.E, self._emitter.constant(-0.5)),
+            'q': (m.Q, m.D_Q),
+            'f': (m.F, m.D_F),
+            'y': (m.Y, None),
+        }
 
     def part(self, effects: Iterable[Written]) -> None:
         """Add a part; every effect takes the signal that the one before has made."""
@@ -116,6 +129,7 @@ class _Builder:
         for effect in effects:
             self._add(effect)
         self._parts.append(self._emitter.code)
+        self._emitter.forget()
 
     def _add(self, effect: Written) -> None:
         into, names = self._emitter, tuple(p.name for p in effect.parameters)
@@ -124,22 +138,21 @@ class _Builder:
             self._parameters.setdefault(name, into.row(held=True))
         slopes = {
             s: slope if isinstance(slope, int) else into.constant(slope)
-            for s, slope in _SLOPE[place].items()
+            for s, slope in _SLOPE.get(place, {}).items()
         }
+        followed = _FOLLOWED.get(place, '')
         into.symbols = {
             **{name: (row, None) for name, row in _HOLDS.items()},
             **{name: (row, slopes.get(name)) for name, row in _VALUE.items()},
+            **{s: (at, d if s in followed else None) for s, (at, d) in self._signals.items()},
             **{name: (self._parameters[name], None) for name in names},
         }
         signal = SIGNAL[place]
         before, slope_before = into.symbols[signal]
-        if place in self._left:
-            slope_before = _LEFT.get(place)
-            into.symbols[signal] = before, slope_before
         used = effect.expression.tree.words()
         after, slope = into.emit(effect.expression.tree)
-        if slope_before is not None:
-            slope = into.constant(0.0) if slope is None else slope
+        if slope_before is not None and slope is None:
+            slope = into.constant(0.0)
         if not effect.expression.exact:
             on = into.row(held=True)
             off = tuple(float(p.neutral or 0.0) for p in effect.parameters)
@@ -147,26 +160,28 @@ class _Builder:
             after = into.do(m.SELECT, after, before, on)
             if slope is not None and slope_before is not None:
                 slope = into.do(m.SELECT, slope, slope_before, on)
-        if slope is not None and slope_before is not None and slope != _LEFT[place]:
-            into.code.append((m.COPY, _LEFT[place], slope, 0, 0, 0))
-        into.code.append((m.COPY, before, after, 0, 0, 0))
-        self._left.add(place)
+        self._signals[signal] = after, slope
         if place in ('specimen', 'piston'):
             self._times = max(self._times, 3 if 'v' in used else 2 if used & _KINKS else 1)
-        into.forget()
 
     def program(self) -> Program:
         """Return what has been added."""
-        code = [(0,) * m.WIDTH, *self._emitter.prepare]
+        code = [*[(0,) * m.WIDTH] * m.FIRST, *self._emitter.prepare]
         ends = [len(code)]
         for part in self._parts:
             code += part
             ends.append(len(code))
-        table = np.array(code, dtype=np.int32)
+        table = np.array(code, dtype=np.uint32)
         table[0, : m.TIMES] = ends[: m.TIMES]
         # One Newton step where a force bends slowly, as for a hardening specimen; more for a
         # kink, and for a force that follows the velocity, which may be steep.
         table[0, m.TIMES] = self._times
+        for at, signal in enumerate('ueqfy', start=m.COMMAND):
+            row, slope = self._signals[signal]
+            table[[m.SIGNAL, m.SLOPE], at] = row, slope or m.NONE
+        for flag, row, (first, last) in _NEEDS:
+            read = table[ends[first - 1] : ends[last], 2:5]
+            table[m.SIGNAL, m.PREPARE] |= flag * bool((read == row).any())
         registers = np.zeros((self._emitter.rows, LANES))
         for value, row in self._emitter.constants.items():
             registers[row] = value
