@@ -110,6 +110,7 @@ def result(**more):
         'faults': [{'kind': 'spike', 'told': True, 'back': 3.0}],
         'memory': {'recorder': grown(0.1, 0.0, 0.2)},
         'samples_missing_in_the_bag': 0,
+        'ended_early': '',
         'estimator': {},
         'worst_write_lag_s': '0.1',
         'callback_delay_s': {'median': 1e-4, 'p99': 1e-3},
@@ -126,6 +127,7 @@ def test_the_headline_says_what_the_numbers_say():
         {'memory': {'recorder': grown(9.0, 8.0, 10.0)}},
         {'memory': {'recorder': grown(0.5, -9.0, 9.0)}},
         {'samples_missing_in_the_bag': 1},
+        {'ended_early': 'the estimator was not ready again in time'},
     ):
         page, passed = text.report(result(**bad))
         assert not passed and page.startswith('**Not everything held')

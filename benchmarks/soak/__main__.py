@@ -21,6 +21,7 @@ from pathlib import Path
 
 import numpy as np
 
+from actuator_glue.errors import InputError
 from benchmarks.soak import judge, memory, text
 from benchmarks.soak.wire import RATE, STIFFNESS, Wire
 from examples.demonstration.domain import own_domain
@@ -166,9 +167,14 @@ def main() -> int:
     shutil.rmtree(args.out / 'bag', ignore_errors=True)
     args.out.mkdir(parents=True, exist_ok=True)
     loads = [os.getloadavg()[0]]
+    ended_early = ''
     with Nodes() as nodes:
         soak = Soak(args, nodes)
-        soak.run()
+        try:
+            soak.run()
+        except (SystemExit, InputError) as error:
+            # What was seen until then is worth as much.
+            ended_early = str(error)
     loads.append(os.getloadavg()[0])
     content = judge.read(soak.bag)
     judge.judge(soak.faults, content)
@@ -176,6 +182,7 @@ def main() -> int:
     found = {
         'schema': 'actuator_glue.soak/1',
         'minutes': args.minutes,
+        'ended_early': ended_early,
         'seed': args.seed,
         'load_before_and_after': loads,
         'cores': os.cpu_count(),

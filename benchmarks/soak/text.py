@@ -23,6 +23,7 @@ def report(found: dict[str, Any]) -> tuple[str, bool]:
         f'{found["minutes"]:g} minutes at 1 kHz, {len(faults)} faults, seed {found["seed"]}, '
         f'{found["cores"]} cores, load {found["load_before_and_after"][0]:.1f} before and '
         f'{found["load_before_and_after"][1]:.1f} after.',
+        *([f'Ended early: {found["ended_early"]}'] if found['ended_early'] else []),
         '',
         f'- told on /diagnostics: {told} of {len(faults)}',
         f'- bands good again within two windows ({limit:g} s): {back} of {len(faults)}',
@@ -53,7 +54,8 @@ def report(found: dict[str, Any]) -> tuple[str, bool]:
             f'{part["upper"]:+.2f}) | {judged(part)} | {part["processes"]} |'
         )
     bounded = all(judged(part) == 'yes' for part in found['memory'].values())
-    passed = told == back == len(faults) and bounded and not missing
+    whole = bounded and not missing and not found['ended_early']
+    passed = told == back == len(faults) and whole
     verdict = 'Everything held.' if passed else 'Not everything held: see the numbers below.'
     return '\n'.join([f'**{verdict}**', '', *lines]) + '\n', passed
 
