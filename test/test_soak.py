@@ -33,9 +33,14 @@ def test_a_band_is_back_after_the_last_bad_one():
     fault = Fault('spike', 50.0, 1.0)
     judge.judge([fault], content([(51.5, 0.95), *hole]))
     assert fault.back == 7.0
+    # Nor where none came any more until the next fault.
+    fault, second = Fault('worker_killed', 50.0, 0.0), Fault('spike', 70.0, 0.0)
+    judge.judge([fault, second], content([b for b in bands if b[0] < 52 or b[0] > 75]))
+    assert np.isnan(fault.back) and second.back == 6.0
     # One that is bad only after the next fault is that one's.
     first, second = Fault('spike', 50.0, 1.0), Fault('spike', 55.0, 0.0)
-    judge.judge([first, second], content([(51.5, 0.95), *[b for b in bands if b[0] > 55.0]]))
+    late = [(t, 0.5 if 55 < t < 58 else 0.95) for t, _ in bands]
+    judge.judge([first, second], content([(51.5, 0.95), *[b for b in late if b[0] > 51.5]]))
     assert first.back == 0.5 and second.back == 3.0
 
 
@@ -111,6 +116,7 @@ def result(**more):
         'memory': {'recorder': grown(0.1, 0.0, 0.2)},
         'samples_missing_in_the_bag': 0,
         'ended_early': '',
+        'good_bands_per_hop': 0.8,
         'estimator': {},
         'worst_write_lag_s': '0.1',
         'callback_delay_s': {'median': 1e-4, 'p99': 1e-3},

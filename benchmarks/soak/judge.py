@@ -30,7 +30,8 @@ class Fault:
         time: when it began, wall clock [s].
         seconds: how long it lasted [s].
         told: whether it showed on /diagnostics.
-        back: from its end to the first good band after the last bad one [s]; NaN for never.
+        back: from its end to the first of good bands that last a window [s]; NaN for not before
+            the next fault.
     """
 
     kind: str
@@ -96,17 +97,27 @@ def read(bag: Path) -> Content:
 
 def judge(faults: Sequence[Fault], content: Content) -> None:
     """Fill in whether each fault was told, and when the bands were back."""
+    last = max((t for reports in content.reports.values() for t, _ in reports[-1:]), default=0.0)
+    last = max([last, *(t for t, _ in content.bands[-1:])])
     for number, fault in enumerate(faults):
-        following = faults[number + 1].time if number + 1 < len(faults) else float('inf')
+        following = faults[number + 1].time if number + 1 < len(faults) else last
         fault.told = _told(fault, content)
-        end = fault.time + fault.seconds
-        after = [(t, c) for t, c in content.bands if end < t < following]
-        times = [end, *(t for t, _ in after)]
-        # No band for longer than two hops is as bad as a bad one.
-        holes = [b - 1e-6 for a, b in pairwise(times) if b - a > HOLE]
-        since = max([end, *holes, *(t for t, c in after if c < GOOD)])
-        good = [t for t, c in after if c >= GOOD and t > since]
-        fault.back = good[0] - end if good else float('nan')
+        fault.back = _back(fault.time + fault.seconds, following, content.bands)
+
+
+def _back(end: float, following: float, bands: Sequence[tuple[float, float]]) -> float:
+    """Return the time from the end of a fault until bands are good, and stay so for a window.
+
+    No band for longer than two hops is as bad as a bad one.
+    """
+    after = [(t, c) for t, c in bands if end < t <= following]
+    for place, (begin, _) in enumerate(after):
+        until = min(begin + WINDOW, following)
+        lasting = [(t, c) for t, c in after[place:] if t <= until]
+        holes = any(b - a > HOLE for a, b in pairwise([*(t for t, _ in lasting), until]))
+        if not holes and all(c >= GOOD for _, c in lasting):
+            return begin - end
+    return float('nan')
 
 
 def _told(fault: Fault, content: Content) -> bool:
@@ -155,9 +166,12 @@ def summary(content: Content) -> dict[str, Any]:
         'latency median (s)',
         'latency p99 (s)',
     )
+    good = sum(c >= GOOD for _, c in content.bands)
+    hops = content.bands[-1][0] - content.bands[0][0] + 1.0 if content.bands else 1.0
     median, late = np.quantile(content.delays or [np.nan], (0.5, 0.99))
     return {
         'estimator': {key: last.get('estimator', {}).get(key) for key in keys},
+        'good_bands_per_hop': good / hops,
         'worst_write_lag_s': last.get('recorder', {}).get('worst bag write lag (s)'),
         'callback_delay_s': {'median': float(median), 'p99': float(late)},
     }

@@ -27,6 +27,8 @@ def report(found: dict[str, Any]) -> tuple[str, bool]:
         '',
         f'- told on /diagnostics: {told} of {len(faults)}',
         f'- bands good again within two windows ({limit:g} s): {back} of {len(faults)}',
+        '- good bands over the whole run, faults included: '
+        f'{100 * found["good_bands_per_hop"]:.0f} of 100 hops',
         f'- samples missing in the bag beyond the gaps that were told: {missing}',
         f'- from the sending of a block to the callback of the recorder: median '
         f'{1e3 * found["callback_delay_s"]["median"]:.2f} ms, p99 '
