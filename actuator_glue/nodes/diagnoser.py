@@ -85,7 +85,10 @@ class DiagnoserNode(WorkingNode):
         if self._request is not None:
             if not self.finished:
                 self.give_up()
-            self._finish(diagnosing.Outcome(message='the node was deactivated'))
+            seconds = time.monotonic() - self._last
+            text = f'given up after {seconds:.0f} s: the node was deactivated'
+            self.complain('diagnosis', f'{text}; a launch waits longer with linger:=SECONDS')
+            self._finish(diagnosing.Outcome(message=text))
 
     def do_cleanup(self) -> None:
         """End the worker, withdraw the action."""

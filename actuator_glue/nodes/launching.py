@@ -29,7 +29,10 @@ COMMON = {
         'parameter file of all nodes',
     ),
     'use_sim_time': ('false', 'take the time from /clock'),
-    'linger': ('5.0', 'time for the last windows, once the streams have ended [s]'),
+    'linger': (
+        '5.0',
+        'time for the last windows and a diagnosis that runs, once the streams have ended [s]',
+    ),
 }
 Given = Mapping[str, str]
 

@@ -104,3 +104,15 @@ def test_a_diagnosis_on_request_reports_its_progress_and_can_be_cancelled(start,
     probe.until(lambda: diagnoses, 10)
     assert diagnoses[0].verdict == answer.diagnosis.verdict
     assert diagnoser.end() == 0
+
+
+def test_a_diagnosis_that_is_given_up_is_told(start, probe):
+    """As when a launch ends while it runs: the log says so, and what to do."""
+    diagnoser = start('diagnoser')
+    client = ActionClient(probe, Diagnose, 'diagnoser/diagnose')
+    probe.until(client.server_is_ready, 60)
+    sent = client.send_goal_async(Diagnose.Goal(records=[str(BAGS / 'undeclared_clamped')]))
+    probe.until(sent.done, 20)
+    probe.until(lambda: probe.value('diagnoser', 'diagnosing') == 'True', 20)
+    assert diagnoser.end() == 0
+    assert 'given up after' in diagnoser.text and 'linger' in diagnoser.text
