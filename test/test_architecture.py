@@ -149,8 +149,32 @@ def test_core_is_pure(path: Path) -> None:
 
 @pytest.mark.parametrize('path', SOURCES, ids=identifier)
 def test_files_stay_small(path: Path) -> None:
-    """One idea per file."""
-    assert len(path.read_text(encoding='utf-8').splitlines()) <= 300
+    """One idea per file, and functions that can be called without counting."""
+    text = path.read_text(encoding='utf-8')
+    assert len(text.splitlines()) <= 300
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            how = ' '.join(map(ast.unparse, node.decorator_list))
+            given = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]
+            named = [a for a in given if a.arg not in ('self', 'cls')]
+            compiled = 'njit' in how or '_strict' in how
+            assert compiled or len(named) <= 8, f'{identifier(path)}:{node.lineno} {node.name}'
+
+
+def test_layout_is_left_to_the_formatter() -> None:
+    """Where lines are laid out by hand, a table is read as one."""
+    root = ROOT.parent
+    ours = [
+        p for f in ('test', 'benchmarks', 'launch', 'scripts') for p in (root / f).rglob('*.py')
+    ]
+    mark = '# fmt: ' + 'skip'
+    assert (
+        sum(p.read_text(encoding='utf-8').count(mark) for p in [*SOURCES, *OUTSIDE, *ours]) <= 20
+    )
+    # Tests too have one subject a file.
+    assert all(
+        len(p.read_text(encoding='utf-8').splitlines()) <= 300 for p in ours if 'test' in p.parts
+    )
 
 
 OUTSIDE = sorted(p for f in ('studies', 'examples') for p in (ROOT.parent / f).rglob('*.py'))

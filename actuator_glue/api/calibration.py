@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Literal
 
@@ -19,6 +19,7 @@ from actuator_glue.api.calibration_parts import (
 )
 from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.api.compilation import compilation
+from actuator_glue.api.options import chosen
 from actuator_glue.api.prior import check_prior, given_prior
 from actuator_glue.api.tracking import record_tracking
 from actuator_glue.diagnosis.data import SETTLE
@@ -72,6 +73,7 @@ class CalibrationOptions:
     prior_age: float = 0.0
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, 'effects', tuple(self.effects))
         if self.seed < 0:
             raise InputError(f'seed {self.seed} is negative')
         if self.settle is not None and self.settle < 0.0:
@@ -112,7 +114,7 @@ def calibrate(
         >>> posterior = calibrate([free, clamped], seed=3)  # doctest: +SKIP
         >>> posterior.parameters['beta_1'].mean  # doctest: +SKIP
     """
-    options = chosen(options or CalibrationOptions(), changes)
+    options = chosen(options or CalibrationOptions(), changes, 'calibrate')
     given = [records] if isinstance(records, Record) else list(records)
     model = sampled_model(options)
     cleaned, notes = clean(given)
@@ -196,23 +198,6 @@ def calibrate(
             for record in cleaned
         ),
     )
-
-
-def chosen(options: CalibrationOptions, changes: Mapping[str, Any]) -> CalibrationOptions:
-    """Return options with some of them replaced.
-
-    Raises:
-        InputError: no such option, or a value that cannot be used.
-    """
-    known = [f.name for f in fields(CalibrationOptions)]
-    unknown = sorted(set(changes) - set(known))
-    if unknown:
-        raise InputError(
-            f'calibrate has no option {", ".join(unknown)}; it has {", ".join(known)}'
-        )
-    if 'effects' in changes:
-        changes = {**changes, 'effects': tuple(changes['effects'])}
-    return replace(options, **changes)
 
 
 def sampled_model(options: CalibrationOptions) -> ModelChoice:

@@ -7,8 +7,9 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar
 
+from actuator_glue.api.options import chosen
 from actuator_glue.api.prior import given_prior
 from actuator_glue.api.provenance import provenance
 from actuator_glue.api.result import Result
@@ -109,17 +110,46 @@ class Diagnosis(DiagnosisData, Result):
         return page(self, tables(self.tracking))
 
 
+@dataclass(frozen=True, slots=True)
+class DiagnosisOptions:
+    """How to diagnose; every one has the default of the command line.
+
+    Attributes:
+        seed: seed of every random step; the same seed gives the same diagnosis.
+        jobs: threads for the refits of candidates; the result does not depend on it.
+        false_alarms: probability of an addition on a healthy machine.
+        prior: an earlier calibration of the actuator, or the file it was saved to: what it knew
+            of Eq. (2)'s parameters goes into fits and posterior. None for nothing.
+        drift: standard deviation by which the logarithm of each parameter may have moved in an
+            hour since (random walk) [h^-1/2].
+        prior_age: time since that calibration [s].
+    """
+
+    seed: int = 1
+    jobs: int = 2
+    false_alarms: float = 0.01
+    prior: Calibration | Path | str | None = None
+    drift: float = 0.02
+    prior_age: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise InputError(f'seed {self.seed} is negative')
+        if self.jobs < 1:
+            raise InputError(f'jobs {self.jobs} is below 1')
+        if not 0.0 < self.false_alarms < 1.0:
+            raise InputError(
+                f'false_alarms {self.false_alarms:g} is no probability between 0 and 1'
+            )
+
+
 def diagnose(
     records: Sequence[Record] | Record,
     holdout: Sequence[Record] | Record | None = None,
+    options: DiagnosisOptions | None = None,
     *,
-    seed: int = 1,
-    jobs: int = 2,
     progress: Progress | None = None,
-    false_alarms: float = 0.01,
-    prior: Calibration | Path | str | None = None,
-    drift: float = 0.02,
-    prior_age: float = 0.0,
+    **changes: Any,
 ) -> Diagnosis:
     """Ask whether Eq. (2) explains records and, if not, which effects it lacks.
 
@@ -127,43 +157,33 @@ def diagnose(
         records: one or several tests of one actuator, each with its specimen stiffness.
         holdout: record(s) that decide nothing and give the error before and after; without one,
             every fourth block of each record is set aside before any look.
-        seed: seed of every random step; the same seed gives the same diagnosis.
-        jobs: threads for the refits of candidates; the result does not depend on it.
+        options: how to diagnose; see DiagnosisOptions.
         progress: called with (stage, share of it done in [0, 1]).
-        false_alarms: probability of an addition on a healthy machine.
-        prior: an earlier calibration of the actuator, or the file it was saved to: what it knew
-            of Eq. (2)'s parameters goes into fits and posterior. None for nothing.
-        drift: standard deviation by which the logarithm of each parameter may have moved in an
-            hour since (random walk) [h^-1/2].
-        prior_age: time since that calibration [s].
+        changes: options by name that replace those of `options`.
 
     Returns:
         Verdict, additions with their evidence, error before and after, the augmented model.
 
     Raises:
-        InputError: stiffness not known, records too short, channels that cannot belong together.
+        InputError: stiffness not known, records too short, channels that cannot belong together,
+            or an option that cannot be used.
     """
-    if seed < 0:
-        raise InputError(f'seed {seed} is negative')
-    if jobs < 1:
-        raise InputError(f'jobs {jobs} is below 1')
-    if not 0.0 < false_alarms < 1.0:
-        raise InputError(f'false_alarms {false_alarms:g} is no probability between 0 and 1')
+    options = chosen(options or DiagnosisOptions(), changes, 'diagnose')
     given = [records] if isinstance(records, Record) else list(records)
     held = [holdout] if isinstance(holdout, Record) else list(holdout or ())
-    with ThreadPoolExecutor(jobs) as pool:
+    with ThreadPoolExecutor(options.jobs) as pool:
         found = core.diagnose(
             given,
             held,
-            seed=seed,
+            seed=options.seed,
             each=pool.map,
             progress=progress,
-            settings=Thresholds(false_alarms=false_alarms),
+            settings=Thresholds(false_alarms=options.false_alarms),
             clock=time.perf_counter,
-            prior=given_prior(prior, drift, prior_age),
+            prior=given_prior(options.prior, options.drift, options.prior_age),
         )
     values = {f.name: getattr(found, f.name) for f in fields(found)}
-    values['provenance'] = provenance([*given, *held], seed)
+    values['provenance'] = provenance([*given, *held], options.seed)
     return Diagnosis(**values, tracking=_tracking(found, clean(given)[0]))
 
 

@@ -7,13 +7,11 @@ import pytest
 import targets
 from scipy import stats
 
-from actuator_glue.inference import dream, metropolis, moves, student
+from actuator_glue.inference import metropolis, moves, student
 from actuator_glue.inference.adaptation import empty_counts, tuned
 from actuator_glue.inference.moves import MOVES
 from actuator_glue.inference.moves.draw import distinct
 from actuator_glue.inference.moves.move import (
-    NO_CLASS,
-    U_FREE,
     Move,
     ProposalContext,
     uniforms_per_chain,
@@ -21,7 +19,6 @@ from actuator_glue.inference.moves.move import (
 )
 from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.inference.transforms.log import Log
-from actuator_glue.jit import njit
 from actuator_glue.records import Array
 
 SETTINGS = SamplerSettings()
@@ -256,49 +253,3 @@ def test_an_independent_draw_knows_how_far_from_the_centre_it_is(dimension, rng_
         distance2 = student.draw(uniforms, 0, centre, factor, point)
         away = np.linalg.solve(factor, point - centre)
         np.testing.assert_allclose(distance2, away @ away, rtol=1e-9)
-
-
-@njit(cache=False)
-def _uniform_step(z, uniforms, rows, size, tuning, knobs, scratch, candidate):
-    """A walk of one coordinate, a standard deviation either way; no archive, no correction."""
-    at = min(int(uniforms[U_FREE] * z.size), z.size - 1)
-    candidate[:] = z
-    candidate[at] += tuning.scale[at] * 2.0 * (2.0 * uniforms[U_FREE + 1] - 1.0)
-    return 0.0, NO_CLASS
-
-
-@pytest.mark.parametrize('share', [0.5, None], ids=['fixed', 'by what it achieves'])
-def test_a_fourth_move_is_registered_from_outside(share: float | None, rng_seed: int) -> None:
-    """It is made as often as it says, samples right, and crossover statistics stay in place."""
-    walk = Move('walk', _uniform_step, lambda dimension, pairs: 2, share=share, most=0.5)
-    settings = SamplerSettings(moves=(*MOVES, walk), adaptation=50)
-    target = targets.scales()
-    runs = []
-    for rng in np.random.default_rng(rng_seed).spawn(8):
-        run = dream.sample(
-            rng,
-            target.log_density,
-            target.lower,
-            target.upper,
-            evaluations=15_000,
-            settings=settings,
-        )
-        scores = (run.posterior() - target.mean) / target.sd
-        runs.append(np.append(scores.mean(axis=0), (scores**2).mean(axis=0)))
-    truth = np.repeat((0.0, 1.0), 4)
-    assert (np.abs(targets.t_values(np.array(runs), truth)) < targets.t_limit(8, 8, 1e-6)).all()
-
-    rng = np.random.default_rng(rng_seed)
-    state = dream.init(rng, target.log_density, target.lower, target.upper, settings)
-    state = state._replace(counts=np.zeros_like(state.counts), settings=settings)
-    made: list[int] = []
-    classes = np.zeros(settings.crossovers)
-    for _ in range(40):
-        state, info = dream.step(rng, state)
-        made += info.move.tolist()
-        classes += np.bincount(info.crossover[info.crossover >= 0], minlength=len(classes))
-    uses = state.counts[:, 0]
-    assert np.array_equal(uses[:4], np.bincount(made, minlength=4)) and uses[3] > 0
-    assert np.array_equal(uses[4:], classes)
-    if share is not None:
-        assert abs(np.mean(np.array(made) == 3) - share) < 0.1

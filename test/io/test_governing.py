@@ -70,10 +70,8 @@ def test_calibrate_and_replay_agree(tmp_path: Path, record: Record, case: str) -
     assert [r.stiffness for r in records] == [0.0, 5e4, 7e4]
     seen = [0, 0, 0]
     for window in windows(tmp_path / 'bag'):
-        (k,) = (
-            i for i, r in enumerate(records)
-            if r.start_ns <= window.record.start_ns < r.stamp_ns(len(r))
-        )  # fmt: skip
+        at = window.record.start_ns
+        (k,) = (i for i, r in enumerate(records) if r.start_ns <= at < r.stamp_ns(len(r)))
         held, first = records[k], window.record.first_index - records[k].first_index
         seen[k] += 1
         assert (window.record.stiffness, window.record.hold) == (held.stiffness, held.hold)

@@ -65,6 +65,7 @@ print(np.abs(a - none).max(), np.abs(a - b).max())
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(900)
 def test_one_file_is_enough(tmp_path: Path) -> None:
     """Rows, switch, coefficients and the compiled step follow from the file."""
     package = tmp_path / 'actuator_glue'
@@ -81,7 +82,7 @@ def test_one_file_is_enough(tmp_path: Path) -> None:
         check=True,
         capture_output=True,
         text=True,
-        timeout=280,
+        timeout=850,
     )
     size, difference = (float(word) for word in done.stdout.split())
     # Both take the flow's slope with the increment differently: none against the exact one.

@@ -1,93 +1,20 @@
 """The estimator's state machine: jobs, warm start, forecasts, and replays to the last bit."""
 
-import pickle
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from live import Live, Message, is_result, results, same
 from online_streams import RATE, SETTINGS, THETA, record
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.online import wire
-from actuator_glue.online.estimator import Ahead, Estimator, Schedule
-from actuator_glue.online.job import WindowResult, run
+from actuator_glue.online.estimator import Ahead
 from actuator_glue.online.playback import replay, stream
 from actuator_glue.online.published import differences
 from actuator_glue.online.stream import Block, Dropped, Failed, Preview
 from actuator_glue.setups import StreamSetup
-
-
-def results(items, **more):
-    """Results of a replay, events left out."""
-    return [r for r in replay(items, more.pop('settings', SETTINGS), **more) if is_result(r)]
-
-
-def is_result(item):
-    return isinstance(item, WindowResult)
-
-
-def fields(result):
-    """Everything a result publishes."""
-    bands = [wire.prediction(p, 'a')[1] for p in (*result.scored, *result.forecast)]
-    return [wire.posterior(result, 0.0)[1], *bands, wire.response(result)[1]]
-
-
-def same(one, other):
-    """Whether two results publish the same bits."""
-    pairs = list(zip(fields(one), fields(other), strict=True))
-    return all(not differences(a, Message(b)) for a, b in pairs)
-
-
-class Message:
-    """Fields with attributes, as a message has them."""
-
-    def __init__(self, given):
-        self.__dict__.update(given)
-
-
-class Live:
-    """An estimator as the node drives it, some windows slow, dropped or stopped early."""
-
-    def __init__(self, items, drop=(), stop=None, models=None):
-        self.results, self.events, self.done, self.models = [], [], {}, []
-        estimator = Estimator(SETTINGS, choose_model(), live=True)
-        self.models.append((0, estimator.model))
-        busy = 0
-        for item in items:
-            if isinstance(item, StreamSetup):
-                self.events += estimator.setup(item)
-            elif isinstance(item, Preview):
-                self.events += estimator.preview(item)
-            else:
-                self.events += estimator.push(item)
-            busy -= 1
-            if busy > 0:
-                continue
-            self.events += estimator.drop(lambda _: True)
-            job = estimator.next_job()
-            if job is None:
-                continue
-            number = job.window.number
-            if models and number >= models[0] and not job.model.effects:
-                estimator.running = None
-                estimator._waiting.insert(0, job.window)
-                estimator.set_model(models[1])
-                job = estimator.next_job()
-                self.models.append((number, models[1]))
-            asked = iter(range(10**9))
-            expired = None if stop is None else (lambda asked=asked: next(asked) >= stop)
-            result = run(pickle.loads(pickle.dumps(job)), expired)
-            self.events += estimator.finish(pickle.loads(pickle.dumps(result)))
-            if number in drop:
-                busy = 25  # blocks pass by while a window is computed
-            if not result.failure:
-                self.results.append(result)
-                key = (result.window.record.first_index, result.window.record.start_ns)
-                self.done[key] = (number, result.evaluations)
-
-    def schedule(self):
-        return Schedule(self.done, tuple(self.models))
 
 
 def test_a_stream_gives_the_posterior_and_honest_bands():
@@ -242,78 +169,6 @@ def test_what_one_record_cannot_identify_is_flagged():
     assert abs(np.log(ratio.mean() / (THETA[1] / THETA[2]))) < 0.02
     held = results(stream(record(4.0)))[-1]
     assert held.prior_dominated[1] and held.prior_dominated[2] and not held.prior_dominated[0]
-
-
-def test_few_windows_wait_live():
-    estimator = Estimator(SETTINGS, choose_model(), live=True)
-    whole = record(8.0)
-    events = []
-    for item in stream(whole, 200):
-        events += estimator.setup(item) if isinstance(item, StreamSetup) else estimator.push(item)
-        estimator.next_job()  # the first is never finished
-    assert estimator.running is not None
-    assert [w.number for w in estimator.waiting] == [9, 10, 11, 12]
-    assert [e.number for e in events if isinstance(e, Dropped)] == list(range(1, 9))
-    assert estimator.abandon('its process has died')[0].number == 0
-    assert estimator.next_job().window.number == 9
-
-
-def test_nothing_depends_on_a_window_that_failed():
-    """A replay leaves it out: its bands must be scored by the next window, live as well."""
-    items = list(stream(record(6.0), 50))
-    live, told = Estimator(SETTINGS, choose_model(), live=True), []
-    for item in items:
-        live.setup(item) if isinstance(item, StreamSetup) else live.push(item)
-        while (job := live.next_job()) is not None:
-            result = run(job)
-            if job.window.number in (3, 4):
-                result = WindowResult(job.window, SETTINGS, job.model, failure='out of time')
-            else:
-                told.append(result)
-            live.finish(result)
-    done = {
-        (r.window.record.first_index, r.window.record.start_ns): (r.window.number, r.evaluations)
-        for r in told
-    }
-    again = results(items, schedule=Schedule(done))
-    assert len(again) == len(told) > 4
-    assert all(same(one, other) for one, other in zip(told, again, strict=True))
-
-
-def test_windows_that_are_late_are_dropped_but_never_the_newest():
-    estimator = Estimator(SETTINGS, choose_model(), live=True)
-    for item in stream(record(3.5), 700):
-        estimator.setup(item) if isinstance(item, StreamSetup) else estimator.push(item)
-    assert [w.number for w in estimator.waiting] == [0, 1, 2, 3]
-    assert not estimator.drop(lambda window: False)
-    told = estimator.drop(lambda window: window.number < 2)
-    assert [(e.number, e.index) for e in told] == [(0, 0), (1, 100)]
-    assert [e.number for e in estimator.drop(lambda window: True)] == [2]
-    assert [w.number for w in estimator.waiting] == [3]
-
-
-def test_a_window_that_waits_forecasts_from_its_own_end():
-    estimator = Estimator(SETTINGS, choose_model(), live=True)
-    whole = record(4.0)
-    estimator.preview(Preview(0, whole.period, whole.command))
-    for item in stream(whole, 50):
-        estimator.setup(item) if isinstance(item, StreamSetup) else estimator.push(item)
-    job = estimator.next_job()
-    start, stop = job.window.end, job.forecast[1]
-    assert start < stop < len(whole)
-    assert np.array_equal(job.ahead, whole.command[start:stop])
-
-
-def test_a_window_ends_when_its_draws_will_do():
-    items = list(stream(record(4.0)))
-    sooner = results(items, settings=replace(SETTINGS, evaluations=8000, ess=200))
-    never = results(items, settings=replace(SETTINGS, evaluations=8000, ess=10**6))
-    assert len(sooner) == len(never) > 2
-    for few, all_of_them in zip(sooner, never, strict=True):
-        # Well before the others, the start aside; such a window is a whole one.
-        assert few.evaluations < 0.9 * all_of_them.evaluations
-        assert few.ess.min() >= 200 and few.rhat.max() <= 0.5 * (1.0 + SETTINGS.rhat_limit)
-        assert not few.stopped_early and not all_of_them.stopped_early
 
 
 def test_the_models_box_is_checked():
