@@ -177,12 +177,17 @@ def respond(
     return out.T
 
 
+def initial_samples(record: Record) -> int:
+    """Return how many measured samples `initial_state` looks at."""
+    return min(len(record), max(3, 1 + round(_FIT_SPAN / record.period)))
+
+
 def initial_state(record: Record) -> tuple[float, float]:
     """Return position [m] and velocity [m/s] at a record's first sample.
 
     A straight line is fitted to the first 10 ms of measured displacement, three samples or more.
     """
-    n = min(len(record), max(3, 1 + round(_FIT_SPAN / record.period)))
+    n = initial_samples(record)
     time = record.period * (np.arange(n) - 0.5 * (n - 1))
     first = record.measured[:n]
     velocity = float(time @ first / (time @ time))

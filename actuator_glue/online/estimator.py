@@ -205,12 +205,12 @@ class Estimator:
 
     def _judged(self, window: Window) -> tuple[Frozen, ...]:
         """Return the earlier posteriors whose forecasts a window's samples judge."""
-        record = window.record
-        settled = record.first_index + round(self.settings.settle / record.period)
+        first = window.recent.first_index
+        # All commands since their windows' ends are known.
         return tuple(
             f
             for f in self._memory.frozen
-            if f.segment == window.segment and f.stop <= window.end and f.start >= settled
+            if f.segment == window.segment and first <= f.end and f.stop <= window.end
         )
 
     def _planned(self, window: Window) -> Window | None:

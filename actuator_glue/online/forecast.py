@@ -12,7 +12,7 @@ from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.inference.predictive import ResidualModel
 from actuator_glue.jit import njit
 from actuator_glue.online.mixture import mixture_band
-from actuator_glue.records import Array
+from actuator_glue.records import Array, Record
 
 # PARAMETER holds the spread of the parameters, TOTAL adds what the model left over in its window
 # (honest about a model that lacks something), NOISE adds the sensor's noise only: measurements
@@ -36,6 +36,8 @@ class Frozen:
         draws: posterior draws, shape (m, p).
         residual: what the best draw left over in its window [m].
         noise: standard deviation of the sensor noise [m].
+        past: last samples of its window, from which its responses run on: nothing measured after
+            the window's end enters a forecast, whenever it is computed.
     """
 
     number: int
@@ -46,6 +48,12 @@ class Frozen:
     draws: Array
     residual: ResidualModel
     noise: float
+    past: Record
+
+    @property
+    def end(self) -> int:
+        """Running index one past the last sample of its window."""
+        return self.past.first_index + len(self.past)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,36 +110,35 @@ def predictions(
     frozen: Frozen,
     simulated: Array,
     *,
-    stamp_ns: int,
-    period: float,
     levels: tuple[float, ...],
-    seed: tuple[int, ...],
+    seed: int,
     measured: Array | None = None,
 ) -> list[Prediction]:
     """Return the bands of a frozen posterior over its forecast, scored where it was measured.
 
+    The bands do not depend on whether they are scored: what is scored is what was published.
+
     Args:
         frozen: the posterior.
         simulated: response of each of its draws over the forecast, shape (m, n) [m].
-        stamp_ns: acquisition time of the first sample [ns].
-        period: time between samples [s].
         levels: probability of each band.
-        seed: seeds the draws of the residual, so that a replay repeats them.
+        seed: of the estimator; with the forecast's first index it seeds the residual's draws.
         measured: the samples, shape (n,) [m], where they are known by now.
     """
     if not np.isfinite(simulated).all():
         simulated = simulated[np.isfinite(simulated).all(axis=1)]
     if len(simulated) < 2:
         return []
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng((seed, frozen.start, 1))
     mean, sd = frozen.residual.levels(rng, len(simulated))
+    sensor = np.full(len(simulated), max(frozen.noise, TINY))
     bands: list[tuple[Kind, Band]] = [
         ('parameter', band(simulated, levels)),
         ('total', mixture_band(simulated, mean, np.maximum(sd, TINY), levels)),
+        ('noise', mixture_band(simulated, mean, sensor, levels)),
     ]
-    if measured is not None:
-        sensor = np.full(len(simulated), max(frozen.noise, TINY))
-        bands.append(('noise', mixture_band(simulated, mean, sensor, levels)))
+    past = frozen.past
+    stamp_ns = past.stamp_ns(frozen.start - past.first_index)
     found = []
     for kind, limits in bands:
         inside, error = None, float('nan')
@@ -142,7 +149,15 @@ def predictions(
         width = np.asarray((limits.upper - limits.lower).mean(axis=1))
         found.append(
             Prediction(
-                frozen.number, frozen.start, stamp_ns, period, kind, limits, width, inside, error
+                number=frozen.number,
+                index=frozen.start,
+                stamp_ns=stamp_ns,
+                period=past.period,
+                kind=kind,
+                band=limits,
+                width=width,
+                coverage=inside,
+                rms_error=error,
             )
         )
     return found

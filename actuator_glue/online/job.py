@@ -19,7 +19,7 @@ from actuator_glue.online.response import ResponseBand, response_band
 from actuator_glue.online.sampling import Job, WindowFit
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Window
-from actuator_glue.records import Array, Record
+from actuator_glue.records import Array
 
 # Generations that R-hat and ESS are computed from.
 DIAGNOSED = 150
@@ -136,8 +136,7 @@ def _report(job: Job, fitted: WindowFit, limits: bool) -> WindowResult:
     # R-hat and ESS of very many draws would cost more than the sampling.
     rhat, ess = rhat_and_ess(chains.kept[:: max(1, len(chains.kept) // DIAGNOSED)])
     summary = moments(chains.posterior(), *model.bounds)
-    seed = (settings.seed, record.first_index)
-    scored = [p for old in job.frozen for p in _score(job, old, seed)]
+    scored = [p for old in job.frozen for p in _score(job, old)]
     if not limits:
         scored = [replace(p, band=p.band.slice(0, 0)) for p in scored]
     return WindowResult(
@@ -159,7 +158,7 @@ def _report(job: Job, fitted: WindowFit, limits: bool) -> WindowResult:
             response_band(frozen.draws, record.known_stiffness(), settings) if limits else None
         ),
         scored=tuple(scored),
-        forecast=tuple(_forecast(job, frozen, seed)) if limits else (),
+        forecast=tuple(_forecast(job, frozen)) if limits else (),
         frozen=frozen,
         archive=fitted.archive,
         learned=fitted.learned,
@@ -167,48 +166,46 @@ def _report(job: Job, fitted: WindowFit, limits: bool) -> WindowResult:
     )
 
 
-def _score(job: Job, old: Frozen, seed: tuple[int, int]) -> list[Prediction]:
-    """Hold an earlier posterior against the samples of this window that it forecast."""
-    record = job.window.record
-    start, stop = old.start - record.first_index, old.stop - record.first_index
+def _score(job: Job, old: Frozen) -> list[Prediction]:
+    """Hold an earlier posterior against the samples of its forecast, as this window holds them."""
+    record = job.window.recent
+    end, start, stop = (i - record.first_index for i in (old.end, old.start, old.stop))
     return predictions(
         old,
-        _respond(job, old, record, start, stop),
-        stamp_ns=record.stamp_ns(start),
-        period=record.period,
+        _respond(old, record.command[end:stop]),
         levels=job.settings.levels,
-        seed=(*seed, 1, old.number),
+        seed=job.settings.seed,
         measured=record.measured[start:stop],
     )
 
 
-def _respond(job: Job, frozen: Frozen, record: Record, start: int, stop: int) -> Array:
-    """Response of frozen draws over start:stop, its initial state forgotten, shape (m, n) [m]."""
-    settle = round(job.settings.settle / record.period)
-    # Eq. (2) forgets; an effect may remember the whole window (yield, drift).
-    begin = 0 if frozen.model.effects or settle == 0 else max(0, start - 2 * settle)
-    part = record.slice(begin, stop)
-    return fitting.simulate(frozen.model, frozen.draws, part, start - begin)
-
-
-def _forecast(job: Job, frozen: Frozen, seed: tuple[int, int]) -> list[Prediction]:
+def _forecast(job: Job, frozen: Frozen) -> list[Prediction]:
     """Bands over the samples to come, where their commands are known."""
-    record, ahead = job.window.record, job.ahead
-    if ahead is None:
+    if job.ahead is None:
         return []
-    longer = replace(
-        record,
-        command=np.concatenate([record.command, ahead]),
-        # Only the first measured samples are used, for the initial state.
-        measured=np.concatenate([record.measured, np.full(len(ahead), record.measured[-1])]),
-        force=None,
-    )
-    start = frozen.start - record.first_index
     return predictions(
         frozen,
-        _respond(job, frozen, longer, start, len(longer)),
-        stamp_ns=record.stamp_ns(start),
-        period=record.period,
+        _respond(frozen, job.ahead),
         levels=job.settings.levels,
-        seed=(*seed, 2, frozen.number),
+        seed=job.settings.seed,
+    )
+
+
+def _respond(frozen: Frozen, ahead: Array) -> Array:
+    """Response of frozen draws over their forecast, shape (m, n) [m].
+
+    Args:
+        frozen: the posterior.
+        ahead: commands from its window's end to its forecast's [m].
+    """
+    past = frozen.past
+    longer = replace(
+        past,
+        command=np.concatenate([past.command, ahead]),
+        # Only the first measured samples are used, for the initial state.
+        measured=np.concatenate([past.measured, np.full(len(ahead), past.measured[-1])]),
+        force=None,
+    )
+    return fitting.simulate(
+        frozen.model, frozen.draws, longer, frozen.start - past.first_index
     )

@@ -19,6 +19,7 @@ from actuator_glue.inference.predictive import fit_residual
 from actuator_glue.inference.prior_conflict import Conflict, conflict
 from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.inference.state import State
+from actuator_glue.model import linear
 from actuator_glue.online import fitting
 from actuator_glue.online.forecast import Frozen, sensor_noise
 from actuator_glue.online.settings import EstimatorSettings
@@ -73,10 +74,9 @@ class Job:
     def forecast(self) -> tuple[int, int]:
         """Running index of the first sample the posterior forecasts, and one past the last."""
         settings, end, period = self.settings, self.window.end, self.window.record.period
-        return (
-            end + round(settings.time_budget / period),
-            end + round((settings.time_budget + settings.hop) / period),
-        )
+        hop = max(1, round(settings.hop / period))
+        start = end + min(round(settings.time_budget / period), hop)
+        return start, start + hop
 
     @property
     def chains(self) -> int:
@@ -152,6 +152,7 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> WindowFit:
             draws=posterior[spread(len(posterior), job.settings.draws)],
             residual=fit_residual(residual, parameters=len(job.model.names)),
             noise=noise,
+            past=_past(job, start),
         ),
         archive=_archive(posterior[spread(len(posterior), ARCHIVE)], job.archive),
         learned=(
@@ -162,6 +163,20 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> WindowFit:
         conflict=None if target.prior is None else conflict(target.prior, posterior),
         complete=complete,
     )
+
+
+def _past(job: Job, start: int) -> Record:
+    """Return the last samples of a window, as many as a forecast from `start` on runs up with.
+
+    Twice the settling time before the forecast, and never less than gives the initial state.
+    """
+    record, settle = job.window.record, round(job.settings.settle / job.window.record.period)
+    # Eq. (2) forgets; an effect may remember the whole window (yield, drift).
+    if job.model.effects or settle == 0:
+        return record
+    known = len(record) - linear.initial_samples(record)
+    begin = min(start - record.first_index - 2 * settle, known)
+    return record.slice(max(0, begin), len(record))
 
 
 def _target(job: Job) -> Target:

@@ -122,12 +122,15 @@ class Window:
         record: the samples, those that only let the state be forgotten included.
         epoch: counts the actuators; a posterior of one says nothing about the next.
         segment: counts the restarts; samples of one segment are contiguous.
+        recent: the samples of the last two hops at least, where so many have come, and those of
+            the record: all that judge the forecast of the window two hops before.
     """
 
     number: int
     record: Record
     epoch: int
     segment: int
+    recent: Record
 
     @property
     def end(self) -> int:

@@ -181,7 +181,7 @@ class SlidingWindows:
         if before is None or setup.period != before.period or self._tail is None:
             self._window = max(2, round(self.settings.window / setup.period))
             self._hop = max(1, round(self.settings.hop / setup.period))
-            self._tail = Tail(self._window)
+            self._tail = Tail(max(self._window, 2 * self._hop))
         index = setup.index if self._next is None else max(setup.index, self._next)
         known = 'unknown' if setup.stiffness is None else f'{setup.stiffness:g} N/m'
         message = (
@@ -200,24 +200,29 @@ class SlidingWindows:
             stop = min(len(block), start + self._hop - here % self._hop)
             tail.append(block.command[start:stop], block.measured[start:stop])
             end = block.index + stop
-            full = end % self._hop == 0 and len(tail) == self._window
+            full = end % self._hop == 0 and len(tail) >= self._window
             if full and setup.stiffness is not None:
-                stamp = block.stamp_ns + round((stop - self._window) * block.period * 1e9)
-                windows.append(self._cut(end, stamp, setup, tail))
+                windows.append(self._cut(block, stop, setup, tail))
             start = stop
 
-    def _cut(self, end: int, stamp_ns: int, setup: StreamSetup, tail: Tail) -> Window:
-        command, measured = tail.last(self._window)
-        record = Record(
-            command=command,
-            measured=measured,
-            period=setup.period,
-            stiffness=setup.stiffness,
-            start_ns=stamp_ns,
-            first_index=end - self._window,
-            hold=setup.hold,
-            actuator=setup.actuator,
-        )
+    def _cut(self, block: Block, stop: int, setup: StreamSetup, tail: Tail) -> Window:
+        """Return the window that ends with the sample before `stop` of a block."""
+
+        def last(count: int) -> Record:
+            command, measured = tail.last(count)
+            return Record(
+                command=command,
+                measured=measured,
+                period=setup.period,
+                stiffness=setup.stiffness,
+                start_ns=block.stamp_ns + round((stop - count) * block.period * 1e9),
+                first_index=block.index + stop - count,
+                hold=setup.hold,
+                actuator=setup.actuator,
+            )
+
+        record = last(self._window)
+        recent = record if len(tail) == self._window else last(len(tail))
         number = self.tally.windows
         self.tally.windows += 1
-        return Window(number, record, self._epoch, self.tally.restarts)
+        return Window(number, record, self._epoch, self.tally.restarts, recent)
