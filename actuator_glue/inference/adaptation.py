@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from actuator_glue.inference import student
+from actuator_glue.inference import bend, student
 from actuator_glue.inference.archive import newest
 from actuator_glue.inference.moves.move import UNTEMPERED, Knobs, ProposalContext, Tuning
 from actuator_glue.inference.settings import SamplerSettings
@@ -52,6 +52,8 @@ def tuned(points: Array, counts: Array, settings: SamplerSettings, box: Log) -> 
             np.empty(d),
             np.empty(d),
             np.empty((d, d)),
+            np.empty(d),
+            np.empty(d),
         ),
         tempering=UNTEMPERED,
         fixed=np.array([-1.0 if move.share is None else move.share for move in moves]),
@@ -128,6 +130,11 @@ def _fit(points: Array, counts: Array, context: ProposalContext, crossover: bool
         for k in range(j + 1):
             scale[j] += tuning.factor[j, k] * tuning.factor[j, k]
         scale[j] = math.sqrt(scale[j])
+    if bend.fit(points, tuning.centre, tuning.factor, tuning.along, tuning.across):
+        straight = points.copy()
+        for i in range(len(straight)):
+            bend.shift(straight[i], tuning.centre, tuning.along, tuning.across, -1.0)
+        student.fit(straight, tuning.centre, tuning.factor)
 
 
 @njit(fastmath=False)

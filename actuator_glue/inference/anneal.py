@@ -39,12 +39,27 @@ class Reference(NamedTuple):
     factor: Array
 
 
-class Population(NamedTuple):
-    """Points z (m, p), x (m, p) with their log density (m,) at the last temperature reached."""
+class Points(NamedTuple):
+    """Points z (m, p), x (m, p) with their log density (m,)."""
 
     z: Array
     x: Array
     log_density: Array
+
+
+class Population(NamedTuple):
+    """What annealing leaves.
+
+    Attributes:
+        points: at the last temperature reached.
+        before: at the temperature before, or of the reference: spread wider than the posterior.
+        counts: what the moves achieved at the last temperature.
+        power: the last one reached.
+        evaluations: how many were made.
+    """
+
+    points: Points
+    before: Points
     counts: Array
     power: float
     evaluations: int
@@ -93,6 +108,7 @@ def anneal(
     check_values(values, x)
     evaluations = size
     power = 0.0
+    before = Points(z, x, values)
     counts = empty_counts(settings)
     density = compiled(log_density)
     chains = max(size // settings.steps, 2)
@@ -100,6 +116,7 @@ def anneal(
     most = math.inf if limit is None else limit
     start, target = np.empty(chains, np.intp), np.empty(chains)
     while power < 1.0 and evaluations + chains * settings.steps <= most:
+        before = Points(z, x, values)
         chosen = np.empty(len(z), np.intp)
         power = _reweigh(
             z,
@@ -128,7 +145,7 @@ def anneal(
         z = path.z.swapaxes(0, 1).reshape(-1, dimension)
         x, log_jacobian = box.inverse(z)
         values = path.log_density.swapaxes(0, 1).reshape(-1)
-    return Population(z, x, values, counts, power, evaluations)
+    return Population(Points(z, x, values), before, counts, power, evaluations)
 
 
 # Strict floating point: not-a-number and minus infinity are asked for.

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 from actuator_glue.errors import InputError
 from actuator_glue.inference.adaptation import empty_counts, tuned
 from actuator_glue.inference.anneal import (
+    Points,
     Population,
     anneal,
     archive_reference,
@@ -66,20 +67,22 @@ def init(
     settings = settings or SamplerSettings()
     box = Log(lower, upper)
     start = _points(rng, log_density, box, settings, archive, limit)
-    # Chains start at points spread over the population; impossible points are no start.
-    possible = np.where(np.isfinite(start.log_density), 0.0, -np.inf)
+    # Chains start at points spread over the population one temperature above the posterior: R-hat
+    # compares chains that began further apart than they must end. Impossible points are no start.
+    wide, z = start.before, start.points.z
+    possible = np.where(np.isfinite(wide.log_density), 0.0, -np.inf)
     chosen = resample(rng, possible, settings.chains)
-    _, log_jacobian = box.inverse(start.z[chosen])
+    _, log_jacobian = box.inverse(wide.z[chosen])
     return State(
         now=ChainState(
-            z=start.z[chosen],
-            x=start.x[chosen],
-            log_density=start.log_density[chosen],
-            log_target=start.log_density[chosen] + log_jacobian,
+            z=wide.z[chosen],
+            x=wide.x[chosen],
+            log_density=wide.log_density[chosen],
+            log_target=wide.log_density[chosen] + log_jacobian,
         ),
-        archive=Archive.of(start.z),
-        context=tuned(start.z, start.counts, settings, box),
-        fitted=len(start.z),
+        archive=Archive.of(z),
+        context=tuned(z, start.counts, settings, box),
+        fitted=len(z),
         counts=empty_counts(settings),
         sum_log_density=np.zeros(settings.chains),
         made=0,
@@ -112,7 +115,8 @@ def _points(
             values[: settings.chains] = evaluate(log_density, x[: settings.chains])
             check_values(values, x)
             counts = empty_counts(settings)
-            return Population(reference.points, x, values, counts, 1.0, settings.chains)
+            points = Points(reference.points, x, values)
+            return Population(points, points, counts, 1.0, settings.chains)
     return anneal(rng, log_density, box, reference, settings, limit)
 
 

@@ -206,6 +206,4 @@ def _respond(frozen: Frozen, ahead: Array) -> Array:
         measured=np.concatenate([past.measured, np.full(len(ahead), past.measured[-1])]),
         force=None,
     )
-    return fitting.simulate(
-        frozen.model, frozen.draws, longer, frozen.start - past.first_index
-    )
+    return fitting.simulate(frozen.model, frozen.draws, longer, frozen.start - past.first_index)

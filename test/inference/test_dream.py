@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import targets
-from scipy import integrate, stats
+from scipy import stats
 
 from actuator_glue.inference.convergence import ess_bulk
 from actuator_glue.inference.dream import Chains, SamplerSettings, sample
@@ -89,30 +89,19 @@ def test_two_modes_ten_sigma_apart(rng_seed: int) -> None:
     _check_moments(target, both)
 
 
-@pytest.mark.slow
-@pytest.mark.timeout(900)
-def test_banana(rng_seed: int) -> None:
-    """Moments of the coordinates that the twist left Gaussian, and the mass of the two tips.
+def test_ten_dimensional_banana_with_default_settings(rng_seed: int) -> None:
+    """Variances of the two bent coordinates, as long a run as `calibrate` makes by default.
 
-    The variance of the twisted coordinate itself is a fourth moment of the other: its estimates
-    scatter too widely for Student's t.
+    Over seeds the variance of x_1 scatters by 1.3 % and that of x_2, a fourth moment of x_1, by 4 %:
+    one run in a hundred thousand is 6 % off, the mean of eight never 5 %.
     """
-    target, twist, tip = targets.banana(), 0.1, -10.0
-    runs = _replicates(target, rng_seed, 16, 800_000, SamplerSettings())
-    beyond, _ = integrate.quad(
-        lambda z: stats.norm.pdf(z) * stats.norm.cdf(tip - 100.0 * twist * (1.0 - z * z)), -8, 8
-    )
-    estimates = []
-    for run in runs:
-        # The first draws know the middle better than the tips: E[x_1^2] is 0.85 in the first
-        # eighth of 1.6 million evaluations and 0.98 +- 0.03 in the last half.
-        draws = run.draws[len(run.draws) // 2 :].reshape(-1, run.draws.shape[2])
-        straight = draws / np.where(np.arange(draws.shape[1]) == 0, 10.0, 1.0)
-        straight[:, 1] = draws[:, 1] + twist * (draws[:, 0] ** 2 - 100.0)
-        mass = (draws[:, 1] < tip).mean() / beyond
-        estimates.append([*straight.mean(axis=0), *(straight**2).mean(axis=0), mass])
-    d = len(target.mean)
-    _check_estimates(np.array(estimates), np.array([0.0] * d + [1.0] * (d + 1)))
+    target = targets.banana()
+    runs = _replicates(target, rng_seed, 8, 60_000, SamplerSettings())
+    squares = np.array([(_scores(run, target)[:, :2] ** 2).mean(axis=0) for run in runs])
+    assert np.abs(squares[:, 0] - 1.0).max() < 0.08, squares
+    assert (np.abs(squares.mean(axis=0) - 1.0) < (0.05, 0.08)).all(), squares
+    assert max(run.rhat.max() for run in runs) < 1.02
+    _check_moments(target, runs)
 
 
 @pytest.mark.slow

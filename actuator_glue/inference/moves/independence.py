@@ -1,7 +1,7 @@
-"""Independence move: candidates from a Student t fitted to the archive.
+"""Independence move: candidates from a Student t fitted to the archive, bent as the archive is.
 
-An addition to Vrugt (2016): where the posterior is near a single hill the fitted density proposes
-almost independent draws; elsewhere its share falls by itself (see adaptation.py).
+An addition to Vrugt (2016): where the posterior is near a single hill, bent or not, the fitted
+density proposes almost independent draws; elsewhere its share falls by itself (see adaptation.py).
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from typing import Final
 
-from actuator_glue.inference import student
+from actuator_glue.inference import bend, student
 from actuator_glue.inference.moves.move import (
     NO_CLASS,
     U_FREE,
@@ -34,9 +34,12 @@ def propose(
     candidate: Array,
 ) -> tuple[float, int]:
     """Write a candidate that does not depend on z: a `Move.propose`."""
-    centre, factor = tuning.centre, tuning.factor
+    centre, factor, along, across = tuning.centre, tuning.factor, tuning.along, tuning.across
+    candidate[:] = z
+    bend.shift(candidate, centre, along, across, -1.0)
+    here = student.DEGREES + student.distance2(candidate, centre, factor, scratch.residual)
     there = student.DEGREES + student.draw(uniforms, U_FREE, centre, factor, candidate)
-    here = student.DEGREES + student.distance2(z, centre, factor, scratch.residual)
+    bend.shift(candidate, centre, along, across, 1.0)
     return 0.5 * (student.DEGREES + z.size) * math.log(there / here), NO_CLASS
 
 

@@ -28,8 +28,10 @@ class Tuning(NamedTuple):
         move_cdf: cumulative probabilities of the moves, (M,).
         crossover_cdf: cumulative probabilities of the crossover classes, (n_CR,).
         scale: standard deviation of each coordinate over the archive, (p,).
-        centre: centre of the Student t fitted to the archive, (p,).
+        centre: centre of the Student t fitted to the archive, its bend taken off, (p,).
         factor: Cholesky factor of its covariance, (p, p).
+        along: direction along which the archive bends (`bend`), (p,); zeros where it is straight.
+        across: direction and size of the bend, (p,).
     """
 
     move_cdf: Array
@@ -37,6 +39,8 @@ class Tuning(NamedTuple):
     scale: Array
     centre: Array
     factor: Array
+    along: Array
+    across: Array
 
 
 class Tempering(NamedTuple):
