@@ -32,6 +32,7 @@ from actuator_glue.inference.choice import ModelChoice, choose_model
 from actuator_glue.inference.moments import moments
 from actuator_glue.inference.posterior import Problem, sample
 from actuator_glue.inference.prior_conflict import conflict
+from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
@@ -50,6 +51,8 @@ class CalibrationOptions:
         shaping_factor: G of L = -G ln Var[E], Eq. (4); used with 'glue' only.
         evaluations: likelihood evaluations.
         seed: seed of the sampler.
+        sampler: 'adaptive' is DREAM(ZS) with an adaptive independence move and an annealed start;
+            'published' is DREAM(ZS) as Vrugt (2016) runs it, and needs many times the evaluations.
         initial: state at the first sample, 'rest', 'measured', or 'auto' to look.
         settle: start of each record that only lets the initial state be forgotten [s]; None for
             0 from rest, else 1.
@@ -66,6 +69,7 @@ class CalibrationOptions:
     shaping_factor: float = 256.0
     evaluations: int = 60_000
     seed: int = 1
+    sampler: Literal['adaptive', 'published'] = 'adaptive'
     initial: Literal['auto', 'rest', 'measured'] = 'auto'
     settle: float | None = None
     prior: Calibration | Path | str | None = None
@@ -82,6 +86,7 @@ class CalibrationOptions:
         for name, known in (
             ('likelihood', ('glue', 'gaussian', 'ar1')),
             ('initial', ('auto', 'rest', 'measured')),
+            ('sampler', ('adaptive', 'published')),
         ):
             if getattr(self, name) not in known:
                 raise InputError(
@@ -145,6 +150,7 @@ def calibrate(
             target,
             (options.seed,),
             options.evaluations,
+            settings=SamplerSettings.published() if options.sampler == 'published' else None,
             progress=None if progress is None else lambda made, _: progress(made),
         )
     seconds = time.perf_counter() - started - sum(compiled)
@@ -183,6 +189,7 @@ def calibrate(
         likelihood=options.likelihood,
         shaping_factor=options.shaping_factor if options.likelihood == 'glue' else None,
         seed=options.seed,
+        sampler=options.sampler,
         initial=initial,
         settle=settle,
         evaluations=chains.evaluations,

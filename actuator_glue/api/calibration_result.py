@@ -48,6 +48,7 @@ class Calibration(Result):
         likelihood: 'glue', 'gaussian' or 'ar1'.
         shaping_factor: G of Eq. (4); None with a formal likelihood.
         seed: seed of the sampler.
+        sampler: 'adaptive' or 'published', see `CalibrationOptions`.
         initial: state at a record's first sample, 'rest' or 'measured'.
         settle: uncounted start of each record [s].
         evaluations: likelihood evaluations.
@@ -82,6 +83,7 @@ class Calibration(Result):
     prior: PriorUse | None = None
     records: tuple[Record, ...] = ()
     tracking: tuple[RecordTracking, ...] = ()
+    sampler: str = 'adaptive'
 
     @property
     def model_effects(self) -> tuple[str, ...]:
@@ -145,6 +147,7 @@ class Calibration(Result):
             'likelihood': self.likelihood,
             'shaping_factor': self.shaping_factor,
             'seed': self.seed,
+            'sampler': self.sampler,
             'initial': self.initial,
             'settle_s': self.settle,
             'records': [asdict(s) for s in self.sources],

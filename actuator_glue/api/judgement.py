@@ -13,6 +13,8 @@ from actuator_glue.records import Array, Record
 
 # R-hat above which draws are not yet the posterior (Vehtari et al. 2021).
 CONVERGED = 1.01
+# R-hat above which chains have not met at all (the threshold of Gelman and Rubin 1992).
+APART = 1.2
 TIED = 0.99  # correlation above which two parameters are only known together
 MISFIT = 0.1  # share of a record's spread: a model that leaves more does not describe the test
 
@@ -37,6 +39,13 @@ def problems(
         prior: what was known before, if anything.
     """
     told = []
+    apart = {n: p.rhat for n, p in parameters.items() if not p.rhat <= APART}
+    if apart:
+        name = max(apart, key=apart.__getitem__)
+        told.append(
+            f'no posterior was reached: the chains of {", ".join(apart)} have not met (R-hat '
+            f'{apart[name]:.3g} of {name}, above {APART}); give more --evaluations'
+        )
     poor = [r for r in fit.records if r.nrmse is not None and r.nrmse > MISFIT]
     if poor:
         where = ', '.join(

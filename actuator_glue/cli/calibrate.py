@@ -47,6 +47,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument('--seed', type=int, default=1, metavar='S', help='seed (default 1)')
     parser.add_argument(
+        '--sampler',
+        choices=('adaptive', 'published'),
+        default='adaptive',
+        help='adaptive is DREAM(ZS) with an adaptive independence move and an annealed start; '
+        'published is DREAM(ZS) as Vrugt (2016) runs it, three chains from the prior, and needs '
+        'many times the evaluations (default adaptive)',
+    )
+    parser.add_argument(
         '--effect',
         action='append',
         default=[],
@@ -107,6 +115,7 @@ def run(args: argparse.Namespace) -> int:
         shaping_factor=args.shaping_factor,
         evaluations=args.evaluations,
         seed=args.seed,
+        sampler=args.sampler,
         initial=args.initial,
         settle=args.settle,
         **prior_options(args),

@@ -146,7 +146,8 @@ def sample(
 ) -> Chains:
     """Draw from a posterior; return chains of physical parameters with their log likelihoods.
 
-    With an informative prior its log density is part of them.
+    With an informative prior its log density is part of them. A sampler that starts from the prior
+    as published moves in the physical parameters, whatever coordinates the target has.
 
     Args:
         target: what is sampled.
@@ -162,7 +163,8 @@ def sample(
         InputError: see `dream.sample`; the run ended before it had draws of the posterior.
     """
     settings = settings or SamplerSettings()
-    transform, density, bounds = target.transform, target.log_likelihood, target.bounds
+    density, bounds, published = target.log_likelihood, target.bounds, settings.start == 'prior'
+    transform = None if published else target.transform
     if transform is not None:
         if archive is None:
             settings, archive = _cold(target, transform, seed, settings)
@@ -170,7 +172,7 @@ def sample(
         bounds = transform.lower, transform.upper
     elif target.prior is not None:
         density = _Informed(density, target.prior)
-        if archive is None:
+        if archive is None and not published:
             settings, archive = _cold(target, None, seed, settings)
     chains = dream.sample(
         np.random.default_rng(seed),
