@@ -26,7 +26,7 @@ from examples.demonstration.processes import end_in_order
 PEERS = ('emcee_samplers', 'pydream_sampler', 'spotpy_sampler', 'pints_samplers')
 
 
-def _isolated(interpreter: Path | str, *arguments: str, timeout: float = 600.0) -> None:
+def _isolated(interpreter: Path | str, *arguments: str, timeout: float = 1800.0) -> None:
     """Run a module in a process of its own, so that nothing it loads or pins stays."""
     subprocess.run(
         [str(interpreter), '-m', *arguments],
@@ -67,7 +67,7 @@ def problem_r(out: Path) -> dict[str, Any]:
         except subprocess.CalledProcessError as error:
             peers[module] = {'error': (error.stderr or '').strip().splitlines()[-1:]}
         except subprocess.TimeoutExpired:
-            peers[module] = {'error': ['took more than ten minutes']}
+            peers[module] = {'error': ['took more than half an hour']}
     ours()
     lower = min(runs, key=lambda run: run['ess_per_second'])
     best_peer = max(

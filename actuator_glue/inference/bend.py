@@ -1,7 +1,7 @@
 """The strongest bend of a cloud of points: found, taken off, put on again.
 
-A direction `along` and one `across` it: y = z - across h(along.(z - centre)), h(t) = t^2 up to where
-the points tell. Since along.across = 0 the map is one-to-one with Jacobian 1, and its inverse has
+A direction `along` and one `across` it: y = z - across h(along.(z - centre)), h(t) = t^2 up to
+where the points tell. Since along.across = 0 the map is one-to-one with Jacobian 1, and its inverse has
 a plus in place of the minus. Student t's fitted to y are bent distributions of z (the twisted
 normal of Haario, Saksman and Tamminen 1999 is one exactly).
 """
@@ -121,10 +121,10 @@ def _solve(matrix: Array, x: Array) -> None:
 
 @njit(fastmath=False)
 def _turn(w: Array, g: Array, a: Array) -> float:
-    """Turn the unit direction a (p,) to the one along which points w bend into g, by least squares.
+    """Turn the unit direction a (p,) to the one along which points w bend into g.
 
-    g.w is regressed on 1, w and (a.w) w; the last coefficients say where a should point. Returns
-    the slope of the bend.
+    By least squares: g.w is regressed on 1, w and (a.w) w; the last coefficients say where a
+    should point. Returns the slope of the bend.
     """
     m, p = w.shape
     n = 2 * p + 1

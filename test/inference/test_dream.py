@@ -92,8 +92,8 @@ def test_two_modes_ten_sigma_apart(rng_seed: int) -> None:
 def test_ten_dimensional_banana_with_default_settings(rng_seed: int) -> None:
     """Variances of the two bent coordinates, as long a run as `calibrate` makes by default.
 
-    Over seeds the variance of x_1 scatters by 1.3 % and that of x_2, a fourth moment of x_1, by 4 %:
-    one run in a hundred thousand is 6 % off, the mean of eight never 5 %.
+    Over seeds the variance of x_1 scatters by 1.3 %, that of x_2, a fourth moment of x_1, by more:
+    8 % is six standard deviations, 5 % of the mean of eight runs more than ten.
     """
     target = targets.banana()
     runs = _replicates(target, rng_seed, 8, 60_000, SamplerSettings())
