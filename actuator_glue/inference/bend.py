@@ -1,9 +1,9 @@
 """The strongest bend of a cloud of points: found, taken off, put on again.
 
 A direction `along` and one `across` it: y = z - across h(along.(z - centre)), h(t) = t^2 up to
-where the points tell. Since along.across = 0 the map is one-to-one with Jacobian 1, and its inverse has
-a plus in place of the minus. Student t's fitted to y are bent distributions of z (the twisted
-normal of Haario, Saksman and Tamminen 1999 is one exactly).
+where the points tell. Since along.across = 0 the map is one-to-one with Jacobian 1, and its
+inverse has a plus in place of the minus. Student t's fitted to y are bent distributions of z (the
+twisted normal of Haario, Saksman and Tamminen 1999 is one exactly).
 """
 
 from __future__ import annotations
