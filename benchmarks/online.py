@@ -111,6 +111,40 @@ def replayed(seconds: float = 300.0, repeats: int = 7) -> dict[str, Any]:
     }
 
 
+def priors(seconds: float = 120.0) -> dict[str, Any]:
+    """Return what a window costs with the sequential prior over what it costs from the box.
+
+    Both estimators take the same stream side by side with the node's default settings; medians of
+    the processor's time over windows, the first five left out.
+    """
+    names = ('box', 'sequential')
+    estimators = {name: Estimator(EstimatorSettings(prior=name), choose_model()) for name in names}
+    costs: dict[str, list[float]] = {name: [] for name in names}
+    for item in stream(_record(seconds), block=100):
+        for name, estimator in estimators.items():
+            if isinstance(item, StreamSetup):
+                estimator.setup(item)
+                continue
+            if isinstance(item, Preview):
+                estimator.preview(item)
+                continue
+            estimator.push(item)
+            while True:
+                began = time.process_time()
+                job = estimator.next_job()
+                if job is None:
+                    break
+                estimator.finish(window_job.run(job))
+                costs[name].append(time.process_time() - began)
+    box, carried = (statistics.median(costs[name][5:]) for name in names)
+    return {
+        'box_prior_window_ms': 1e3 * box,
+        'sequential_prior_window_ms': 1e3 * carried,
+        'sequential_over_box': carried / box,
+        'prior_windows': len(costs['box']) - 5,
+    }
+
+
 def run(seconds: float = 60.0) -> dict[str, Any]:
     """Return the `online` figures of bench.json; `first_use_s` is the first window, compiled."""
     began = time.perf_counter()
@@ -120,6 +154,7 @@ def run(seconds: float = 60.0) -> dict[str, Any]:
     live(12.0)  # scoring is compiled, too
     return {
         **live(seconds),
+        **priors(),
         'seconds': seconds,
         'first_use_s': first_use,
     }

@@ -21,7 +21,7 @@ BOUNDS = {
     'mass_damping': (3.0, 5.0),
 }
 LIKELIHOOD = 'gaussian'
-EVALUATIONS = 40_000
+EVALUATIONS = 36_000
 DRAWS = 200
 
 
@@ -66,6 +66,7 @@ def design() -> dict[str, object]:
         'damping': list(actuators.DAMPING),
         'pre_test': [actuators.RATE, actuators.DURATION, actuators.NOISE],
         'record_s': actuators.RECORD,
+        'bands': 'order statistics',
     }
 
 
