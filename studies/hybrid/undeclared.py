@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 # Eq. (2) with the benchmark's numbers, its second-order valve and its moving mass left out.
 THETA = (235.3, 5.012e10, 4.23e6, 3.3)
 
+HELD = 0.8  # share of a response in its 95 % band from which the band is taken for right
 RATE, DURATION = 128.0, 20.0  # of a pre-test [Hz, s]
 EVALUATIONS = 60_000
 
@@ -98,6 +99,11 @@ class Story:
         if library.Structure(self.actuator.effects).linear:
             return self.actuator.grows()
         return bool(self.run.diverged[0])
+
+    def right(self, said: Prediction) -> bool:
+        """Whether a prediction has the more likely side right, and its band holds the response."""
+        likely = said.stability.p_unstable.value >= 0.5
+        return likely == self.unstable and (said.inside or 0.0) >= HELD
 
 
 def actuator(case: str, seed: int) -> Actuator:
@@ -177,15 +183,15 @@ def main(argv: list[str] | None = None) -> int:
             'unstable': one.unstable,
             'found': list(one.diagnosis.structure),
             'verdict': one.diagnosis.verdict,
-            'before': one.before.to_json(),
-            'after': one.after.to_json(),
+            'before': one.before.to_json() | {'right': one.right(one.before)},
+            'after': one.after.to_json() | {'right': one.right(one.after)},
         }
         print(f'{case}: {content[case]}', flush=True)
     library.write_json(
         {'schema': 'studies.hybrid.undeclared/1', **content}, str(out / 'undeclared.json')
     )
     figure(told).savefig(out / 'undeclared.png')
-    return 0
+    return 0 if all(one.right(one.after) and not one.right(one.before) for one in told) else 1
 
 
 if __name__ == '__main__':
