@@ -9,6 +9,7 @@ import argparse
 import sys
 from dataclasses import asdict
 from pathlib import Path
+from shutil import copy
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from actuator_glue.errors import InputError
 from studies.hybrid import library, outcomes
 from studies.hybrid.figure import reliability_figure
 from studies.hybrid.findings import Findings, findings
+from studies.hybrid.page import write_between
 from studies.hybrid.trial import Outcome, design
 
 KEPT, NUMBERS, PICTURE = 'outcomes.jsonl', 'results.json', 'reliability.png'
@@ -36,6 +38,12 @@ def parser() -> argparse.ArgumentParser:
     )
     found.add_argument(
         '--workers', type=int, default=1, metavar='N', help='processes (default: %(default)s)'
+    )
+    found.add_argument(
+        '--page',
+        type=Path,
+        metavar='FILE.md',
+        help='also write table and picture into this page (docs/rths.md)',
     )
     return found
 
@@ -77,6 +85,9 @@ def main(argv: list[str] | None = None) -> int:
         done = [kept.known[seed] for seed in wanted]
         found = findings(done)
         write(done, found, out)
+        if args.page is not None:
+            write_between(args.page, 'study', found.table())
+            copy(out / PICTURE, args.page.parent / 'images' / 'rths_reliability.png')
     except (InputError, OSError) as error:
         print(f'error: {error}', file=sys.stderr)
         return 2

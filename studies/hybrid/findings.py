@@ -89,6 +89,22 @@ class Findings:
         )
         return '\n'.join(lines)
 
+    def table(self) -> str:
+        """Return the same for a page, in Markdown."""
+        lines = [
+            '| predicted P(unstable) | actuators | mean prediction | unstable | limits | |',
+            '|---|---|---|---|---|---|',
+        ]
+        lines += [
+            f'| {b.lower:g} to {b.upper:g} | {b.count} | {b.predicted:.3f} | {b.unstable} | '
+            f'{b.least} to {b.most} | {"met" if b.met else "**not met**"} |'
+            for b in self.bins
+        ]
+        first, *_, last = self.text().split('\n')
+        actuators = sum(b.count for b in self.bins)
+        told = [f'**{actuators} actuators.** {first}.', '', *lines, '', f'{last}.']
+        return '\n'.join([*told, f'Brier score {self.brier:.4f}.', ''])
+
 
 def findings(outcomes: Sequence[Outcome]) -> Findings:
     """Return what outcomes say."""

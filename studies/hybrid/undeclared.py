@@ -6,6 +6,7 @@ import argparse
 import sys
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from shutil import copy
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +14,7 @@ import numpy as np
 import actuator_glue as ag
 from studies.hybrid import actuators, library
 from studies.hybrid.actuators import Actuator
+from studies.hybrid.page import write_between
 from studies.hybrid.trial import BOUNDS, inside, predict
 
 if TYPE_CHECKING:
@@ -143,6 +145,24 @@ def prediction(
     return Prediction(effects, found, predicted, inside(run, predicted))
 
 
+def table(stories: list[Story]) -> str:
+    """Return what the stories say for a page, in Markdown."""
+    lines = [
+        '| nobody declared | found | P(unstable) before, after | in band before, after | was |',
+        '|---|---|---|---|---|',
+    ]
+    for one in stories:
+        hidden, sides = CASES[one.case], (one.before, one.after)
+        shares = ', '.join(f'{s.stability.p_unstable.value:.3f}' for s in sides)
+        inside = ', '.join('-' if s.inside is None else f'{100 * s.inside:.0f} %' for s in sides)
+        lines.append(
+            f'| {one.case}: `{hidden.effect}`, {hidden.parameter} = {hidden.value:g} | '
+            f'{", ".join(f"`{name}`" for name in one.diagnosis.structure) or "nothing"} | '
+            f'{shares} | {inside} | {"unstable" if one.unstable else "stable"} |'
+        )
+    return '\n'.join([*lines, ''])
+
+
 @library.style.styled
 def figure(stories: list[Story]) -> Figure:
     """Draw the top floor: bands before and after the diagnosis, and what happened."""
@@ -170,10 +190,14 @@ def main(argv: list[str] | None = None) -> int:
         prog='python -m studies.hybrid.undeclared', description=__doc__
     )
     parser.add_argument('--out', default='out/study-rths', metavar='DIR', help='(%(default)s)')
+    parser.add_argument(
+        '--page', type=Path, metavar='FILE.md', help='also write table and picture into this page'
+    )
     args = parser.parse_args(argv)
     out = Path(args.out)
     out.mkdir(parents=True, exist_ok=True)
-    told, content = [], {}
+    told: list[Story] = []
+    content: dict[str, object] = {}
     for case, hidden in CASES.items():
         one = story(case)
         told.append(one)
@@ -190,7 +214,11 @@ def main(argv: list[str] | None = None) -> int:
     library.write_json(
         {'schema': 'studies.hybrid.undeclared/1', **content}, str(out / 'undeclared.json')
     )
-    figure(told).savefig(out / 'undeclared.png')
+    figure(told).savefig(out / 'undeclared.png', dpi=75)
+    print(table(told))
+    if args.page is not None:
+        write_between(args.page, 'stories', table(told))
+        copy(out / 'undeclared.png', args.page.parent / 'images' / 'rths_undeclared.png')
     return 0 if all(one.right(one.after) and not one.right(one.before) for one in told) else 1
 
 
