@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 from actuator_glue.jit import njit
 from actuator_glue.model.effects import rows as r
@@ -15,11 +14,6 @@ from actuator_glue.records import Array
 
 def _behind(values: Mapping[str, Array], origin: float) -> dict[str, Array]:
     return {'delay': values['delay'] + values['clock_skew'] * origin}
-
-
-@njit
-def _skew(p: Any) -> Any:
-    return p.clock_skew
 
 
 EFFECT = Effect(
@@ -34,5 +28,5 @@ EFFECT = Effect(
     source='Mills 1991 (frequency error of clocks)',
     starts=lambda s: ((5e-5,), (-5e-5,), (3e-4,), (-3e-4,)),
     onset=lambda record: _behind,
-    stage=Stage(adds={'skew': _skew}, shared=(r.ON_LAG,)),
+    stage=Stage(adds={'skew': njit(lambda p: p.clock_skew)}, shared=(r.ON_LAG,)),
 )

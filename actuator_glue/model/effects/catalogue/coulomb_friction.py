@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from actuator_glue.jit import njit
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.effects.stage import Stage
 from actuator_glue.model.parameters import Parameter
-
-
-@njit
-def _dry(p: Any) -> Any:
-    return p.coulomb_force
-
 
 EFFECT = Effect(
     name='coulomb-friction',
@@ -26,5 +18,5 @@ EFFECT = Effect(
     signature='odd harmonics with the sign of the velocity; relative size falls as 1/A',
     source='Armstrong-Helouvry et al. 1994; return mapping: Simo & Hughes 1998',
     starts=lambda s: tuple((share * s.oil * s.stroke,) for share in (0.005, 0.02, 0.08)),
-    stage=Stage(adds={'dry': _dry}),
+    stage=Stage(adds={'dry': njit(lambda p: p.coulomb_force)}),
 )

@@ -2,19 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from actuator_glue.jit import njit
 from actuator_glue.model.effects import rows as r
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.effects.stage import Stage
 from actuator_glue.model.parameters import Parameter
-
-
-@njit
-def _delay(p: Any) -> Any:
-    return p.delay
-
 
 EFFECT = Effect(
     name='delay',
@@ -26,5 +18,5 @@ EFFECT = Effect(
     source='Horiuchi et al. 1999',
     starts=lambda s: ((0.001,), (0.004,), (0.01,)),
     exact=(),
-    stage=Stage(adds={'delay': _delay}, shared=(r.ON_LAG,)),
+    stage=Stage(adds={'delay': njit(lambda p: p.delay)}, shared=(r.ON_LAG,)),
 )

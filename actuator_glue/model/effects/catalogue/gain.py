@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from actuator_glue.jit import njit
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.effects.stage import Stage
 from actuator_glue.model.parameters import Parameter
-
-
-@njit
-def _gain(p: Any) -> Any:
-    return p.gain
-
 
 EFFECT = Effect(
     name='gain',
@@ -27,5 +19,5 @@ EFFECT = Effect(
     source='Jelali & Kroll 2003',
     starts=lambda s: ((1.01,), (0.99,), (1.05,), (0.95,)),
     exact=(),
-    stage=Stage(adds={'gain': _gain}),
+    stage=Stage(adds={'gain': njit(lambda p: p.gain)}),
 )

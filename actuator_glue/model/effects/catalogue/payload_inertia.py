@@ -3,24 +3,12 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from actuator_glue.jit import njit
 from actuator_glue.model.effects import lti_step
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.effects.stage import Stage
 from actuator_glue.model.parameters import Parameter
-
-
-@njit
-def _mass(p: Any) -> Any:
-    return p.mass
-
-
-@njit
-def _damping(p: Any) -> Any:
-    return p.mass * p.mass_damping
-
 
 EFFECT = Effect(
     name='payload-inertia',
@@ -41,5 +29,7 @@ EFFECT = Effect(
         for ratio in (0.1, 0.4)
     ),
     exact=lti_step.MASS,
-    stage=Stage(adds={'damping': _damping, 'mass': _mass}),
+    stage=Stage(
+        adds={'damping': njit(lambda p: p.mass * p.mass_damping), 'mass': njit(lambda p: p.mass)}
+    ),
 )

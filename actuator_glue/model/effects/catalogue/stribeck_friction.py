@@ -25,11 +25,6 @@ _BELL_1, _BELL_2, _BELL_3, _BELL_4 = (64.0**-i / math.factorial(i) for i in rang
 
 
 @njit
-def _dry(p: Any) -> Any:
-    return p.sliding_force
-
-
-@njit
 def _fill(w: Array, n: int, p: Any, case: Case) -> None:
     extra, speed = p.sliding_force * (p.breakaway_ratio - 1.0), p.stribeck_velocity
     memory = max(MEMORY, MARGIN * extra / ((case.k + p.alpha_2) * speed))
@@ -125,5 +120,5 @@ EFFECT = Effect(
         for ratio, speed in ((1.5, 0.005), (2.0, 0.03))
     ),
     holds=('coulomb-friction', 'breakaway_ratio', 1.0),
-    stage=Stage(_fill, adds={'dry': _dry}, own=ON),
+    stage=Stage(_fill, adds={'dry': njit(lambda p: p.sliding_force)}, own=ON),
 )

@@ -2,19 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from actuator_glue.jit import njit
 from actuator_glue.model.effects import lti_step
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.effects.stage import Stage
 from actuator_glue.model.parameters import Parameter
-
-
-@njit
-def _valve_lag(p: Any) -> Any:
-    return p.valve_lag
-
 
 EFFECT = Effect(
     name='valve-lag',
@@ -26,5 +18,5 @@ EFFECT = Effect(
     source='Merritt 1967; Jelali & Kroll 2003',
     starts=lambda s: ((0.0005,), (0.002,), (0.006,)),
     exact=lti_step.VALVE,
-    stage=Stage(adds={'valve_lag': _valve_lag}),
+    stage=Stage(adds={'valve_lag': njit(lambda p: p.valve_lag)}),
 )

@@ -2,18 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from actuator_glue.jit import njit
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.effects.stage import Stage
 from actuator_glue.model.parameters import Parameter
-
-
-@njit
-def _error(p: Any) -> Any:
-    return p.null_offset
-
 
 EFFECT = Effect(
     name='valve-null',
@@ -26,5 +18,5 @@ EFFECT = Effect(
     signature='constant offset; with k > 0 and leakage slightly smaller than without',
     source='Merritt 1967',
     starts=lambda s: ((0.02 * s.stroke,), (-0.02 * s.stroke,)),
-    stage=Stage(adds={'error': _error}),
+    stage=Stage(adds={'error': njit(lambda p: p.null_offset)}),
 )

@@ -2,19 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from actuator_glue.jit import njit
 from actuator_glue.model.effects import lti_step
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.effects.stage import Stage
 from actuator_glue.model.parameters import Parameter
-
-
-@njit
-def _damping(p: Any) -> Any:
-    return p.damping
-
 
 EFFECT = Effect(
     name='viscous-damping',
@@ -28,5 +20,5 @@ EFFECT = Effect(
         (share * s.oil * s.stroke / s.velocity,) for share in (0.01, 0.05, 0.3)
     ),
     exact=lti_step.VELOCITY,
-    stage=Stage(adds={'damping': _damping}),
+    stage=Stage(adds={'damping': njit(lambda p: p.damping)}),
 )
