@@ -84,3 +84,16 @@ def test_every_parameter_in_yaml_has_a_comment(path: Path) -> None:
         if match and match['value']:
             assert match['note'] or above.lstrip().startswith('#'), f'{path.name}: {line.strip()}'
         above = line
+
+
+def test_sources_that_documents_name_are_there() -> None:
+    """A file that has moved leaves no name behind."""
+    folders = ('actuator_glue', 'studies', 'examples', 'test', 'benchmarks', 'scripts', 'docs')
+    known = {
+        '/' + p.relative_to(REPOSITORY).as_posix()
+        for f in folders
+        for p in (REPOSITORY / f).rglob('*.py')
+    }
+    for page in [*REPOSITORY.glob('*.md'), *(REPOSITORY / 'docs').glob('*.md')]:
+        for name in re.findall(r'`([\w/]+\.py)`', page.read_text(encoding='utf-8')):
+            assert any(path.endswith('/' + name) for path in known), f'{page.name}: {name}'
