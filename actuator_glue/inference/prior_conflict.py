@@ -40,9 +40,11 @@ def conflict(prior: InformativePrior, posterior: Array) -> Conflict:
     """Return the conflict between a prior and the posterior drawn with it, (m, p).
 
     The means m0, m1 and covariances S0, S1 of a normal prior and of its posterior: before the
-    data are seen, m1 - m0 is normal with covariance S0 - S1 (Evans and Moshonov 2006). A
-    likelihood tempered by Eq. (4) is wider than its estimates scatter: the p-value is then
-    larger than it need be, never smaller.
+    data are seen, m1 - m0 is normal with covariance S0 - S1, and its distance from 0 is their
+    check of a prior (Evans and Moshonov 2006), exact where both are normal and the likelihood is
+    that of the data. A mixture counts by its mean and covariance. With Eq. (4) the p-value is too
+    large where 2 G is less than the effective number of samples, and too small where it is more
+    (a residual with long correlation).
     """
     mean, spread = covariance(prior.mixture)
     z = prior.coordinates(posterior)
@@ -61,7 +63,13 @@ class SequentialTest:
 
     Each p-value p is an e-value 1/(2 sqrt p), whose mean is at most 1 where the prior holds; they
     are multiplied from the most favourable start on (CUSUM). With a threshold c the mean time to
-    a false alarm is at least c windows (Shin, Ramdas and Rinaldo 2022).
+    a false alarm is at least c windows (Shin, Ramdas and Rinaldo 2022), as far as the p-values are
+    uniform or larger where the prior holds.
+
+    Attributes:
+        threshold: c.
+        evidence: running product of the e-values, 1 at its least; no marginal likelihood.
+        since: index of the window that the product began with.
 
     Args:
         windows: independent windows per hour, at most.

@@ -1,10 +1,12 @@
-"""Everything of `actuator_glue` that the study's computations use, gathered in one place."""
+"""Everything of `actuator_glue` that the study's computations use, gathered in one place.
+
+The public names where they offer it; the paper's own steps (its likelihood on residuals that are
+added, its sampler, bands of draws) are below them.
+"""
 
 from __future__ import annotations
 
-from actuator_glue.diagnosis.diagnose import diagnose
-from actuator_glue.diagnosis.result import DiagnosisData
-from actuator_glue.errors import InputError
+from actuator_glue import Diagnosis, InputError, Record, diagnose
 from actuator_glue.inference.bands import Band, band, check_draws
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.convergence import gelman_rubin
@@ -19,7 +21,7 @@ from actuator_glue.model.parameters import BASE, NAMES, TABLE_2, bounds
 from actuator_glue.model.problem_r import EQUATION_3, NOISE, RATE, STIFFNESS
 from actuator_glue.model.problem_r import records as reconstructed_tests
 from actuator_glue.model.structure import Structure
-from actuator_glue.records import Array, Record
+from actuator_glue.records import Array
 
 __all__ = [
     'BASE',
@@ -32,7 +34,7 @@ __all__ = [
     'Array',
     'Band',
     'Chains',
-    'DiagnosisData',
+    'Diagnosis',
     'Errors',
     'ExactErrors',
     'GlueLikelihood',

@@ -16,7 +16,7 @@ from studies.chen.identify import (
     fit_transfer_function,
 )
 from studies.chen.laboratory import Laboratory, Posterior, Progress
-from studies.chen.library import DiagnosisData, ExactErrors, Record, diagnose, reconstructed_tests
+from studies.chen.library import Diagnosis, ExactErrors, Record, diagnose, reconstructed_tests
 from studies.chen.published import CHOSEN, SHAPING_FACTORS, SHOWN
 
 
@@ -119,7 +119,7 @@ class Results:
     frequency: dict[str, tuple[dict[str, responses.FrequencyBand], ...]]
     time: dict[str, tuple[responses.TimeBand, ...]]
     refits: dict[str, misfit.Refit]
-    diagnoses: dict[str, DiagnosisData]
+    diagnoses: dict[str, Diagnosis]
     covered: list[Coverage]
 
     @property
