@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from studies.chen.identify import implied
 from studies.chen.laboratory import Posterior
-from studies.chen.library import BASE, EQUATION_3, TABLE_2, Array
+from studies.chen.library import BASE, EQUATION_3, STIFFNESS, TABLE_2, Array, linear
 from studies.chen.misfit import removed
 from studies.chen.published import CLOSE_UPS, TABLE_3, TABLE_4
 from studies.chen.responses import CLOSE, GRID, LEVEL
@@ -27,6 +27,30 @@ TOLERANCE = 0.02  # coverage this far from its level covers too little or too mu
 def bounds_as_published() -> bool:
     """Tell whether our priors have Table 3's bounds."""
     return bool(np.array_equal([(p.lower, p.upper) for p in BASE], TABLE_3))
+
+
+def model_difference() -> float:
+    """Return the largest relative difference of Eq. (2a) from Eq. (1), solved at `GRID`.
+
+    Valve, oil and specimen as they stand there, three unknowns at each frequency: alpha_1 q, f and
+    x under u = 1.
+    """
+    beta_1, product, alpha_2, alpha_3 = TABLE_2
+    largest = 0.0
+    for stiffness in STIFFNESS:
+        response = linear.frequency_response(TABLE_2, stiffness, GRID)
+        for frequency, found in zip(GRID, response, strict=True):
+            s = 2j * np.pi * frequency
+            equations = np.array(
+                [
+                    [s + beta_1, 0.0, product],
+                    [-1.0, s + alpha_3, alpha_2 * s],
+                    [0.0, 1.0, -stiffness],
+                ]
+            )
+            x = np.linalg.solve(equations, np.array([product, 0.0, 0.0]))[2]
+            largest = max(largest, float(abs(found / x - 1.0)))
+    return largest
 
 
 def spring_more(results: Results, what: str) -> list[float]:

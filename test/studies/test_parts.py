@@ -10,7 +10,7 @@ from actuator_glue.inference.likelihood import GlueLikelihood
 from actuator_glue.model import problem_r
 from actuator_glue.model.exact import ExactErrors
 from actuator_glue.model.parameters import TABLE_2
-from studies.chen import misfit, shaping, spread
+from studies.chen import findings, misfit, shaping, spread
 from studies.chen.calibration import simulated_case
 from studies.chen.laboratory import AddedResidual, Laboratory
 from studies.chen.published import CHOSEN, TABLE_4
@@ -137,3 +137,8 @@ def test_numbers_are_written_for_people() -> None:
     assert power_of_two(8192.0) == '2¹³'
     assert listed([1.0, 5.0, 10.0]) == '1, 5 and 10' and listed(['a']) == 'a'
     assert listed([]) == 'none'
+
+
+def test_eq_2a_is_eq_1_solved_at_every_frequency() -> None:
+    """What the report's first row says of the model."""
+    assert findings.model_difference() < 1e-12
