@@ -59,9 +59,10 @@ def test_problem_r_from_csv_files(run, problem_r: Path, tmp_path: Path, rng_seed
 def test_the_published_sampler_finds_the_same_posterior_and_says_where_it_has_not(
     run, problem_r: Path, rng_seed: int
 ) -> None:
-    """Of 20 seeds none was further than a third of a standard deviation off, or above R-hat 1.05.
+    """Of 12 seeds none was 0.04 standard deviations off, or had an R-hat above 1.002.
 
-    What 3000 evaluations from the prior leave is told to be no posterior.
+    What 3000 evaluations from the prior leave is told to be no posterior: their R-hat was 1.37 at
+    its least.
     """
     records = (problem_r / 'r_1.csv', problem_r / 'r_2.csv', '--stiffness', 0, 250e3)
     how = ('--sampler', 'published', '--seed', rng_seed, '--json', '-')
