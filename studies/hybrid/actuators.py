@@ -15,6 +15,7 @@ DAMPING = (0.067, 0.087)  # of the structures: from mostly unstable to mostly st
 RATE, DURATION = 128.0, 8.0  # of a pre-test [Hz, s]
 NOISE = 16e-6  # of the displacement sensor, standard deviation [m]
 RECORD = 10.0  # s, of the ground motion
+SPECIMENS = 32  # that each actuator is run with; its own is the first
 NONE = library.Compensator('none', np.array([1.0, 0.0, 0.0]))
 
 
@@ -26,7 +27,8 @@ class Actuator:
         seed: of all its noise and its ground motion.
         theta: parameters, (p,), SI units.
         effects: beyond Eq. (2).
-        specimen: mass, damping, stiffness, (1,) each.
+        specimen: mass, damping, stiffness, (m,) each: its own first, then others of the same
+            spread that it is run with, too.
         test: the hybrid test as the laboratory knows it.
     """
 
@@ -64,15 +66,16 @@ class Actuator:
     def grows(self) -> bool:
         """Whether its own loop has a growing root; its linear effects only."""
         names = library.Structure(self.effects).names
-        own = library.Loop.of(self.test, self.theta[None], names, self.effects, self.specimen)
+        first = {name: values[:1] for name, values in self.specimen.items()}
+        own = library.Loop.of(self.test, self.theta[None], names, self.effects, first)
         root = library.growth(own.numerical, own.plants, NONE.coefficients, self.test.period)
         return bool(root[0] > 0.0)
 
     def run(self) -> library.Responses:
-        """Return what its own hybrid test does under its ground motion, uncompensated."""
+        """Return what its hybrid test does with each specimen, uncompensated."""
         return library.VirtualTest(
             self.test,
-            self.theta[None],
+            np.repeat(self.theta[None], len(self.specimen['mass']), axis=0),
             library.Structure(self.effects).names,
             self.effects,
             self.specimen,
@@ -87,15 +90,13 @@ def drawn(seed: int) -> Actuator:
     p = library.BenchmarkParameters().drawn(
         np.random.default_rng(library.stream(seed, 'actuator'))
     )
-    specimen = {'mass': p.mass, 'damping': p.damping, 'stiffness': p.stiffness}
     ratio = np.random.default_rng(library.stream(seed, 'structure')).uniform(*DAMPING)
-    return Actuator(
-        seed,
-        plant(p),
-        EFFECTS,
-        {name: np.array([value]) for name, value in specimen.items()},
-        damped(ratio),
-    )
+    test = damped(ratio)
+    rng = np.random.default_rng(library.stream(seed, 'specimens'))
+    specimen = test.specimen.drawn(rng, SPECIMENS)
+    for name in specimen:
+        specimen[name][0] = getattr(p, name)
+    return Actuator(seed, plant(p), EFFECTS, specimen, test)
 
 
 def plant(p: library.BenchmarkParameters) -> np.ndarray:

@@ -29,6 +29,6 @@ def reliability_figure(outcomes: Sequence[Outcome], found: Findings) -> Figure:
     held = [100 * o.inside for o in outcomes if o.inside is not None]
     right.hist(held, bins=20, range=(0.0, 100.0), color=style.BAND)
     right.axvline(95.0, color=style.WARNING)
-    right.set_xlabel('share of the response in its 95 % band [%]')
+    right.set_xlabel('share of the responses in the 95 % band [%]')
     right.set_ylabel('actuators')
     return figure

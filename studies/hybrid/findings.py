@@ -49,8 +49,8 @@ class Findings:
         bins: of the reliability diagram, empty ones left out.
         reliable: whether every bin is within its limits.
         brier: mean squared error of P(unstable).
-        banded: actuators whose response has a band: theirs and some prediction did not diverge.
-        coverage: mean share of their responses inside the 95 % bands.
+        banded: actuators with a test that did not diverge.
+        coverage: mean share of their responses, with all specimens, inside the 95 % bands.
         coverage_error: its standard error over actuators.
         covered: whether it lies within COVERAGE.
         worst: smallest such share.

@@ -34,9 +34,9 @@ class Outcome:
         predicted: P(unstable) over the posterior and the specimen's spread.
         effective: independent draws that it counts for.
         unstable: whether its own loop has a growing root.
-        diverged: whether its own floors left five times the reference's peak.
-        inside: share of its own floors' response in the predicted 95 % band; None where it
-            diverged, or every prediction did: bands are those of tests that do not.
+        diverged: share of its tests whose floors left five times the reference's peak.
+        inside: share of the floors' response in the predicted 95 % band, mean over its tests that
+            did not diverge, as bands are those of such tests; None where there are none.
         error: error of the best draw in the pre-tests, of the spread measured.
         rhat: largest of a parameter.
     """
@@ -45,7 +45,7 @@ class Outcome:
     predicted: float
     effective: float
     unstable: bool
-    diverged: bool
+    diverged: float
     inside: float | None
     error: float | None
     rhat: float
@@ -67,6 +67,7 @@ def design() -> dict[str, object]:
         'pre_test': [actuators.RATE, actuators.DURATION, actuators.NOISE],
         'record_s': actuators.RECORD,
         'bands': 'order statistics',
+        'specimens': actuators.SPECIMENS,
     }
 
 
@@ -88,7 +89,7 @@ def trial(seed: int) -> Outcome:
         predicted.p_unstable.value,
         predicted.p_unstable.effective_draws,
         actuator.grows(),
-        bool(run.diverged[0]),
+        float(run.diverged.mean()),
         inside(run, predicted),
         found.error.nrmse,
         max(p.rhat for p in found.parameters.values()),
@@ -107,11 +108,14 @@ def predict(actuator: Actuator, found: ag.Calibration) -> ag.StabilityResult:
 
 
 def inside(run: library.Responses, predicted: ag.StabilityResult) -> float | None:
-    """Return the share of a test's response in the predicted band; None without one of both."""
+    """Return the share of the response in the predicted band, over tests that did not diverge.
+
+    None where all of them did, or all that were predicted.
+    """
     virtual = predicted.virtual
     assert virtual is not None
-    if run.diverged[0] or not virtual.indicators:
+    if run.diverged.all() or not virtual.indicators:
         return None
-    response = run.response[1:, :, 0]  # nothing has moved at the first sample
-    held = (response >= virtual.lower[1:]) & (response <= virtual.upper[1:])
-    return float(held.mean())
+    response = run.response[1:, :, ~run.diverged]  # nothing has moved at the first sample
+    lower, upper = virtual.lower[1:, :, None], virtual.upper[1:, :, None]
+    return float(((response >= lower) & (response <= upper)).mean())
