@@ -106,14 +106,20 @@ def test_a_calibration_is_shown(posterior: ag.Calibration, tmp_path: Path) -> No
     assert mean == pytest.approx(posterior.parameters['alpha_2'].mean)
 
 
-def test_a_diagnosis_is_kept_and_shown(record: ag.Record, tmp_path: Path) -> None:
-    """The same for a diagnosis."""
-    found = ag.diagnose(record)
+def test_a_diagnosis_is_kept_and_shown(
+    record: ag.Record, posterior: ag.Calibration, tmp_path: Path
+) -> None:
+    """The same for a diagnosis, which may begin with what a calibration knew."""
+    found = ag.diagnose(record, prior=posterior, prior_age=60.0)
+    assert found.prior is not None and found.prior.source == 'a calibration'
+    assert not found.prior.contradicted  # it is the same record's
+    assert found.to_json()['tracking'][0]['predicted']['J2']['median'] > 0.0
     again = ag.Diagnosis.load(found.save(tmp_path / 'diagnosis.npz'))
     assert json.dumps(again.to_json()) == json.dumps(found.to_json())
     np.testing.assert_array_equal(again.traces[0].measured, found.traces[0].measured)
     assert again.plot().axes
-    assert again.report(tmp_path / 'report.html').exists()
+    page = again.report(tmp_path / 'report.html').read_text()
+    assert 'Tracking of' in page and 'prior from a calibration' in page
     assert found.summary().split(':')[0] in found._repr_html_()
     assert set(found.inference_data.posterior) == set(found.names)
     with pytest.raises(ag.InputError, match='holds'):

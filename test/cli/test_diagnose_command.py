@@ -34,7 +34,10 @@ def test_a_record_without_stiffness_is_refused(
     assert '--stiffness' in capsys.readouterr().err
 
 
-@pytest.mark.parametrize('option', [['--seed', '-1'], ['--jobs', '0']])
+@pytest.mark.parametrize(
+    'option',
+    [['--seed', '-1'], ['--jobs', '0'], ['--prior', 'missing.npz'], ['--drift', '-1']],
+)
 def test_impossible_options_are_refused(tmp_path: Path, option: list[str]) -> None:
     """Exit code 2."""
     path = write(tmp_path / 'a.csv', 0.0, 0.0, 1)
