@@ -34,6 +34,7 @@ def one(seed: int, cache: Path, generator: str) -> dict[str, Any]:
 
     from actuator_glue.diagnosis.diagnose import diagnose
     from actuator_glue.diagnosis.thresholds import Thresholds
+    from actuator_glue.model.parameters import NAMES
     from actuator_glue.records import Record
 
     case = import_module(generator).build(seed)
@@ -55,6 +56,7 @@ def one(seed: int, cache: Path, generator: str) -> dict[str, Any]:
         'sizes': case.sizes,
         'ratio': case.ratio,
         'shares': case.shares,
+        'parameters': dict(zip(NAMES, map(float, case.theta), strict=True)) | case.parameters,
         'colour': case.colour,
         'seconds': time.perf_counter() - start,
         'true_structure_error': truth.refitted(case, records),

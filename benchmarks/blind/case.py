@@ -32,7 +32,8 @@ class Case:
 
     Commands, measured and clean displacements are [m], one array per record; the last record is
     held out. `ratio` is the post-refit noise-free residual of the fitting records over the noise,
-    `shares` that of each effect of a pair on its own.
+    `shares` that of each effect of a pair on its own; `parameters` are the catalogue's, where an
+    effect is written as there.
     """
 
     seed: int
@@ -48,6 +49,7 @@ class Case:
     colour: float
     sizes: dict[str, float] = field(default_factory=dict)
     shares: dict[str, float] = field(default_factory=dict)
+    parameters: dict[str, float] = field(default_factory=dict)
 
 
 def kinds(seed: int, known: Sequence[str], unknown: Sequence[str]) -> tuple[str, tuple[str, ...]]:

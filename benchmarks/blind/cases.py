@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import plant
 from case import Case, kinds
+from equivalents import values
 from scipy import signal
 from sizing import NOISE, Array, base_residual, sized
 
@@ -269,4 +270,5 @@ def build(seed: int) -> Case:
         colour,
         sizes,
         shares,
+        values(sizes, theta, 2e-3),
     )

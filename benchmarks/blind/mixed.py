@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 import variant_plant as plant
 from case import Case, group
+from equivalents import values
 from scipy import signal
 from sizing import NOISE, Array, base_residual, sized
 from variant import draw_plant, noise, shaking, sweep
@@ -136,4 +137,5 @@ def build(seed: int) -> Case:
         float(colour),
         sizes | ({'onset': onset[1]} if onset[0] else {}),
         shares,
+        values(sizes, theta, float(np.abs(inputs[0]).max()), forms.sign, forms.form),
     )

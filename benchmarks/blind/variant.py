@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 import variant_plant as plant
 from case import Case, kinds
+from equivalents import values
 from scipy import signal
 from sizing import NOISE, Array, base_residual, sized
 from variant_effects import SIZES, UNKNOWN, Forms, respond
@@ -146,4 +147,5 @@ def build(seed: int) -> Case:
         float(colour),
         sizes,
         shares,
+        values(sizes, theta, float(np.abs(inputs[0]).max()), forms.sign, forms.form),
     )

@@ -48,6 +48,29 @@ def test_a_healthy_machine_is_left_alone() -> None:
     assert found.error.after == pytest.approx(1e-5, rel=0.1)
 
 
+def test_friction_that_may_fall_with_velocity_has_an_alternative() -> None:
+    """Coulomb friction: Stribeck friction at a ratio of one is it, and is not excluded.
+
+    The note's limit is the alternative's, in the JSON too.
+    """
+    a, b, held = make(['coulomb-friction'], [250.0], 14)
+    found = diagnose([a, b], held, settings=QUICK)
+    (friction,) = found.effects
+    assert friction.name == 'coulomb-friction'
+    assert friction.alternatives == ('stribeck-friction',)
+    richer = next(r for r in friction.rivals if r.name == 'stribeck-friction')
+    assert richer.tied and richer.limit is not None
+    name, limit = richer.limit
+    assert name == 'breakaway_ratio' and 1.0 < limit < 1.5
+    (note,) = [line for line in found.advice if 'is not excluded' in line]
+    assert note == (
+        'stribeck-friction, which is coulomb-friction at breakaway_ratio = 1, is not excluded: '
+        f'breakaway_ratio may be as far as {limit:.3g} (95 %)'
+    )
+    told = json.loads(json.dumps(found.to_json()))['effects'][0]['rivals']
+    assert {'parameter': name, 'limit': limit} in [r['limit'] for r in told]
+
+
 def test_held_out_records_that_contradict_are_undecided() -> None:
     """A transducer set differently for that test alone: headline, verdict and notes say so."""
     a, b, held = make([], [], 13)

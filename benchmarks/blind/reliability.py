@@ -1,0 +1,160 @@
+"""Whether probabilities and intervals are what they say: `reliability.py FOLDER...`.
+
+Reads the answers that campaigns left (`FOLDER/**/*.json`), counts how often names were right that
+were given a probability, and how often 95 % intervals held the true size.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from collections.abc import Iterable
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from equivalents import catalogued
+from score import share
+
+from actuator_glue.model.parameters import NAMES
+
+Json = dict[str, Any]
+_EDGES = (0.0, 0.3, 0.6, 0.8, 0.9, 1.0)
+
+
+def answers(folders: Iterable[Path]) -> list[Json]:
+    """Return the answers below some folders."""
+    paths = sorted(p for folder in folders for p in folder.rglob('*.json'))
+    read = [json.loads(p.read_text()) for p in paths]
+    return [r for r in read if 'diagnosis' in r]
+
+
+def truths(result: Json) -> set[str]:
+    """Names of a case's effects, as the catalogue has them."""
+    return {catalogued(name) for name in result['effects']}
+
+
+def named(results: Iterable[Json]) -> list[tuple[float, bool, bool]]:
+    """Probability of every name that has one, whether the name is right, whether its set is."""
+    out = []
+    for result in results:
+        true = truths(result)
+        for effect in result['diagnosis']['effects']:
+            if effect['probability'] is not None:
+                held = true & {effect['name'], *effect['alternatives']}
+                out.append((effect['probability'], effect['name'] in true, bool(held)))
+    return out
+
+
+def bins(rows: list[tuple[float, bool, bool]]) -> list[Json]:
+    """Count names by their probability."""
+    out = []
+    for low, high in pairwise(_EDGES):
+        inside = [r for r in rows if low <= r[0] < high or r[0] == high == 1.0]
+        mean = float(np.mean([r[0] for r in inside])) if inside else None
+        out.append(
+            {'from': low, 'to': high, 'mean': mean}
+            | {'right': share([r[1] for r in inside]), 'in_set': share([r[2] for r in inside])}
+        )
+    return out
+
+
+def _holds(estimate: Json, value: float) -> bool:
+    return bool(estimate['lower'] <= value <= estimate['upper'])
+
+
+def coverage(results: Iterable[Json]) -> tuple[list[tuple[str, bool]], list[tuple[str, bool]]]:
+    """Return whether intervals hold the truth, with the parameter's name.
+
+    First of the sizes of names that are right, then of Eq. (2)'s parameters on machines all of
+    whose effects are named and nothing else (healthy ones among them). What is told as not
+    identified has no interval of the data.
+    """
+    sizes, base = [], []
+    for result in results:
+        found, values = result['diagnosis'], result['parameters']
+        true = truths(result)
+        for effect in found['effects']:
+            if effect['name'] in true and effect['noise'] is None:
+                sizes += [
+                    (name, _holds(e, values[name]))
+                    for name, e in effect['parameters'].items()
+                    if name in values and e['identified']
+                ]
+        told = {e['name'] for e in found['effects']}
+        if told == true and found['complete'] and 'payload-inertia' not in told:
+            base += [
+                (name, _holds(found['base'][name], values[name]))
+                for name in NAMES
+                if found['base'][name]['identified']
+            ]
+    return sizes, base
+
+
+def table(rows: list[Json]) -> str:
+    """Return the counts as Markdown."""
+    lines = ['| probability given | mean | names right | right or in the set of alternatives |']
+    lines += ['|---|---|---|---|']
+    for row in rows:
+        n = row['right']['n']
+        if n:
+            lines.append(
+                f'| {row["from"]:g} to {row["to"]:g} | {row["mean"]:.2f} | '
+                f'{_told(row["right"])} | {_told(row["in_set"])} |'
+            )
+    return '\n'.join(lines)
+
+
+def _told(found: Json) -> str:
+    n = found['n']
+    if not n:
+        return 'none'
+    low, high = found['ci']
+    return f'{round(found["share"] * n)} of {n} ({low:.0%} to {high:.0%})'
+
+
+def picture(rows: list[Json], path: Path) -> None:
+    """Draw the reliability diagram."""
+    import matplotlib
+
+    matplotlib.use('Agg')
+    from matplotlib import pyplot as plt
+
+    used = [r for r in rows if r['right']['n']]
+    fig, axes = plt.subplots(figsize=(4.2, 4.0), layout='constrained')
+    axes.plot([0, 1], [0, 1], color='0.7', lw=1)
+    x = np.array([r['mean'] for r in used])
+    y = np.array([r['right']['share'] for r in used])
+    low, high = np.array([r['right']['ci'] for r in used]).T
+    axes.errorbar(x, y, [y - low, high - y], fmt='o', color='C0', capsize=3)
+    for r in used:
+        axes.annotate(
+            str(r['right']['n']), (r['mean'], r['right']['share']), (6, -10),
+            textcoords='offset points',
+        )  # fmt: skip
+    axes.set(xlim=(0, 1.02), ylim=(0, 1.02), xlabel='probability given', ylabel='share right')
+    fig.savefig(path, dpi=120)
+
+
+def main() -> int:
+    """Print the tables and draw the diagram."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('folders', nargs='+', type=Path)
+    parser.add_argument('--picture', type=Path)
+    args = parser.parse_args()
+    results = answers(args.folders)
+    rows = bins(named(results))
+    print(f'{len(results)} machines\n\n{table(rows)}\n')
+    sizes, base = coverage(results)
+    for title, found in (('sizes of right names', sizes), ("Eq. (2)'s parameters", base)):
+        print(f'95 % intervals, {title}: {_told(share([hit for _, hit in found]))}')
+        for name in sorted({n for n, hit in found if not hit}):
+            print(f'  missed: {name} {_told(share([h for n, h in found if n == name]))}')
+    if args.picture:
+        picture(rows, args.picture)
+    return 0
+
+
+if __name__ == '__main__':
+    raise SystemExit(main())

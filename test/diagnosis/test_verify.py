@@ -1,0 +1,30 @@
+"""The control of a held-out look: as many shams as there were candidates, the best of them."""
+
+import numpy as np
+
+from actuator_glue.diagnosis import verify
+from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.fit import rms
+from actuator_glue.model.parameters import TABLE_2
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Record
+
+RATE = 64.0
+T = np.arange(int(30 * RATE)) / RATE
+
+
+def test_the_sham_is_the_best_of_as_many_as_were_tried() -> None:
+    """Chosen on the fitting part, as an effect is: there the best of more is never worse."""
+    side = verify.Side(Structure(()), TABLE_2, TABLE_2[None])
+    command = 2e-3 * np.sin(np.pi * (8.0 / 30.0) * T**2)
+    data = Data.whole([Record(command, 0.0 * command, 1 / RATE, stiffness=0.0)])
+    rng = np.random.default_rng(3)
+    # A residual that follows the command by chance, as wrong models leave.
+    error = np.convolve(rng.standard_normal(len(T)), np.hanning(15), 'same')
+    errors = (error, error)
+    left = [verify._sham(data, data, side, errors, (1, count), seed=4) for count in (1, 2, 8, 16)]
+    assert np.all(np.diff(left) <= 0.0)
+    assert left[-1] < left[0] < rms(error)
+    # The choice is the fitting part's: elsewhere it adds to an error that it never saw.
+    other = rng.standard_normal(len(T))
+    assert verify._sham(data, data, side, (error, other), (1, 16), seed=4) > rms(other)
