@@ -11,6 +11,7 @@ import numpy as np
 
 from actuator_glue.diagnosis import (
     advice,
+    discrepancy,
     findings,
     homogeneity,
     learned_term,
@@ -89,11 +90,13 @@ def diagnose(
         if sides and not decision.final.effects:
             sides.append(sides[0])
             break
+        size = max(found.material, decision.left)
         draws, rhat = posterior.sample(
             data,
             trial.model,
             trial.fit,
             scorer,
+            beside=discrepancy.below(result.selection.search, trial.effects, scorer, size),
             rng=rng,
             evaluations=settings.evaluations if trial.effects else 0,
             progress=partial(tell, stage),

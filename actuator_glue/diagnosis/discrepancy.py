@@ -1,58 +1,133 @@
-"""What may be there below what matters: a discrepancy of the catalogue's own shapes.
+"""What may be there below what matters: a discrepancy made of the catalogue's own shapes.
 
-An effect too small to be added still pulls the parameters: 20 N of friction are immaterial in the
-error and many standard deviations in alpha_3. So the likelihood of a posterior holds, beside
-noise, responses to every effect that was not added, each of a random size. Their common scale, from
-nothing to what would have been material, is unknown and integrated (Kennedy & O'Hagan
-2001; its shapes are physics instead of a smooth process). All sizes act linearly and are
-marginalised in closed form.
+An effect that is too small to be added still pulls the parameters: 20 N of friction do not matter
+in the error and are many standard deviations of alpha_3. So the likelihood of a posterior holds,
+beside noise, the response to every effect that was not added, each of a random size. Their common
+scale, from nothing to what would have been material, is unknown and integrated (Kennedy & O'Hagan
+2001, with physics for shapes). So small they act linearly and are marginalised in closed form.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
+from actuator_glue.diagnosis.fit import rms
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 
-# Scales tried, of the largest: the first, no discrepancy, is as likely as all the others.
-_SCALES = np.concatenate([[0.0], 2.0 ** -np.arange(6.0, -1.0, -1.0)])
-_SAME = 1e-10  # of the largest power: shapes that others hold
+# Scales, of the largest: none at all is as likely as all others together.
+_SCALES = np.concatenate([[0.0], 2.0 ** np.arange(-6.0, 1.0)])
+_PRIOR = np.log(np.concatenate([[0.5], np.full(len(_SCALES) - 1, 0.5 / (len(_SCALES) - 1))]))
+_SAME = 1e-10  # of the largest power: a shape that others make up
 
 
 @dataclass(frozen=True)
 class Discrepancy:
-    """Normal discrepancies of whitened errors, of several scales.
+    """Normal discrepancies of a whitened error, of unknown scale.
 
     Attributes:
         shapes: orthogonal whitened shapes of unit length (s, N).
-        powers: their variance at the largest scale (s,), of whitened noise.
+        powers: their variances at the largest scale (s,).
     """
 
     shapes: Array
     powers: Array
 
     @classmethod
-    def of(cls, search: Search, effects: tuple[str, ...], scorer: Scorer, size: float) -> Discrepancy:
-        """Take the responses to all effects that a structure lacks.
+    def of(cls, rows: Array) -> Discrepancy:
+        """Take whitened responses at the largest scale (e, N), each of a size of its own."""
+        values, vectors = np.linalg.eigh(rows @ rows.T)
+        kept = values > _SAME * values.max(initial=0.0)
+        powers = values[kept]
+        return cls(vectors[:, kept].T @ rows / np.sqrt(powers)[:, None], powers)
+
+    def without(self, error: Array) -> Array:
+        """Return what no shape takes up of a whitened error (N,)."""
+        return np.asarray(error - (self.shapes @ error) @ self.shapes)
+
+    def log_likelihood(self, errors: Array, noise: float) -> Array:
+        """Log density of whitened errors (m, N), up to a constant, (m,).
 
         Args:
-            search: what was tried, and the fit of Eq. (2) to which an effect is added.
-            effects: those of the structure.
-            scorer: the noise.
-            size: rms of each response at the largest scale [m].
+            errors: free-run errors; not-a-number where a simulation diverged.
+            noise: variance of the whitened noise.
         """
-        base, rows = search.base_theta, []
-        for name in search.names:
-            if name in effects:
-                continue
-            alone = Structure((name,))
-            thetas = alone.starts(base, search.scale())
-            smallest = thetas[np.argsort(np.abs(thetas[:, len(base)]), kind='stable')[:1]]
-            seen = search.data.simulate(alone, smallest) - search.data.simulate(Structure(()), base)
-            ...
-        return cls.from_rows(np.array(rows))
+        squares = np.einsum('mn,mn->m', errors, errors)
+        along = (errors @ self.shapes.T) ** 2
+        rows = []
+        for scale, prior in zip(_SCALES, _PRIOR, strict=True):
+            power = scale**2 * self.powers
+            left = squares - along @ (power / (noise + power))
+            rows.append(prior - 0.5 * left / noise - 0.5 * np.log1p(power / noise).sum())
+        return np.asarray(np.logaddexp.reduce(rows, axis=0))
+
+    def gaussian(
+        self, jacobian: Array, error: Array, noise: float, widest: Array
+    ) -> tuple[Array, Array]:
+        """Mean (p,) and covariance (p, p) of what parameters move by from where they stand.
+
+        Args:
+            jacobian: whitened derivatives of the simulation (p, N).
+            error: whitened error (N,); rows beyond the shapes' are a prior's, in both.
+            noise: variance of the whitened noise.
+            widest: standard deviations (p,) of what is known without any record.
+        """
+        size = np.sqrt(np.einsum('pn,pn->p', jacobian, jacobian))
+        size = np.maximum(size, 1e-9 / widest)
+        jac = jacobian / size[:, None]
+        count = self.shapes.shape[1]
+        seen, along = self.shapes @ jac[:, :count].T, self.shapes @ error[:count]
+        weights, means, covariances = [], [], []
+        for scale, prior in zip(_SCALES, _PRIOR, strict=True):
+            power = scale**2 * self.powers
+            share = power / (noise + power)
+            normal = (jac @ jac.T - seen.T @ (share[:, None] * seen)) / noise
+            normal[np.diag_indices(len(size))] += 1.0 / (widest * size) ** 2
+            covariance = np.linalg.inv(normal)
+            pull = (jac @ error - seen.T @ (share * along)) / noise
+            mean = covariance @ pull
+            left = (error @ error - share @ along**2) / noise - pull @ mean
+            spread = np.log1p(power / noise).sum() + np.linalg.slogdet(normal)[1]
+            weights.append(prior - 0.5 * (left + spread))
+            means.append(mean)
+            covariances.append(covariance)
+        share = np.exp(np.array(weights) - np.logaddexp.reduce(weights))
+        mean = share @ np.array(means)
+        off = np.array(means) - mean
+        covariance = np.einsum('s,sij->ij', share, np.array(covariances))
+        covariance += np.einsum('s,si,sj->ij', share, off, off)
+        return mean / size, covariance / np.outer(size, size)
+
+
+def below(search: Search, effects: Iterable[str], scorer: Scorer, size: float) -> Discrepancy:
+    """Return the discrepancy of effects that a structure lacks.
+
+    Args:
+        search: what was tried, and the fit of Eq. (2), to which each effect is added.
+        effects: those of the structure.
+        scorer: the noise.
+        size: rms of each response at the largest scale [m].
+    """
+    data, sizes = search.data, search.scale()
+    off = data.simulate(Structure(()), sizes.theta)
+    rows = []
+    for name in search.names:
+        if name in effects:
+            continue
+        alone = Structure((name,))
+        starts, first = alone.starts(sizes.theta, sizes), len(sizes.theta)
+        neutral = alone.parameters[first].neutral or 0.0
+        theta = starts[np.argmin(np.abs(starts[:, first] - neutral))]
+        seen = rms((data.simulate(alone, theta) - off)[0])
+        # Its shape about that size: play and friction have another when they are large.
+        if seen > size:
+            theta[first] = neutral + (theta[first] - neutral) * size / seen
+        response = (data.simulate(alone, theta) - off)[0]
+        if 0.0 < rms(response) < 1.0:
+            rows.append(response * (size / rms(response)))
+    return Discrepancy.of(scorer.whiten(np.reshape(rows, (-1, data.target.size))))

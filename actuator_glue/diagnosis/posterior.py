@@ -10,11 +10,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.diagnosis.base_prior import BasePrior
 from actuator_glue.diagnosis.data import Data, Model, chunks
+from actuator_glue.diagnosis.discrepancy import Discrepancy
 from actuator_glue.diagnosis.fit import Fit, Space, jacobian
 from actuator_glue.diagnosis.fit import fit as fit_to
-from actuator_glue.diagnosis.identifiable import coordinates
+from actuator_glue.diagnosis.identifiable import Straight, Working, coordinates
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.inference import posterior
 from actuator_glue.inference.settings import SamplerSettings
@@ -60,26 +60,12 @@ def most_likely(data: Data, model: Model, found: Fit, scorer: Scorer) -> Fit:
     return Fit(best.theta, data.target - output[0], jac, best.z)
 
 
-def laplace(
-    scorer: Scorer, fit: Fit, slopes: Array, prior: BasePrior | None = None
-) -> tuple[Array, float]:
-    """Covariance (p, p) of coordinates at the best fit and the noise inflation.
+def inflation(error: Array) -> float:
+    """Variance of whitened noise that a whitened error (N,) asks for, at least 1.
 
-    `slopes` (p, p) are the derivatives of the working coordinates j with respect to these, i.
-
-    The inflation is the mean square of the whitened error: where structure remains, every
-    parameter is known less well than the noise alone says (Kennedy & O'Hagan 2001).
+    Where structure remains, every parameter is known less well than the noise alone says.
     """
-    jac = slopes @ scorer.whiten(fit.jacobian)
-    error = scorer.whiten(fit.error)
-    inflation = max(1.0, float(np.mean(error**2)))
-    if prior is not None:
-        known = slopes @ prior.slopes(len(slopes))
-        jac = np.hstack([jac, np.sqrt(inflation) * known])
-    scale = np.sqrt(np.maximum(np.einsum('pn,pn->p', jac, jac), 1e-300))
-    normal = (jac / scale[:, None]) @ (jac / scale[:, None]).T
-    covariance = np.linalg.pinv(normal, rcond=1e-10, hermitian=True) / np.outer(scale, scale)
-    return np.asarray(inflation * covariance), inflation
+    return max(1.0, float(np.mean(error**2)))
 
 
 def identified(space: Space, draws: Array) -> NDArray[np.bool_]:
@@ -94,12 +80,23 @@ def identified(space: Space, draws: Array) -> NDArray[np.bool_]:
     return np.asarray(high - low < widest)
 
 
+def _inside(around: Working | Straight, phi: Array, move: Array) -> Array:
+    """Return coordinates (p,) moved as far as they mean something."""
+    move = np.clip(move, -around.widest, around.widest)
+    for _ in range(_HALVINGS):
+        if np.isfinite(around.inverse((phi + move)[None])[1][0]):
+            return phi + move
+        move *= 0.5
+    return phi
+
+
 def sample(
     data: Data,
     model: Model,
     fit: Fit,
     scorer: Scorer,
     *,
+    beside: Discrepancy,
     rng: np.random.Generator,
     evaluations: int,
     progress: Callable[[float], None],
@@ -111,6 +108,7 @@ def sample(
         model: the structure.
         fit: its least-squares fit.
         scorer: whitening filters of the noise.
+        beside: what may be there beside the structure.
         rng: random numbers.
         evaluations: likelihood evaluations; 0 returns draws of the Laplace approximation, and
             not-a-number for R-hat.
@@ -120,8 +118,14 @@ def sample(
     space = Space(model, max(r.duration for r in data.records))
     around = coordinates(space, model, data, fit.z)
     phi = around.forward(fit.theta[None])[0]
-    covariance, inflation = laplace(scorer, fit, around.slopes(phi), data.prior)
-    transform = Composed(around, Laplace(phi, covariance, around.widest))
+    slopes, error = around.slopes(phi), scorer.whiten(fit.error)
+    noise, jac = inflation(beside.without(error)), slopes @ scorer.whiten(fit.jacobian)
+    if data.prior is not None:
+        size = math.sqrt(noise)
+        jac = np.hstack([jac, size * slopes @ data.prior.slopes(len(slopes))])
+        error = np.concatenate([error, -size * data.prior.pull(fit.z)])
+    move, covariance = beside.gaussian(jac, error, noise, around.widest)
+    transform = Composed(around, Laplace(_inside(around, phi, move), covariance, around.widest))
 
     def gaussian(count: int) -> Array:
         w = rng.standard_normal((count, len(phi)))
@@ -139,8 +143,9 @@ def sample(
         found = np.empty(len(theta))
         for some in chunks(len(theta), data.target.size):
             error = scorer.whiten(data.target - data.simulate(model, theta[some]))
-            sums = np.einsum('mn,mn->m', error, error)
-            found[some] = np.where(np.isfinite(sums), -0.5 * sums / inflation, -np.inf)
+            with np.errstate(all='ignore'):
+                likely = beside.log_likelihood(error, noise)
+            found[some] = np.where(np.isfinite(likely), likely, -np.inf)
         # Uniform in the logarithms otherwise.
         return found if data.prior is None else found + data.prior.log_density(theta)
 

@@ -6,6 +6,7 @@ from scipy import signal
 
 from actuator_glue.diagnosis import posterior
 from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.discrepancy import Discrepancy
 from actuator_glue.diagnosis.fit import fit
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.model import commands
@@ -41,7 +42,14 @@ def test_intervals_under_slow_noise_hold_the_truth() -> None:
         found = fit(data, model, theta)
         scorer = Scorer.of(data, splits_of(data, found.error))
         draws, _ = posterior.sample(
-            data, model, found, scorer, rng=rng, evaluations=0, progress=lambda share: None
+            data,
+            model,
+            found,
+            scorer,
+            beside=Discrepancy.of(np.empty((0, data.target.size))),
+            rng=rng,
+            evaluations=0,
+            progress=lambda share: None,
         )
         low, high = np.quantile(draws, [0.025, 0.975], axis=0)
         inside.append((low <= theta) & (theta <= high))
