@@ -1,0 +1,59 @@
+"""Discrepancies of unknown scale: what they leave open, and what they must not."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from actuator_glue.diagnosis.discrepancy import _SCALES, Discrepancy
+
+N = 400
+WIDE = np.full(2, 10.0)
+
+
+def test_the_likelihood_is_that_of_the_mixture() -> None:
+    """Closed form against the normal densities of all scales, with their full covariances."""
+    rng = np.random.default_rng(1)
+    rows = 3.0 * rng.standard_normal((3, 12))
+    errors = rng.standard_normal((4, 12)) + rng.standard_normal((4, 3)) @ rows
+    prior = np.full(len(_SCALES), 0.5 / (len(_SCALES) - 1))
+    prior[0] = 0.5
+    expected = np.log(
+        sum(
+            p * stats.multivariate_normal(cov=1.7 * np.eye(12) + s**2 * rows.T @ rows).pdf(errors)
+            for p, s in zip(prior, _SCALES, strict=True)
+        )
+    )
+    found = Discrepancy.of(rows).log_likelihood(errors, 1.7)
+    # Up to a constant, which the noise alone decides.
+    assert found - expected == pytest.approx(np.full(4, (found - expected)[0]), abs=1e-9)
+
+
+def test_a_clean_record_keeps_its_narrow_interval() -> None:
+    """Noise alone: the spread is that of least squares; beside a shape that is there, it is not.
+
+    The shape pulls the first parameter by half of its size; the allowance holds the truth.
+    """
+    rng = np.random.default_rng(2)
+    jac = rng.standard_normal((2, N))
+    shape = 0.5 * jac[0] + rng.standard_normal(N)
+    beside = Discrepancy.of(0.8 * shape[None])
+    noise = rng.standard_normal(N)
+    plain = np.sqrt(np.diag(np.linalg.inv(jac @ jac.T)))
+    _, covariance = beside.gaussian(jac, noise, 1.0, WIDE)
+    assert np.sqrt(np.diag(covariance)) == pytest.approx(plain, rel=0.1)
+    error = noise + 0.6 * shape
+    alone = np.linalg.solve(jac @ jac.T, jac @ error)
+    assert alone[0] > 4.0 * plain[0]
+    move, covariance = beside.gaussian(jac, error, 1.0, WIDE)
+    assert abs(move[0]) < 2.5 * np.sqrt(covariance[0, 0])
+
+
+def test_what_no_record_tells_keeps_the_width_of_the_bounds() -> None:
+    """Two parameters that do the same: their sum is known, neither of them is."""
+    rng = np.random.default_rng(3)
+    row = rng.standard_normal(N)
+    empty = Discrepancy.of(np.empty((0, N)))
+    move, covariance = empty.gaussian(np.stack([row, row]), row, 1.0, WIDE)
+    assert np.sqrt(np.diag(covariance)) == pytest.approx(WIDE / np.sqrt(2.0), rel=0.01)
+    assert move.sum() == pytest.approx(1.0, abs=0.01)
+    assert np.sqrt(covariance.sum()) == pytest.approx(1.0 / np.linalg.norm(row), rel=0.01)
