@@ -4,9 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
-from actuator_glue.diagnosis import false_alarms
+import numpy as np
+
+from actuator_glue.diagnosis import false_alarms, regression
 from actuator_glue.diagnosis.finding import Rival
+from actuator_glue.diagnosis.fit import Fit
 from actuator_glue.diagnosis.ranking import compare, removed, spokesman
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.search import Search, Trial
@@ -15,6 +19,8 @@ from actuator_glue.diagnosis.thresholds import Thresholds
 Progress = Callable[[str, float], None]
 # Rounds in which members may be swapped for better or simpler ones.
 _SWAPS = 4
+# Share of the motion's power that passes for noise, above which a residual's may, too.
+_STATIONARY = 0.3
 
 
 @dataclass(frozen=True)
@@ -55,21 +61,47 @@ class ModelSelection:
         self.search, self.settings, self.progress = search, settings, progress
         self.noise = self.first = self.material = 0.0
         self.nats = settings.nats
+        self._known: tuple[Fit, tuple[float, float]] | None = None
 
     def renoise(self, error_of: Trial | None = None) -> None:
         """Take the noise from the residual of a structure (first: of the base)."""
-        error = error_of.fit.error if error_of else self.search.base().error
-        parts = splits_of(self.search.data, error)
-        left, self.noise = pooled(self.search.data, parts)
-        self.first = self.first or left
+        fit = error_of.fit if error_of else self.search.base()
+        parts = splits_of(self.search.data, fit.error)
         self.search.scorer = Scorer.of(self.search.data, parts)
+        left, self.noise = self._apart(fit)
+        self.first = self.first or left
         stroke = self.search.scale().stroke
         s = self.settings
         self.material = max(s.noise_share * self.noise, s.stroke_share * stroke)
 
     def left(self, trial: Trial) -> float:
         """Rms structure that remains in the residual of a structure [m]."""
-        return pooled(self.search.data, splits_of(self.search.data, trial.fit.error))[0]
+        return self._apart(trial.fit)[0]
+
+    def _apart(self, fit: Fit) -> tuple[float, float]:
+        """Rms structure and noise of a residual [m].
+
+        A command that is as stationary as noise lets structure pass for noise: there a forecast
+        of samples that were not fitted says how much noise there is at most.
+        """
+        if self._known is not None and self._known[0] is fit:
+            return self._known[1]
+        data, scorer = self.search.data, self.search.scorer
+        left, noise = pooled(data, splits_of(data, fit.error))
+        if self._stationary and scorer is not None:
+            theta = self.search.scale().theta
+            forecast = regression.forecast(data, scorer, theta, fit, self.settings.nats)
+            noise = min(noise, forecast)
+            left = max(left, float(np.sqrt(max(0.0, fit.rms**2 - noise**2))))
+        self._known = fit, (left, noise)
+        return left, noise
+
+    @cached_property
+    def _stationary(self) -> bool:
+        """Whether what follows the command looks like noise: the motion itself does."""
+        data = self.search.data
+        structure, noise = pooled(data, splits_of(data, data.target))
+        return noise**2 > _STATIONARY * (structure**2 + noise**2)
 
     def rescored(self, trials: Sequence[Trial]) -> list[Trial]:
         """Score with the present noise, best first."""

@@ -16,6 +16,7 @@ from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 
 _TELLING = 0.3  # share of the squared error a surrogate must remove to point at a place
+_FORECAST = 12  # features of a forecast
 
 
 @dataclass(frozen=True)
@@ -138,9 +139,49 @@ def compare(data: Data, scorer: Scorer, base: Trial, structure: Trial) -> Surrog
     count = len(structure.fit.theta) - len(base.fit.theta)
     features = library(data, base.fit.theta)
     names = list(features)
-    rows = np.stack([features.pop(n) for n in names])
-    error = scorer.whiten(base.fit.error)
-    own, free = scorer.whiten(base.fit.jacobian), scorer.whiten(rows)
+    fit, chosen = _regressed(np.stack([features.pop(n) for n in names]), scorer, base.fit, count)
+    left, whole = scorer.left_out_error(fit), scorer.left_out_error(base.fit)
+    return Surrogate(
+        features=tuple(names[i] for i in chosen),
+        structure=structure.effects,
+        error=left,
+        structure_error=scorer.left_out_error(structure.fit),
+        explained=max(0.0, 1.0 - (left / whole) ** 2) if whole > 0.0 else 0.0,
+        nats=evidence(scorer.block_scores(fit), structure.scores),
+        tried=len(names),
+    )
+
+
+def forecast(data: Data, scorer: Scorer, theta: Array, fit: Fit, nats: float) -> float:
+    """Return the error that a regression forecasts of a structure's residual leaves, rms [m].
+
+    Each block is forecast without having been fitted, so what is explained there is no noise;
+    infinite where it is no more than chance.
+
+    Args:
+        data: the counted samples.
+        scorer: noise and blocks.
+        theta: Eq. (2), whose motion gives the features (4,).
+        fit: the structure.
+        nats: evidence of any addition.
+    """
+    rows = np.stack(list(library(data, theta).values()))
+    found, chosen = _regressed(rows, scorer, fit, _FORECAST)
+    gained = evidence(scorer.block_scores(found), scorer.block_scores(fit))
+    if gained < nats + len(chosen) * math.log(len(rows)):
+        return math.inf
+    return scorer.left_out_error(found)
+
+
+def _regressed(rows: Array, scorer: Scorer, fit: Fit, count: int) -> tuple[Fit, list[int]]:
+    """Regress a residual on the best of some features (f, N), parameters refitted with them.
+
+    Returns:
+        The residual that is left, with the Jacobian of parameters and weights, and which features
+        were chosen, best first.
+    """
+    error = scorer.whiten(fit.error)
+    own, free = scorer.whiten(fit.jacobian), scorer.whiten(rows)
     start = np.einsum('pn,pn->p', free, free)
     q = np.linalg.qr(own.T)[0]
     for row in free:  # one by one: a table of a long record's features is large
@@ -157,19 +198,9 @@ def compare(data: Data, scorer: Scorer, base: Trial, structure: Trial) -> Surrog
         unit = free[best] / np.sqrt(power[best])
         for row in free:
             row -= (row @ unit) * unit
-    raw = np.concatenate([base.fit.jacobian, rows[chosen]])
+    raw = np.concatenate([fit.jacobian, rows[chosen]])
     white = np.concatenate([own, scorer.whiten(rows[chosen])])
     scale = np.sqrt(np.einsum('pn,pn->p', white, white))
     scale = np.where(scale > 0.0, scale, 1.0)
     weights, *_ = np.linalg.lstsq((white / scale[:, None]).T, error, rcond=1e-10)
-    fit = Fit(base.fit.theta, base.fit.error - (weights / scale) @ raw, raw, base.fit.z)
-    left, whole = scorer.left_out_error(fit), scorer.left_out_error(base.fit)
-    return Surrogate(
-        features=tuple(names[i] for i in chosen),
-        structure=structure.effects,
-        error=left,
-        structure_error=scorer.left_out_error(structure.fit),
-        explained=max(0.0, 1.0 - (left / whole) ** 2) if whole > 0.0 else 0.0,
-        nats=evidence(scorer.block_scores(fit), structure.scores),
-        tried=len(names),
-    )
+    return Fit(fit.theta, fit.error - (weights / scale) @ raw, raw, fit.z), chosen
