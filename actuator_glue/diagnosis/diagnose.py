@@ -85,18 +85,19 @@ def diagnose(
     found, decision = result.found, result.decision
     stretches = homogeneity.agreement(decision.final, scorer)
     rng = np.random.default_rng([seed, 1])
+    size = max(found.material, decision.left)
+    small = discrepancy.responses(result.selection.search, size)
     sides: list[Side] = []
     for stage, trial in (('posterior before', found.base), ('posterior', decision.final)):
         if sides and not decision.final.effects:
             sides.append(sides[0])
             break
-        size = max(found.material, decision.left)
         draws, rhat = posterior.sample(
             data,
             trial.model,
             trial.fit,
             scorer,
-            beside=discrepancy.below(result.selection.search, trial.effects, scorer, size),
+            beside=discrepancy.beside(small, trial.effects, scorer),
             rng=rng,
             evaluations=settings.evaluations if trial.effects else 0,
             progress=partial(tell, stage),

@@ -9,7 +9,7 @@ scale, from nothing to what would have been material, is unknown and integrated 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +17,6 @@ import numpy as np
 from actuator_glue.diagnosis.fit import rms
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.search import Search
-from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 
 # Scales, of the largest: none at all is as likely as all others together.
@@ -104,30 +103,35 @@ class Discrepancy:
         return mean / size, covariance / np.outer(size, size)
 
 
-def below(search: Search, effects: Iterable[str], scorer: Scorer, size: float) -> Discrepancy:
-    """Return the discrepancy of effects that a structure lacks.
+def responses(search: Search, size: float) -> dict[str, Array]:
+    """Return what each effect, so large that it has a given rms, adds to Eq. (2) as fitted.
 
     Args:
-        search: what was tried, and the fit of Eq. (2), to which each effect is added.
-        effects: those of the structure.
-        scorer: the noise.
-        size: rms of each response at the largest scale [m].
+        search: what was tried, and the fit of Eq. (2).
+        size: rms of each response [m].
+
+    Returns:
+        Per name the response (N,) [m]; effects without one are left out.
     """
-    data, sizes = search.data, search.scale()
-    off = data.simulate(Structure(()), sizes.theta)
-    rows = []
+    data, base = search.data, search.scale().theta
+    off, found = data.simulate(search.structure(), base)[0], {}
     for name in search.names:
-        if name in effects:
-            continue
-        alone = Structure((name,))
-        starts, first = alone.starts(sizes.theta, sizes), len(sizes.theta)
-        neutral = alone.parameters[first].neutral or 0.0
-        theta = starts[np.argmin(np.abs(starts[:, first] - neutral))]
-        seen = rms((data.simulate(alone, theta) - off)[0])
+        alone = search.structure(name)
+        starts, seen = search.signature(name)
+        neutral = alone.parameters[len(base)].neutral or 0.0
+        nearest = int(np.argmin(np.abs(starts[:, 0] - neutral)))
+        theta = np.concatenate([base, starts[nearest]])
         # Its shape about that size: play and friction have another when they are large.
-        if seen > size:
-            theta[first] = neutral + (theta[first] - neutral) * size / seen
-        response = (data.simulate(alone, theta) - off)[0]
+        share = min(1.0, size / max(rms(seen[nearest]), 1e-12))
+        theta[len(base)] = neutral + (theta[len(base)] - neutral) * share
+        response = data.simulate(alone, theta)[0] - off
         if 0.0 < rms(response) < 1.0:
-            rows.append(response * (size / rms(response)))
-    return Discrepancy.of(scorer.whiten(np.reshape(rows, (-1, data.target.size))))
+            found[name] = response * (size / rms(response))
+    return found
+
+
+def beside(small: Mapping[str, Array], effects: Container[str], scorer: Scorer) -> Discrepancy:
+    """Return the discrepancy of small effects that a structure does not hold."""
+    rows = [scorer.whiten(row) for name, row in small.items() if name not in effects]
+    size = sum(part.stop - part.start for part in scorer.data.parts)
+    return Discrepancy.of(np.reshape(rows, (-1, size)))

@@ -173,6 +173,10 @@ class Search:
             self._signatures[name] = thetas[:, alone.columns(name)], seen
         return self._signatures[name]
 
+    def signature(self, name: str) -> tuple[Array, Array]:
+        """Starting sizes of an effect (s, k), and what each adds to Eq. (2) as fitted (s, M)."""
+        return self._signature(name, self._stand_in(self.structure(name)))
+
     def signatures(self) -> tuple[Array, Array, Scorer]:
         """Every effect's at all its starting sizes (s, M) [m], beside what it is seen against.
 
@@ -181,8 +185,7 @@ class Search:
         assert self.scorer is not None
         part, rows = self._stretches, []
         for name in self.names:
-            own = self._stand_in(self.structure(name))
-            seen = self._signature(name, own)[1]
+            own, seen = self._stand_in(self.structure(name)), self.signature(name)[1]
             rows.append(seen if own is part else seen[:, part.rows])
         every = np.concatenate(rows)
         jacobian = self._tried[frozenset()].jacobian[:, part.rows]

@@ -6,7 +6,6 @@ from scipy import signal
 
 from actuator_glue.diagnosis import discrepancy, posterior
 from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.discrepancy import Discrepancy
 from actuator_glue.diagnosis.fit import fit
 from actuator_glue.diagnosis.pipeline import mean_effects
 from actuator_glue.diagnosis.score import Scorer, splits_of
@@ -41,16 +40,13 @@ def test_what_is_immaterial_is_in_the_intervals() -> None:
         search = Search(Data.whole(records), mean_effects())
         found = search.base()
         scorer = Scorer.of(search.data, splits_of(search.data, found.error))
-        for hits, beside in (
-            (inside, discrepancy.below(search, (), scorer, 5e-6)),
-            (plain, Discrepancy.of(np.empty((0, search.data.target.size)))),
-        ):
+        for hits, small in ((inside, discrepancy.responses(search, 5e-6)), (plain, {})):
             draws, _ = posterior.sample(
                 search.data,
                 Structure(()),
                 found,
                 scorer,
-                beside=beside,
+                beside=discrepancy.beside(small, (), scorer),
                 rng=rng,
                 evaluations=0,
                 progress=lambda share: None,
@@ -90,7 +86,7 @@ def test_intervals_under_slow_noise_hold_the_truth() -> None:
             model,
             found,
             scorer,
-            beside=Discrepancy.of(np.empty((0, data.target.size))),
+            beside=discrepancy.beside({}, (), scorer),
             rng=rng,
             evaluations=0,
             progress=lambda share: None,
