@@ -13,6 +13,7 @@ from collections.abc import Sequence
 
 from actuator_glue.diagnosis.learned_forms import forms
 from actuator_glue.diagnosis.model_selection import ModelSelection, Selection
+from actuator_glue.diagnosis.ranking import removed
 from actuator_glue.diagnosis.search import Trial
 
 _MOST = 2  # learned terms
@@ -56,11 +57,17 @@ def _additions(
     selection: ModelSelection, starts: Sequence[Trial], best: Trial, names: Sequence[str]
 ) -> Trial | None:
     """Return the best structure with one more term, where it is worth more than the present."""
-    search, worth = selection.search, []
+    search, worth, cost = selection.search, [], math.log(len(names))
     for start in starts:
         new = [n for n in names if n not in start.effects]
         for trial in search.additions(start, search.screened(start, new)[:_REFITS]):
-            if selection.better(trial, best, selection.material, math.log(len(names))):
+            least = selection.material
+            if len(trial.fit.theta) <= len(best.fit.theta):
+                # In the place of names it must remove more than what would leave them tied.
+                if not selection.better(trial, start, least, cost):
+                    continue
+                least = selection.settings.tie_share * removed(start, trial)
+            if selection.better(trial, best, least, cost):
                 worth.append(trial)
     return max(worth, key=_merit) if worth else None
 

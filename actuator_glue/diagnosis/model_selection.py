@@ -19,6 +19,8 @@ from actuator_glue.diagnosis.thresholds import Thresholds
 Progress = Callable[[str, float], None]
 # Rounds in which members may be swapped for better or simpler ones.
 _SWAPS = 4
+# Share of the bounds within which a parameter is at one of them.
+_AT_BOUND = 1e-3
 # Share of the motion's power that passes for noise, above which a residual's may, too.
 _STATIONARY = 0.3
 
@@ -197,8 +199,12 @@ class ModelSelection:
                     names = self.search.screened(rest, names)[: self.settings.tried]
                 trials = self.search.additions(rest, names)
                 rivals[name] = self._rivals(rest, current, name, trials)
-                if trials and trials[0].scores.sum() > best.scores.sum():
-                    best = trials[0]
+                for trial in trials:
+                    if trial.scores.sum() <= best.scores.sum():
+                        break
+                    if not self._pressed_form(trial, trial.added, name):
+                        best = trial
+                        break
             if best is current:
                 best = self.simpler(current, rivals)
             # The last members stay, so that the rivals told are theirs.
@@ -236,6 +242,20 @@ class ModelSelection:
         assert self.search.scorer is not None
         return compare(rest, best, name, trials, self.search.scorer, self.settings)
 
+    def _pressed_form(self, trial: Trial, name: str, simpler: str) -> bool:
+        """Whether an effect is a richer form of another only by a parameter at its bound.
+
+        No equation is the machine's: such a form mends that of the other, it is not found.
+        """
+        entry = self.search.entries[name]
+        if entry.holds is None or entry.holds[0] != simpler:
+            return False
+        columns = trial.structure.columns(name)
+        for p, value in zip(entry.parameters, trial.fit.theta[columns], strict=True):
+            if min(value - p.lower, p.upper - value) < _AT_BOUND * (p.upper - p.lower):
+                return True
+        return False
+
     def simpler(self, current: Trial, rivals: dict[str, tuple[Rival, ...]]) -> Trial:
         """Take a rival of fewer parameters that these data cannot tell from a member."""
         for name, row in rivals.items():
@@ -243,6 +263,8 @@ class ModelSelection:
                 effects = (*(n for n in current.effects if n != name), rival.name)
                 entries = self.search.entries
                 fewer = len(entries[rival.name].parameters) < len(entries[name].parameters)
-                if rival.tied and fewer and rival.nats < self.settings.tie_nats:
+                alike = rival.nats < self.settings.tie_nats
+                alike = alike or self._pressed_form(current, name, rival.name)
+                if rival.tied and fewer and alike:
                     return self.search.trial(effects, rival.name)
         return current

@@ -136,13 +136,15 @@ def since_onset(first: Conclusion, settings: Thresholds, each: Each, tell: Progr
 
 
 def with_learned_terms(result: Conclusion) -> Conclusion:
-    """Describe by learned terms material structure that the catalogue leaves."""
-    if result.decision.left < result.found.material or result.found.final.own is not None:
+    """Describe by learned terms material structure that the catalogue leaves, or names badly."""
+    decision, found = result.decision, result.found
+    left = decision.verdict == 'unexplained' or decision.left >= found.material
+    if not left or found.final.own is not None:
         return result
-    found = learning.learned(result.selection, result.found)
-    if found is None:
+    described = learning.learned(result.selection, found)
+    if described is None:
         return result
-    learned = _conclusion(result.prepared, result.selection, found, result.line)
+    learned = _conclusion(result.prepared, result.selection, described, result.line)
     return replace(learned, onset=result.onset)
 
 

@@ -9,8 +9,9 @@ EFFECT = term(
     'sensor-curve',
     'sensor: y = y + sensor_even*y**2 + sensor_odd*y**3',
     (
-        Parameter('sensor_even', '1/m', -50.0, 50.0, 'even part', 0.0),
-        Parameter('sensor_odd', '1/m^2', -4e4, 4e4, 'odd part', 0.0),
+        # Half of the reading at strokes of 1 mm.
+        Parameter('sensor_even', '1/m', -500.0, 500.0, 'even part', 0.0),
+        Parameter('sensor_odd', '1/m^2', -5e5, 5e5, 'odd part', 0.0),
     ),
     group='sensor-curve',
     signature='harmonics that do not depend on frequency; relative size grows with A and A^2',
