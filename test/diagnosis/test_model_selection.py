@@ -1,0 +1,111 @@
+"""What decides between structures: noise under stationary commands, forms held by a bound."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+from scipy import signal
+
+from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.finding import Rival
+from actuator_glue.diagnosis.fit import Fit
+from actuator_glue.diagnosis.model_selection import ModelSelection
+from actuator_glue.diagnosis.pipeline import mean_effects
+from actuator_glue.diagnosis.score import pooled, splits_of
+from actuator_glue.diagnosis.search import Search, Trial
+from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.model.effects import CATALOGUE, Effect
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Record
+
+RATE = 128.0
+THETA = np.array([235.0, 5.0e10, 4.23e6, 3.3])
+
+
+def stationary(effects: tuple[str, ...], sizes: list[float], seed: int) -> Data:
+    """A random command between 0.1 and 7 Hz without and with a specimen, 10 um of noise."""
+    rng, n, records = np.random.default_rng(seed), int(40 * RATE), []
+    for k in (0.0, 250e3):
+        sos = signal.butter(3, [0.1, 7.0], 'bandpass', fs=RATE, output='sos')
+        u = signal.sosfilt(sos, rng.standard_normal(n)) * np.minimum(1.0, np.arange(n) / 256)
+        u *= 2e-3 / np.abs(u).max()
+        y = Structure(effects).simulate(np.append(THETA, sizes), Record(u, u, 1 / RATE, k))
+        records.append(Record(u, y + 1e-5 * rng.standard_normal(n), 1 / RATE, k))
+    return Data.whole(records)
+
+
+def selection(data: Data) -> ModelSelection:
+    """The first step of a selection: Eq. (2) fitted, noise taken from what it leaves."""
+    found = ModelSelection(Search(data, mean_effects()), Thresholds(), lambda stage, share: None)
+    found.renoise()
+    return found
+
+
+def test_structure_under_a_stationary_command_is_no_noise() -> None:
+    """40 um of play: all of its error looks stationary, a forecast of left-out blocks does not."""
+    found = selection(stationary(('backlash',), [4e-5], 1))
+    error = found.search.base().error
+    looks = pooled(found.search.data, splits_of(found.search.data, error))[1]
+    assert looks > 1.5e-5
+    assert 0.97e-5 < found.noise < 0.75 * looks
+    left = found.left(found.search.trial(()))
+    assert np.hypot(left, found.noise) == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-6)
+    assert left > found.material
+
+
+def test_noise_under_a_stationary_command_stays_noise() -> None:
+    """A healthy machine: nothing can be forecast beyond chance."""
+    found = selection(stationary((), [], 2))
+    assert found.noise == pytest.approx(1e-5, rel=0.05)
+    assert found.left(found.search.trial(())) < 0.3 * found.noise
+
+
+def test_a_transducer_may_bend_by_a_tenth_of_a_short_stroke() -> None:
+    """180 um of y^2 at 1.5 mm, 75 1/m: found inside its bounds, the error down to the noise."""
+    t = np.arange(int(24 * RATE)) / RATE
+    u = 1.55e-3 * np.sin(np.pi * (8.0 / 24.0) * t**2)
+    bent = Structure(('sensor-curve',))
+    y = bent.simulate(np.append(THETA, [75.0, 0.0]), Record(u, u, 1 / RATE, 0.0))
+    y += 1e-5 * np.random.default_rng(3).standard_normal(len(u))
+    found = selection(Data.whole([Record(u, y, 1 / RATE, stiffness=0.0)]))
+    trial = found.search.polish(found.search.add(found.search.trial(()), 'sensor-curve'))
+    assert trial.fit.theta[4] == pytest.approx(75.0, rel=0.02)
+    assert trial.fit.rms < 1.05e-5
+
+
+@dataclass
+class Tried:
+    """A search that knows two structures."""
+
+    trials: dict[tuple[str, ...], Trial]
+    entries: dict[str, Effect] = field(default_factory=lambda: dict(CATALOGUE))
+
+    def trial(self, effects: tuple[str, ...], added: str = '') -> Trial:
+        """Return the structure."""
+        return self.trials[effects]
+
+
+@pytest.mark.parametrize(
+    ('ratio', 'speed', 'name'),
+    [
+        (4.0, 0.016, 'coulomb-friction'),
+        (1.5, 0.1, 'coulomb-friction'),
+        (1.8, 0.005, 'stribeck-friction'),
+    ],
+)
+def test_a_richer_form_at_its_bound_mends_the_other(ratio: float, speed: float, name: str) -> None:
+    """Friction that falls by as much as may be, or nowhere, is Coulomb's, 300 nats or not."""
+    coulomb, stribeck = ('coulomb-friction',), ('stribeck-friction',)
+    sizes = {coulomb: [100.0], stribeck: [80.0, ratio, speed]}
+    trials = {
+        n: Trial(
+            Structure(n),
+            n[0],
+            Fit(np.append(THETA, s), np.zeros(3), np.zeros((4 + len(s), 3)), np.zeros(4)),
+            np.zeros(2),
+        )
+        for n, s in sizes.items()
+    }
+    found = ModelSelection(Tried(trials), Thresholds(), lambda stage, share: None)  # type: ignore[arg-type]
+    rivals = {stribeck[0]: (Rival(coulomb[0], 300.0, 20.0, 1e-6, True, 0.4),)}
+    assert found.simpler(trials[stribeck], rivals).effects == (name,)
