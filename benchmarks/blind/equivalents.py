@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from sizing import Array
 
+# Machines whose parameters the catalogue counts in another way than the generators: (T s + 1) (s +
+# beta_1) of a valve is T s^2 + s + beta_1 there, and a heavy payload comes with leakage.
+OTHERWISE = {'valve-lag', 'payload-inertia'}
 # Kinds that were outside of the catalogue when the generators were written.
 SAME = {'sensor-cubic': 'sensor-curve', 'sensor-quadratic': 'sensor-curve'} | {
     'command-lag': 'sensor-lag',
@@ -11,7 +14,6 @@ SAME = {'sensor-cubic': 'sensor-curve', 'sensor-quadratic': 'sensor-curve'} | {
 # name -> parameter, where the size is its value.
 _PLAIN = {
     'delay': 'delay',
-    'valve-lag': 'valve_lag',
     'backlash': 'backlash',
     'specimen-gap': 'gap',
     'integral-action': 'integral_rate',

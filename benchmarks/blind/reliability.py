@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from equivalents import catalogued
+from equivalents import OTHERWISE, catalogued
 from score import share
 
 from actuator_glue.model.parameters import NAMES
@@ -83,7 +83,7 @@ def coverage(results: Iterable[Json]) -> tuple[list[tuple[str, bool]], list[tupl
                     if name in values and e['identified']
                 ]
         told = {e['name'] for e in found['effects']}
-        if told == true and found['complete'] and 'payload-inertia' not in told:
+        if told == true and found['complete'] and not told & OTHERWISE:
             base += [
                 (name, _holds(found['base'][name], values[name]))
                 for name in NAMES
