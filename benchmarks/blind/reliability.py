@@ -129,10 +129,8 @@ def picture(rows: list[Json], path: Path) -> None:
     low, high = np.array([r['right']['ci'] for r in used]).T
     axes.errorbar(x, y, [y - low, high - y], fmt='o', color='C0', capsize=3)
     for r in used:
-        axes.annotate(
-            str(r['right']['n']), (r['mean'], r['right']['share']), (6, -10),
-            textcoords='offset points',
-        )  # fmt: skip
+        at = r['mean'], r['right']['share']
+        axes.annotate(str(r['right']['n']), at, (6, -10), textcoords='offset points')
     axes.set(xlim=(0, 1.02), ylim=(0, 1.02), xlabel='probability given', ylabel='share right')
     fig.savefig(path, dpi=120)
 
