@@ -87,7 +87,10 @@ def test_mts_of_another_day_gets_what_is_supported(seed: int) -> None:
 @pytest.mark.slow
 @pytest.mark.skipif(not FASTER.is_file(), reason=f'its records are not at {FASTER}')
 def test_a_second_machine_gets_what_is_supported() -> None:
-    """Another controller, a random command: a gain helps on the third that was held out."""
+    """Another controller, a random command: weak integral action helps on a held-out third.
+
+    A gain, which it passes for, left 7.5 um there, integral action 6.2 um.
+    """
     data = np.genfromtxt(FASTER, delimiter=',', names=True)
     cut = 2 * len(data) // 3
     fitted, held = (
@@ -95,6 +98,7 @@ def test_a_second_machine_gets_what_is_supported() -> None:
         for part in (data[:cut], data[cut:])
     )
     found = diagnose([fitted], held, jobs=2)
-    assert 'gain' in {n for e in found.effects for n in (e.name, *e.alternatives)}
+    names = {n for e in found.effects for n in (e.name, *e.alternatives)}
+    assert names & {'gain', 'integral-action'}
     assert found.error.removed_ci[0] > 0.0
-    assert found.error.after < 8.5e-6 < 9.0e-6 < found.error.before
+    assert found.error.after < 7.0e-6 < 9.0e-6 < found.error.before
