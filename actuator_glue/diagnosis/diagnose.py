@@ -86,7 +86,9 @@ def diagnose(
     stretches = homogeneity.agreement(decision.final, scorer)
     rng = np.random.default_rng([seed, 1])
     size = max(found.material, decision.left)
-    small = discrepancy.responses(result.selection.search, size)
+    # One record's own setting is told from a common one by size alone: no common one beside it.
+    own = decision.final.own is not None
+    small = {} if own else discrepancy.responses(result.selection.search, size)
     sides: list[Side] = []
     for stage, trial in (('posterior before', found.base), ('posterior', decision.final)):
         if sides and not decision.final.effects:

@@ -22,6 +22,7 @@ from actuator_glue.records import Array
 # Scales, of the largest: none at all is as likely as all others together.
 _SCALES = np.concatenate([[0.0], 2.0 ** np.arange(-6.0, 1.0)])
 _PRIOR = np.log(np.concatenate([[0.5], np.full(len(_SCALES) - 1, 0.5 / (len(_SCALES) - 1))]))
+_FLAT = 1e-8  # of what the records tell of a parameter alone
 _SAME = 1e-10  # of the largest power: a shape that others make up
 
 
@@ -77,7 +78,11 @@ class Discrepancy:
             widest: standard deviations (p,) of what is known without any record.
         """
         size = np.sqrt(np.einsum('pn,pn->p', jacobian, jacobian))
+        # Where the logarithm of next to no leakage stands it has hardly a slope, and its width says
+        # nothing of how far it goes: the ridge that it makes with a gain is left as it is.
+        flat = (size > 1e-9 / widest) & ((widest * size) ** 2 < noise)
         size = np.maximum(size, 1e-9 / widest)
+        floor = np.where(flat, _FLAT, 1.0 / (widest * size) ** 2)
         jac = jacobian / size[:, None]
         count = self.shapes.shape[1]
         seen, along = self.shapes @ jac[:, :count].T, self.shapes @ error[:count]
@@ -86,7 +91,7 @@ class Discrepancy:
             power = scale**2 * self.powers
             share = power / (noise + power)
             normal = (jac @ jac.T - seen.T @ (share[:, None] * seen)) / noise
-            normal[np.diag_indices(len(size))] += 1.0 / (widest * size) ** 2
+            normal[np.diag_indices(len(size))] += floor
             covariance = np.linalg.inv(normal)
             pull = (jac @ error - seen.T @ (share * along)) / noise
             mean = covariance @ pull

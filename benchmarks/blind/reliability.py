@@ -11,13 +11,17 @@ import json
 from collections.abc import Iterable
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from equivalents import OTHERWISE, catalogued
 from score import share
 
 from actuator_glue.model.parameters import NAMES
+from actuator_glue.report import style
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 Json = dict[str, Any]
 _EDGES = (0.0, 0.3, 0.6, 0.8, 0.9, 1.0)
@@ -114,25 +118,22 @@ def _told(found: Json) -> str:
     return f'{round(found["share"] * n)} of {n} ({low:.0%} to {high:.0%})'
 
 
-def picture(rows: list[Json], path: Path) -> None:
+@style.styled
+def picture(rows: list[Json]) -> Figure:
     """Draw the reliability diagram."""
-    import matplotlib
-
-    matplotlib.use('Agg')
-    from matplotlib import pyplot as plt
-
     used = [r for r in rows if r['right']['n']]
-    fig, axes = plt.subplots(figsize=(4.2, 4.0), layout='constrained')
-    axes.plot([0, 1], [0, 1], color='0.7', lw=1)
+    figure = style.new_figure(4.0, 4.2)
+    axes = figure.subplots()
+    axes.plot([0, 1], [0, 1], color=style.COMMAND, lw=0.8)
     x = np.array([r['mean'] for r in used])
     y = np.array([r['right']['share'] for r in used])
-    low, high = np.array([r['right']['ci'] for r in used]).T
-    axes.errorbar(x, y, [y - low, high - y], fmt='o', color='C0', capsize=3)
+    low, high = np.reshape([r['right']['ci'] for r in used], (-1, 2)).T
+    axes.errorbar(x, y, [y - low, high - y], fmt='o', color=style.BAND, capsize=3)
     for r in used:
         at = r['mean'], r['right']['share']
         axes.annotate(str(r['right']['n']), at, (6, -10), textcoords='offset points')
     axes.set(xlim=(0, 1.02), ylim=(0, 1.02), xlabel='probability given', ylabel='share right')
-    fig.savefig(path, dpi=120)
+    return figure
 
 
 def main() -> int:
@@ -150,7 +151,7 @@ def main() -> int:
         for name in sorted({n for n, hit in found if not hit}):
             print(f'  missed: {name} {_told(share([h for n, h in found if n == name]))}')
     if args.picture:
-        picture(rows, args.picture)
+        style.save(picture(rows), args.picture)
     return 0
 
 

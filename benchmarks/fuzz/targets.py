@@ -16,6 +16,7 @@ from actuator_glue.io.bag_reader import messages
 from actuator_glue.io.messages import deserialize
 from actuator_glue.io.partition import read_partition
 from actuator_glue.io.yaml_file import parse
+from actuator_glue import setups
 from actuator_glue.online import wire
 from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.settings import EstimatorSettings
@@ -191,7 +192,7 @@ def _messages(_: Path) -> Use:
         if kind == 'SampleBlock':
             uses.append(lambda: estimator.push(wire.block(message)))
         elif kind == 'TestSetup':
-            uses.append(lambda: estimator.setup(wire.setup(message)))
+            uses.append(lambda: estimator.setup(setups.from_message(message)))
         elif kind == 'CommandPreview':
             uses.append(lambda: estimator.preview(wire.preview(message)))
         elif kind == 'EstimatorSetup':

@@ -57,7 +57,7 @@ def write(done: list[Outcome], found: Findings, out: Path) -> None:
         'actuators': [asdict(one) for one in done],
     }
     library.write_json(content, str(out / NUMBERS))
-    reliability_figure(done, found).savefig(out / PICTURE)
+    library.style.save(reliability_figure(done, found), out / PICTURE)
 
 
 def main(argv: list[str] | None = None) -> int:

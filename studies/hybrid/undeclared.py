@@ -214,7 +214,7 @@ def main(argv: list[str] | None = None) -> int:
     library.write_json(
         {'schema': 'studies.hybrid.undeclared/1', **content}, str(out / 'undeclared.json')
     )
-    figure(told).savefig(out / 'undeclared.png', dpi=75)
+    library.style.save(figure(told), out / 'undeclared.png')
     print(table(told))
     if args.page is not None:
         write_between(args.page, 'stories', table(told))
