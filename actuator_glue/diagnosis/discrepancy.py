@@ -78,8 +78,8 @@ class Discrepancy:
             widest: standard deviations (p,) of what is known without any record.
         """
         size = np.sqrt(np.einsum('pn,pn->p', jacobian, jacobian))
-        # Where the logarithm of next to no leakage stands it has hardly a slope, and its width says
-        # nothing of how far it goes: the ridge that it makes with a gain is left as it is.
+        # The logarithm of next to no leakage has hardly a slope, and its width says nothing of how
+        # far it goes: the ridge that it makes with a gain is left as it is.
         flat = (size > 1e-9 / widest) & ((widest * size) ** 2 < noise)
         size = np.maximum(size, 1e-9 / widest)
         floor = np.where(flat, _FLAT, 1.0 / (widest * size) ** 2)

@@ -10,13 +10,13 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from actuator_glue import setups
 from actuator_glue.errors import InputError
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.io.bag_reader import messages
 from actuator_glue.io.messages import deserialize
 from actuator_glue.io.partition import read_partition
 from actuator_glue.io.yaml_file import parse
-from actuator_glue import setups
 from actuator_glue.online import wire
 from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.settings import EstimatorSettings
