@@ -62,9 +62,11 @@ def _additions(
         new = [n for n in names if n not in start.effects]
         for trial in search.additions(start, search.screened(start, new)[:_REFITS]):
             least = selection.material
-            if len(trial.fit.theta) <= len(best.fit.theta):
-                # In the place of names it must remove more than what would leave them tied.
-                if not selection.better(trial, start, least, cost):
+            if start is not best:
+                # In the place of names it must explain the rest, and be more than tied with them:
+                # while something remains a name is worth more than a description.
+                whole = selection.left(trial) < selection.material
+                if not whole or not selection.better(trial, start, least, cost):
                     continue
                 least = selection.settings.tie_share * removed(start, trial)
             if selection.better(trial, best, least, cost):
