@@ -15,6 +15,7 @@ from actuator_glue.api.provenance import provenance
 from actuator_glue.api.result import Result
 from actuator_glue.api.tracking import RecordTracking, record_tracking, tables
 from actuator_glue.diagnosis import diagnose as core
+from actuator_glue.diagnosis.decimate import decimated, factor
 from actuator_glue.diagnosis.estimate import Json
 from actuator_glue.diagnosis.preparation import clean, initial_state
 from actuator_glue.diagnosis.result import SCHEMA, DiagnosisData
@@ -188,10 +189,14 @@ def diagnose(
 
 
 def _tracking(found: DiagnosisData, records: Sequence[Record]) -> tuple[RecordTracking, ...]:
-    """Return how the augmented model follows each record; not where one has its own settings."""
+    """Return how the augmented model follows each record; not where one has its own settings.
+
+    At the rate it was fitted with.
+    """
     if set(found.names) != set(found.model.names):
         return ()
+    fitted = (decimated(r, factor(r)) for r in records)
     return tuple(
         record_tracking(found.posterior, found.names, found.model, r, initial_state(r))
-        for r in records
+        for r in fitted
     )

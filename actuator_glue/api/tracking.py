@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuator_glue.api.spread import Spread, spread
+from actuator_glue.diagnosis.data import chunks
 from actuator_glue.hybrid.actuator import actuator, table_of
 from actuator_glue.hybrid.indicators import (
     criteria,
@@ -114,15 +115,16 @@ def record_tracking(
             predicted[f'delay_at_{f:g}_hz_s'] = spread(found.delay[:, i])
             predicted[f'amplitude_at_{f:g}_hz'] = spread(found.amplitude[:, i])
         predicted['bandwidth_hz'] = spread(found.bandwidth)
-    moved = structure.simulate(some, record, initial=initial, origin=origin)[:, settle:]
-    moved = moved[np.isfinite(moved).all(axis=1)]
-    record = record.slice(settle, len(record))
-    if np.ptp(record.command) > 0.0 and len(moved):
-        drawn = [_numbers(record, x) for x in moved]
+    counted = record.slice(settle, len(record))
+    drawn: list[dict[str, float]] = []
+    if np.ptp(counted.command) > 0.0:
+        for part in chunks(len(some), len(record)):  # all at once a long test takes gigabytes
+            moved = structure.simulate(some[part], record, initial=initial, origin=origin)
+            finite = np.isfinite(moved[:, settle:]).all(axis=1)
+            drawn += [_numbers(counted, x) for x in moved[finite, settle:]]
+    measured = _numbers(counted, counted.measured) if drawn else {}
+    if drawn:
         predicted |= {n: spread(np.array([d[n] for d in drawn])) for n in drawn[0]}
-        measured = _numbers(record, record.measured)
-    else:
-        measured = {}
     return RecordTracking(source_name(record.source), predicted, measured)
 
 

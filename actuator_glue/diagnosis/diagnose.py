@@ -88,9 +88,7 @@ def diagnose(
     size = max(found.material, decision.left)
     # One record's own setting is told from a common one by size alone: no common one beside it.
     own = decision.final.own is not None
-    # Its shapes of all samples have to be kept: of long records, gigabytes.
-    long = data.target.size > discrepancy.MOST
-    small = {} if own or long else discrepancy.responses(result.selection.search, size)
+    small = {} if own else discrepancy.responses(result.selection.search, size)
     sides: list[Side] = []
     for stage, trial in (('posterior before', found.base), ('posterior', decision.final)):
         if sides and not decision.final.effects:
@@ -146,7 +144,6 @@ def diagnose(
             *advice.unidentified(data, estimates),
             *advice.unconverged(rhat),
             *([used.remark()] if used else []),
-            *([discrepancy.LEFT_OUT] if long else []),
             *prepared.notes,
         ),
         base={p.name: estimates[p.name] for p in BASE},

@@ -22,11 +22,6 @@ from actuator_glue.records import Array
 # Scales, of the largest: none at all is as likely as all others together.
 _SCALES = np.concatenate([[0.0], 2.0 ** np.arange(-6.0, 1.0)])
 _PRIOR = np.log(np.concatenate([[0.5], np.full(len(_SCALES) - 1, 0.5 / (len(_SCALES) - 1))]))
-MOST = 200_000  # samples
-LEFT_OUT = (
-    'intervals are those of the noise: in records this long they do not allow for effects too '
-    'small to be added'
-)
 _FLAT = 1e-8  # of what the records tell of a parameter alone
 _SAME = 1e-10  # of the largest power: a shape that others make up
 
