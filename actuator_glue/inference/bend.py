@@ -12,6 +12,7 @@ import math
 
 import numpy as np
 
+from actuator_glue.inference.student import factorize
 from actuator_glue.jit import njit
 from actuator_glue.records import Array
 
@@ -98,18 +99,10 @@ def _bent(w: Array, a: Array, g: Array) -> float:
 
 @njit(fastmath=False)
 def _solve(matrix: Array, x: Array) -> None:
-    """Solve matrix x = x in place for a symmetric positive definite matrix (n, n); both are lost.
-
-    By hand: what libraries return may depend on how many threads they use.
-    """
+    """Solve matrix x = x in place for a positive definite matrix (n, n); both are lost."""
     n = len(x)
+    factorize(matrix)
     for j in range(n):
-        for k in range(j + 1):
-            for i in range(k):
-                matrix[j, k] -= matrix[j, i] * matrix[k, i]
-            if k < j:
-                matrix[j, k] /= matrix[k, k]
-        matrix[j, j] = math.sqrt(max(matrix[j, j], 1e-300))
         for i in range(j):
             x[j] -= matrix[j, i] * x[i]
         x[j] /= matrix[j, j]

@@ -16,6 +16,21 @@ from actuator_glue.records import Array
 DEGREES = 8.0
 
 
+@njit
+def factorize(matrix: Array) -> None:
+    """Replace a positive definite matrix (n, n) by its Cholesky factor, in its lower triangle.
+
+    By hand: what libraries return may depend on how many threads they use.
+    """
+    for j in range(len(matrix)):
+        for k in range(j + 1):
+            for i in range(k):
+                matrix[j, k] -= matrix[j, i] * matrix[k, i]
+            if k < j:
+                matrix[j, k] /= matrix[k, k]
+        matrix[j, j] = math.sqrt(max(matrix[j, j], 1e-300))
+
+
 @njit(fastmath=False)
 def fit(points: Array, centre: Array, factor: Array) -> None:
     """Write centre (p,) and lower Cholesky factor (p, p) of the covariance of points (m, p).
@@ -42,13 +57,7 @@ def fit(points: Array, centre: Array, factor: Array) -> None:
         # Never singular: points all equal in a coordinate get the spread of rounding.
         least = 1e-16 * (1.0 + centre[j] * centre[j])
         factor[j, j] = max(factor[j, j] / max(m - 1, 1), least) * (1.0 + 1e-9)
-    for j in range(d):
-        for k in range(j + 1):
-            for i in range(k):
-                factor[j, k] -= factor[j, i] * factor[k, i]
-            if k < j:
-                factor[j, k] /= factor[k, k]
-        factor[j, j] = math.sqrt(factor[j, j])
+    factorize(factor)
 
 
 @njit
