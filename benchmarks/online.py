@@ -17,7 +17,7 @@ from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.model import commands, linear
 from actuator_glue.online import job as window_job
 from actuator_glue.online.estimator import Estimator
-from actuator_glue.online.playback import at_once, items, replay, stream
+from actuator_glue.online.playback import at_once, give, items, replay, stream
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Preview
 from actuator_glue.records import Record
@@ -122,13 +122,7 @@ def priors(seconds: float = 120.0) -> dict[str, Any]:
     costs: dict[str, list[float]] = {name: [] for name in names}
     for item in stream(_record(seconds), block=100):
         for name, estimator in estimators.items():
-            if isinstance(item, StreamSetup):
-                estimator.setup(item)
-                continue
-            if isinstance(item, Preview):
-                estimator.preview(item)
-                continue
-            estimator.push(item)
+            give(estimator, item)
             while True:
                 began = time.process_time()
                 job = estimator.next_job()

@@ -61,7 +61,7 @@ def replay(
 def _sampled(items: Iterable[Item], estimator: Estimator) -> Iterator[Event | Sampled]:
     """Run the estimator as far as windows depend on one another."""
     for item in items:
-        yield from _given(estimator, item)
+        yield from give(estimator, item)
         while (job := estimator.next_job()) is not None:
             fitted = fit(job)
             yield from estimator.finish(fitted)
@@ -69,7 +69,8 @@ def _sampled(items: Iterable[Item], estimator: Estimator) -> Iterator[Event | Sa
                 yield job, fitted
 
 
-def _given(estimator: Estimator, item: Item) -> list[Event]:
+def give(estimator: Estimator, item: Item) -> list[Event]:
+    """Give an estimator what was streamed; return what it has to tell of it."""
     if isinstance(item, StreamSetup):
         return estimator.setup(item)
     if isinstance(item, Preview):

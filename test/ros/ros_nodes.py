@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 import rclpy
 import yaml
-from actuator_glue_msgs.msg import SampleBlock, TestSetup
+from actuator_glue_msgs.msg import PosteriorMoments, SampleBlock, TestSetup
 from diagnostic_msgs.msg import DiagnosticArray
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
@@ -218,6 +218,27 @@ class Probe(Node):
             part = slice(start, start + size)
             self.block(record.command[part], record.measured[part])
             self.for_a_while(pause)
+
+
+def posteriors_of_a_test(start, probe, found):
+    """Stream six simulated seconds to an estimator that has started; return its posteriors.
+
+    They are there when as many of what follows them have been found.
+    """
+    posteriors = []
+    probe.create_subscription(PosteriorMoments, 'posterior', posteriors.append, 10)
+    probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 120, 'estimator compiled')
+    simulator = start(
+        'actuator_sim',
+        duration=6.0,
+        rate=RATE,
+        specimen_stiffness=250e3,
+        wait_for=1,
+        exit_at_end=True,
+    )
+    assert simulator.wait(60) == 0, simulator.text
+    probe.until(lambda: len(posteriors) > 2 and len(found) >= len(posteriors), 30)
+    return posteriors
 
 
 def recorded(bag):

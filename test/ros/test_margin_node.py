@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from actuator_glue_msgs.msg import PosteriorDraws, PosteriorMoments, StabilityMargin
-from ros_nodes import QUICK, RATE
+from actuator_glue_msgs.msg import PosteriorDraws, StabilityMargin
+from ros_nodes import QUICK, posteriors_of_a_test
 
 from actuator_glue.nodes import topics
 
@@ -59,20 +59,9 @@ def test_the_estimator_feeds_it(start, probe):
     """From samples to StabilityMargin: one for each window, of the same number."""
     estimator = start('estimator', **QUICK)
     margin = start('margin', partition='sdof')
-    found, posteriors = [], []
+    found = []
     probe.create_subscription(StabilityMargin, 'stability_margin', found.append, 10)
-    probe.create_subscription(PosteriorMoments, 'posterior', posteriors.append, 10)
-    probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 120, 'estimator compiled')
-    simulator = start(
-        'actuator_sim',
-        duration=6.0,
-        rate=RATE,
-        specimen_stiffness=250e3,
-        wait_for=1,
-        exit_at_end=True,
-    )
-    assert simulator.wait(60) == 0, simulator.text
-    probe.until(lambda: len(posteriors) > 2 and len(found) >= len(posteriors), 30)
+    posteriors = posteriors_of_a_test(start, probe, found)
     assert [m.window for m in found] == [m.window for m in posteriors]
     assert all(m.header.stamp == p.header.stamp for m, p in zip(found, posteriors, strict=True))
     assert all(m.draws == 200 and m.frequency[1] == 5.0 for m in found)

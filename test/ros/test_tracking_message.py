@@ -1,27 +1,16 @@
 """How the actuator follows its command, after every window of the estimator."""
 
 import numpy as np
-from actuator_glue_msgs.msg import PosteriorMoments, TrackingIndicators
-from ros_nodes import QUICK, RATE
+from actuator_glue_msgs.msg import TrackingIndicators
+from ros_nodes import QUICK, posteriors_of_a_test
 
 
 def test_one_for_each_window(start, probe):
     """The numbers of its window; their limits in order, and about the measured ones."""
     estimator = start('estimator', **QUICK, tracking_frequencies=[2.0, 5.0])
-    found, posteriors = [], []
+    found = []
     probe.create_subscription(TrackingIndicators, 'tracking', found.append, 10)
-    probe.create_subscription(PosteriorMoments, 'posterior', posteriors.append, 10)
-    probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 120, 'estimator compiled')
-    simulator = start(
-        'actuator_sim',
-        duration=6.0,
-        rate=RATE,
-        specimen_stiffness=250e3,
-        wait_for=1,
-        exit_at_end=True,
-    )
-    assert simulator.wait(60) == 0, simulator.text
-    probe.until(lambda: len(posteriors) > 2 and len(found) >= len(posteriors), 30)
+    posteriors = posteriors_of_a_test(start, probe, found)
     assert [m.window for m in found] == [m.window for m in posteriors]
     for message, posterior in zip(found, posteriors, strict=True):
         assert message.header.stamp == posterior.header.stamp
