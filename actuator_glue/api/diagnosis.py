@@ -15,7 +15,7 @@ from actuator_glue.api.provenance import provenance
 from actuator_glue.api.result import Result
 from actuator_glue.api.tracking import RecordTracking, record_tracking, tables
 from actuator_glue.diagnosis import diagnose as core
-from actuator_glue.diagnosis.decimate import decimated, factor
+from actuator_glue.diagnosis.decimate import decimated
 from actuator_glue.diagnosis.estimate import Json
 from actuator_glue.diagnosis.preparation import clean, initial_state
 from actuator_glue.diagnosis.result import SCHEMA, DiagnosisData
@@ -195,7 +195,8 @@ def _tracking(found: DiagnosisData, records: Sequence[Record]) -> tuple[RecordTr
     """
     if set(found.names) != set(found.model.names):
         return ()
-    fitted = (decimated(r, factor(r)) for r in records)
+    rates = (r.rate / of['fitted_rate_hz'] for r, of in zip(records, found.sampling, strict=True))
+    fitted = (decimated(r, round(times)) for r, times in zip(records, rates, strict=True))
     return tuple(
         record_tracking(found.posterior, found.names, found.model, r, initial_state(r))
         for r in fitted

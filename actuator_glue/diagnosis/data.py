@@ -39,8 +39,8 @@ _ROWS = 8
 
 
 def chunks(rows: int, columns: int) -> Iterator[slice]:
-    """Yield slices of rows, of so few that their columns stay within a block."""
-    size = max(_ROWS, _BLOCK // max(columns, 1))
+    """Yield slices of rows, of so few that their columns stay within a block, by full lanes."""
+    size = max(1, _BLOCK // max(columns, 1) // _ROWS) * _ROWS
     for begin in range(0, rows, size):
         yield slice(begin, begin + size)
 

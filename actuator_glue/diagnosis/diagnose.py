@@ -63,7 +63,7 @@ def diagnose(
         holdout: record(s) that decide nothing and give the error before and after; without
             one, a quarter of each record is set aside in blocks before any look.
         seed: seed of every random step; the same seed gives the same diagnosis.
-        each: refits candidates: `map`, or that of a pool of threads, which is as good.
+        each: refits candidates and evaluates draws: `map`, or that of a pool of threads.
         progress: called with (stage, share done in [0, 1]).
         settings: thresholds.
         clock: gives seconds, for the duration reported (NaN without one).
@@ -103,6 +103,7 @@ def diagnose(
             rng=rng,
             evaluations=settings.evaluations if trial.effects else 0,
             progress=partial(tell, stage),
+            each=each,
         )
         sides.append(Side(trial.model, trial.fit.theta, draws))
     before, after = sides

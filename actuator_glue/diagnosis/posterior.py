@@ -16,6 +16,7 @@ from actuator_glue.diagnosis.fit import Fit, Space, jacobian
 from actuator_glue.diagnosis.fit import fit as fit_to
 from actuator_glue.diagnosis.identifiable import Straight, Working, coordinates
 from actuator_glue.diagnosis.score import Scorer
+from actuator_glue.diagnosis.search import Each
 from actuator_glue.inference import posterior
 from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.inference.transforms import Composed
@@ -100,6 +101,7 @@ def sample(
     rng: np.random.Generator,
     evaluations: int,
     progress: Callable[[float], None],
+    each: Each = map,
 ) -> tuple[Array, float]:
     """Draw (m, p) from the posterior, physical units; return the largest R-hat with the draws.
 
@@ -113,6 +115,7 @@ def sample(
         evaluations: likelihood evaluations; 0 returns draws of the Laplace approximation, and
             not-a-number for R-hat.
         progress: called with the share done.
+        each: evaluates some draws at a time: `map`, or that of a pool of threads.
     """
     fit = most_likely(data, model, fit, scorer)
     space = Space(model, max(r.duration for r in data.records))
@@ -139,13 +142,17 @@ def sample(
     if evaluations <= 0:
         return transform.inverse(gaussian(500))[0], math.nan
 
+    target = data.target
+
+    def of_some(theta: Array) -> Array:
+        error = scorer.whiten(target - data.simulate(model, theta))
+        with np.errstate(all='ignore'):
+            likely = beside.log_likelihood(error, noise)
+        return np.where(np.isfinite(likely), likely, -np.inf)
+
     def log_likelihood(theta: Array) -> Array:
-        found = np.empty(len(theta))
-        for some in chunks(len(theta), data.target.size):
-            error = scorer.whiten(data.target - data.simulate(model, theta[some]))
-            with np.errstate(all='ignore'):
-                likely = beside.log_likelihood(error, noise)
-            found[some] = np.where(np.isfinite(likely), likely, -np.inf)
+        parts = chunks(len(theta), target.size)
+        found = np.concatenate(list(each(of_some, [theta[some] for some in parts])))
         # Uniform in the logarithms otherwise.
         return found if data.prior is None else found + data.prior.log_density(theta)
 
