@@ -179,6 +179,14 @@ class BagWriter:
                 self._file.refuse(error)
                 raise
 
+    def sync(self) -> None:
+        """Wait until the disk has what was flushed; any thread may call this.
+
+        Raises:
+            InputError: the disk does not take it.
+        """
+        self._file.sync()
+
     def close(self) -> None:
         """Finish the bag: index, fsync, metadata.yaml in one step; closing twice is harmless.
 

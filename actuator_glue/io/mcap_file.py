@@ -103,6 +103,23 @@ class McapFile:
             self.size = self._stream.tell()
         self.flushes += 1
 
+    def sync(self) -> None:
+        """Wait until the disk has what was flushed: neither power nor disk takes it then.
+
+        Another thread may call this while the file is written.
+
+        Raises:
+            InputError: the disk does not take it.
+        """
+        try:
+            if self._raw is not None:
+                os.fdatasync(self._raw.fileno())
+        except ValueError:  # closed meanwhile, and waited for by whoever closed it
+            return
+        except OSError as error:
+            if error.errno != errno.EBADF:
+                raise disk_error(self._bag, error) from error
+
     def finish(self, serialized_metadata: str) -> None:
         """Write index and end, and wait until the disk has them.
 

@@ -37,6 +37,9 @@ SPECS = (
 )
 
 
+SYNC_PERIOD = 1.0  # s after which the disk itself, and not the system's memory, has a message
+
+
 class Item(NamedTuple):
     """A message on its way to the disk; times in ns, `arrived` is monotonic [s]."""
 
@@ -73,6 +76,8 @@ class RecorderNode(base.SuiteNode):
         self._wanted = {name for name in values['topics'] if name}
         self._thread = threading.Thread(target=self._write, name='writer', daemon=True)
         self._thread.start()
+        self._finished = threading.Event()
+        threading.Thread(target=self._sync, name='sync', daemon=True).start()
         self._heard: dict[str, tuple[topics.Topic, Any]] = {}
         for topic in topics.RECORDED if values['suite'] else ():
             self._record(topic)
@@ -84,6 +89,7 @@ class RecorderNode(base.SuiteNode):
         if self.writer is None:
             return
         self._take_what_waits()
+        self._finished.set()
         self._queue.put(None)
         self._thread.join()
         try:
@@ -211,6 +217,16 @@ class RecorderNode(base.SuiteNode):
             self._waiting_bytes -= len(item.data)
             self._lag = time.monotonic() - item.arrived
             self._worst_lag = max(self._worst_lag, self._lag)
+
+    def _sync(self) -> None:
+        """Have the disk take what was written; a thread of its own, for a disk may take long."""
+        writer, finished = self.writer, self._finished
+        assert writer is not None
+        while not finished.wait(SYNC_PERIOD):
+            try:
+                writer.sync()
+            except InputError as error:
+                self._failed = str(error)
 
 
 def _suited(asked: QoSProfile, offered: Sequence[QoSProfile]) -> QoSProfile:

@@ -1,5 +1,6 @@
 """Gaps, restarts and set-ups inside a bag, and what a killed or starved writer leaves."""
 
+import errno
 import os
 import signal
 import subprocess
@@ -267,6 +268,25 @@ def test_a_next_file_that_cannot_be_made_is_said_again_and_again(
         writer.close()
     (tmp_path / 'bag' / 'bag_1.mcap').rmdir()
     assert recover(tmp_path / 'bag').messages > 0
+
+
+def test_a_disk_that_does_not_take_what_was_flushed_is_said(
+    tmp_path: Path, record: Record, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """An error of the disk itself comes late, when the file is synchronised, or never."""
+    writer = BagWriter(tmp_path / 'bag')
+    write_record(writer, record)
+    writer.sync()
+
+    def broken(_: int) -> None:
+        raise OSError(errno.EIO, 'Input/output error')
+
+    monkeypatch.setattr(os, 'fdatasync', broken)
+    with pytest.raises(InputError, match='bag'):
+        writer.sync()
+    writer.close()
+    writer.sync()  # nothing is left to wait for
+    assert len(read_records(tmp_path / 'bag')[0]) == len(record)
 
 
 def test_a_read_only_disk_is_said(tmp_path: Path) -> None:

@@ -1,8 +1,11 @@
 """Killed nodes and full disks: what was recorded is kept, and what begins anew says so."""
 
+import os
 import resource
 import signal
+import subprocess
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +15,7 @@ from ros_nodes import QUICK, RATE, recorded
 
 from actuator_glue.io.bag_reader import decoded, messages, summarise
 from actuator_glue.io.recover import recover
+from actuator_glue.nodes.recorder import SYNC_PERIOD
 
 # What a kill may cost [s].
 LOST = 0.5
@@ -115,6 +119,67 @@ def test_a_full_disk_is_said_and_what_is_there_stays(start, probe, tmp_path):
     assert recover(bag).messages > 200
     index = recorded(bag)
     assert np.array_equal(index, np.arange(index[0], index[0] + len(index)))
+
+
+@pytest.fixture
+def breakable(tmp_path):
+    """A disk that goes read-only at its first error: folder, what breaks it, what remounts it."""
+    image, folder = tmp_path / 'disk.img', tmp_path / 'disk'
+    folder.mkdir()
+
+    def run(*command):
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode:
+            raise OSError(f'{command[0]}: {done.stderr.strip()}')
+        return done.stdout
+
+    def mount():
+        run('mount', '-o', 'loop,errors=remount-ro', str(image), str(folder))
+
+    try:
+        with image.open('wb') as file:
+            file.truncate(64 << 20)
+        run('mkfs.ext4', '-q', '-F', str(image))
+        mount()
+        device = Path(run('findmnt', '-n', '-o', 'SOURCE', str(folder)).strip()).name
+        trigger = Path('/sys/fs/ext4', device, 'trigger_fs_error')
+        if not os.access(trigger, os.W_OK):
+            raise OSError(f'{trigger} cannot be written')
+    except OSError as error:
+        pytest.skip(f'no disk of its own here ({error})')
+
+    def remount():
+        run('umount', str(folder))
+        mount()
+
+    yield folder, lambda: trigger.write_text('test'), remount
+    run('umount', str(folder))
+
+
+@pytest.mark.slow  # needs root and a loop device
+def test_a_disk_that_goes_read_only_keeps_all_but_the_last_seconds(breakable, start, probe):
+    """As after a fault of the disk or of the power: only what the disk itself has comes back."""
+    folder, break_it, remount = breakable
+    bag = folder / 'bag'
+    newest = []
+    probe.create_subscription(SampleBlock, 'samples', lambda m: newest.append(m.index), 100)
+    recorder = start('recorder', bag=str(bag))
+    simulator = start('actuator_sim', rate=1000.0, repeat=True, wait_for=1)
+    probe.until(lambda: probe.number('recorder', 'messages written') > 500, 60, 'recording')
+    before = newest[-1]
+    break_it()
+    probe.until(lambda: 'read-only' in probe.faults['recorder'], 30, 'a read-only disk')
+    probe.for_a_while(2.0)
+    assert recorder.alive
+    assert recorder.end() == 0 and 'Traceback' not in recorder.text
+    assert simulator.end() == 0
+    remount()
+    assert recover(bag).messages > 0
+    index = recorded(bag)
+    assert np.array_equal(index, np.arange(index[0], index[0] + len(index)))
+    missing = (before - index[-1]) / 1000.0
+    print(f'{missing:.2f} s missing')
+    assert missing <= SYNC_PERIOD + 1.0
 
 
 def test_a_folder_that_cannot_be_written_is_said(start):
