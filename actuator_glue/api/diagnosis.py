@@ -189,14 +189,15 @@ def diagnose(
 
 
 def _tracking(found: DiagnosisData, records: Sequence[Record]) -> tuple[RecordTracking, ...]:
-    """Return how the augmented model follows each record; not where one has its own settings.
+    """Return how the augmented model follows each fitted record, at the rate that was fitted.
 
-    At the rate it was fitted with.
+    Not where one has its own settings, nor for records that were left out.
     """
     if set(found.names) != set(found.model.names):
         return ()
-    rates = (r.rate / of['fitted_rate_hz'] for r, of in zip(records, found.sampling, strict=True))
-    fitted = (decimated(r, round(times)) for r, times in zip(records, rates, strict=True))
+    rates = {of['source']: of['fitted_rate_hz'] for of in found.sampling}
+    known = [r for r in records if r.source in rates]
+    fitted = (decimated(r, round(r.rate / rates[r.source])) for r in known)
     return tuple(
         record_tracking(found.posterior, found.names, found.model, r, initial_state(r))
         for r in fitted

@@ -1,4 +1,4 @@
-"""Records without their impulses, which get no leverage on any fit, and are told."""
+"""Records without impulses and frozen readings, which get no leverage on any fit, and are told."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from actuator_glue.diagnosis import decimate
+from actuator_glue.diagnosis import decimate, frozen
 from actuator_glue.diagnosis.checks import where
 from actuator_glue.diagnosis.data import SETTLE, Data, Model
 from actuator_glue.diagnosis.fit import base_fit, fit
@@ -62,6 +62,41 @@ def without_impulses(
     return replace(data, records=tuple(records)), tuple(counts), notes
 
 
+def without_frozen(data: Data, model: Model, theta: Array) -> tuple[Data, list[str]]:
+    """Bridge readings that stand still while a model moves; say which channels are slow.
+
+    Returns:
+        The data with the model's motion in place of repeated readings, and what was done.
+    """
+    records, notes = [], []
+    rows = zip(data.records, data.recorded, data.factors, data.initials, strict=True)
+    for i, (record, whole, count, initial) in enumerate(rows):
+        every = frozen.slower(whole)
+        if every > 1:
+            notes.append(
+                f'{where(record, i + 1)}: the measured displacement changes at every {every}. '
+                f'sample only, its channel gives {whole.rate / every:.4g} Hz of '
+                f'{whole.rate:.4g}; up to {1e3 * (every - 1) * whole.period:.3g} ms of delay are '
+                'those of the recorder'
+            )
+            records.append(record)
+            continue
+        output = model.simulate(theta[None], record, initial=initial, origin=data.origins[i])[0]
+        fine = output if count == 1 else np.interp(whole.time, record.time, output)
+        found = frozen.find(whole, fine)
+        if len(found.first):
+            sizes = found.last + 1 - found.first
+            notes.append(
+                f'{where(record, i + 1)}: the measured displacement stands still {len(sizes)} '
+                f'times while the piston must move ({int(sizes.sum())} of {len(whole)} samples, '
+                f'up to {1e3 * float(sizes.max()) * whole.period:.3g} ms): a frozen channel; the '
+                "model's motion stands in their place"
+            )
+            record = replace(record, measured=frozen.bridged(record, found, output, count))
+        records.append(record)
+    return replace(data, records=tuple(records)), notes
+
+
 def _told(found: Impulses, record: Record) -> str:
     up = float(np.mean(found.sizes > 0.0))
     side = ', all to one side' if up in (0.0, 1.0) and found.count > 4 else ''
@@ -75,7 +110,7 @@ def _told(found: Impulses, record: Record) -> str:
 def despiked(
     records: Sequence[Record], initials: Sequence[Initial]
 ) -> tuple[list[Record], list[str]]:
-    """Take impulses out of records, at the rate they were sampled with.
+    """Take impulses and frozen readings out of records, at the rate they were sampled with.
 
     Args:
         records: checked records of one actuator.
@@ -92,5 +127,6 @@ def despiked(
     whole = replace(Data.whole(slow), masks=tuple(masks), initials=tuple(initials))
     theta = trimmed(whole)
     as_given = replace(Data.whole(records), initials=tuple(initials))
-    data, _, notes = without_impulses(as_given, Structure(()), theta)
-    return list(data.records), notes
+    data, held = without_frozen(as_given, Structure(()), theta)
+    data, _, notes = without_impulses(data, Structure(()), theta)
+    return list(data.records), held + notes

@@ -95,7 +95,6 @@ def diagnose(
             sides.append(sides[0])
             break
         draws, rhat = posterior.sample(
-            data,
             trial.model,
             trial.fit,
             scorer,

@@ -92,7 +92,6 @@ def _inside(around: Working | Straight, phi: Array, move: Array) -> Array:
 
 
 def sample(
-    data: Data,
     model: Model,
     fit: Fit,
     scorer: Scorer,
@@ -106,10 +105,9 @@ def sample(
     """Draw (m, p) from the posterior, physical units; return the largest R-hat with the draws.
 
     Args:
-        data: the fitting part.
         model: the structure.
         fit: its least-squares fit.
-        scorer: whitening filters of the noise.
+        scorer: the fitting part, and whitening filters of its noise.
         beside: what may be there beside the structure.
         rng: random numbers.
         evaluations: likelihood evaluations; 0 returns draws of the Laplace approximation, and
@@ -117,6 +115,7 @@ def sample(
         progress: called with the share done.
         each: evaluates some draws at a time: `map`, or that of a pool of threads.
     """
+    data = scorer.data
     fit = most_likely(data, model, fit, scorer)
     space = Space(model, max(r.duration for r in data.records))
     around = coordinates(space, model, data, fit.z)

@@ -193,15 +193,23 @@ def prepare(
             Data(tuple(every[s]), tuple(masks[s]), initials[s], recorded[s], origins[s], prior)
             for s in parts
         )
-        return _despiked(Prepared(fit, held, tuple(notes), (0,) * n, False))
+        return _mended(Prepared(fit, held, tuple(notes), (0,) * n, False))
     notes.append('every fourth block of each record held out')
     both = [
         tuple(m & side(_folds(r)) for m, r in zip(masks, every, strict=True))
         for side in (np.logical_not, np.asarray)
     ]
     fit, held = (Data(tuple(every), side, initials, recorded, origins, prior) for side in both)
-    return _despiked(Prepared(fit, held, tuple(notes), (0,) * n, True))
+    return _mended(Prepared(fit, held, tuple(notes), (0,) * n, True))
 
 
-def _despiked(prepared: Prepared) -> Prepared:
-    return prepared.without_impulses(Structure(()), despike.trimmed(prepared.fit))
+def _mended(prepared: Prepared) -> Prepared:
+    model, theta = Structure(()), despike.trimmed(prepared.fit)
+    fit, notes = despike.without_frozen(prepared.fit, model, theta)
+    if prepared.folded:
+        held = replace(prepared.held, records=fit.records)
+    else:
+        held, told = despike.without_frozen(prepared.held, model, theta)
+        notes += told
+    prepared = replace(prepared, fit=fit, held=held, notes=(*notes, *prepared.notes))
+    return prepared.without_impulses(model, theta)

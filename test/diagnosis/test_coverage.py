@@ -42,7 +42,6 @@ def test_what_is_immaterial_is_in_the_intervals() -> None:
         scorer = Scorer.of(search.data, splits_of(search.data, found.error))
         for hits, small in ((inside, discrepancy.responses(search, 5e-6)), (plain, {})):
             draws, _ = posterior.sample(
-                search.data,
                 Structure(()),
                 found,
                 scorer,
@@ -82,7 +81,6 @@ def test_intervals_under_slow_noise_hold_the_truth() -> None:
         found = fit(data, model, theta)
         scorer = Scorer.of(data, splits_of(data, found.error))
         draws, _ = posterior.sample(
-            data,
             model,
             found,
             scorer,

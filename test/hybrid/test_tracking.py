@@ -1,11 +1,14 @@
 """The tracking numbers of a calibration: known actuators, and what calibrate hands out."""
 
 import json
+from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import actuator_glue as ag
+from actuator_glue.api.diagnosis import _tracking
 from actuator_glue.api.tracking import record_tracking
 from actuator_glue.model.structure import Structure
 
@@ -42,6 +45,23 @@ def ag_sensors() -> object:
     from actuator_glue.api.simulation import Sensors
 
     return Sensors(noise=0.0, force_noise=0.0)
+
+
+def test_a_diagnosis_tells_of_the_records_it_was_fitted_to() -> None:
+    """Records from before a change of the machine are left out of the fit, and at its rate."""
+    theta = np.array([235.0, 5.0e10, 4.23e6, 3.3])
+    records = [
+        replace(ag.simulate(theta=theta, stiffness=250e3), source=name)
+        for name in ('before.csv', 'after.csv')
+    ]
+    found = SimpleNamespace(
+        names=Structure(()).names,
+        model=Structure(()),
+        posterior=np.tile(theta, (8, 1)),
+        sampling=({'source': 'after.csv', 'fitted_rate_hz': records[1].rate / 2},),
+    )
+    (told,) = _tracking(found, records)  # type: ignore[arg-type]
+    assert told.source == 'after.csv'
 
 
 def test_calibrate_hands_them_out() -> None:

@@ -1,0 +1,84 @@
+"""Readings that stand still although the piston must move, and channels slower than a recorder.
+
+A converter that hangs, or a packet that is sent again, repeats one value exactly. A piston that
+play or friction holds still does not: what a model then misses is part of its whole residual, and
+a channel's grid holds it for one step at most.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_glue.records import Array, Record
+
+_REPEATS = 3  # equal readings at least
+_BEYOND = 8.0  # times the residual's robust size
+_STEPS = 2.0  # of the channel's grid
+_REGULAR = 0.98  # of a slow channel's changes come in step with it
+_SLOWEST = 50  # samples from one change of a slow channel to the next
+
+
+@dataclass(frozen=True)
+class Frozen:
+    """Stretches of one record, first and last repeated sample of each, (c,)."""
+
+    first: NDArray[np.intp]
+    last: NDArray[np.intp]
+
+
+def find(record: Record, output: Array) -> Frozen:
+    """Return where readings repeat while a model's output moves beyond noise and grid.
+
+    Args:
+        record: as it was sampled.
+        output: of a model that was fitted, at the same times, (n,) [m].
+    """
+    y = record.measured
+    moved = np.diff(y) != 0.0
+    changes = np.concatenate([[0], np.flatnonzero(moved) + 1, [len(y)]])
+    first, last = changes[:-1], changes[1:] - 1
+    off = y - output
+    noise = 1.4826 * float(np.median(np.abs(off - np.median(off))))
+    steps = np.abs(np.diff(y)[moved])
+    grid = float(steps.min()) if len(steps) else 0.0
+    motion = np.maximum.reduceat(output, first) - np.minimum.reduceat(output, first)
+    far = (motion > max(_BEYOND * noise, _STEPS * grid)) & (last - first >= _REPEATS - 1)
+    return Frozen(first[far] + 1, last[far])
+
+
+def bridged(record: Record, found: Frozen, output: Array, samples_each: int = 1) -> Array:
+    """Return the measured channel (n,) [m] with the motion of a model in place of repeats.
+
+    What the model misses on both sides is joined by a line.
+
+    Args:
+        record: one sample for `samples_each` of the record that was searched (means of twice as
+            many).
+        found: see `find`.
+        output: of the model, (n,) [m].
+        samples_each: how many samples were made one.
+    """
+    out = np.zeros(len(record), dtype=np.bool_)
+    reach = 0 if samples_each == 1 else 1
+    for first, last in zip(found.first, found.last, strict=True):
+        out[max(0, first // samples_each - reach) : last // samples_each + 1 + reach] = True
+    if out.all() or not out.any():
+        return record.measured
+    at = np.arange(len(record))
+    off = record.measured - output
+    return np.where(out, output + np.interp(at, at[~out], off[~out]), record.measured)
+
+
+def slower(record: Record) -> int:
+    """Return every which sample the measured channel changes at most; 1 where at every one."""
+    at = np.flatnonzero(np.diff(record.measured)) + 1
+    if len(at) < _SLOWEST:
+        return 1
+    every = round(float(np.median(np.diff(at))))
+    if not 2 <= every <= _SLOWEST:
+        return 1
+    in_step = np.bincount(at % every, minlength=every).max() / len(at)
+    return every if in_step >= _REGULAR else 1

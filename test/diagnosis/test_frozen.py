@@ -1,0 +1,77 @@
+"""Readings that repeat: a channel that froze is bridged and told, one that is slow is told."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from actuator_glue.diagnosis import frozen
+from actuator_glue.diagnosis.despike import despiked
+from actuator_glue.diagnosis.fit import base_fit
+from actuator_glue.diagnosis.preparation import prepare
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Record
+
+THETA = np.array([235.0, 5.0e10, 4.23e6, 3.3])
+NOISE = 3e-6
+
+
+def machine(rate: float, seed: int, effects: tuple[str, ...] = (), *own: float):  # type: ignore[no-untyped-def]
+    """Return a record of 24 s of sweep to 10 Hz and its noise-free response."""
+    t = np.arange(int(24 * rate)) / rate
+    command = 2e-3 * np.sin(np.pi * (10.0 / 24.0) * t**2)
+    bare = Record(command, np.zeros(len(t)), 1 / rate, stiffness=250e3)
+    x = Structure(effects).simulate(np.array([*THETA, *own]), bare)
+    noise = NOISE * np.random.default_rng(seed).standard_normal(len(t))
+    return replace(bare, measured=x + noise), x
+
+
+@pytest.mark.parametrize('rate', [500.0, 4000.0])
+def test_a_channel_that_freezes_is_bridged_and_told(rate: float) -> None:
+    record, x = machine(rate, 1)
+    y, rng = record.measured.copy(), np.random.default_rng(5)
+    starts = 6.0 + 2.0 * np.arange(8) + rng.uniform(0.0, 1.0, 8)
+    lengths = rng.uniform(0.02, 0.3, 8)
+    places = zip((starts * rate).astype(int), (lengths * rate).astype(int), strict=True)
+    for at, size in places:
+        y[at : at + size] = y[at]
+    given = replace(record, measured=y)
+    prepared = prepare([given], [])
+    note = next(n for n in prepared.notes if 'frozen' in n)
+    assert 'stands still' in note
+    healthy = prepare([record], [])
+    bent, found = base_fit(healthy.fit).theta, base_fit(prepared.fit).theta
+    assert found[0] == pytest.approx(bent[0], rel=0.005)
+    kept = prepared.fit.records[0].measured - healthy.fit.records[0].measured
+    assert np.abs(kept).max() < 30e-6
+    clean, notes = despiked([given], ['rest'])
+    assert any('frozen' in n for n in notes)
+    assert np.abs(clean[0].measured - x).max() < 40e-6
+
+
+@pytest.mark.parametrize(
+    ('effects', 'own'),
+    [((), ()), (('backlash',), (2e-4,)), (('stribeck-friction',), (3000.0, 1.5, 0.01))],
+)
+@pytest.mark.parametrize('grid', [0.0, 2e-5])
+def test_a_piston_that_stands_still_is_no_frozen_channel(
+    effects: tuple[str, ...], own: tuple[float, ...], grid: float
+) -> None:
+    """Without noise play repeats a reading exactly, and so does a coarse grid."""
+    _, x = machine(1000.0, 2, effects, *own)
+    y = np.round(x / grid) * grid if grid else x
+    record = replace(machine(1000.0, 2)[0], measured=y)
+    assert not any('frozen' in n for n in prepare([record], []).notes)
+
+
+@pytest.mark.parametrize('every', [2, 5])
+def test_a_channel_slower_than_its_recorder_is_told(every: int) -> None:
+    record, _ = machine(1000.0, 3)
+    y = np.repeat(record.measured[::every], every)[: len(record)]
+    assert frozen.slower(record) == 1
+    assert frozen.slower(replace(record, measured=np.round(record.measured / 2e-5) * 2e-5)) == 1
+    slow = replace(record, measured=y)
+    assert frozen.slower(slow) == every
+    (note,) = (n for n in prepare([slow], []).notes if 'recorder' in n)
+    assert f'every {every}. sample' in note
+    assert f'{1000 / every:.4g} Hz' in note
