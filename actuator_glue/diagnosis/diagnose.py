@@ -17,6 +17,7 @@ from actuator_glue.diagnosis import (
     learned_term,
     posterior,
     response,
+    rest,
     verdict,
 )
 from actuator_glue.diagnosis.base_prior import BasePrior
@@ -32,7 +33,7 @@ from actuator_glue.diagnosis.pipeline import (
     with_learned_terms,
     with_the_right_hold,
 )
-from actuator_glue.diagnosis.preparation import prepare
+from actuator_glue.diagnosis.preparation import prepare, rest_samples
 from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.diagnosis.search import Each
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -106,6 +107,7 @@ def diagnose(
         )
         sides.append(Side(trial.model, trial.fit.theta, draws))
     before, after = sides
+    still = [rest.noise_at_rest(r, rest_samples(r)) for r in data.records]
     tell('held-out', 0.0)
     error, coverage, curves = verify(
         data, prepared.held, before, after, decision.noise, seed, result.line, len(found.singles)
@@ -143,6 +145,7 @@ def diagnose(
             *advice.contradicted(error, found.material),
             *advice.unidentified(data, estimates),
             *advice.unconverged(rhat),
+            *rest.compared(data.records, still, decision.noise),
             *([used.remark()] if used else []),
             *prepared.notes,
         ),
@@ -175,9 +178,10 @@ def diagnose(
                 'rate_hz': whole.rate,
                 'fitted_rate_hz': r.rate,
                 'impulse_samples': impulses,
+                'noise_at_rest_m': noise,
             }
-            for r, whole, impulses in zip(
-                prepared.fit.records, prepared.fit.recorded, prepared.impulses, strict=True
+            for r, whole, impulses, noise in zip(
+                prepared.fit.records, prepared.fit.recorded, prepared.impulses, still, strict=True
             )
         ),
     )

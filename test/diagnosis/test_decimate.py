@@ -104,6 +104,7 @@ def test_what_lives_in_single_samples_is_found(effect: str, size: float) -> None
             'rate_hz': 2000.0,
             'fitted_rate_hz': pytest.approx(2000.0 / 6),
             'impulse_samples': 0,
+            'noise_at_rest_m': None,
         }
     ]
 
