@@ -11,31 +11,28 @@ from typing import Any, Literal
 import numpy as np
 
 from actuator_glue.api import judgement
-from actuator_glue.api.calibration_parts import (
-    CalibratedRecord,
-    FitError,
-    Marginal,
-    RecordError,
-)
+from actuator_glue.api.calibration_error import fit_error, force_errors
+from actuator_glue.api.calibration_parts import CalibratedRecord, Marginal, RecordForce
 from actuator_glue.api.calibration_result import Calibration
+from actuator_glue.api.calibration_shaping import sampled
 from actuator_glue.api.compilation import compilation
 from actuator_glue.api.options import chosen
 from actuator_glue.api.prior import check_prior, given_prior
 from actuator_glue.api.tracking import record_tracking
 from actuator_glue.diagnosis.data import SETTLE
 from actuator_glue.diagnosis.despike import despiked
+from actuator_glue.diagnosis.force import check_forces
 from actuator_glue.diagnosis.preparation import clean, initial_state
 from actuator_glue.errors import InputError
 from actuator_glue.inference.at_bound import pressed
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.choice import ModelChoice, choose_model
 from actuator_glue.inference.moments import moments
-from actuator_glue.inference.posterior import Problem, sample
+from actuator_glue.inference.posterior import Problem
 from actuator_glue.inference.prior_conflict import conflict
-from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
-from actuator_glue.records import Array, Record
+from actuator_glue.records import Record
 
 Progress = Callable[[float], None]
 
@@ -48,7 +45,8 @@ class CalibrationOptions:
         effects: effects of the catalogue beyond Eq. (2), by name.
         bounds: prior bounds by parameter [its unit] in place of those of Table 3 or the catalogue.
         likelihood: 'glue' is Eq. (4); 'gaussian' and 'ar1' are formal ones.
-        shaping_factor: G of L = -G ln Var[E], Eq. (4); used with 'glue' only.
+        shaping_factor: G of L = -G ln Var[E], Eq. (4), used with 'glue' only; 'auto' is half of
+            the independent samples that the residual is worth (`effective_size`).
         evaluations: likelihood evaluations.
         seed: seed of the sampler.
         sampler: 'adaptive' is DREAM(ZS) with an adaptive independence move and an annealed start;
@@ -61,12 +59,13 @@ class CalibrationOptions:
         drift: standard deviation by which the logarithm of each parameter may have moved in an
             hour since (random walk) [h^-1/2].
         prior_age: time since that calibration [s].
+        use_force: the recorded forces are evidence, too; not with 'ar1'.
     """
 
     effects: tuple[str, ...] = ()
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     likelihood: Literal['glue', 'gaussian', 'ar1'] = 'glue'
-    shaping_factor: float = 256.0
+    shaping_factor: float | Literal['auto'] = 'auto'
     evaluations: int = 60_000
     seed: int = 1
     sampler: Literal['adaptive', 'published'] = 'adaptive'
@@ -75,11 +74,19 @@ class CalibrationOptions:
     prior: Calibration | Path | str | None = None
     drift: float = 0.02
     prior_age: float = 0.0
+    use_force: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, 'effects', tuple(self.effects))
+        if self.use_force and self.likelihood == 'ar1':
+            raise InputError(
+                "the likelihood 'ar1' is one of the displacement alone and takes no force; use "
+                "'glue' or 'gaussian'"
+            )
         if self.seed < 0:
             raise InputError(f'seed {self.seed} is negative')
+        if isinstance(self.shaping_factor, str) and self.shaping_factor != 'auto':
+            raise InputError(f"shaping factor {self.shaping_factor!r} is no number, nor 'auto'")
         if self.settle is not None and self.settle < 0.0:
             raise InputError(f'settle {self.settle:g} s is negative')
         check_prior(self.drift, self.prior_age)
@@ -120,15 +127,17 @@ def calibrate(
         >>> posterior.parameters['beta_1'].mean  # doctest: +SKIP
     """
     options = chosen(options or CalibrationOptions(), changes, 'calibrate')
-    given = [records] if isinstance(records, Record) else list(records)
+    tests = [records] if isinstance(records, Record) else list(records)
     model = sampled_model(options)
-    cleaned, notes = clean(given)
+    cleaned, notes = clean(tests)
+    if options.use_force:
+        check_forces(cleaned)
     initial: Initial = 'measured'
     if options.initial == 'rest' or (
         options.initial == 'auto' and all(initial_state(r) == 'rest' for r in cleaned)
     ):
         initial = 'rest'
-    cleaned, found = despiked(cleaned, [initial] * len(cleaned))
+    cleaned, found, near = despiked(cleaned, [initial] * len(cleaned))
     notes += found
     settle = options.settle
     if settle is None:
@@ -140,26 +149,18 @@ def calibrate(
             records=cleaned,
             model=model,
             likelihood=options.likelihood,
-            shaping_factor=options.shaping_factor,
             initial=initial,
             settle=settle,
             prior=None if given_before is None else given_before.carried,
         )
-        target = problem.target()
-        chains = sample(
-            target,
-            (options.seed,),
-            options.evaluations,
-            settings=SamplerSettings.published() if options.sampler == 'published' else None,
-            progress=None if progress is None else lambda made, _: progress(made),
-        )
+        problem, target, chains, remark = sampled(problem, options, near, progress)
     seconds = time.perf_counter() - started - sum(compiled)
     if not chains.annealed:
         raise InputError(
             f'{options.evaluations} evaluations ended on the way from the prior: no posterior was '
             'reached; give more --evaluations'
         )
-    fit = _fit(model, chains.best, cleaned, initial, settle)
+    fit = fit_error(model, chains.best, cleaned, initial, settle)
     parameters = _marginals(model, chains)
     at_bound = pressed(chains.posterior(), model.names, *model.bounds)
     prior = None
@@ -170,6 +171,9 @@ def calibrate(
             conflict(target.prior, chains.posterior()).p_value,
         )
     converged = judgement.converged(parameters)
+    forces: tuple[RecordForce, ...] = ()
+    if options.use_force:
+        forces = force_errors(model, chains.best, cleaned, initial, settle)
     return Calibration(
         parameters=parameters,
         draws=chains.kept,
@@ -183,11 +187,15 @@ def calibrate(
                 cleaned, parameters, chains.posterior(), converged, at_bound, prior
             ),
             *notes,
+            *remark,
+            *(f.remark() for f in forces),
         ),
         converged=converged,
         effects=model.effects,
         likelihood=options.likelihood,
-        shaping_factor=options.shaping_factor if options.likelihood == 'glue' else None,
+        shaping_factor=problem.shaping_factor if options.likelihood == 'glue' else None,
+        automatic_shaping=bool(remark),
+        force=forces,
         seed=options.seed,
         sampler=options.sampler,
         initial=initial,
@@ -245,19 +253,3 @@ def _marginals(model: ModelChoice, chains: Chains) -> dict[str, Marginal]:
         )
         for i, (name, unit) in enumerate(zip(model.names, model.units, strict=True))
     }
-
-
-def _fit(
-    model: ModelChoice, best: Array, records: list[Record], initial: Initial, settle: float
-) -> FitError:
-    """Return the error of the best draw, over all records and in each."""
-    structure = Structure(model.effects)
-    counts = [round(settle / r.period) for r in records]
-    residuals = structure.errors(records, counts, initial).residuals(best[: len(structure.names)])
-    measured = [r.measured[n:] for r, n in zip(records, counts, strict=True)]
-    whole = RecordError.of('', np.concatenate(residuals), np.concatenate(measured))
-    each = (
-        RecordError.of(r.source, e, y)
-        for r, e, y in zip(records, residuals, measured, strict=True)
-    )
-    return FitError(whole.rms_m, whole.nrmse, tuple(each))

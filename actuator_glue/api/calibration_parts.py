@@ -6,7 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuator_glue.records import Array, Record
+from actuator_glue.model.force_errors import transducer
+from actuator_glue.records import Array, Record, source_name
+
+# Logarithm of a transducer's gain beyond which its scale is doubted.
+_OFF = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +61,45 @@ class RecordError:
         """Return it for errors (n,) of measured displacement (n,) [m]."""
         rms, spread = float(np.sqrt(np.mean(error**2))), float(measured.std())
         return cls(source, rms, float(np.mean(error)), rms / spread if spread > 0.0 else None)
+
+
+@dataclass(frozen=True, slots=True)
+class RecordForce:
+    """How the best draw explains the force of one record.
+
+    Attributes:
+        source: the record.
+        gain: of the transducer, measured over simulated; 0 where no force is simulated.
+        offset_n: of the transducer [N].
+        rms_n: root mean square of what is left [N].
+        nrmse: share of the force's spread.
+    """
+
+    source: str
+    gain: float
+    offset_n: float
+    rms_n: float
+    nrmse: float
+
+    @classmethod
+    def of(cls, source: str, simulated: Array, measured: Array) -> RecordForce:
+        """Return it for actuator forces (1, n) and the measured one (n,) [N]."""
+        gain, offset = (float(v[0]) for v in transducer(simulated, measured))
+        rms = float(np.sqrt(np.mean((measured - gain * simulated[0] - offset) ** 2)))
+        return cls(source, gain, offset, rms, rms / float(measured.std()))
+
+    def remark(self) -> str:
+        """Return the force as evidence in one line, for people."""
+        line = f'force of {source_name(self.source) or "a record"}: '
+        if self.gain == 0.0:
+            return f'{line}the model has none in phase with it, it says nothing'
+        line += f'{self.rms_n:.3g} N rms are left, {100.0 * self.nrmse:.1f} % of its spread'
+        if abs(np.log(self.gain)) > _OFF:
+            return (
+                f'{line}; its transducer would have a gain of {self.gain:.3g}: check its scale '
+                'and the specimen stiffness'
+            )
+        return line
 
 
 @dataclass(frozen=True, slots=True)

@@ -73,8 +73,11 @@ def moment_rows(found: Calibration) -> list[tuple[str, ...]]:
 def moments_title(found: Calibration) -> str:
     """Return the title of the table of moments."""
     g = found.shaping_factor
-    how = f'G = {g:g}' if g is not None else found.likelihood
-    return f'Posterior moments, {len(found.sources)} record(s), {how}'
+    how = f'G = {g:.6g}' if g is not None else found.likelihood
+    if found.automatic_shaping:
+        how += ' (automatic)'
+    force = ' and force' if found.force else ''
+    return f'Posterior moments, {len(found.sources)} record(s){force}, {how}'
 
 
 def error_line(found: Calibration) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from actuator_glue.api import store
-from actuator_glue.api.calibration_parts import CalibratedRecord, FitError, Marginal
+from actuator_glue.api.calibration_parts import CalibratedRecord, FitError, Marginal, RecordForce
 from actuator_glue.api.result import Result
 from actuator_glue.api.tracking import RecordTracking
 from actuator_glue.inference.at_bound import Pressed
@@ -47,6 +47,8 @@ class Calibration(Result):
         effects: effects of the model beyond Eq. (2).
         likelihood: 'glue', 'gaussian' or 'ar1'.
         shaping_factor: G of Eq. (4); None with a formal likelihood.
+        automatic_shaping: G is half of the independent samples that the residual is worth.
+        force: how the best draw explains each record's force; empty where that was no evidence.
         seed: seed of the sampler.
         sampler: 'adaptive' or 'published', see `CalibrationOptions`.
         initial: state at a record's first sample, 'rest' or 'measured'.
@@ -84,6 +86,8 @@ class Calibration(Result):
     records: tuple[Record, ...] = ()
     tracking: tuple[RecordTracking, ...] = ()
     sampler: str = 'adaptive'
+    automatic_shaping: bool = False
+    force: tuple[RecordForce, ...] = ()
 
     @property
     def model_effects(self) -> tuple[str, ...]:
@@ -146,6 +150,9 @@ class Calibration(Result):
             **CATALOGUE.definitions(self.effects),
             'likelihood': self.likelihood,
             'shaping_factor': self.shaping_factor,
+            'automatic_shaping': self.automatic_shaping,
+            'use_force': bool(self.force),
+            'force': [asdict(f) for f in self.force],
             'seed': self.seed,
             'sampler': self.sampler,
             'initial': self.initial,

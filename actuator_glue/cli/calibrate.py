@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 from actuator_glue.arguments import Output, number
 from actuator_glue.cli._effects_file import add_effects_file, load_effects
@@ -27,10 +27,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_records(parser)
     parser.add_argument(
         '--shaping-factor',
-        type=number,
-        default=256.0,
+        type=_shaping,
+        default='auto',
         metavar='G',
-        help='G of L = -G ln Var[E], Eq. (4) (default 256)',
+        help='G of L = -G ln Var[E], Eq. (4); the paper shows 256 (default auto: half of the '
+        'independent samples that the residual is worth by its autocorrelation)',
     )
     parser.add_argument(
         '--likelihood',
@@ -84,6 +85,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help='prior bounds of a parameter in the unit of the table, as in beta_1=0:800, in place '
         'of those of Table 3 or the catalogue; repeatable',
     )
+    parser.add_argument(
+        '--use-force',
+        action='store_true',
+        help='the recorded force is evidence, too: it tells friction, leakage and the specimen '
+        'apart; gain and offset of its transducer are fitted in each record',
+    )
     add_prior(parser)
     parser.add_argument(
         '--save',
@@ -118,6 +125,7 @@ def run(args: argparse.Namespace) -> int:
         sampler=args.sampler,
         initial=args.initial,
         settle=args.settle,
+        use_force=args.use_force,
         **prior_options(args),
     )
     records = load(args)
@@ -149,6 +157,11 @@ def bounds(given: Sequence[str]) -> dict[str, tuple[float, float]]:
             raise InputError(f'--bounds {text}: {name} has bounds already')
         out[name] = (lower, upper)
     return out
+
+
+def _shaping(text: str) -> float | Literal['auto']:
+    """Return G, or 'auto'."""
+    return 'auto' if text == 'auto' else number(text)
 
 
 def _show(found: Calibration, args: argparse.Namespace) -> None:

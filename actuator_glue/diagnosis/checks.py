@@ -130,23 +130,11 @@ def _pushes(record: Record) -> None:
         InputError: the stiffness is off by a factor of five, or that of a free actuator where
             a specimen pushes back.
     """
-    stated = record.known_stiffness()
-    if record.force is None or float(np.ptp(record.force)) == 0.0:
+    stated, found = record.known_stiffness(), _push(record)
+    if found is None:
         return
-    x, acceleration = _slow(record.measured, record)
-    force, _ = _slow(record.force, record)
-    if len(x) < 10 or float(acceleration @ acceleration) == 0.0:
-        return
-    # What a mass takes must not pass for a specimen, nor be taken off it where they look alike.
-    shared = float(x @ acceleration) ** 2 / float((x @ x) * (acceleration @ acceleration))
-    separate = 1.0 - shared > _SEPARATE
-    basis = np.stack([x, acceleration]) if separate else x[None]
-    weights, *_ = np.linalg.lstsq(basis.T, force, rcond=None)
-    left = force - weights @ basis
-    if float(left @ left) > (1.0 - _TELLING) * float(force @ force):
-        return
-    seen = abs(float(weights[0]))
-    share = max(seen, stated) * float(x.std() / force.std())
+    weight, size, separate = found
+    seen, share = abs(weight), max(abs(weight), stated) * size
     if stated > 0.0:
         wrong = share > 0.1 and not 1.0 / _OFF < seen / stated < _OFF
     else:
@@ -157,3 +145,32 @@ def _pushes(record: Record) -> None:
             f'stiffness is given as {stated:.3g} N/m; check it (--stiffness, in N/m and in the '
             'order of the records) and the units of the force channel'
         )
+
+
+def pull(record: Record) -> float | None:
+    """Return force over displacement [N/m], with its sign; None where that explains no force."""
+    found = _push(record)
+    return None if found is None else found[0]
+
+
+def _push(record: Record) -> tuple[float, float, bool] | None:
+    """Return what displacement and acceleration say of the force; None where they explain it not.
+
+    That is force over displacement [N/m], the spread of the displacement over that of the force
+    [m/N], and whether a mass could be told apart.
+    """
+    if record.force is None or float(np.ptp(record.force)) == 0.0:
+        return None
+    x, acceleration = _slow(record.measured, record)
+    force, _ = _slow(record.force, record)
+    if len(x) < 10 or float(acceleration @ acceleration) == 0.0:
+        return None
+    # What a mass takes must not pass for a specimen, nor be taken off it where they look alike.
+    shared = float(x @ acceleration) ** 2 / float((x @ x) * (acceleration @ acceleration))
+    separate = 1.0 - shared > _SEPARATE
+    basis = np.stack([x, acceleration]) if separate else x[None]
+    weights, *_ = np.linalg.lstsq(basis.T, force, rcond=None)
+    left = force - weights @ basis
+    if float(left @ left) > (1.0 - _TELLING) * float(force @ force):
+        return None
+    return float(weights[0]), float(x.std() / force.std()), separate

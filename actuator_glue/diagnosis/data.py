@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,9 +28,35 @@ class Model(Protocol):
         """Parameters in the order of theta's columns."""
 
     def simulate(
-        self, theta: Array, record: Record, *, initial: Initial = 'rest', origin: float = 0.0
+        self,
+        theta: Array,
+        record: Record,
+        *,
+        initial: Initial = 'rest',
+        origin: float = 0.0,
+        force: bool = False,
     ) -> Array:
-        """Free-run sensor output (m, n) [m] of theta (m, p); the test began `origin` s before."""
+        """Free-run sensor output (m, n) [m] of theta (m, p); the test began `origin` s before.
+
+        Or the actuator force [N].
+        """
+
+
+@runtime_checkable
+class Channel(Protocol):
+    """A record that shows something else than the displacement (see diagnosis/force.py)."""
+
+    def simulate(self, model: Model, theta: Array, initial: Initial, origin: float) -> Array:
+        """What its measured channel shows of theta (m, p), (m, n)."""
+
+
+def simulated(
+    model: Model, theta: Array, record: Record, initial: Initial, origin: float = 0.0
+) -> Array:
+    """Return what a record's measured channel shows of theta (m, p), free-run, (m, n) [m]."""
+    if isinstance(record, Channel):
+        return record.simulate(model, theta, initial, origin)
+    return model.simulate(theta, record, initial=initial, origin=origin)
 
 
 # Numbers of a block that is worked on at a time, and the least of rows: the kernels' lanes.
@@ -122,7 +148,7 @@ class Data:
         rows = zip(self.records, self.initials, self.origins, self.masks, self.parts, strict=True)
         for record, initial, origin, mask, part in rows:
             for some in chunks(len(table), len(record)):
-                y = model.simulate(table[some], record, initial=initial, origin=origin)
+                y = simulated(model, table[some], record, initial, origin)
                 out[some, part] = y[:, mask]
         return out
 

@@ -109,7 +109,7 @@ def _told(found: Impulses, record: Record) -> str:
 
 def despiked(
     records: Sequence[Record], initials: Sequence[Initial]
-) -> tuple[list[Record], list[str]]:
+) -> tuple[list[Record], list[str], Array]:
     """Take impulses and frozen readings out of records, at the rate they were sampled with.
 
     Args:
@@ -117,7 +117,7 @@ def despiked(
         initials: per record, the state it starts from.
 
     Returns:
-        The records and what was done, for people.
+        The records, what was done, for people, and parameters of Eq. (2) (4,) near their best fit.
     """
     slow = [decimate.decimated(r, decimate.factor(r)) for r in records]
     masks = [np.ones(len(r), dtype=np.bool_) for r in slow]
@@ -129,4 +129,4 @@ def despiked(
     as_given = replace(Data.whole(records), initials=tuple(initials))
     data, held = without_frozen(as_given, Structure(()), theta)
     data, _, notes = without_impulses(data, Structure(()), theta)
-    return list(data.records), held + notes
+    return list(data.records), held + notes, theta

@@ -50,13 +50,19 @@ class OneRecord:
         return self._inner.parameters
 
     def simulate(
-        self, theta: Array, record: Record, *, initial: Initial = 'rest', origin: float = 0.0
+        self,
+        theta: Array,
+        record: Record,
+        *,
+        initial: Initial = 'rest',
+        origin: float = 0.0,
+        force: bool = False,
     ) -> Array:
-        """Free-run sensor output, the effect at its neutral value in other records [m]."""
+        """Free-run sensor output [m] or force [N], the effect neutral in other records."""
         table = np.array(np.atleast_2d(theta))
         if not any(record is r for r in self.records):
             table[:, self._inner.columns(self.own)] = self._off
-        out = self._inner.simulate(table, record, initial=initial, origin=origin)
+        out = self._inner.simulate(table, record, initial=initial, origin=origin, force=force)
         return out.reshape(*np.shape(theta)[:-1], len(record))
 
 

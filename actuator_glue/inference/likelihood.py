@@ -15,7 +15,9 @@ from numpy.typing import NDArray
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference.compiled import Compiled, likelihoods
+from actuator_glue.inference.evaluate import LogDensity
 from actuator_glue.model.fast import FastErrors
+from actuator_glue.model.force_errors import ForceErrors
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.records import Array
 
@@ -115,6 +117,37 @@ class GaussianLikelihood:
     def compiled(self) -> Compiled | None:
         """Return the same as plain arrays; None where the errors are not `FastErrors`."""
         return _compiled(self.errors, self._size, 0.0, self.sigma or 0.0)
+
+
+class ForceLikelihood:
+    """A log likelihood of displacements with that of the forces: less G ln sum e^2 of the force.
+
+    With G half of the samples it is the Gaussian one of independent errors whose standard
+    deviation is integrated out, beside transducers whose gain and offset are each record's own.
+
+    Args:
+        displacement: log likelihood of the displacements.
+        errors: of the forces.
+        shaping_factor: G > 0 of the forces.
+
+    Raises:
+        InputError: the shaping factor is not a positive number.
+    """
+
+    def __init__(
+        self, displacement: LogDensity, errors: ForceErrors, shaping_factor: float
+    ) -> None:
+        if not (math.isfinite(shaping_factor) and shaping_factor > 0.0):
+            raise InputError(f'shaping factor G must be positive, got {shaping_factor:g}')
+        self.displacement = displacement
+        self.errors = errors
+        self.shaping_factor = shaping_factor
+
+    def __call__(self, theta: Array) -> Array:
+        """Return the log likelihood (m,) of theta (m, p)."""
+        with np.errstate(divide='ignore', invalid='ignore'):
+            force = np.log(self.errors(theta).sum(axis=1))
+        return np.asarray(self.displacement(theta) - self.shaping_factor * force)
 
 
 class Ar1Likelihood:

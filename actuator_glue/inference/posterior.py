@@ -16,13 +16,19 @@ from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.inference.compiled import Compiled, compiled
 from actuator_glue.inference.evaluate import LogDensity
 from actuator_glue.inference.informative_prior import InformativePrior, informative_prior
-from actuator_glue.inference.likelihood import Ar1Likelihood, GaussianLikelihood, GlueLikelihood
+from actuator_glue.inference.likelihood import (
+    Ar1Likelihood,
+    ForceLikelihood,
+    GaussianLikelihood,
+    GlueLikelihood,
+)
 from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.inference.transforms import Composed, Transform
 from actuator_glue.inference.transforms.ridge import Ridge
 from actuator_glue.inference.transforms.triangular import Triangular
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.fast import FastErrors
+from actuator_glue.model.force_errors import ForceErrors
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 
@@ -69,6 +75,7 @@ class Problem:
         near: parameters (p,) near the best fit, where known; they save time and change nothing.
         shown: parameters (m, p) of an earlier posterior of this model, whose bends are taken off.
         prior: draws of what is known of the parameters; None: no more than the box.
+        force: G of the measured force; None where it is no evidence.
     """
 
     records: Sequence[Record]
@@ -81,6 +88,7 @@ class Problem:
     near: Array | None = None
     shown: Array | None = None
     prior: Carried | None = None
+    force: float | None = None
 
     def target(self) -> Target:
         """Return the log likelihood with its prior and the coordinates to sample it in.
@@ -93,8 +101,17 @@ class Problem:
         )
 
     def _log_likelihood(self) -> LogDensity:
-        effects, initial = self.model.effects, self.initial
         counts = [round(self.settle / r.period) for r in self.records]
+        displacement = self._displacement(counts)
+        if self.force is None:
+            return displacement
+        origin = self.first_index * self.records[0].period
+        structure = Structure(self.model.effects)
+        errors = ForceErrors(structure, self.records, counts, self.initial, origin)
+        return ForceLikelihood(displacement, errors, self.force)
+
+    def _displacement(self, counts: Sequence[int]) -> LogDensity:
+        effects, initial = self.model.effects, self.initial
         if self.likelihood == 'ar1' or effects:
             origin = self.first_index * self.records[0].period
             errors = Structure(effects).errors(self.records, counts, initial, origin)

@@ -128,6 +128,7 @@ class Structure:
         initial: Initial = 'rest',
         rate: int = 1,
         origin: float = 0.0,
+        force: bool = False,
     ) -> Array:
         """Return the recorded displacement the model expects (free run), (n,) or (m, n) [m].
 
@@ -138,6 +139,7 @@ class Structure:
             rate: how many times finer than usual the integration steps are.
             origin: time of the first sample since the test began [s]: drift, clock skew and hum
                 count from there. gain-drift counts from the first sample, whatever the origin.
+            force: return the actuator force [N] instead: what specimen, friction and masses take.
 
         Raises:
             InputError: wrong shape of theta, or the specimen stiffness is not known.
@@ -146,7 +148,7 @@ class Structure:
         start = linear.initial_state(record) if initial == 'measured' else (0.0, 0.0)
         out = np.empty((len(table), len(record)))
         onsets = self.onsets(record, initial)
-        for which, begin, part in self.parts(table, record, start, onsets, origin, rate):
+        for which, begin, part in self.parts(table, record, start, onsets, origin, rate, force):
             out[which, begin : begin + len(part)] = part.T
         return out.reshape(*np.shape(theta)[:-1], len(record))
 
@@ -240,8 +242,12 @@ class Structure:
         onsets: Sequence[Onset],
         origin: float,
         rate: int = 1,
+        force: bool = False,
     ) -> Iterator[tuple[NDArray[np.intp], int, Array]]:
-        """Yield which parameter sets (c,), from which sample, and what they record (n, c)."""
+        """Yield which parameter sets (c,), from which sample, and what they record (n, c).
+
+        That is the displacement [m], or the actuator force [N].
+        """
         if self._plain:
             x = linear.simulate(
                 table[:, : len(BASE)],
@@ -251,18 +257,18 @@ class Structure:
                 hold=record.hold,
                 initial=start,
             )
-            yield np.arange(len(table)), 0, x.T
+            yield np.arange(len(table)), 0, x.T * record.known_stiffness() if force else x.T
             return
         values = self.values(table)
         if self.linear:
-            blocks = run.exact_blocks(values, *self.exact, record, start)
+            blocks = run.exact_blocks(values, *self.exact, record, start, force)
         else:
             with np.errstate(all='ignore'):  # absurd parameters
                 for onset in onsets:
                     values |= onset(values, origin)
             values['origin'] = np.full(len(table), origin)
-            blocks = run.blocks(values, self._on, self.program, record, start, rate)
+            blocks = run.blocks(values, self._on, self.program, record, start, rate, force)
         time = record.time + origin
         for which, begin, x in blocks:
             now = time[begin : begin + len(x)]
-            yield which, begin, self.sensed(table[which], now, x)
+            yield which, begin, x if force else self.sensed(table[which], now, x)

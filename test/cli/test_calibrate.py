@@ -24,6 +24,8 @@ def test_problem_r_from_csv_files(run, problem_r: Path, tmp_path: Path, rng_seed
         '--stiffness',
         0,
         250e3,
+        '--shaping-factor',
+        256,
         '--seed',
         rng_seed,
         '--draws',
@@ -65,7 +67,7 @@ def test_the_published_sampler_finds_the_same_posterior_and_says_where_it_has_no
     its least.
     """
     records = (problem_r / 'r_1.csv', problem_r / 'r_2.csv', '--stiffness', 0, 250e3)
-    how = ('--sampler', 'published', '--seed', rng_seed, '--json', '-')
+    how = ('--sampler', 'published', '--shaping-factor', 256, '--seed', rng_seed, '--json', '-')
     done = run('calibrate', *records, *how, '--evaluations', 400_000)
     assert done.code == 0, done.err
     content = done.json
@@ -77,6 +79,52 @@ def test_the_published_sampler_finds_the_same_posterior_and_says_where_it_has_no
     short = run('calibrate', *records, *how, '--evaluations', 3000)
     assert short.code == 1
     assert short.json['problems'][0].startswith('no posterior was reached')
+
+
+def test_the_shaping_factor_is_that_of_the_residual(run, problem_r: Path, tmp_path: Path) -> None:
+    """White noise: every sample counts, and the posterior is the Gaussian one.
+
+    Problem R holds a gain that Eq. (2) cannot have: its 24 002 samples are worth about 2100.
+    """
+    records, test = [tmp_path / f'{i}.csv' for i in (0, 1)], ('--rate', 200, '--duration', 30)
+    for i, stiffness in enumerate((0, 250e3)):
+        more = ('--stiffness', stiffness, '--noise-mm', 0.02, '--seed', i)
+        assert run('simulate', records[i], *test, *more).code == 0
+    given = (*records, '--evaluations', 20_000)
+    found, formal = (
+        run('calibrate', *given, '--likelihood', kind, '--json', '-').json
+        for kind in ('glue', 'gaussian')
+    )
+    assert found['automatic_shaping'] is True and formal['automatic_shaping'] is False
+    count = sum(r['samples'] for r in found['records'])
+    assert 0.85 * count < 2.0 * found['shaping_factor'] <= count
+    assert formal['shaping_factor'] is None
+    for name in NAMES[:3]:
+        one, other = found['parameters'][name], formal['parameters'][name]
+        assert abs(one['mean'] - other['mean']) < 0.5 * other['stddev']
+        assert abs(one['stddev'] / other['stddev'] - 1.0) < 0.15
+    worth = f'of {count} samples is worth {2.0 * found["shaping_factor"]:.0f} independent ones'
+    assert worth in run('calibrate', *given).err
+    records = [problem_r / 'r_1.csv', problem_r / 'r_2.csv']
+    lacking = run('calibrate', *records, '--evaluations', 20_000, '--json', '-').json
+    assert 700 < lacking['shaping_factor'] < 1500
+
+
+def test_the_force_is_used_on_request(run, problem_r: Path, tmp_path: Path) -> None:
+    """JSON and table say so; a record without one is a single error."""
+    record = tmp_path / 'r.csv'
+    test = ('--rate', 200, '--duration', 20, '--stiffness', 250e3)
+    assert run('simulate', record, *test).code == 0
+    done = run('calibrate', record, '--use-force', '--evaluations', 20_000, '--json', '-')
+    assert done.code == 0, done.err
+    assert done.json['use_force'] is True
+    (force,) = done.json['force']
+    assert abs(force['gain'] - 1.0) < 0.01 and force['nrmse'] < 0.05
+    assert 'force of r.csv' in done.err
+    done = run('calibrate', record, '--use-force', '--evaluations', 20_000)
+    assert '1 record(s) and force' in done.out
+    done = run('calibrate', problem_r / 'r_2.csv', '--stiffness', 250e3, '--use-force')
+    assert done.code == 2 and 'no force is recorded' in done.message
 
 
 def test_draws_are_drawn(run, short_bag: Path, tmp_path: Path) -> None:

@@ -31,7 +31,7 @@ def healthy(seed: int, command: Array = SWEEP, effects: tuple[str, ...] = (), *o
 def test_clean_channels_have_none(seed: int) -> None:
     """Gaussian noise is never beyond six times itself."""
     record, _ = healthy(seed)
-    clean, notes = despiked([record], ['rest'])
+    clean, notes, _ = despiked([record], ['rest'])
     assert notes == []
     assert clean[0] is record
 
@@ -47,7 +47,7 @@ def test_spikes_are_taken_out_and_told(one_sided: bool) -> None:
     )
     y = record.measured.copy()
     y[at] += size
-    clean, notes = despiked([replace(record, measured=y)], ['rest'])
+    clean, notes, _ = despiked([replace(record, measured=y)], ['rest'])
     left = clean[0].measured - x
     assert np.abs(left).max() < 8 * NOISE
     assert left.std() == pytest.approx(NOISE, rel=0.05)
@@ -85,7 +85,7 @@ def test_what_the_model_lacks_is_no_impulse(
     """Kinks and bursts of a motion come with the motion."""
     command = 1e-3 * np.sign(np.sin(np.pi * T)) if steps else SWEEP
     record, _ = healthy(5, command, (effect,), *sizes)
-    clean, _ = despiked([record], ['rest'])
+    clean, _, _ = despiked([record], ['rest'])
     changed = clean[0].measured != record.measured
     assert changed.mean() < 1e-3
 

@@ -92,6 +92,7 @@ def blocks(
     record: Record,
     start: tuple[float, float],
     rate: int = 1,
+    force: bool = False,
 ) -> Iterator[tuple[NDArray[np.intp], int, Array]]:
     """Simulate a record for every parameter set, some samples and sets at a time.
 
@@ -102,10 +103,11 @@ def blocks(
         record: command, period, hold and known stiffness.
         start: position and velocity at the first sample.
         rate: how many times finer than usual the sub-steps are.
+        force: whether the actuator force is wanted in place of the displacement.
 
     Yields:
         Which parameter sets (c,), the first sample, and displacement (n, c) [m] before sensor
-        post-steps; the array is overwritten by the next block.
+        post-steps, or force [N]; the array is overwritten by the next block.
     """
     stiffness = record.known_stiffness()
     base = rate * sample_steps(record.period)
@@ -113,8 +115,8 @@ def blocks(
     # One sample before the record: at rest the command was zero, else it was held.
     before = record.command[:1] if start != (0.0, 0.0) else np.zeros(1)
     command = np.concatenate([before, record.command])
-    nothing = np.empty((0, rows.LANES))
     out = np.empty((min(len(record), _CHUNK), rows.LANES))
+    load = np.empty((len(out) if force else 0, rows.LANES))
     for factor in np.unique(factors):
         which = np.flatnonzero(factors == factor)
         substeps = base * int(factor)
@@ -135,9 +137,10 @@ def blocks(
                     record.period,
                     record.hold == 'linear',
                     part,
-                    nothing,
+                    load[: len(part)],
                 )
-                yield lanes, begin, part[:, : len(lanes)]
+                shown = load[: len(part)] if force else part
+                yield lanes, begin, shown[:, : len(lanes)]
 
 
 def exact_blocks(
@@ -146,6 +149,7 @@ def exact_blocks(
     delayed: bool,
     record: Record,
     start: tuple[float, float],
+    force: bool = False,
 ) -> Iterator[tuple[NDArray[np.intp], int, Array]]:
     """Simulate a record with linear effects only, as `blocks` does, but exactly and faster.
 
@@ -154,16 +158,17 @@ def exact_blocks(
     linear = record.hold == 'linear'
     before = record.command[:1] if start != (0.0, 0.0) else np.zeros(1)
     command = np.concatenate([before, record.command])
-    nothing = np.empty((0, rows.LANES))
     out = np.empty((min(len(record), _CHUNK), rows.LANES))
+    load = np.empty((len(out) if force else 0, rows.LANES))
     split = lti.tables(values, record.known_stiffness(), record.period, linear, start)
     count = len(values['beta_1'])
     for block, table in enumerate(split):
         lanes = np.arange(block * rows.LANES, min((block + 1) * rows.LANES, count))
         for begin in range(0, len(record), _CHUNK):
             part = out[: min(_CHUNK, len(record) - begin)]
-            lti_step.advance(table, third, delayed, command, -1, begin, part, nothing)
-            yield lanes, begin, part[:, : len(lanes)]
+            lti_step.advance(table, third, delayed, command, -1, begin, part, load[: len(part)])
+            shown = load[: len(part)] if force else part
+            yield lanes, begin, shown[:, : len(lanes)]
 
 
 @njit(nogil=True)

@@ -1,0 +1,98 @@
+"""The force channel beside the displacement: as a record of its own that the model simulates."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+
+from actuator_glue.diagnosis.checks import pull, where
+from actuator_glue.diagnosis.data import Data, Model
+from actuator_glue.errors import InputError
+from actuator_glue.model.exact import Initial
+from actuator_glue.model.force_errors import recorded_force, shown
+from actuator_glue.records import Array, Record
+
+# m: what a force may move as a displacement at most, where its error is next to nothing.
+_LARGEST = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ForceRecord(Record):
+    """A record whose measured channel is its force, in units of `newtons` per metre.
+
+    Attributes:
+        base: the record with its displacement, from which a state of motion is known.
+        newtons: force that counts as much as a metre of displacement [N/m].
+    """
+
+    base: Record | None = None
+    newtons: float = 1.0
+
+    @classmethod
+    def of(cls, record: Record, newtons: float) -> ForceRecord:
+        """Return the force of a record.
+
+        Raises:
+            InputError: it has none.
+        """
+        force = recorded_force(record)
+        newtons = max(newtons, float(np.abs(force).max()) / _LARGEST)
+        values = {f.name: getattr(record, f.name) for f in fields(Record)}
+        return cls(**{**values, 'measured': force / newtons}, base=record, newtons=newtons)
+
+    def simulate(self, model: Model, theta: Array, initial: Initial, origin: float) -> Array:
+        """Return what the transducer shows of the simulated force, (m, n) [m]."""
+        assert self.base is not None
+        force = model.simulate(theta, self.base, initial=initial, origin=origin, force=True)
+        return shown(force, self.newtons * self.measured) / self.newtons
+
+
+def check_forces(records: Sequence[Record]) -> None:
+    """Refuse records whose force cannot be evidence.
+
+    Raises:
+        InputError: no force, one that does not move, or one of opposite sign.
+    """
+    for i, record in enumerate(records):
+        name = where(record, i + 1)
+        force = recorded_force(replace(record, source=name))
+        if float(np.ptp(force)) == 0.0:
+            raise InputError(f'{name}: the force is constant; check that its channel is connected')
+        found = pull(record)
+        if found is not None and record.known_stiffness() > 0.0 and found < 0.0:
+            raise InputError(
+                f'{name}: the force moves against the displacement ({found:.3g} N/m); an actuator '
+                'that pushes its specimen has both positive: change the sign of the force '
+                '(`scale: -1` in a channel map)'
+            )
+
+
+def with_forces(data: Data, model: Model, theta: Array) -> Data:
+    """Return data with the records' forces behind them, weighed as both errors of a fit are.
+
+    Args:
+        data: records with forces, without their forces.
+        model: the structure that was fitted.
+        theta: its parameters, (p,).
+    """
+    count, error = 0, 0.0
+    forces = []
+    rows = zip(data.records, data.initials, data.origins, data.masks, strict=True)
+    for record, initial, origin, mask in rows:
+        force = ForceRecord.of(record, 1.0)
+        off = force.measured - force.simulate(model, theta[None], initial, origin)[0]
+        error += force.newtons**2 * float((off[mask] ** 2).sum())
+        count += int(mask.sum())
+        forces.append(force)
+    size = data.target - data.simulate(model, theta)[0]
+    newtons = float(np.sqrt(error / count / np.mean(size**2)))
+    return replace(
+        data,
+        records=(*data.records, *(ForceRecord.of(r, newtons) for r in data.records)),
+        masks=2 * data.masks,
+        initials=2 * data.initials,
+        recorded=2 * data.recorded,
+        origins=2 * data.origins,
+    )
