@@ -63,7 +63,7 @@ def without_impulses(
 
 
 def without_frozen(data: Data, model: Model, theta: Array) -> tuple[Data, list[str]]:
-    """Bridge readings that stand still while a model moves; say which channels are slow.
+    """Bridge readings that stand still while a model moves.
 
     Returns:
         The data with the model's motion in place of repeated readings, and what was done.
@@ -71,16 +71,6 @@ def without_frozen(data: Data, model: Model, theta: Array) -> tuple[Data, list[s
     records, notes = [], []
     rows = zip(data.records, data.recorded, data.factors, data.initials, strict=True)
     for i, (record, whole, count, initial) in enumerate(rows):
-        every = frozen.slower(whole)
-        if every > 1:
-            notes.append(
-                f'{where(record, i + 1)}: the measured displacement changes at every {every}. '
-                f'sample only, its channel gives {whole.rate / every:.4g} Hz of '
-                f'{whole.rate:.4g}; up to {1e3 * (every - 1) * whole.period:.3g} ms of delay are '
-                'those of the recorder'
-            )
-            records.append(record)
-            continue
         output = model.simulate(theta[None], record, initial=initial, origin=data.origins[i])[0]
         fine = output if count == 1 else np.interp(whole.time, record.time, output)
         found = frozen.find(whole, fine)

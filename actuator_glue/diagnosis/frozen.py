@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 
 from actuator_glue.records import Array, Record
 
@@ -72,9 +73,9 @@ def bridged(record: Record, found: Frozen, output: Array, samples_each: int = 1)
     return np.where(out, output + np.interp(at, at[~out], off[~out]), record.measured)
 
 
-def slower(record: Record) -> int:
-    """Return every which sample the measured channel changes at most; 1 where at every one."""
-    at = np.flatnonzero(np.diff(record.measured)) + 1
+def every_which(values: Array) -> int:
+    """Return every which sample a channel (n,) changes; 1 where it may change at every one."""
+    at = np.flatnonzero(np.diff(values)) + 1
     if len(at) < _SLOWEST:
         return 1
     every = round(float(np.median(np.diff(at))))
@@ -82,3 +83,12 @@ def slower(record: Record) -> int:
         return 1
     in_step = np.bincount(at % every, minlength=every).max() / len(at)
     return every if in_step >= _REGULAR else 1
+
+
+def filled(values: Array, every: int) -> Array:
+    """Return a channel (n,) that changes at every `every`-th sample, smooth between them."""
+    at = np.flatnonzero(np.diff(values)) + 1
+    first = int(np.bincount(at % every, minlength=every).argmax())
+    known = np.arange(first, len(values), every)
+    places = np.clip(np.arange(len(values)), known[0], known[-1])
+    return np.asarray(CubicSpline(known, values[known])(places))

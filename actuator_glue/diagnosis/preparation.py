@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import ndimage
 
-from actuator_glue.diagnosis import decimate, despike
+from actuator_glue.diagnosis import decimate, despike, frozen
 from actuator_glue.diagnosis.base_prior import BasePrior
 from actuator_glue.diagnosis.checks import check, refuse_repeats, where
 from actuator_glue.diagnosis.data import SETTLE, Data, Mask, Model
@@ -127,7 +127,7 @@ def initial_state(record: Record) -> Initial:
 def clean(
     records: Sequence[Record], holdout: Sequence[Record] = ()
 ) -> tuple[list[Record], list[str]]:
-    """Check records, and zero them where all of them show their zero.
+    """Check records, fill channels that are slower, zero where all show their zero.
 
     Returns:
         The records in the order given, held-out ones last, and what was done, for people.
@@ -139,7 +139,25 @@ def clean(
     for i, record in enumerate(every):
         check(record, i + 1)
     refuse_repeats(records, holdout)
-    return zeroed(every)
+    every, notes = _filled(every)
+    every, more = zeroed(every)
+    return every, notes + more
+
+
+def _filled(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
+    """Fill in channels of displacement that are slower than their recorder: no delay is left."""
+    out, notes = [], []
+    for i, record in enumerate(records):
+        every = frozen.every_which(record.measured)
+        if every > 1:
+            notes.append(
+                f'{where(record, i + 1)}: the measured displacement changes in one sample of '
+                f'{every} only, its channel gives {record.rate / every:.4g} Hz of '
+                f'{record.rate:.4g}; a cubic runs between its changes'
+            )
+            record = replace(record, measured=frozen.filled(record.measured, every))
+        out.append(record)
+    return out, notes
 
 
 def _folds(record: Record) -> Mask:
