@@ -109,8 +109,8 @@ def test_intervals_hold_the_truth_under_coloured_noise(rng_seed: int) -> None:
 def test_coverage_of_the_automatic_factor(phi: float, rng_seed: int) -> None:
     """92 to 98 % of 800 intervals of 200 machines.
 
-    Intervals of one machine are correlated: counted as 400, a true 95 % falls outside once in
-    200 runs.
+    Intervals of one machine are correlated: counted as 400, a true 95.5 % falls outside once in
+    100 runs.
     """
     share = np.mean([held((rng_seed, i), phi, 16_000) for i in range(200)])
     assert 0.92 <= share <= 0.98
