@@ -47,7 +47,8 @@ class CalibrationOptions:
         likelihood: 'glue' is Eq. (4); 'gaussian' and 'ar1' are formal ones.
         shaping_factor: G of L = -G ln Var[E], Eq. (4), used with 'glue' only; 'auto' is half of
             the independent samples that the residual is worth (`effective_size`).
-        evaluations: likelihood evaluations.
+        evaluations: likelihood evaluations; with effects as many again where their best fit shows
+            that the residual is worth another number of samples.
         seed: seed of the sampler.
         sampler: 'adaptive' is DREAM(ZS) with an adaptive independence move and an annealed start;
             'published' is DREAM(ZS) as Vrugt (2016) runs it, and needs many times the evaluations.

@@ -47,7 +47,7 @@ def sampled(
         problem: what is calibrated.
         options: how.
         near: parameters of Eq. (2) near their best fit, (4,).
-        progress: called with the evaluations made so far.
+        progress: called with the evaluations made so far in a run.
 
     Raises:
         InputError: settle too long, a residual without spread, or a run that cannot be.
@@ -72,7 +72,6 @@ def _run(
 ) -> tuple[Target, Chains]:
     """Return the target and its draws, perhaps from where an earlier posterior stands."""
     target, archive = problem.target(), None
-    first = 0 if before is None else before.evaluations
     published = SamplerSettings.published() if options.sampler == 'published' else None
     if before is not None and published is None:
         archive = before.posterior()[:: max(1, len(before.posterior()) // _ARCHIVE)]
@@ -84,7 +83,7 @@ def _run(
         options.evaluations,
         settings=published,
         archive=archive,
-        progress=None if progress is None else lambda made, _: progress(first + made),
+        progress=None if progress is None else lambda made, _: progress(made),
     )
     return target, chains
 

@@ -44,7 +44,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=int,
         default=60_000,
         metavar='N',
-        help='likelihood evaluations (default 60000)',
+        help='likelihood evaluations (default 60000); with effects and an automatic G as many '
+        'again where it changes',
     )
     parser.add_argument('--seed', type=int, default=1, metavar='S', help='seed (default 1)')
     parser.add_argument(
