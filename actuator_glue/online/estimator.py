@@ -110,6 +110,7 @@ class Estimator:
         """Take one block of samples as it came; unusable ones are told, never raised."""
         events, windows = self._windows.push(block)
         for window in windows:
+            self._knowledge.formed(window)
             planned = self._planned(window)
             if planned is None:
                 continue

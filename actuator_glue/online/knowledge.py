@@ -47,6 +47,11 @@ class Knowledge:
         independent = 3600.0 / max(settings.window - settings.settle, settings.hop)
         self._test = SequentialTest(independent, settings.false_alarms)
 
+    def formed(self, window: Window) -> None:
+        """Note where the stream begins: with its first window, estimated or not."""
+        if self._began_ns is None:
+            self._began_ns = self._times(window)[0]
+
     def prior(self, window: Window, effects: tuple[str, ...]) -> Carried | None:
         """Return what is known before a window; None where it is no more than the box.
 
@@ -61,8 +66,6 @@ class Knowledge:
             self._first, self._learned, self._tested_ns = self._given, [], None
             self._test.restart()
         start, middle, _ = self._times(window)
-        if self._began_ns is None:
-            self._began_ns = start
         before = [one for one in self._learned if one.last_ns < start]
         if before:
             self._learned = self._learned[self._learned.index(before[-1]) :]
@@ -70,7 +73,7 @@ class Knowledge:
             return known.carried.drifted(self._drift, (middle - known.middle_ns) * 1e-9)
         if self._first is None:
             return None
-        elapsed = (middle - self._began_ns) * 1e-9
+        elapsed = (middle - (self._began_ns or start)) * 1e-9
         return self._first.drifted(self._drift, self._settings.prior_age + elapsed)
 
     def learn(

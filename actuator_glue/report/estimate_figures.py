@@ -54,7 +54,8 @@ def parameters(content: Content, path: Path, truth: Array | None = None) -> Path
     Args:
         content: the bag.
         path: where the picture goes.
-        truth: true parameters of a simulated actuator, in the order of Eq. (2).
+        truth: true parameters of a simulated actuator in each window, in the order of Eq. (2),
+            shape (windows, 4).
 
     Raises:
         InputError: the bag holds no posterior.
@@ -73,7 +74,8 @@ def parameters(content: Content, path: Path, truth: Array | None = None) -> Path
         for name, unit in zip(last.parameter_names, last.units, strict=True)
     ]
     if truth is not None:
-        truth = np.concatenate([truth, np.full(len(columns) - len(truth), np.nan)])
+        unknown = np.full((len(truth), len(columns) - truth.shape[1]), np.nan)
+        truth = np.hstack([truth, unknown])
     # No parameter of Eq. (2) is negative.
     least = [0.0 if name in NAMES else -np.inf for name in last.parameter_names]
     figure = parameters_against_time(

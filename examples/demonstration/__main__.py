@@ -58,7 +58,7 @@ def parser() -> argparse.ArgumentParser:
         default='backlash',
         metavar='NAME',
         help='effect of the simulated actuator that no node is told of (%(default)s; none for '
-        'none)',
+        'none); its oil warms, too',
     )
     add('--seed', type=int, default=1, help='seed of noise and sampler (%(default)s)')
     add(
@@ -97,6 +97,7 @@ def run(args: argparse.Namespace) -> int:
         known = demonstration.known(source, args.calibration, folder, display, args.seed)
         if known is not None:
             settings |= {'prior': 'sequential', 'calibration': str(known.resolve())}
+            settings |= {'drift_of': list(source.drift_of)} if source.drift_of else {}
         demonstration.stream(source, settings, folder, display, diagnose=diagnose)
         outcome = demonstration.finish(source, folder, display, args.seed, diagnose=diagnose)
     outcome.seconds = time.monotonic() - started

@@ -79,7 +79,7 @@ class SessionOutcome:
         sent: samples published by the source.
         content: the bag.
         comparison: the replay held against the live run.
-        truth: true parameters of Eq. (2) where they are known, shape (4,).
+        truth: true parameters of Eq. (2) in each window where they are known, shape (windows, 4).
         diagnosis: what the model lacks, None where nobody asked.
         seconds: time from the first process to the last picture [s].
     """
@@ -119,10 +119,33 @@ class SessionOutcome:
         posteriors = self.content.posteriors
         if self.truth is None or not posteriors:
             return None
-        same = [p for p in posteriors if list(p.effects) == list(posteriors[-1].effects)]
+        same = [list(p.effects) == list(posteriors[-1].effects) for p in posteriors]
+        mean, sd = (np.array([getattr(p, c)[:4] for p in posteriors]) for c in ('mean', 'stddev'))
+        inside = np.abs(mean - self.truth) <= 1.96 * sd
+        return dict(zip(NAMES, inside[same].mean(axis=0).tolist(), strict=True))
+
+    def drift(self) -> dict[str, dict[str, float]] | None:
+        """Return how parameters that drift were followed, from the last model's first window on.
+
+        Of each: change of its true value from that window to the last, and of the posterior mean,
+        with the standard deviation of the last.
+        """
+        posteriors = self.content.posteriors
+        if self.truth is None or not posteriors:
+            return None
+        first = next(
+            i for i, p in enumerate(posteriors) if list(p.effects) == list(posteriors[-1].effects)
+        )
+        start, end = posteriors[first], posteriors[-1]
+        true = self.truth[-1] - self.truth[first]
         return {
-            name: float(np.mean([abs(p.mean[j] - true) <= 1.96 * p.stddev[j] for p in same]))
-            for j, (name, true) in enumerate(zip(NAMES, self.truth, strict=True))
+            name: {
+                'true': float(true[j]),
+                'followed': float(end.mean[j] - start.mean[j]),
+                'stddev': float(end.stddev[j]),
+            }
+            for j, name in enumerate(NAMES)
+            if true[j] != 0.0
         }
 
     @property
@@ -155,6 +178,7 @@ class SessionOutcome:
             },
             'moments': self.moments(),
             'truth_inside_95': self.truth_inside(),
+            'drift': self.drift(),
             'replay_identical': self.comparison.identical,
             'replay': {
                 'windows': self.comparison.windows,
@@ -184,6 +208,11 @@ class SessionOutcome:
         if (inside := self.truth_inside()) is not None:
             shares = ', '.join(f'{name} {share:.0%}' for name, share in inside.items())
             console.print(f'truth     inside the 95 % interval of the last model: {shares}')
+        for name, moved in (self.drift() or {}).items():
+            console.print(
+                f'drift     {name} by {moved["true"]:.3g} under the last model, followed by '
+                f'{moved["followed"]:.3g} +- {moved["stddev"]:.2g}'
+            )
         found = self.comparison
         answer = 'identical, bit for bit' if found.identical else 'NOT identical'
         console.print(f'replay    {answer} ({found.windows} posteriors, {found.bands} bands)')

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from actuator_glue.diagnosis.result import DiagnosisData, Trace
@@ -63,15 +65,21 @@ def carried(
 ) -> Path:
     """Draw each window's 95 % interval of Eq. (2)'s parameters, from the box and with the prior.
 
+    A parameter that drifts is drawn once more, larger, where the last model is used.
+
     Args:
         content: the bag of a run whose windows began with what was known before.
         boxed: some of its windows, estimated from the box.
         path: where the picture goes.
-        truth: true parameters of a simulated actuator, shape (4,).
+        truth: true parameters of a simulated actuator in each window, shape (windows, 4).
     """
+    drifting = [] if truth is None else np.flatnonzero(np.ptp(truth, axis=0)).tolist()
+    figure = style.new_figure(4.6 + 1.8 * len(drifting))
+    rows: list[Any] = [[0, 1], [2, 3], *([f'drift {j}'] * 2 for j in drifting)]
+    panels: Any = figure.subplot_mosaic(rows)
     first, period = content.record.first_index, content.record.period
-    figure = style.new_figure(4.6)
-    for j, (axes, parameter) in enumerate(zip(figure.subplots(2, 2).flat, BASE, strict=True)):
+    for j, parameter in enumerate(BASE):
+        axes = panels[j]
         for number, result in enumerate(boxed):
             draws = result.frozen.draws[:, j] if result.frozen is not None else np.empty(0)
             axes.plot(
@@ -83,12 +91,7 @@ def carried(
                 solid_capstyle='butt',
                 label='from the box' if number == 0 else None,
             )
-        ends = [(int(p.index) + int(p.samples) - first) * period for p in content.posteriors]
-        middle = np.array([p.mean[j] for p in content.posteriors])
-        half = 1.96 * np.array([p.stddev[j] for p in content.posteriors])
-        axes.fill_between(ends, middle - half, middle + half, color=style.BAND, label='carried on')
-        if truth is not None:
-            axes.axhline(truth[j], ls='--', color=style.TRUTH, label='truth')
+        _followed(axes, content, j, truth)
         for start, _ in _changes(content):
             axes.axvline((start - first) * period, ls=':', color=style.TRUTH)
         axes.set(ylabel=style.label(parameter.name, parameter.unit))
@@ -96,9 +99,33 @@ def carried(
         axes.set(yscale='log') if j > 0 else axes.set(ylim=(0.0, None))
         if j > 1:
             axes.set_xlabel('time [s]')
-    figure.legend(*axes.get_legend_handles_labels(), loc='outside lower center', ncols=3)
+    for j in drifting:
+        axes = panels[f'drift {j}']
+        _followed(axes, content, j, truth, under_last=True)
+        axes.set(ylabel=style.label(BASE[j].name, BASE[j].unit), xlabel='time [s]')
+        axes.set_title('it drifts while the oil warms, and is followed')
+    figure.legend(*panels[0].get_legend_handles_labels(), loc='outside lower center', ncols=3)
     figure.suptitle('95 % of each window: from the box, and with what was known before it')
     return style.save(figure, path)
+
+
+def _followed(
+    axes: Axes, content: Content, j: int, truth: Array | None, *, under_last: bool = False
+) -> None:
+    """Draw the 95 % interval of parameter j in each window, and its true value there."""
+    first, last = content.record.first_index, content.posteriors[-1]
+    shown = np.array(
+        [not under_last or list(p.effects) == list(last.effects) for p in content.posteriors]
+    )
+    end = [(int(p.index) + int(p.samples) - first) * float(p.period) for p in content.posteriors]
+    middle, half = (
+        scale * np.array([getattr(p, column)[j] for p in content.posteriors])[shown]
+        for column, scale in (('mean', 1.0), ('stddev', 1.96))
+    )
+    time = np.array(end)[shown]
+    axes.fill_between(time, middle - half, middle + half, color=style.BAND, label='carried on')
+    if truth is not None:
+        axes.plot(time, truth[shown, j], ls='--', color=style.TRUTH, label='truth')
 
 
 def _changes(content: Content) -> list[tuple[int, str]]:

@@ -23,6 +23,8 @@ from examples.demonstration.watch import Watch
 READY_SECONDS = 180.0  # the first start on a machine compiles the kernels
 DRAIN_SECONDS = 15.0  # for the last window to be computed after the last sample
 POLL_SECONDS = 0.25
+# Of samples before the live diagnosis: so many tell the effect, and the drift is small in them.
+DIAGNOSED_SECONDS = 16.0
 STAGES = 8  # of a diagnosis, about
 # What a run leaves in its folder; only these are removed by the next one.
 LEAVINGS = ('bag', 'nodes', 'calibration.npz', 'summary.json', 'truth.json')
@@ -61,7 +63,7 @@ def known(
         return calibration
     stage = display.stage('two short tests, calibrated', total=1)
     path = pretests.calibrate(
-        source.truth,
+        source.truth.start,
         float(source.parameters['specimen_stiffness']),
         float(source.parameters['rate']),
         seed,
@@ -93,7 +95,8 @@ def stream(
         nodes.start('recorder', {'bag': str((folder / 'bag').resolve())}, logs)
         nodes.start('estimator', settings, logs)
         if diagnose:
-            nodes.start('diagnoser', {'apply': True, 'seed': settings['seed']}, logs)
+            asked = {'apply': True, 'seed': settings['seed'], 'minimum': DIAGNOSED_SECONDS}
+            nodes.start('diagnoser', asked, logs)
         _wait_until_ready(nodes, watch, display)
         listeners = {'wait_for': 3 if diagnose else 2}
         sender = nodes.start(source.node, source.parameters | listeners, logs)
@@ -167,16 +170,15 @@ def finish(
     stage = display.stage('drawing', total=4)
     estimate_figures.bands(content, folder / 'bands.png')
     display.advance(stage, 1)
-    estimate_figures.parameters(content, folder / 'parameters.png', source.truth)
+    truth = None if source.truth is None else source.truth.over(content.posteriors)
+    estimate_figures.parameters(content, folder / 'parameters.png', truth)
     display.advance(stage, 2)
     pictures.live(content, folder / 'live.png')
     display.advance(stage, 3)
     if (folder / 'calibration.npz').exists():
-        pictures.carried(content, from_the_box(content), folder / 'prior.png', source.truth)
+        pictures.carried(content, from_the_box(content), folder / 'prior.png', truth)
     display.advance(stage, 4)
-    outcome = SessionOutcome(
-        source.title, _sent(source, folder), content, comparison, source.truth
-    )
+    outcome = SessionOutcome(source.title, _sent(source, folder), content, comparison, truth)
     if diagnose:
         _diagnose(outcome, folder, display, seed)
     return outcome

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,32 @@ BLOCKS_PER_SECOND = 50.0
 # The simulated actuator: near the paper's Table 2, not equal to it.
 TRUTH = {'beta_1': 134.0, 'alpha_1_beta_0': 1.1e9, 'alpha_2': 2.5e5, 'alpha_3': 0.5}
 STIFFNESS = 250e3  # N/m, the paper's second test
+# What its oil does to it while it warms: one parameter grows by so much of itself in the test.
+DRIFTS, DRIFT = 'alpha_1_beta_0', 0.03
+
+
+@dataclass(frozen=True, slots=True)
+class Truth:
+    """True parameters of Eq. (2), of which one drifts.
+
+    Attributes:
+        start: at the first sample, shape (4,).
+        growth: of each, as a share of itself per second, shape (4,) [1/s].
+    """
+
+    start: Array
+    growth: Array
+
+    def over(self, posteriors: Sequence[Any]) -> Array:
+        """Return what each window's posterior stands for, shape (windows, 4).
+
+        That is the truth in its middle; with a model that has the drift itself, at its start.
+        """
+        found = np.empty((len(posteriors), len(self.start)))
+        for row, p in zip(found, posteriors, strict=True):
+            middle = 0.0 if 'gain-drift' in list(p.effects) else 0.5 * int(p.samples)
+            row[:] = self.start * (1.0 + self.growth * (int(p.index) + middle) * float(p.period))
+        return found
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,14 +55,16 @@ class Source:
         parameters: its parameters.
         samples: how many it will publish.
         title: what it is, for people.
-        truth: true parameters of Eq. (2) where it is simulated.
+        truth: true parameters where it is simulated.
+        drift_of: what the estimator is told of their drift.
     """
 
     node: str
     parameters: dict[str, Any]
     samples: int
     title: str
-    truth: Array | None = None
+    truth: Truth | None = None
+    drift_of: tuple[str, ...] = ()
 
 
 def simulator(
@@ -47,7 +76,8 @@ def simulator(
         seconds: length of the sweep [s].
         rate: samples per second [Hz].
         stiffness: specimen stiffness [N/m], the paper's where None.
-        effect: effects the nodes are not told of, joined by '+'; empty for none.
+        effect: effects the nodes are not told of, joined by '+'; empty for none. Beside them
+            the oil warms, unless they say how the gain drifts.
         sealed: file that gets the truth.
         seed: seed of the noise.
     """
@@ -63,14 +93,22 @@ def simulator(
         'exit_at_end': True,
         **TRUTH,
     }
-    if effect:
-        parameters |= {'undeclared_effect': effect, 'sealed_file': str(sealed.resolve())}
+    growth = np.zeros(len(TRUTH))
+    hidden = [effect] if effect else []
+    drift_of: tuple[str, ...] = ()
+    if 'gain-drift' not in effect:
+        growth[list(TRUTH).index(DRIFTS)] = rate_of_drift = DRIFT / seconds
+        hidden.append(f'gain-drift:gain_drift={rate_of_drift!r}')
+        # A random walk that comes as far in the time of the test.
+        drift_of = (f'{DRIFTS}={DRIFT * np.sqrt(3600.0 / seconds):.3g}',)
+    parameters |= {'undeclared_effect': '+'.join(hidden), 'sealed_file': str(sealed.resolve())}
     return Source(
         'actuator_sim',
         parameters,
         round(seconds * rate) + 1 + round(REST * rate),
         f'simulated actuator, {k / 1e3:g} kN/m',
-        np.array(list(TRUTH.values())),
+        Truth(np.array(list(TRUTH.values())), growth),
+        drift_of,
     )
 
 

@@ -7,18 +7,28 @@ import socket
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from actuator_glue.api.simulation import Command, simulate
 from actuator_glue.errors import InputError
+from actuator_glue.inference.carried import Carried
 from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.io.messages import header, message
+from actuator_glue.model.parameters import NAMES
+from actuator_glue.online.job import WindowResult
+from actuator_glue.online.playback import replay, stream
+from actuator_glue.online.settings import EstimatorSettings
+from actuator_glue.records import Array, Record
 from examples.demonstration import __main__ as command
 from examples.demonstration import domain
 from examples.demonstration.processes import Nodes, executable
 from examples.demonstration.session import prepare
+from examples.demonstration.sources import STIFFNESS, Truth, simulator
 from examples.demonstration.watch import Watch
 
 
@@ -129,6 +139,50 @@ def test_a_domain_with_a_participant_is_not_free() -> None:
     domain._held.pop().close()
 
 
+def test_a_parameter_that_drifts_is_followed(tmp_path: Path, rng_seed: int) -> None:
+    """The oil's warming is in every window's 95 %; told of no drift, the estimator stays behind.
+
+    One of 68 normal errors is beyond 4 standard deviations once in 230 runs, or more rarely; in
+    200 runs the largest was 2.2, the smallest share of windows inside 82 %.
+    """
+    source = simulator(20.0, 200.0, None, 'none', tmp_path / 'truth.json', rng_seed)
+    assert source.truth is not None
+    growth = float(source.truth.growth.max())
+    record = simulate(
+        Command(duration=20.0, rate=200.0),
+        stiffness=STIFFNESS,
+        theta=source.truth.start,
+        effects={'gain-drift': {'gain_drift': growth}},
+        seed=rng_seed,
+    )
+    steps = np.random.default_rng(rng_seed).standard_normal((600, 4))
+    known = Carried(NAMES, source.truth.start * np.exp([0.003, 0.003, 0.004, 0.05] * steps))
+    settings = EstimatorSettings(window=4.0, time_budget=0.5, prior='sequential', seed=rng_seed)
+    follows = replace(settings, drift_of=source.drift_of)
+    off = _off(record, follows, known, source.truth)
+    assert len(off) > 12 and np.abs(off).max() < 4.0
+    assert ((np.abs(off) < 1.96).mean(axis=0) > 0.6).all()
+    stays = replace(settings, drift=0.0, contradiction='alarm')
+    assert _off(record, stays, known, source.truth)[-1, 1] < -4.0
+
+
+def _off(record: Record, settings: EstimatorSettings, known: Carried, truth: Truth) -> Array:
+    """How far each window's mean is from the truth, in its standard deviations, (windows, 4)."""
+    results = replay(stream(record), settings, carried=known)
+    found = [r for r in results if isinstance(r, WindowResult) and r.moments is not None]
+    windows = [
+        SimpleNamespace(
+            effects=[],
+            samples=len(r.window.record),
+            index=r.window.record.first_index,
+            period=r.window.record.period,
+        )
+        for r in found
+    ]
+    mean, sd = (np.array([getattr(r.moments, c) for r in found]) for c in ('mean', 'stddev'))
+    return (mean - truth.over(windows)) / sd
+
+
 @pytest.mark.ros
 def test_a_dying_node_is_reported(tmp_path: Path) -> None:
     """The end of its log is in the message, and the others are stopped."""
@@ -177,10 +231,14 @@ def test_whoever_is_ended_ends_its_nodes(tmp_path: Path, numbers: list[signal.Si
 @pytest.mark.ros
 @pytest.mark.timeout(240)
 def test_demo_from_end_to_end(tmp_path: Path) -> None:
-    """Nothing lost, replay identical, everything promised is there."""
+    """Nothing lost, replay identical, everything promised is there; the drift is followed.
+
+    Its seed is fixed: only a computer too slow for the windows fails it by chance.
+    """
     _need_nodes()
     out = tmp_path / 'out'
     arguments = ['--seconds', '12', '--rate', '200', '--window', '3', '--no-diagnosis']
+    arguments += ['--effect', 'none']
     command = [sys.executable, '-m', 'examples.demonstration', '--out', str(out)]
     done = subprocess.run([*command, *arguments], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
@@ -190,8 +248,12 @@ def test_demo_from_end_to_end(tmp_path: Path) -> None:
     assert summary['replay_identical'] is True
     assert summary['windows'] >= 5
     assert set(summary['moments']) == {'beta_1', 'alpha_1_beta_0', 'alpha_2', 'alpha_3'}
+    assert not any(p['prior_dominated'] for p in summary['moments'].values())
+    assert min(summary['truth_inside_95'].values()) > 0.6
+    drift = summary['drift']['alpha_1_beta_0']
+    assert abs(drift['followed'] - drift['true']) < 4.0 * drift['stddev'] < drift['true']
     assert (out / 'bag' / 'metadata.yaml').exists()
-    assert {p.name for p in out.glob('*.png')} >= {'bands.png', 'parameters.png'}
+    assert {p.name for p in out.glob('*.png')} >= {'bands.png', 'parameters.png', 'prior.png'}
 
 
 def _need_nodes() -> None:

@@ -13,7 +13,7 @@ from actuator_glue.inference.choice import choose_model
 from actuator_glue.inference.posterior import Problem, sample
 from actuator_glue.model.parameters import NAMES
 from actuator_glue.online import wire
-from actuator_glue.online.estimator import Estimator
+from actuator_glue.online.estimator import Estimator, Schedule
 from actuator_glue.online.job import WindowResult, run
 from actuator_glue.online.playback import replay
 from actuator_glue.online.settings import EstimatorSettings
@@ -163,6 +163,27 @@ def test_a_replay_is_identical_bit_for_bit():
     for one, other in zip(once, twice, strict=True):
         assert one.moments.mean.tobytes() == other.moments.mean.tobytes()
         assert one.conflict == other.conflict
+
+
+def test_a_first_window_without_a_posterior_changes_no_later_prior():
+    """The calibration's age counts from the stream's start, in a replay that lacks it, too."""
+    settings = replace(SEQUENTIAL, drift=0.5)
+    live, done, once = Estimator(settings, choose_model(), carried=known()), {}, []
+    for item in stream(record(6.0)):
+        live.setup(item) if isinstance(item, StreamSetup) else live.push(item)
+        while (job := live.next_job()) is not None:
+            if job.window.number == 0:
+                live.abandon('no posterior was reached')
+                continue
+            once.append(run(job))
+            live.finish(once[-1])
+            first = job.window.record
+            done[first.first_index, first.start_ns] = job.window.number, once[-1].evaluations
+    again = replay(stream(record(6.0)), settings, schedule=Schedule(done), carried=known())
+    twice = [r for r in again if isinstance(r, WindowResult)]
+    assert len(once) == len(twice) > 5
+    for one, other in zip(once, twice, strict=True):
+        assert one.moments.mean.tobytes() == other.moments.mean.tobytes()
 
 
 def test_memory_is_bounded():
