@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuator_glue.api.tracking import shown
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import source_name
 from actuator_glue.report import html
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
 
 ROWS = 20  # windows shown to people; JSON has all
 TITLE = 'Posterior mean (SI units) and standard deviation (% of it) of each window'
+TRACKING = 'How the actuator followed each window: median (95 % limits)'
 
 
 def header(found: Replay) -> tuple[str, ...]:
@@ -28,11 +30,8 @@ def header(found: Replay) -> tuple[str, ...]:
 
 def rows(found: Replay) -> list[tuple[str, ...]]:
     """Return a row of text for each of some windows, evenly chosen where there are many."""
-    shown = _windows(found)
-    if len(shown) > ROWS:
-        shown = [shown[i * (len(shown) - 1) // (ROWS - 1)] for i in range(ROWS)]
     out = []
-    for w in shown:
+    for w in _some(_windows(found)):
         coverage = [b.coverage[-1] for b in w.bands if b.kind == 'total']
         out.append(
             (
@@ -45,6 +44,35 @@ def rows(found: Replay) -> list[tuple[str, ...]]:
             )
         )
     return out
+
+
+def tracking_table(found: Replay) -> tuple[tuple[str, ...], list[tuple[str, ...]]] | None:
+    """Return header and rows of the tracking numbers; None where nobody asked for them.
+
+    Of each window median and 95 % limits over the draws.
+    """
+    told = [w for w in _windows(found) if w.tracking is not None]
+    if not told:
+        return None
+    names = list(dict.fromkeys(n for w in told if w.tracking for n in w.tracking.predicted))
+    units = [shown(name) for name in names]
+    out = []
+    for w in _some(told):
+        row = [str(w.window), f'{w.end_s:.2f}']
+        for name, (_, _, factor) in zip(names, units, strict=True):
+            of = None if w.tracking is None else w.tracking.predicted.get(name)
+            numbers = () if of is None else (of.median, of.lower, of.upper)
+            told_as = [f'{factor * v:.4g}' for v in numbers]
+            row.append(f'{told_as[0]} ({told_as[1]} to {told_as[2]})' if told_as else '-')
+        out.append(tuple(row))
+    return ('window', 'end [s]', *(f'{text} [{unit}]' for text, unit, _ in units)), out
+
+
+def _some(windows: list[WindowEstimate]) -> list[WindowEstimate]:
+    """Return some windows, evenly chosen where there are many."""
+    if len(windows) <= ROWS:
+        return windows
+    return [windows[i * (len(windows) - 1) // (ROWS - 1)] for i in range(ROWS)]
 
 
 def _percent(stddev: float, mean: float) -> str:
@@ -67,6 +95,7 @@ def brief(found: Replay) -> list[html.Block]:
     return [
         html.Text(found.summary()),
         html.Table(header(found), rows(found), TITLE),
+        *([html.Table(*followed, TRACKING)] if (followed := tracking_table(found)) else []),
         *(html.Note(line) for line in told),
     ]
 

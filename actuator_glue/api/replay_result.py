@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from actuator_glue.api.result import Result
+from actuator_glue.api.tracking import RecordTracking
 from actuator_glue.model.effects import CATALOGUE
 
 if TYPE_CHECKING:
@@ -59,6 +60,7 @@ class WindowEstimate:
         converged: R-hat is below the limit of the settings.
         error: of the best draw.
         bands: forecasts that ended in this window.
+        tracking: how the actuator followed the command, where that was asked for.
     """
 
     window: int
@@ -70,6 +72,7 @@ class WindowEstimate:
     converged: bool
     error: WindowError
     bands: tuple[ScoredBand, ...]
+    tracking: RecordTracking | None = None
 
 
 @dataclass(frozen=True, slots=True)

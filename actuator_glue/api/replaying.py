@@ -16,6 +16,7 @@ from actuator_glue.api.replay_result import (
     WindowEstimate,
     WindowParameter,
 )
+from actuator_glue.api.tracking import window_tracking
 from actuator_glue.errors import InputError
 from actuator_glue.io.bag_reader import decoded, is_bag, summarise
 from actuator_glue.io.bag_samples import topics_of_actuator
@@ -49,12 +50,14 @@ class _Run:
     events: list[str] = field(default_factory=list)
     effects: tuple[str, ...] = ()
     data_seconds: float = 0.0
+    tracking: bool = False
 
 
 def replay(
     source: Path | str | Record | Sequence[Record],
     *,
     namespace: str | None = None,
+    tracking: bool = False,
     progress: Progress | None = None,
     **settings: Any,
 ) -> Replay:
@@ -64,6 +67,7 @@ def replay(
         source: a bag, a laboratory file, or records; where a bag holds what a live estimator
             published and no setting is given, both are compared bit by bit.
         namespace: whose samples, where a bag has several actuators.
+        tracking: whether each window tells how the actuator followed its command.
         progress: called with the share of the messages read.
         settings: window [s], hop [s], settle [s], shaping_factor, evaluations, seed.
 
@@ -77,6 +81,7 @@ def replay(
         )
     asked = {name: value for name, value in settings.items() if value is not None}
     under_way = _open(source, namespace, compare_live=not asked)
+    under_way.tracking = tracking
     started = time.perf_counter()
     used = _settings(under_way.live, asked)
     comparison = _estimate(under_way, used, progress or (lambda share: None))
@@ -163,7 +168,7 @@ def _estimate(out: _Run, settings: EstimatorSettings, done: Progress) -> Compari
         for told in run(counted(), settings, model, schedule, reports, carried):
             if isinstance(told, WindowResult):
                 # Not the result itself: its samples and bands are many.
-                out.windows.append(_window(told))
+                out.windows.append(_window(told, out.tracking))
                 out.effects = told.model.effects
                 yield told
             else:
@@ -185,7 +190,7 @@ def _usable_seconds(block: Block) -> float:
         return 0.0  # told by the estimator
 
 
-def _window(r: WindowResult) -> WindowEstimate:
+def _window(r: WindowResult, tracking: bool) -> WindowEstimate:
     assert r.moments is not None and r.rhat is not None and r.ess is not None
     record, m = r.window.record, r.moments
     columns = (m.mean, m.stddev, m.skewness, m.cov, r.rhat, r.ess)
@@ -211,4 +216,5 @@ def _window(r: WindowResult) -> WindowEstimate:
             )
             for p in r.scored
         ),
+        tracking=window_tracking(r) if tracking else None,
     )

@@ -20,6 +20,7 @@ from actuator_glue.hybrid.indicators import (
 from actuator_glue.hybrid.stability import tracking
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
+from actuator_glue.online.job import WindowResult
 from actuator_glue.records import Array, Record, source_name
 
 if TYPE_CHECKING:
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 FREQUENCIES = (1.0, 5.0, 10.0)  # Hz
 _DRAWS = 100
+_WINDOW_DRAWS = 40  # of a window, which has little time
 HEADER = ('number', 'unit', 'measured', 'median', '2.5 %', '97.5 %')
 # Name in JSON: text, unit and factor for people.
 SHOWN = {
@@ -64,7 +66,7 @@ class RecordTracking:
         """Return a row of text for each number, under HEADER."""
         out = []
         for name, of in self.predicted.items():
-            text, unit, factor = _shown(name)
+            text, unit, factor = shown(name)
             seen = self.measured.get(name)
             told = '' if seen is None else f'{factor * seen:.4g}'
             numbers = (f'{factor * v:.4g}' for v in (of.median, of.lower, of.upper))
@@ -128,6 +130,26 @@ def record_tracking(
     return RecordTracking(source_name(record.source), predicted, measured)
 
 
+def window_tracking(
+    result: WindowResult, frequencies: Sequence[float] = FREQUENCIES
+) -> RecordTracking | None:
+    """Return how the actuator followed the command of a window; None without a posterior."""
+    if result.frozen is None or result.failure:
+        return None
+    record, settings = result.window.record, result.settings
+    draws = result.frozen.draws
+    return record_tracking(
+        draws[:: max(1, len(draws) // _WINDOW_DRAWS)],
+        result.model.names,
+        Structure(result.model.effects),
+        record,
+        'measured',
+        round(settings.settle / record.period),
+        frequencies,
+        record.first_index * record.period,
+    )
+
+
 def _numbers(record: Record, moved: Array) -> dict[str, float]:
     target, period = record.command, record.period
     index, j = frequency_evaluation(target, moved, period), criteria(target, moved, period)
@@ -145,7 +167,8 @@ def _numbers(record: Record, moved: Array) -> dict[str, float]:
     return out
 
 
-def _shown(name: str) -> tuple[str, str, float]:
+def shown(name: str) -> tuple[str, str, float]:
+    """Return text, unit and factor under which people see a number."""
     if name in SHOWN:
         return SHOWN[name]
     what, _, hz, *_ = name.split('_')

@@ -23,6 +23,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--namespace', metavar='/NS', help='whose samples, where a bag has several actuators'
     )
+    parser.add_argument(
+        '--tracking',
+        action='store_true',
+        help='of each window delay, amplitude, bandwidth, FEI, J1 to J3, TI and HSEM',
+    )
     group = parser.add_argument_group(
         'settings', 'for what was not estimated live, or to estimate it differently'
     )
@@ -50,10 +55,18 @@ def run(args: argparse.Namespace) -> int:
         source = load(args)
     settings = {name: getattr(args, name) for name in SETTINGS}
     with progress('replaying', 1.0) as done:
-        found = replay(source, namespace=args.namespace, progress=done, **settings)
-    from actuator_glue.api.replay_report import TITLE, header, rows
+        found = replay(
+            source,
+            namespace=args.namespace,
+            tracking=args.tracking,
+            progress=done,
+            **settings,
+        )
+    from actuator_glue.api.replay_report import TITLE, TRACKING, header, rows, tracking_table
 
     table(TITLE, header(found), rows(found), args)
+    if (followed := tracking_table(found)) is not None:
+        table(TRACKING, *followed, args)
     for line in (*found.notes, *list(dict.fromkeys(found.events))[:20]):
         note(line)
     _verdict(found, args)

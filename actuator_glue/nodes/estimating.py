@@ -5,8 +5,7 @@ from __future__ import annotations
 import time
 from typing import NamedTuple
 
-from actuator_glue.api.tracking import FREQUENCIES, RecordTracking, record_tracking
-from actuator_glue.model.structure import Structure
+from actuator_glue.api.tracking import FREQUENCIES, RecordTracking, window_tracking
 from actuator_glue.online.job import WindowResult, run
 from actuator_glue.online.sampling import Job
 from actuator_glue.workers.warm import warm_windows
@@ -16,10 +15,6 @@ from actuator_glue.workers.worker import Tell
 ON_THE_WAY = 5e-3
 # Share of the time budget that is left to whatever else the computer does meanwhile.
 SLACK = 0.08
-
-
-# Draws that the tracking numbers are computed from.
-_DRAWS = 40
 
 
 class _Reserve:
@@ -39,24 +34,6 @@ class Computed(NamedTuple):
 
     result: WindowResult
     tracking: RecordTracking | None
-
-
-def window_tracking(result: WindowResult, frequencies: tuple[float, ...]) -> RecordTracking | None:
-    """Return how the actuator followed the command of a window; None without a posterior."""
-    if result.frozen is None or result.failure:
-        return None
-    record, settings = result.window.record, result.settings
-    draws = result.frozen.draws
-    return record_tracking(
-        draws[:: max(1, len(draws) // _DRAWS)],
-        result.model.names,
-        Structure(result.model.effects),
-        record,
-        'measured',
-        round(settings.settle / record.period),
-        frequencies,
-        record.first_index * record.period,
-    )
 
 
 def compute(job: Job, deadline: float, frequencies: tuple[float, ...], tell: Tell) -> Computed:

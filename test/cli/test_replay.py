@@ -7,10 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from actuator_glue import replay as replayed
+from actuator_glue.hybrid.indicators import criteria
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.io import messages
 from actuator_glue.io.bag_records import read_records, write_record
 from actuator_glue.io.bag_writer import BagWriter
+from actuator_glue.model import linear
+from actuator_glue.model.parameters import NAMES
 from actuator_glue.online import wire
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.playback import replay, stream
@@ -127,6 +131,29 @@ def test_a_laboratory_file_is_estimated_window_by_window(run, problem_r: Path) -
     assert done.code == 0, done.err
     assert len(done.json['windows']) == 3
     assert done.json['times_real_time'] > 1
+
+
+def test_each_window_tells_how_the_actuator_followed(run, estimated: Callable[..., Path]) -> None:
+    """What was measured is the window's own; what is predicted holds Eq. (2a)'s delay."""
+    bag = estimated('bag')
+    done = run('replay', bag, '--tracking', '--json', '-')
+    assert done.code == 0 and done.json['identical'] is True
+    (record,) = read_records(bag)
+    windows = done.json['windows']
+    assert len(windows) == 3
+    for window in windows:
+        start = window['index'] - record.first_index + round(0.5 / record.period)
+        part = record.slice(start, window['index'] - record.first_index + window['samples'])
+        j = criteria(part.command, part.measured, part.period)
+        tracking = window['tracking']
+        assert tracking['measured']['J2'] == pytest.approx(j.j2)
+        assert tracking['measured']['J1_s'] == pytest.approx(j.j1)
+        theta = [window['parameters'][name]['mean'] for name in NAMES]
+        gain = linear.frequency_response(theta, record.known_stiffness(), [5.0])[0]
+        delay, told = -np.angle(gain) / (10.0 * np.pi), tracking['predicted']['delay_at_5_hz_s']
+        assert told['lower'] - 2e-3 < delay < told['upper'] + 2e-3
+    (table,) = (b for b in replayed(bag, tracking=True).brief() if 'followed' in str(b))
+    assert 'J2, rms error [%]' in str(table)
 
 
 def test_what_cannot_be_replayed(run, tmp_path: Path, estimated: Callable[..., Path]) -> None:
