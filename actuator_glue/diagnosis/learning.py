@@ -3,7 +3,8 @@
 Sparse regression inside of the loop: forms at every place are screened by their signatures, the
 most promising are refitted together with Eq. (2) and what was found, in the free-run simulation,
 and one is kept if it gains out of sample what any addition must, and the price of having been
-chosen among many. A catalogue effect that does as well in its place takes it.
+chosen among many. A name comes before a description: a term adds to what has a name, and takes
+its place only where it explains the rest, or where the name explains little of what it does.
 """
 
 from __future__ import annotations
@@ -12,12 +13,14 @@ import math
 from collections.abc import Sequence
 
 from actuator_glue.diagnosis.learned_forms import forms
+from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.model_selection import ModelSelection, Selection
 from actuator_glue.diagnosis.ranking import removed
 from actuator_glue.diagnosis.search import Trial
 
 _MOST = 2  # learned terms
 _REFITS = 4  # per structure and turn
+_MAIN = 0.5  # of the squared error that a term removes: a name that removes it stays
 
 
 def learned(selection: ModelSelection, found: Selection) -> Selection | None:
@@ -71,7 +74,25 @@ def _additions(
                 least = selection.settings.tie_share * removed(start, trial)
             if selection.better(trial, best, least, cost):
                 worth.append(trial)
-    return max(worth, key=_merit) if worth else None
+    worth.sort(key=_merit, reverse=True)
+    return next((t for t in worth if not _displaces(selection, t, best)), None)
+
+
+def _displaces(selection: ModelSelection, trial: Trial, best: Trial) -> bool:
+    """Whether a term would only take the place of names that explain the main part of the same.
+
+    Beside the term they are not worth their parameters, though something remains: a smooth form
+    is closer to the machine than the catalogue's equation for what is one cause.
+    """
+    search = selection.search
+    after = selection.pruned(trial)
+    if selection.left(after) < selection.material:
+        return False
+    rest = best
+    for name in best.effects:
+        if name not in after.effects and not is_learned(search.entries[name]):
+            rest = search.without(rest, name)
+    return removed(rest, best) ** 2 > _MAIN * removed(rest, after) ** 2
 
 
 def _merit(trial: Trial) -> float:

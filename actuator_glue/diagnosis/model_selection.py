@@ -11,6 +11,7 @@ import numpy as np
 from actuator_glue.diagnosis import false_alarms, regression
 from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.fit import Fit
+from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.ranking import compare, removed, spokesman
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.search import Search, Trial
@@ -257,7 +258,7 @@ class ModelSelection:
         return False
 
     def simpler(self, current: Trial, rivals: dict[str, tuple[Rival, ...]]) -> Trial:
-        """Take a rival of fewer parameters that these data cannot tell from a member."""
+        """Take a rival that these data cannot tell from a member: simpler, or a name for it."""
         for name, row in rivals.items():
             for rival in row:
                 effects = (*(n for n in current.effects if n != name), rival.name)
@@ -265,6 +266,7 @@ class ModelSelection:
                 fewer = len(entries[rival.name].parameters) < len(entries[name].parameters)
                 alike = rival.nats < self.settings.tie_nats
                 alike = alike or self._pressed_form(current, name, rival.name)
-                if rival.tied and fewer and alike:
+                named = is_learned(entries[name]) and rival.name != name
+                if rival.tied and (named or (fewer and alike)):
                     return self.search.trial(effects, rival.name)
         return current

@@ -6,20 +6,25 @@ import numpy as np
 import pytest
 from scipy import signal
 
+from actuator_glue.diagnosis import learning
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.fit import Fit
+from actuator_glue.diagnosis.learned_forms import forms
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.pipeline import mean_effects
 from actuator_glue.diagnosis.score import pooled, splits_of
 from actuator_glue.diagnosis.search import Search, Trial
 from actuator_glue.diagnosis.thresholds import Thresholds
-from actuator_glue.model.effects import CATALOGUE, Effect
+from actuator_glue.model.effects import CATALOGUE, Effect, Scale
 from actuator_glue.model.structure import Structure
-from actuator_glue.records import Record
+from actuator_glue.records import Array, Record
 
 RATE = 128.0
 THETA = np.array([235.0, 5.0e10, 4.23e6, 3.3])
+ENTRIES = dict(CATALOGUE) | {
+    e.name: e for e in forms(Scale(2e-3, 0.1, 60.0, 1 / 256, 250e3, THETA))
+}
 
 
 def stationary(effects: tuple[str, ...], sizes: list[float], seed: int) -> Data:
@@ -109,3 +114,67 @@ def test_a_richer_form_at_its_bound_mends_the_other(ratio: float, speed: float, 
     found = ModelSelection(Tried(trials), Thresholds(), lambda stage, share: None)  # type: ignore[arg-type]
     rivals = {stribeck[0]: (Rival(coulomb[0], 300.0, 20.0, 1e-6, True, 0.4),)}
     assert found.simpler(trials[stribeck], rivals).effects == (name,)
+
+
+def trial(names: tuple[str, ...], rms: float) -> Trial:
+    """A structure that leaves an error of this size."""
+    error = rms * np.ones(10)
+    return Trial(Structure(ENTRIES[n] for n in names), '', fit_of(error, names), np.zeros(2))
+
+
+def fit_of(error: Array, names: tuple[str, ...]) -> Fit:
+    """A fit of Eq. (2) and of one size per effect."""
+    size = 4 + len(names)
+    return Fit(np.ones(size), error, np.zeros((size, len(error))), np.zeros(4))
+
+
+def test_a_name_takes_the_place_of_a_description_that_it_is_tied_with() -> None:
+    """Though neither is simpler; a description itself, or one that is not tied, stays."""
+    names = ('learned-valve-e2',), ('flow-asymmetry',)
+    tried = Tried({n: trial(n, 1e-5) for n in names}, ENTRIES)  # type: ignore[arg-type]
+    found = ModelSelection(tried, Thresholds(), lambda stage, share: None)  # type: ignore[arg-type]
+    own = Rival('learned-valve-e2', 0.0, 0.0, 0.0, True, 0.7)
+    for tied, chosen in ((True, names[1]), (False, names[0])):
+        row = own, Rival('flow-asymmetry', 60.0, 40.0, 1e-6, tied, 0.2)
+        simpler = found.simpler(tried.trials[names[0]], {'learned-valve-e2': row})
+        assert simpler.effects == chosen
+
+
+@dataclass
+class Displaced:
+    """A selection whose term makes the name beside it worthless."""
+
+    left_by_term: float
+    material: float = 2e-6
+    search: 'Displaced' = field(init=False)
+    entries: dict[str, Effect] = field(default_factory=lambda: ENTRIES)
+
+    def __post_init__(self) -> None:
+        """Search and selection are one here."""
+        self.search = self
+
+    def pruned(self, both: Trial) -> Trial:
+        """Return the structure without the name."""
+        return trial(('learned-valve-e2',), self.left_by_term)
+
+    def left(self, structure: Trial) -> float:
+        """Return the rms structure that remains."""
+        return structure.fit.rms
+
+    def without(self, structure: Trial, name: str) -> Trial:
+        """Return Eq. (2) alone."""
+        return trial((), 30e-6)
+
+
+@pytest.mark.parametrize(
+    ('named', 'term', 'displaces'),
+    [(9e-6, 8e-6, True), (9e-6, 1e-6, False), (25e-6, 8e-6, False)],
+)
+def test_a_term_takes_no_place_of_what_has_a_name(
+    named: float, term: float, displaces: bool
+) -> None:
+    """Unless nothing material is left then, or the name explains little of what the term does."""
+    best = trial(('flow-asymmetry',), named)
+    both = trial(('flow-asymmetry', 'learned-valve-e2'), term)
+    found = Displaced(term)
+    assert learning._displaces(found, both, best) is displaces  # type: ignore[arg-type]
