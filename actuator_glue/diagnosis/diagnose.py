@@ -11,6 +11,7 @@ import numpy as np
 
 from actuator_glue.diagnosis import (
     advice,
+    alternatives,
     discrepancy,
     findings,
     homogeneity,
@@ -35,13 +36,13 @@ from actuator_glue.diagnosis.pipeline import (
 )
 from actuator_glue.diagnosis.preparation import prepare, rest_samples
 from actuator_glue.diagnosis.result import DiagnosisData
-from actuator_glue.diagnosis.search import Each
+from actuator_glue.diagnosis.search import Each, Trial
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.verify import Side, traces, verify
 from actuator_glue.inference.at_bound import Pressed, pressed
 from actuator_glue.inference.prior_use import GivenPrior
 from actuator_glue.model.parameters import BASE
-from actuator_glue.records import Record
+from actuator_glue.records import Array, Record
 
 Clock = Callable[[], float]
 
@@ -90,32 +91,38 @@ def diagnose(
     # One record's own setting is told from a common one by size alone: no common one beside it.
     own = decision.final.own is not None
     small = {} if own else discrepancy.responses(result.selection.search, size)
-    sides: list[Side] = []
-    for stage, trial in (('posterior before', found.base), ('posterior', decision.final)):
-        if sides and not decision.final.effects:
-            sides.append(sides[0])
-            break
-        draws, rhat = posterior.sample(
+
+    def sample(
+        trial: Trial, evaluations: int = 0, stage: str = 'posterior'
+    ) -> tuple[Array, float]:
+        return posterior.sample(
             trial.model,
             trial.fit,
             scorer,
             beside=discrepancy.beside(small, trial.effects, scorer),
             rng=rng,
-            evaluations=settings.evaluations if trial.effects else 0,
+            evaluations=evaluations,
             progress=partial(tell, stage),
             each=each,
         )
-        sides.append(Side(trial.model, trial.fit.theta, draws))
-    before, after = sides
+
+    final = decision.final
+    draws, rhat = sample(found.base, stage='posterior before')
+    before = after = Side(found.base.model, found.base.fit.theta, draws)
+    if final.effects:
+        draws, rhat = sample(final, settings.evaluations)
+        after = Side(final.model, final.fit.theta, draws)
     still = [rest.noise_at_rest(r, rest_samples(r)) for r in data.records]
     tell('held-out', 0.0)
     error, coverage, curves = verify(
         data, prepared.held, before, after, decision.noise, seed, result.line, len(found.singles)
     )
     space = Space(after.model, max(r.duration for r in data.records))
-    estimates, held_at = _estimates(space, after), _pressed(space, after)
+    others = alternatives.alternatives(result)
+    mixed = alternatives.mixed(after.draws, others, lambda trial: sample(trial)[0], rng)
+    estimates, held_at = _estimates(space, replace(after, draws=mixed)), _pressed(space, after)
     plain = Space(before.model, max(r.duration for r in data.records))
-    experiments = _experiments(result)
+    experiments = _experiments(result, [trial for trial, _ in others])
     sizes = result.selection.search.scale()
     decision = replace(
         decision, certainty=verdict.certainty(decision.certainty, error, found.material)
@@ -187,20 +194,11 @@ def diagnose(
     )
 
 
-def _experiments(result: Conclusion) -> tuple[Experiment, ...]:
+def _experiments(result: Conclusion, rivals: Sequence[Trial]) -> tuple[Experiment, ...]:
     """Rank tests by what they would tell about names that these records leave tied."""
-    final, search = result.decision.final, result.selection.search
-    if final.own is not None:
-        return ()
-    rivals = []
-    for name in result.decision.names:
-        rest = [n for n in final.effects if n != name]
-        for rival in result.found.rivals[name]:
-            trial = search.known((*rest, rival.name)) if rival.tied else None
-            if trial is not None and rival.name != name:
-                rivals.append(trial)
     if not rivals:
         return ()
+    final, search = result.decision.final, result.selection.search
     return ranked(final, rivals, result.scorer, search.scale(), result.decision.noise)
 
 

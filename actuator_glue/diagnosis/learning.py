@@ -4,7 +4,7 @@ Sparse regression inside of the loop: forms at every place are screened by their
 most promising are refitted together with Eq. (2) and what was found, in the free-run simulation,
 and one is kept if it gains out of sample what any addition must, and the price of having been
 chosen among many. A name comes before a description: a term adds to what has a name, and takes
-its place only where it explains the rest, or where the name explains little of what it does.
+its place only where it explains the rest, or much that the name does not.
 """
 
 from __future__ import annotations
@@ -20,7 +20,6 @@ from actuator_glue.diagnosis.search import Trial
 
 _MOST = 2  # learned terms
 _REFITS = 4  # per structure and turn
-_MAIN = 0.5  # of the squared error that a term removes: a name that removes it stays
 
 
 def learned(selection: ModelSelection, found: Selection) -> Selection | None:
@@ -79,7 +78,7 @@ def _additions(
 
 
 def _displaces(selection: ModelSelection, trial: Trial, best: Trial) -> bool:
-    """Whether a term would only take the place of names that explain the main part of the same.
+    """Whether a term would only take the place of names that explain nearly the same.
 
     Beside the term they are not worth their parameters, though something remains: a smooth form
     is closer to the machine than the catalogue's equation for what is one cause.
@@ -92,7 +91,8 @@ def _displaces(selection: ModelSelection, trial: Trial, best: Trial) -> bool:
     for name in best.effects:
         if name not in after.effects and not is_learned(search.entries[name]):
             rest = search.without(rest, name)
-    return removed(rest, best) ** 2 > _MAIN * removed(rest, after) ** 2
+    nearly = 1.0 - selection.settings.tie_share
+    return removed(rest, best) ** 2 > nearly * removed(rest, after) ** 2
 
 
 def _merit(trial: Trial) -> float:

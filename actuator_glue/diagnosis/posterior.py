@@ -91,6 +91,24 @@ def _inside(around: Working | Straight, phi: Array, move: Array) -> Array:
     return phi
 
 
+def _loosened(
+    around: Working | Straight, theta: Array, move: Array, rng: np.random.Generator
+) -> Array:
+    """Spread draws (m, p) by how far the allowance moved the optimum, once to either side.
+
+    What took up the error are the catalogue's shapes, not the machine's: where they move a
+    parameter from where it stands without them, it is not known better than by that.
+    """
+    phi, step = around.forward(theta), rng.standard_normal((len(theta), 1)) * move
+    for shorter in (-1.0, *(-0.5,) * _HALVINGS):
+        out, log_prior = around.inverse(phi + step)
+        outside = ~np.isfinite(log_prior)
+        if not outside.any():
+            return out
+        step[outside] *= shorter  # to the other side first
+    return np.where(outside[:, None], theta, out)
+
+
 def sample(
     model: Model,
     fit: Fit,
@@ -127,7 +145,8 @@ def sample(
         jac = np.hstack([jac, size * slopes @ data.prior.slopes(len(slopes))])
         error = np.concatenate([error, -size * data.prior.pull(fit.z)])
     move, covariance = beside.gaussian(jac, error, noise, around.widest)
-    transform = Composed(around, Laplace(_inside(around, phi, move), covariance, around.widest))
+    centre = _inside(around, phi, move)
+    transform = Composed(around, Laplace(centre, covariance, around.widest))
 
     def gaussian(count: int) -> Array:
         w = rng.standard_normal((count, len(phi)))
@@ -139,7 +158,8 @@ def sample(
         return w
 
     if evaluations <= 0:
-        return transform.inverse(gaussian(500))[0], math.nan
+        draws = transform.inverse(gaussian(500))[0]
+        return _loosened(around, draws, centre - phi, rng), math.nan
 
     target = data.target
 
@@ -164,4 +184,5 @@ def sample(
         archive=gaussian(320),
         progress=lambda done, all_: progress(done / all_),
     )
-    return chains.posterior(), float(chains.rhat.max())
+    draws = _loosened(around, chains.posterior(), centre - phi, rng)
+    return draws, float(chains.rhat.max())

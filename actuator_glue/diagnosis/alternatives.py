@@ -1,0 +1,58 @@
+"""What names that cannot be told apart leave open in Eq. (2)'s parameters.
+
+A lag of the transducer and one of the valve fit the same motion beside other values of beta_1.
+Where a name has alternatives, an interval under that name alone says too much: Eq. (2)'s are
+those of the mixture of all structures, each with the weight of its name.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from actuator_glue.diagnosis.pipeline import Conclusion
+from actuator_glue.diagnosis.search import Trial
+from actuator_glue.model.parameters import BASE
+from actuator_glue.records import Array
+
+_P = len(BASE)
+_ROUND = 1e-3  # odds below it move no interval
+
+
+def alternatives(result: Conclusion) -> list[tuple[Trial, float]]:
+    """Return the structures with a tied name for one that is told, and their odds against it."""
+    final, search = result.decision.final, result.selection.search
+    out: list[tuple[Trial, float]] = []
+    for name in result.decision.names if final.own is None else ():
+        row = {rival.name: rival for rival in result.found.rivals[name]}
+        rest = [n for n in final.effects if n != name]
+        for rival in row.values():
+            trial = search.known((*rest, rival.name)) if rival.tied else None
+            if trial is not None and rival.name != name:
+                out.append((trial, rival.probability / max(row[name].probability, _ROUND)))
+    return out
+
+
+def mixed(
+    draws: Array,
+    others: Sequence[tuple[Trial, float]],
+    sample: Callable[[Trial], Array],
+    rng: np.random.Generator,
+) -> Array:
+    """Draws (m, p) with Eq. (2)'s parameters over all structures that may be the machine's.
+
+    Args:
+        draws: those of the structure that is told (m, p); sizes of its effects stay as they are.
+        others: alternatives with their odds against it.
+        sample: draws from the posterior of a structure.
+        rng: random numbers.
+    """
+    known = [draws] + [sample(trial) for trial, odds in others if odds > _ROUND]
+    odds = np.array([1.0, *(o for _, o in others if o > _ROUND)])
+    which = rng.choice(len(odds), len(draws), p=odds / odds.sum())
+    out = draws.copy()
+    for i in range(1, len(odds)):
+        mine = np.flatnonzero(which == i)
+        out[mine, :_P] = known[i][rng.integers(0, len(known[i]), len(mine)), :_P]
+    return out

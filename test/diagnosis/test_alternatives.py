@@ -1,0 +1,82 @@
+"""Intervals of Eq. (2)'s parameters hold what tied names, and the allowance itself, leave open."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from actuator_glue.diagnosis import alternatives, posterior
+from actuator_glue.diagnosis.finding import Rival
+from actuator_glue.diagnosis.fit import Space
+from actuator_glue.diagnosis.identifiable import Working
+from actuator_glue.model import commands
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Record
+
+RATE = 128.0
+THETA = np.array([230.0, 1.7e10, 5.3e6, 26.0])
+
+
+def rival(name: str, tied: bool, probability: float) -> Rival:
+    """A rival with its weight."""
+    return Rival(name, 0.0, 0.0, 0.0, tied, probability)
+
+
+def told(own: Any = None) -> Any:
+    """A conclusion: a sensor's lag, a delay tied with it, and play, which is certain."""
+    rows = {
+        'sensor-lag': (
+            rival('sensor-lag', True, 0.6),
+            rival('delay', True, 0.3),
+            rival('gain', False, 0.01),
+        ),
+        'backlash': (rival('backlash', True, 0.9),),
+    }
+    final = SimpleNamespace(effects=('backlash', 'sensor-lag'), own=own)
+    return SimpleNamespace(
+        decision=SimpleNamespace(final=final, names=final.effects),
+        found=SimpleNamespace(rivals=rows),
+        selection=SimpleNamespace(search=SimpleNamespace(known=lambda names: names)),
+    )
+
+
+def test_a_tied_name_has_its_odds() -> None:
+    """A third of the weight against two; what is not tied has none, nor one record's setting."""
+    assert alternatives.alternatives(told()) == [(('backlash', 'delay'), pytest.approx(0.5))]
+    assert alternatives.alternatives(told(own='a record')) == []
+
+
+def test_parameters_are_those_of_all_structures() -> None:
+    """Two thirds of the draws are those told, a third the alternative's; sizes stay."""
+    rng = np.random.default_rng(1)
+    draws = np.tile([1.0, 1.0, 1.0, 1.0, 7.0], (3000, 1))
+    others: Any = [('other', 0.5), ('hardly', 1e-6)]
+    asked = []
+
+    def sample(trial: Any) -> np.ndarray:
+        asked.append(trial)
+        return np.tile([2.0, 2.0, 2.0, 2.0, 9.0], (10, 1))
+
+    mixed = alternatives.mixed(draws, others, sample, rng)
+    assert asked == ['other']
+    assert np.mean(mixed[:, 0] == 2.0) == pytest.approx(1 / 3, abs=0.03)
+    assert (mixed[:, :4] == mixed[:, :1]).all() and (mixed[:, 4] == 7.0).all()
+    assert (alternatives.mixed(draws, [], sample, rng) == draws).all()
+
+
+def test_what_an_allowance_moves_is_not_known_better() -> None:
+    """An optimum that shapes move by 0.2 of its logarithm: spread by as much; not past a bound."""
+    command = commands.sweep(RATE, 10.0, 0.1, 8.0, 2e-3)
+    record = Record(command, command, 1 / RATE, stiffness=0.0)
+    space = Space(Structure(()), record.duration)
+    around, rng = Working(space), np.random.default_rng(2)
+    draws = np.tile(THETA, (4000, 1))
+    draws[:, 3] = np.exp(space.upper[3])
+    move = np.array([0.2, 0.0, -0.1, 0.1])
+    out = np.log(posterior._loosened(around, draws, move, rng) / draws)
+    assert np.sqrt(np.mean(out**2, axis=0)) == pytest.approx(
+        [0.2, 0.0, 0.1, 0.1], rel=0.05, abs=1e-9
+    )
+    assert np.corrcoef(out[:, 0], out[:, 2])[0, 1] == pytest.approx(-1.0)
+    assert out[:, 3].max() <= 1e-9
