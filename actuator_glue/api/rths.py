@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from actuator_glue.api.calibration_result import Calibration
-from actuator_glue.api.spread import Spread, spread
+from actuator_glue.api.effect_cost import effect_costs, margins
+from actuator_glue.api.spread import spread
 from actuator_glue.api.stability import AtFrequency, DelayMargin, StabilityResult
 from actuator_glue.api.virtual_test import VirtualResult, check_criteria, run, summarise
 from actuator_glue.errors import InputError
-from actuator_glue.hybrid import sampled, stability
-from actuator_glue.hybrid.actuator import actuator, nonlinear
+from actuator_glue.hybrid import stability
+from actuator_glue.hybrid.actuator import nonlinear
 from actuator_glue.hybrid.compensator import Compensator
 from actuator_glue.hybrid.design import Loop, compensator_of
 from actuator_glue.hybrid.ground_motion import GroundMotion
@@ -24,8 +24,6 @@ from actuator_glue.hybrid.partition import Partition
 from actuator_glue.hybrid.virtual import VirtualTest
 from actuator_glue.io.ground_motion import read_ground_motion
 from actuator_glue.io.partition import read_partition
-from actuator_glue.model.structure import Structure
-from actuator_glue.records import Array
 
 FREQUENCIES = (1.0, 5.0, 10.0)  # Hz
 DRAWS = 1000
@@ -99,7 +97,10 @@ def rths(
         )
         motion = ground_motion.name, ground_motion.duration
         virtual = summarise(run(test), test.time, motion, criteria or {}, effective)
-    margin, growth = _margin(loop, chosen)
+    margin, growth = margins(loop, chosen)
+    moved = 0.0
+    if virtual is not None:
+        moved = float(np.sqrt(2.0 * np.mean(virtual.reference[:, partition.interface] ** 2)))
     tracking = stability.tracking(loop.actuators, frequencies)
     inputs = {n: loop.draws[:, i] for i, n in enumerate(loop.names)}
     inputs |= {f'specimen {n}': column for n, column in specimen.items()}
@@ -128,7 +129,7 @@ def rths(
         ),
         sensitivity=sensitive,
         most_sensitive=max(sensitive, key=lambda n: abs(sensitive[n]), default=None),
-        effect_cost_s=_effect_costs(loop, chosen, margin),
+        effect_cost_s=effect_costs(loop, chosen, margin, moved),
         compensator=str(chosen),
         virtual=virtual,
         draws=len(rows),
@@ -138,42 +139,6 @@ def rths(
         margins_drawn=margin,
         growth_drawn=growth,
     )
-
-
-def _effect_costs(loop: Loop, chosen: Compensator, margin: Array) -> dict[str, Spread]:
-    """Return how much of the delay margin each linear effect of the model costs [s].
-
-    The margin of each draw with this effect at its neutral value less that with all of them, under
-    the same compensator; negative where the effect makes room. Without an effect that draws need
-    to stay limited there is no number.
-    """
-    structure = Structure(loop.effects)
-    neutral = structure.neutral(loop.draws[:, :4])
-    names, out = list(loop.names), {}
-    for entry in structure.entries:
-        if not entry.linear or entry.place == 'sensor':
-            continue
-        without = loop.draws.copy()
-        for name in (p.name for p in entry.parameters):
-            without[:, names.index(name)] = neutral[:, structure.names.index(name)]
-        plain = replace(
-            loop,
-            draws=without,
-            actuators=actuator(without, names, loop.effects, loop.specimen['stiffness']),
-        )
-        cost = _margin(plain, chosen)[0] - margin
-        if np.isfinite(cost).all():
-            out[entry.name] = spread(cost)
-    return out
-
-
-def _margin(loop: Loop, chosen: Compensator) -> tuple[Array, Array]:
-    """Return the delay margin of each draw [s], and its growth [1/s], (m,) each."""
-    partition = loop.partition
-    growth = sampled.growth(loop.numerical, loop.plants, chosen.coefficients, partition.period)
-    whole = stability.loops(partition, loop.specimen, loop.actuators.system, chosen)
-    delay = loop.actuators.delay + partition.computation_delay
-    return stability.signed_margin(whole, partition.period, delay, growth > 0.0), growth
 
 
 def _check(

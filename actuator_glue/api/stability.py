@@ -66,8 +66,8 @@ class StabilityResult(Result):
         tracking: delay and amplitude at the frequencies asked for.
         sensitivity: rank correlation of the margin with each parameter.
         most_sensitive: the parameter of the largest one; None where the margin does not vary.
-        effect_cost_s: how much of the margin each linear effect of the model costs; of those with
-            a limit with and without it.
+        effect_cost_s: how much of the margin each effect of the model costs, nonlinear ones under
+            the ground motion; of those with a limit with and without it.
         compensator: 'none', or what it is.
         virtual: what the draws did under a ground motion; None where none was given.
         draws: how many were used.

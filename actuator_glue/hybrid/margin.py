@@ -62,6 +62,21 @@ def sampled_delay_margin(
     return np.where(np.abs(loop.D) >= 1.0, 0.0, later), sooner
 
 
+def critical_frequency(loop: System, period: float, delay: Array | float = 0.0) -> Array:
+    """Return where each sampled loop has its delay margin, (m,) [rad/s].
+
+    Of the frequencies at which the gain is 1 that whose phase is nearest to the limit, as time;
+    not-a-number where there is none. Arguments as in `sampled_delay_margin`.
+    """
+    discrete = held(loop, period)
+    w = 2.0 * np.arctan(crossings(bilinear(discrete))) / period
+    z = np.exp(1j * np.nan_to_num(w, nan=1.0) * period)
+    lag = np.broadcast_to(np.asarray(delay, dtype=np.float64), (len(w),))[:, None]
+    left = np.abs(np.angle(-discrete.response(z) * np.exp(-1j * w * lag))) / w
+    nearest = np.where(np.isnan(w), np.inf, left).argmin(axis=1)
+    return np.asarray(np.take_along_axis(w, nearest[:, None], axis=1)[:, 0])
+
+
 def _nearest(w: Array, gain: Complex, delay: Array | float) -> tuple[Array, Array]:
     turn = 2.0 * np.pi
     lag = np.broadcast_to(np.asarray(delay, dtype=np.float64), (len(w),))[:, None]

@@ -206,11 +206,13 @@ def test_nonlinear_effects_need_a_record_and_are_felt(benchmark_draws: Made) -> 
     found = {
         name: ag.rths(
             'benchmark_case_1', some, compensator='inverse', ground_motion=artificial(1, 10.0)
-        ).virtual
+        )
         for name, some in (('free', rubbed), ('rubbed', heavy))
     }
-    free, stiff = (found[n].indicators['J2'].median for n in ('free', 'rubbed'))
+    free, stiff = (found[n].virtual.indicators['J2'].median for n in ('free', 'rubbed'))
     assert stiff > 2.0 * free
+    costs = [found[n].effect_cost_s['coulomb-friction'].median for n in ('free', 'rubbed')]
+    assert abs(costs[1]) > 2.0 * abs(costs[0])
 
 
 def test_failure_is_counted(benchmark_draws: Made) -> None:
