@@ -48,6 +48,7 @@ class SuiteNode(LifecycleNode):
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._subscriptions_made: list[Any] = []
         self._made: list[Any] = []
+        self._undone: list[Callable[[], object]] = []
         self._timers_made: list[Any] = []
         change = self._service_change_state
         change.callback = answered(
@@ -83,9 +84,6 @@ class SuiteNode(LifecycleNode):
     def do_deactivate(self) -> None:
         """Stop working; subscriptions and timers are removed afterwards."""
 
-    def do_cleanup(self) -> None:
-        """Let go of what do_configure made, publishers apart."""
-
     def do_report(self) -> None:
         """Bring `health.values` up to date."""
 
@@ -103,6 +101,7 @@ class SuiteNode(LifecycleNode):
             qos_overriding_options=partners.OVERRIDES,
         )
         self._made.append(made)
+        self.at_cleanup(lambda: self.destroy_publisher(made))
         return made
 
     def subscribe(
@@ -184,7 +183,15 @@ class SuiteNode(LifecycleNode):
 
     def on_configure(self, state: LifecycleState) -> Any:
         """Configure; a refusal is logged."""
-        return self._transition('configure', self.do_configure, super().on_configure, state)
+
+        def work() -> None:
+            try:
+                self.do_configure()
+            except BaseException:
+                self._clean()
+                raise
+
+        return self._transition('configure', work, super().on_configure, state)
 
     def on_activate(self, state: LifecycleState) -> Any:
         """Activate; a refusal is logged."""
@@ -213,20 +220,14 @@ class SuiteNode(LifecycleNode):
 
         def work() -> None:
             self.finished = True
-            self._stop()
-            self._clean()
+            self._release()
             self.wake()
 
         return self._transition('shut down', work, super().on_shutdown, state)
 
     def on_error(self, state: LifecycleState) -> Any:
         """Return to unconfigured after an error, ready to be configured again."""
-
-        def work() -> None:
-            self._stop()
-            self._clean()
-
-        return self._transition('recover', work, super().on_error, state)
+        return self._transition('recover', self._release, super().on_error, state)
 
     def _transition(
         self, name: str, work: Callable[[], None], base: Callable[..., Any], state: Any
@@ -248,6 +249,10 @@ class SuiteNode(LifecycleNode):
         self._report(reached)
         return base(state)
 
+    def _release(self) -> None:
+        self._stop()
+        self._clean()
+
     def _stop(self) -> None:
         if not self.active:
             return
@@ -262,13 +267,14 @@ class SuiteNode(LifecycleNode):
             self._timers_made.clear()
             self._subscriptions_made.clear()
 
+    def at_cleanup(self, undo: Callable[[], object]) -> None:
+        """Have this let go of what do_configure made, if it was made; the last one goes first."""
+        self._undone.append(undo)
+
     def _clean(self) -> None:
-        try:
-            self.do_cleanup()
-        finally:
-            for publisher in self._made:
-                self.destroy_publisher(publisher)
-            self._made.clear()
+        self._made.clear()
+        while self._undone:
+            self._undone.pop()()
 
     # Diagnostics.
 

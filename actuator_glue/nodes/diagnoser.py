@@ -49,6 +49,7 @@ class DiagnoserNode(WorkingNode):
         self._model_client = self.create_client(
             SetModel, f'{self.parameters["estimator"]}/set_model'
         )
+        self.at_cleanup(lambda: self.destroy_client(self._model_client))
         self._action = ActionServer(
             self,
             Diagnose,
@@ -58,6 +59,7 @@ class DiagnoserNode(WorkingNode):
             handle_accepted_callback=self._accepted,
             cancel_callback=lambda _: CancelResponse.ACCEPT,
         )
+        self.at_cleanup(self._action.destroy)
 
     def do_activate(self) -> None:
         """Listen to samples and bands."""
@@ -89,12 +91,6 @@ class DiagnoserNode(WorkingNode):
             text = f'given up after {seconds:.0f} s: the node was deactivated'
             self.complain('diagnosis', f'{text}; a launch waits longer with linger:=SECONDS')
             self._finish(diagnosing.Outcome(message=text))
-
-    def do_cleanup(self) -> None:
-        """End the worker, withdraw the action."""
-        self.dismiss()
-        self._action.destroy()
-        self.destroy_client(self._model_client)
 
     def do_report(self) -> None:
         """Coverage and what is being done."""

@@ -59,7 +59,8 @@ class EstimatorNode(WorkingNode):
         self.employ(warm_up)
         self._out = {topic: self.publisher(topic) for topic in topics.ESTIMATED}
         self._frequencies = tuple(values['tracking_frequencies'])
-        self._service = self.create_service(SetModel, '~/set_model', self._set_model)
+        service = self.create_service(SetModel, '~/set_model', self._set_model)
+        self.at_cleanup(lambda: self.destroy_service(service))
 
     def do_activate(self) -> None:
         """Begin with an empty window."""
@@ -87,11 +88,6 @@ class EstimatorNode(WorkingNode):
         """Give up the running window."""
         if self.estimator.running is not None and not self.finished:
             self.give_up()
-
-    def do_cleanup(self) -> None:
-        """End the worker."""
-        self.dismiss()
-        self.destroy_service(self._service)
 
     def clock_jumped(self) -> None:
         """Nothing depends on the node's clock: windows follow the stamps of the samples."""

@@ -101,13 +101,10 @@ class LabBridgeNode(streamer.Streamer):
         values = self.parameters.values()
         out = BlockPublisher(self.publisher)
         kind = LiveSource if values['source'] else FileSource
+        self.at_cleanup(self._close)
         if values['results']:
             self._results = ResultsOut(self, values)
-        try:
-            self._source = kind(self, values, out)
-        except InputError:
-            self.do_cleanup()
-            raise
+        self._source = kind(self, values, out)
         for line in self._source.described():
             self.get_logger().info(line)
 
@@ -117,8 +114,7 @@ class LabBridgeNode(streamer.Streamer):
             self._results.listen()
         super().do_activate()
 
-    def do_cleanup(self) -> None:
-        """Close what was opened."""
+    def _close(self) -> None:
         for opened in (self._source, self._results):
             if opened is not None:
                 opened.close()

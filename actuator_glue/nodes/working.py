@@ -32,15 +32,12 @@ class WorkingNode(base.SuiteNode):
         return not self.worker.ready.is_set()
 
     def employ(self, warm: Callable[[], None], nice: int = 0) -> None:
-        """Start the worker; arguments as `Worker`."""
+        """Start the worker, which ends at clean-up; arguments as `Worker`."""
         self._answers: deque[Answer] = deque()
         self._arrived = self.create_guard_condition(self.guarded(self._take_answers))
+        self.at_cleanup(lambda: self.destroy_guard_condition(self._arrived))
         self.worker = Worker(self._hand_over, warm, nice)
-
-    def dismiss(self) -> None:
-        """End the worker."""
-        self.worker.close()
-        self.destroy_guard_condition(self._arrived)
+        self.at_cleanup(self.worker.close)
 
     def give_up(self) -> None:
         """End what the worker does; another begins."""

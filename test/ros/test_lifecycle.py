@@ -56,6 +56,15 @@ def test_every_transition(node, start, probe, tmp_path):
 
 
 @pytest.mark.parametrize('node', NODES)
+def test_a_node_that_was_never_configured_shuts_down(node, start, probe):
+    process = start(node, autostart=False)
+    assert probe.state(node) == 'unconfigured'
+    assert probe.transition(node, 'shutdown'), process.text
+    assert process.wait(20) == 0
+    assert 'Traceback' not in process.text
+
+
+@pytest.mark.parametrize('node', NODES)
 def test_every_parameter_is_described_and_as_the_file_says(node, start, probe, tmp_path):
     process = start(node, autostart=False)
     specs = {spec.name: spec for spec in parameter_file.NODES[node]}
