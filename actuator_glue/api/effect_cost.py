@@ -8,11 +8,11 @@ import numpy as np
 
 from actuator_glue.api.spread import Spread, spread
 from actuator_glue.hybrid import sampled, stability
-from actuator_glue.hybrid.actuator import actuator, nonlinear
+from actuator_glue.hybrid.actuator import actuator, inside, nonlinear
 from actuator_glue.hybrid.compensator import Compensator
 from actuator_glue.hybrid.describing import force_ratio
 from actuator_glue.hybrid.design import Loop
-from actuator_glue.hybrid.linear_system import Complex, System
+from actuator_glue.hybrid.linear_system import System
 from actuator_glue.hybrid.margin import critical_frequency, sampled_delay_margin
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
@@ -71,8 +71,8 @@ def margins(loop: Loop, chosen: Compensator) -> tuple[Array, Array]:
 
 def _nonlinear(loop: Loop, chosen: Compensator, amplitude: float) -> dict[str, Spread]:
     """Return the cost of each nonlinear effect that moves the piston [s]."""
-    inside = [n for n in loop.effects if Structure((n,)).entries[0].place != 'sensor']
-    curved = nonlinear(inside)
+    moving = inside(loop.effects)
+    curved = nonlinear(moving)
     if not curved:
         return {}
     rows = np.linspace(0, len(loop.draws) - 1, min(_DRAWS, len(loop.draws))).astype(np.intp)
@@ -86,14 +86,11 @@ def _nonlinear(loop: Loop, chosen: Compensator, amplitude: float) -> dict[str, S
     if not np.isfinite(w):
         return {}
 
-    def ratio(effects: list[str], at: float) -> Complex:
-        motion = at / (2.0 * np.pi), amplitude
-        return force_ratio(draws, loop.names, effects, nominal, motion)
-
     def margin_with(effects: list[str]) -> Array:
         at = w
         for _ in range(_ROUNDS):
-            found = ratio(effects, at)
+            motion = at / (2.0 * np.pi), amplitude
+            found = force_ratio(draws, loop.names, effects, nominal, motion)
             gain, delay = np.abs(found), late - np.angle(found) / at
             scaled = System(linear.A, linear.B, linear.C * gain[:, None], linear.D * gain)
             at = float(np.median(critical_frequency(scaled, partition.period, delay)))
@@ -102,9 +99,9 @@ def _nonlinear(loop: Loop, chosen: Compensator, amplitude: float) -> dict[str, S
         later, sooner = sampled_delay_margin(scaled, partition.period, delay)
         return np.where(sooner < later, -sooner, later)
 
-    out, whole = {}, margin_with(list(loop.effects))
+    out, whole = {}, margin_with(moving)
     for name in curved:
-        cost = margin_with([n for n in loop.effects if n != name]) - whole
+        cost = margin_with([n for n in moving if n != name]) - whole
         if np.isfinite(cost).all():
             out[name] = spread(cost)
     return out

@@ -38,6 +38,11 @@ def nonlinear(effects: Sequence[str]) -> tuple[str, ...]:
     return tuple(name for name in effects if not CATALOGUE[name].linear)
 
 
+def inside(effects: Sequence[str]) -> list[str]:
+    """Return the effects that the piston's motion has: all but those of the sensor."""
+    return [name for name in effects if CATALOGUE[name].place != 'sensor']
+
+
 def table_of(draws: Array, names: Sequence[str], structure: Structure) -> Array:
     """Return draws (m, p) with the columns in the order of a structure's parameters."""
     return np.asarray(draws)[:, [list(names).index(name) for name in structure.names]]

@@ -57,16 +57,15 @@ def force_ratio(
     Args:
         draws: parameters, (m, p), SI units.
         names: parameter of each column.
-        effects: effects of the model beyond Eq. (2).
+        effects: effects of the model beyond Eq. (2), without those of the sensor.
         specimen: its mass, damping and stiffness.
         motion: frequency [Hz] and amplitude [m] of the command.
     """
-    inside = [n for n in effects if Structure((n,)).entries[0].place != 'sensor']
-    curved = set(nonlinear(inside))
+    curved = set(nonlinear(effects))
     k, w = specimen['stiffness'], 2.0 * np.pi * motion[0]
     test = sine(*motion, k)
     found = []
-    for kept in (inside, [n for n in inside if n not in curved]):
+    for kept in (effects, [n for n in effects if n not in curved]):
         structure = Structure(tuple(kept))
         found.append(describing(structure, table_of(draws, names, structure), test))
     (moved, force), (plain, plain_force) = found

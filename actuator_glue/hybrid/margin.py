@@ -55,10 +55,7 @@ def sampled_delay_margin(
         period: sample period T [s].
         delay: of computation and whatever else the loop has already, (m,) [s].
     """
-    discrete = held(loop, period)
-    w = 2.0 * np.arctan(crossings(bilinear(discrete))) / period
-    z = np.exp(1j * np.nan_to_num(w, nan=1.0) * period)
-    later, sooner = _nearest(w, discrete.response(z), delay)
+    later, sooner = _nearest(*_sampled_crossings(loop, period), delay)
     return np.where(np.abs(loop.D) >= 1.0, 0.0, later), sooner
 
 
@@ -68,13 +65,18 @@ def critical_frequency(loop: System, period: float, delay: Array | float = 0.0) 
     Of the frequencies at which the gain is 1 that whose phase is nearest to the limit, as time;
     not-a-number where there is none. Arguments as in `sampled_delay_margin`.
     """
-    discrete = held(loop, period)
-    w = 2.0 * np.arctan(crossings(bilinear(discrete))) / period
-    z = np.exp(1j * np.nan_to_num(w, nan=1.0) * period)
+    w, gain = _sampled_crossings(loop, period)
     lag = np.broadcast_to(np.asarray(delay, dtype=np.float64), (len(w),))[:, None]
-    left = np.abs(np.angle(-discrete.response(z) * np.exp(-1j * w * lag))) / w
+    left = np.abs(np.angle(-gain * np.exp(-1j * w * lag))) / w
     nearest = np.where(np.isnan(w), np.inf, left).argmin(axis=1)
     return np.asarray(np.take_along_axis(w, nearest[:, None], axis=1)[:, 0])
+
+
+def _sampled_crossings(loop: System, period: float) -> tuple[Array, Complex]:
+    """Return where the gain of the sampled loop is 1 [rad/s], and the loop there."""
+    discrete = held(loop, period)
+    w = 2.0 * np.arctan(crossings(bilinear(discrete))) / period
+    return w, discrete.response(np.exp(1j * np.nan_to_num(w, nan=1.0) * period))
 
 
 def _nearest(w: Array, gain: Complex, delay: Array | float) -> tuple[Array, Array]:
