@@ -10,7 +10,6 @@ import numpy as np
 from actuator_glue.inference.bands import Band, band
 from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.inference.predictive import ResidualModel
-from actuator_glue.jit import njit
 from actuator_glue.online.mixture import mixture_band
 from actuator_glue.records import Array, Record
 
@@ -20,7 +19,6 @@ from actuator_glue.records import Array, Record
 Kind: TypeAlias = Literal['parameter', 'total', 'noise']
 
 TINY = 1e-12  # m; a residual is never exactly nothing
-_DIFFERENCE_GAIN = 70.0  # variance of the 4th difference of white noise of unit variance
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -81,29 +79,6 @@ class Prediction:
     width: Array
     coverage: Array | None = None
     rms_error: float = float('nan')
-
-
-def sensor_noise(measured: Array) -> float:
-    """Return the standard deviation of white sensor noise in a smooth signal (n,) [m].
-
-    From fourth differences, which leave nothing of a motion well below the sample rate: a 10 Hz
-    sine of 2 mm at 200 Hz leaves 20 um in the difference, which is 2 um of noise. Coloured
-    noise is underestimated. Fewer than six samples give 0.
-    """
-    count = len(measured) - 4
-    if count < 2:
-        return 0.0
-    return float(np.sqrt(_fourth_power(measured) / count / _DIFFERENCE_GAIN))
-
-
-@njit
-def _fourth_power(x: Array) -> float:
-    """Return the sum of squares of fourth differences."""
-    total = 0.0
-    for i in range(4, len(x)):
-        difference = x[i] - 4.0 * (x[i - 1] + x[i - 3]) + 6.0 * x[i - 2] + x[i - 4]
-        total += difference * difference
-    return total
 
 
 def predictions(

@@ -21,7 +21,8 @@ from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.inference.state import State
 from actuator_glue.model import linear
 from actuator_glue.online import fitting
-from actuator_glue.online.forecast import Frozen, sensor_noise
+from actuator_glue.online.forecast import Frozen
+from actuator_glue.online.sensor_noise import sensor_noise, white_noise
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Window
 from actuator_glue.records import Array, Record
@@ -128,8 +129,8 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> WindowFit:
     """
     record = job.window.record
     settle = round(job.settings.settle / record.period)
-    noise = sensor_noise(record.measured)
-    moved = _check_excited(record, settle, noise)
+    white = white_noise(record.measured)
+    moved = _check_excited(record, settle, white)
     target = _target(job)
     chains, complete = _sample(job, target, expired)
     posterior = chains.posterior()
@@ -151,7 +152,7 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> WindowFit:
             model=job.model,
             draws=posterior[spread(len(posterior), job.settings.draws)],
             residual=fit_residual(residual, parameters=len(job.model.names)),
-            noise=noise,
+            noise=sensor_noise(residual, record.command[settle:], white),
             past=_past(job, start),
         ),
         archive=_archive(posterior[spread(len(posterior), ARCHIVE)], job.archive),

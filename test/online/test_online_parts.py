@@ -13,7 +13,6 @@ from actuator_glue.model import linear, ridge
 from actuator_glue.normal import below
 from actuator_glue.online.alarm import CoverageAlarm, SwapWatch
 from actuator_glue.online.collect import PIECE, Collector
-from actuator_glue.online.forecast import sensor_noise
 from actuator_glue.online.mixture import mixture_band
 from actuator_glue.online.playback import stream
 from actuator_glue.online.response import response_band
@@ -66,13 +65,6 @@ def test_the_mixture_is_what_total_band_samples_from(share):
         # 60 bands of 1000 rows; the mean's standard error is 0.4 % of the spread.
         error = np.abs(getattr(ours, name) - theirs.mean(axis=0)) / theirs.std(axis=0)
         assert error.max() < 1.0
-
-
-@pytest.mark.parametrize('sd', [1e-6, 2e-5])
-def test_sensor_noise_is_seen_through_the_motion(sd):
-    whole = record(20.0, rate=1000.0, sd=sd)
-    assert sensor_noise(whole.measured) == pytest.approx(sd, rel=0.05)
-    assert sensor_noise(np.zeros(3)) == 0.0
 
 
 def test_the_frequency_response_band_holds_the_truth():
