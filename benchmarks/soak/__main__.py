@@ -29,9 +29,12 @@ from examples.demonstration.processes import Node, Nodes, end_in_order
 
 WIRE = ('drop_out', 'nan_burst', 'spike', 'clock_jump', 'restart', 'disorder', 'garbage')
 NODES = ('estimator_killed', 'worker_killed', 'recorder_stalled')
+KILLED = ('estimator_killed', 'worker_killed')
 STALL = 3.0  # s
-# Share of the run after which memory is watched: by then every kind of fault has come once.
-WARM = 0.4
+# Shares of the run: until the first, processes are killed as well; after the second, memory is
+# watched. By then all kinds of faults have come, buffers are full (the viewer keeps 17 minutes),
+# and nobody's growth is that of a process just born.
+KILLS, WARM = 0.5, 0.6
 READY_SECONDS = 400.0
 
 
@@ -101,21 +104,26 @@ class Soak:
         end = start + 60.0 * self.args.minutes
         # The first windows have nothing to fall back from.
         due = start + 25.0
-        order = list(self.rng.permutation([*WIRE, *NODES]))
+        order: list[str] = []
         while (now := time.monotonic()) < end:
             self._all_there()
             running = {name: node.process.pid for name, node in self.running.items()}
             self.memory += memory.read(now - start, running)
             # None so late that nothing could be seen of it any more.
             if now >= due and now < end - 25.0:
-                kind = str(order.pop())
-                order = order or list(self.rng.permutation([*WIRE, *NODES]))
+                young = now - start < KILLS * (end - start)
+                order = [k for k in order if young or k not in KILLED] or self._kinds(young)
+                kind = order.pop()
                 print(f'{now - start:7.1f} s  {kind}', flush=True)
                 begun = time.time()
                 seconds = self._fault(kind, wire)()
                 self.faults.append(judge.Fault(kind, begun, seconds))
                 due = now + seconds + self.args.every * float(self.rng.uniform(0.7, 1.3))
             time.sleep(1.0)
+
+    def _kinds(self, young: bool) -> list[str]:
+        kinds = [k for k in (*WIRE, *NODES) if young or k not in KILLED]
+        return [str(k) for k in self.rng.permutation(kinds)]
 
     def _all_there(self) -> None:
         for name, node in self.running.items():
