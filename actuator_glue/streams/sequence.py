@@ -18,8 +18,10 @@ AHEAD_SECONDS = 1.0
 BEHIND_SECONDS = 0.1
 # Samples in a row by which another numbering is believed.
 BELIEVED = 5
-# Lost numbers remembered, to tell a late sample from a repeated one.
+# Newest numbers of which it is known whether they were lost: it tells a late sample from a
+# repeated one.
 _REMEMBERED = 4096
+_NONE = np.iinfo(np.int64).min
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -61,7 +63,8 @@ class Sequence:
         # In the order in which they came, with the time of that.
         self._held: dict[int, tuple[float, Array]] = {}
         self._highest = 0
-        self._lost: dict[int, None] = {}
+        # Each lost index at its remainder, so that memory is the same after any losses.
+        self._lost = np.full(_REMEMBERED, _NONE, dtype=np.int64)
         self._candidates: list[tuple[int, Array]] = []
 
     def push(self, counter: NDArray[np.int64], rows: Array, now: float) -> list[Run]:
@@ -140,11 +143,11 @@ class Sequence:
             out.put(self._next - self._base, row)
             self._advance(1, now)
             self._release(now, out)
-        elif number in self._held or (step < 0 and number not in self._lost):
+        elif number in self._held or (step < 0 and not self._was_lost(number)):
             self.counts['duplicates'] += 1
         elif step < 0:
             self.counts['late'] += 1
-            del self._lost[number]
+            self._lost[(number - self._base) % _REMEMBERED] = _NONE
         else:
             if number < self._highest:
                 self.counts['reordered'] += 1
@@ -152,6 +155,10 @@ class Sequence:
             self._held[number] = now, row
             if len(self._held) > HOLD_SAMPLES:
                 self._jump(now, out)
+
+    def _was_lost(self, number: int) -> bool:
+        index = number - self._base
+        return bool(self._lost[index % _REMEMBERED] == index)
 
     def _release(self, now: float, out: _Out) -> None:
         """Hand out what waited for the sample before it."""
@@ -169,10 +176,8 @@ class Sequence:
         assert self._next is not None
         first = min(self._held)
         self.counts['lost'] += first - self._next
-        for number in range(max(self._next, first - _REMEMBERED), first):
-            self._lost[number] = None
-        while len(self._lost) > _REMEMBERED:
-            del self._lost[next(iter(self._lost))]
+        indices = np.arange(max(self._next, first - _REMEMBERED) - self._base, first - self._base)
+        self._lost[indices % _REMEMBERED] = indices
         self._next = first
         self._release(now, out)
 
@@ -201,7 +206,7 @@ class Sequence:
     def _begin(self, number: int, rows: list[Array], now: float, out: _Out) -> None:
         self._next = self._base = number
         self._highest = number
-        self._lost.clear()
+        self._lost.fill(_NONE)
         out.begin()
         for row in rows:
             out.put(self._next - self._base, row)
