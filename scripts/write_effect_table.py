@@ -36,7 +36,7 @@ def markdown() -> str:
         )
         rows.append('| ' + ' | '.join(cell.replace('|', '\\|') for cell in cells) + ' |')
     kept = ', '.join(f'`{e.name}`' for e in CATALOGUE.values() if not e.searched)
-    rows += ['', f'Not tried by the diagnosis, where their blind scores are not known: {kept}.']
+    rows += ['', f'Not tried by the diagnosis: {kept}.']
     return '\n'.join(rows)
 
 

@@ -39,8 +39,13 @@ def nonlinear(effects: Sequence[str]) -> tuple[str, ...]:
 
 
 def inside(effects: Sequence[str]) -> list[str]:
-    """Return the effects that the piston's motion has: all but those of the sensor."""
-    return [name for name in effects if CATALOGUE[name].place != 'sensor']
+    """Return the effects that the piston's motion has: all but those of the sensor.
+
+    Where the controller closes its loop on the recorded transducer, they move the piston, too; the
+    record then stands for its motion.
+    """
+    heard = 'sensor-feedback' in effects
+    return [name for name in effects if heard or CATALOGUE[name].place != 'sensor']
 
 
 def table_of(draws: Array, names: Sequence[str], structure: Structure) -> Array:

@@ -66,6 +66,10 @@ class Stream:
         self._jitter = float(self._values['jitter'][0])
         self._quantum = float(self._values['quantum'][0])
         self._noise = float(noise_stddev)
+        # What noise, jitter and converter make of a sample is what the controller has of it.
+        self._heard = bool(self._values['feedback_share'][0] > 0.0) and bool(
+            self._noise or self._jitter or self._quantum
+        )
         if rng is None and (self._jitter > 0.0 or self._noise > 0.0):
             raise InputError('timing-jitter and sensor noise need a random generator (rng)')
         self._rng = rng
@@ -110,6 +114,9 @@ class Stream:
             raise InputError(
                 f'command block of shape {block.shape} must be one row of finite samples [m]'
             )
+        if self._heard and len(block) > 1:
+            parts = [self.step(sample) for sample in block[:, np.newaxis]]
+            return np.concatenate([y for y, _ in parts]), np.concatenate([f for _, f in parts])
         u = np.concatenate([self._history, block])
         out = np.empty((len(block), rows.LANES))
         force = np.empty_like(out)
@@ -118,7 +125,10 @@ class Stream:
         self._begin += len(block)
         self._forget(u)
         y = self.structure.sensed(self.theta[np.newaxis], samples * self.period, out[:, :1])[:, 0]
-        return self._measured(y), force[:, 0].copy()
+        measured = self._measured(y)
+        if self._heard and len(block):
+            self._table[rows.HELD : rows.HELD + rows.LANES] = measured[-1] - y[-1]
+        return measured, force[:, 0].copy()
 
     def _advance(self, u: Array, out: Array, force: Array) -> None:
         """Run the compiled step through the samples after `_begin`."""

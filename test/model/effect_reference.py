@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from actuator_glue.model.effects import CATALOGUE
 
 NEUTRAL = {p.name: p.neutral for e in CATALOGUE.values() for p in e.parameters}
-Q, QD, F, X, V, Z, ENV, LEVEL, Y = range(9)
+Q, QD, F, X, V, Z, ENV, LEVEL, Y, W, WV = range(11)
 
 
 def soft(value, width):
@@ -63,8 +63,11 @@ class Reference:
 
     def rhs(self, t, s, mode):
         """Time derivative; mode 0: no dry friction, 1 / -1: slipping, 2: sticking."""
-        p, out = self.p, np.zeros(9)
-        error = soft(self.command(t) - s[X] + p['null_offset'], p['deadband'])
+        p, out = self.p, np.zeros(11)
+        own, share = s[X] + s[W], p['feedback_share']
+        recorded = self.transducer(t, s[Y] if p['sensor_lag'] > 0.0 else self.seen(s))
+        position = own + share * (recorded - own)
+        error = soft(self.command(t) - position + p['null_offset'], p['deadband'])
         drive = self.n0 * error - self.b1 * s[Q]
         if p['valve_lag'] > 0.0:
             out[Q], out[QD] = s[QD], (drive - s[QD]) / p['valve_lag']
@@ -79,7 +82,7 @@ class Reference:
             limit = self.a2 * p['saturation_velocity']
             flow = min(max(flow, -limit), limit)
         out[ENV] = (abs(s[Q]) / self.a2 - s[ENV]) / p['droop_time']
-        oil = flow - self.a3 * s[F]
+        oil = flow - self.a3 * s[F] - self.a2 * s[WV]
         force, slope, with_z = self.specimen(s[X], s[Z])
         direction = np.sign(oil) if self.massless else np.sign(s[V])
         if p['damping'] > 0.0 and p['mass'] == 0.0:
@@ -105,8 +108,22 @@ class Reference:
         out[X] = v
         out[F] = oil - self.a2 * v
         if p['sensor_lag'] > 0.0:
-            out[Y] = (s[X] - s[Y]) / p['sensor_lag']
+            out[Y] = (self.seen(s) - s[Y]) / p['sensor_lag']
+        turn = 2.0 * np.pi * p['frame_frequency']
+        rest = p['frame_compliance'] * s[F] - s[W]
+        out[W], out[WV] = s[WV], turn**2 * rest - 2.0 * p['frame_damping'] * turn * s[WV]
         return out
+
+    def seen(self, s):
+        """Position of the piston against what the recorded transducer is fixed to."""
+        return s[X] + self.p['frame_seen'] * s[W]
+
+    def transducer(self, t, y):
+        """What a transducer without play and lag shows."""
+        p, angle = self.p, 2.0 * np.pi * self.p['hum_frequency'] * t
+        y = y + p['bias'] + p['drift'] * t
+        y = y + p['hum_cosine'] * np.cos(angle) + p['hum_sine'] * np.sin(angle)
+        return y + p['sensor_even'] * y**2 + p['sensor_odd'] * y**3
 
     def relax(self, level, v):
         """Derivative of the rise of dry friction."""
@@ -118,26 +135,26 @@ class Reference:
         self.time, self.u = np.arange(len(u)) * period, np.asarray(u)
         at = np.arange((len(u) - 1) * fine + 1) * period / fine
         options = {'rtol': 1e-9, 'atol': self.tolerance(), 'max_step': period, 'method': 'RK45'}
-        state = np.zeros(9)
+        state = np.zeros(11)
         if self.rise > 0.0:
             state[LEVEL] = 0.0
         if self.dry == 0.0:
             s = solve_ivp(self.rhs, (0.0, at[-1]), state, t_eval=at, args=(0,), **options)
             assert s.success, s.message
-            return self.sensed(s.y, fine)
-        return self.sensed(self.hybrid(at, state, options), fine)
+            return self.sensed(at, s.y, fine)
+        return self.sensed(at, self.hybrid(at, state, options), fine)
 
     def tolerance(self):
         """Absolute tolerances: 1e-12 m, and forces and flows accordingly."""
-        scale = np.full(9, 1e-12)
+        scale = np.full(11, 1e-12)
         scale[[Q, QD]] *= self.a2 * np.array([10.0, 1e3])
         scale[[F, LEVEL]] *= self.a2
-        scale[V] *= 100.0
+        scale[[V, WV]] *= 100.0
         return scale
 
     def hybrid(self, at, state, options):
         """Stick and slip with located events."""
-        out, t, mode = np.zeros((9, len(at))), 0.0, 2
+        out, t, mode = np.zeros((11, len(at))), 0.0, 2
 
         def margin(t, s, mode):
             force = s[F] - self.specimen(s[X], s[Z])[0]
@@ -174,9 +191,9 @@ class Reference:
                 state[F] -= 1e-9 * self.dry * np.sign(state[F] - self.specimen(*state[[X, Z]])[0])
         return out
 
-    def sensed(self, states, fine):
+    def sensed(self, at, states, fine):
         """What the record shows: play on a fine grid, lag, offsets."""
-        x = states[Y if self.p['sensor_lag'] > 0.0 else X]
+        x = states[Y] if self.p['sensor_lag'] > 0.0 else self.seen(states)
         half = self.p['backlash']
         if half > 0.0:
             y = np.empty_like(x)
@@ -185,4 +202,4 @@ class Reference:
                 last = min(max(last, position - half), position + half)
                 y[i] = last
             x = y
-        return x[::fine]
+        return self.transducer(at, x)[::fine]

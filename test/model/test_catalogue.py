@@ -33,6 +33,7 @@ PLACES = {
         'specimen-gap',
         'specimen-hardening',
         'specimen-yield',
+        'frame-mode',
     },
     'sensor': {
         'sensor-lag',
@@ -43,6 +44,7 @@ PLACES = {
         'clock-skew',
         'timing-jitter',
         'sensor-curve',
+        'sensor-feedback',
     },
 }
 

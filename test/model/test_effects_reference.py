@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from effect_reference import Reference
+from effect_reference import NEUTRAL, Reference
 
 from actuator_glue.model.commands import sweep
 from actuator_glue.model.parameters import TABLE_2
@@ -52,6 +52,16 @@ CASES = [
     ),
     ('sensor-lag', {'sensor_lag': 2e-3}, 250e3),
     ('clock-skew', {'clock_skew': 3e-4}, 0.0),
+    (
+        'frame-mode',
+        {'frame_compliance': 2e-7, 'frame_frequency': 18.0, 'frame_damping': 0.03},
+        250e3,
+    ),
+    (
+        'frame-mode',
+        {'frame_compliance': 4e-7, 'frame_frequency': 60.0, 'frame_seen': 1.0},
+        250e3,
+    ),
 ]
 COMBINATIONS = [
     {
@@ -84,6 +94,30 @@ COMBINATIONS = [
         'flow-asymmetry': {'asymmetry': 0.05},
         'gain-drift': {'gain_drift': 0.02},
     },
+    {
+        'payload-inertia': {'mass': 10.0, 'mass_damping': 60.0},
+        'pressure-flow': {'inverse_stall_force': 1e-3},
+        'frame-mode': {
+            'frame_compliance': 2e-7,
+            'frame_frequency': 12.0,
+            'frame_damping': 0.05,
+            'frame_seen': 0.5,
+        },
+    },
+    {'sensor-lag': {'sensor_lag': 3e-3}, 'sensor-feedback': {'feedback_share': 1.0}},
+    {
+        'valve-deadband': {'deadband': 30e-6},
+        'sensor-lag': {'sensor_lag': 2e-3},
+        'bias': {'bias': 50e-6},
+        'drift': {'drift': 2e-5},
+        'hum': {'hum_cosine': 20e-6, 'hum_sine': 10e-6, 'hum_frequency': 12.0},
+        'frame-mode': {'frame_compliance': 2e-7, 'frame_seen': 0.3},
+        'sensor-feedback': {'feedback_share': 0.7},
+    },
+    {
+        'sensor-curve': {'sensor_even': 10.0, 'sensor_odd': 8e3},
+        'sensor-feedback': {'feedback_share': 1.0},
+    },
 ]
 
 
@@ -91,7 +125,7 @@ def compare(effects: dict[str, dict[str, float]], stiffness: float) -> np.ndarra
     """Return the difference to the reference [um]."""
     structure = Structure(effects)
     values = {name: v for part in effects.values() for name, v in part.items()}
-    theta = np.array([*TABLE_2, *(values[name] for name in structure.names[4:])])
+    theta = np.array([*TABLE_2, *((NEUTRAL | values)[name] for name in structure.names[4:])])
     record = Record(U, U, 1.0 / RATE, stiffness, hold='linear')
     reference = Reference(TABLE_2, values, stiffness)
     fine = 40 if 'backlash' in values else 1

@@ -121,9 +121,10 @@ def test_measured_start_needs_no_settling() -> None:
 def test_every_parameter_of_an_entry_acts(name: str) -> None:
     """An entry whose stage does not know one of its parameters would be ignored in silence."""
     r = record(250e3)
-    structure = Structure((name,))
+    names = (name, 'backlash') if name == 'sensor-feedback' else (name,)  # which alone is nothing
+    structure = Structure(names)
     for which in range(2):  # some parameters of a shape act in some of the typical sizes only
-        theta = np.repeat(typical((name,), r, which)[np.newaxis], len(structure.names) + 1, axis=0)
+        theta = np.repeat(typical(names, r, which)[np.newaxis], len(structure.names) + 1, axis=0)
         for j in range(4, theta.shape[1]):
             p = structure.parameters[j]
             theta[j, j] += 0.05 * (p.upper - p.lower) * (1.0 if theta[j, j] < p.upper else -1.0)

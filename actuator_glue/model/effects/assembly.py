@@ -72,6 +72,14 @@ def _sensed(first: Any, then: Any) -> Any:
     return both
 
 
+def _added(first: Any, then: Any) -> Any:
+    @_njit
+    def both(w: Array, n: int) -> Any:
+        return first(w, n) + then(w, n)
+
+    return both
+
+
 def _times(first: Any, gain: Any, own: Any) -> Any:
     @_njit
     def all_lanes(w: Array, on: NDArray[np.bool_], time: float) -> None:
@@ -103,6 +111,8 @@ fill = reduce(_filled, [s.fill for s in _STAGES if s.fill is not None])
 # (w, n, value, slope) -> (value, slope): control error, and flow after its gains.
 error = reduce(_passed, [s.error for s in _BY_NAME if s.error is not None])
 limit = reduce(_passed, [s.limit for s in _BY_NAME if s.limit is not None])
+# (w, n) -> what the controller's own transducer shows beyond the position.
+beyond = reduce(_added, [s.beyond for s in _BY_NAME if s.beyond is not None])
 # (w, n, y) -> y: recorded displacement.
 sensed = reduce(_sensed, [s.sensed for s in _BY_NAME if s.sensed is not None])
 # (w, on, time): writes IN_GAIN of all lanes, from IN_Q; an effect that is off costs nothing.

@@ -158,6 +158,7 @@ def fill(
         w[r.GAIN + n] = assembly.gain(p)
         w[r.LAG_SAMPLES + n], w[r.SKEW + n] = assembly.delay(p) / period, assembly.skew(p)
         w[r.NULL + n], w[r.COULOMB + n] = assembly.offset(p), assembly.dry(p)
+        w[r.NULL_ALONE + n] = w[r.NULL + n]
         w[r.STIFFNESS + n] = stiffness
         _valve(w, n, p, step)
         _forces(w, n, p, stiffness, step)

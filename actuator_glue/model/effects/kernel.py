@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.jit import njit
-from actuator_glue.model.effects import assembly, balance, command, lag, stages
+from actuator_glue.model.effects import assembly, balance, command, feedback, lag, stages
 from actuator_glue.model.effects import rows as r
 from actuator_glue.model.effects.catalogue import specimen_gap, specimen_yield, stribeck_friction
 from actuator_glue.model.effects.terms import machine, stage
@@ -253,6 +253,9 @@ def advance(
     if begin == 0 and displacement.shape[0] > 0:  # the state as it stands
         for n in range(r.LANES):
             displacement[0, n] = w[r.X + n]
+        if on[r.ON_FEEDBACK]:
+            for _ in range(2):  # now, and a step before
+                feedback.keep(w, g, program, 0.0, displacement[0])
     for i in range(displacement.shape[0]):
         at = begin + i - 1  # the interval from sample `at` to the sample written now
         for j in range(substeps if at >= 0 else 0):
@@ -266,6 +269,8 @@ def advance(
                 mean, slope = command.linear(u, offset, start, start + inverse)
             else:
                 mean = command.held(u, at - offset)
+            if on[r.ON_BEYOND]:
+                feedback.expect(w)
             substep(w, g, program, on, mean, rate, (at + (j + 0.5) * inverse) * period)
             if on[r.ON_TRANSDUCER]:
                 for n in range(r.LANES):
@@ -274,6 +279,9 @@ def advance(
             else:
                 for n in range(r.LANES):
                     displacement[i, n] = stages.chains(w, n, mean, slope)
+            if on[r.ON_FEEDBACK]:
+                time = (at + (j + 1.0) * inverse) * period
+                feedback.keep(w, g, program, time, displacement[i])
         if want_force:
             for n in range(r.LANES):
                 force[i, n] = w[r.F + n]

@@ -52,15 +52,23 @@ ROWS, SWITCHES = Numbers(LANES), Numbers(1)
     ACTING_TOUCHED, IDLE_TOUCHED, ACTING_FREE, IDLE_FREE,
     EXACT_XX, EXACT_XV, EXACT_XU, EXACT_XR, EXACT_VX, EXACT_VV, EXACT_VU, EXACT_VR,
     TRAP_XX, TRAP_XQ, TRAP_XU, TRAP_QX, TRAP_QQ, TRAP_QU,
+    # Share of the recorded transducer in the loop, and the error's offset without what transducers
+    # show beyond the position.
+    FEEDBACK, NULL_ALONE,
     # ... its states (carried on by `advance`) ...
     X, Q, QD, F, R, V, DX, DF, X_EXACT, V_EXACT, X_TRAP, Q_TRAP,
+    # What the recorded transducer shows beyond the position, now and a step before, and what a
+    # record's noise adds from sample to sample.
+    BEYOND, BEYOND_BEFORE, HELD,
     # ... and scratch within one step: command samples and what part of each, command, spool flow,
     # gain of the orifice, flow, balance of forces, the increment.
     PER_CLOCK, IN_SHARE, IN_PART, IN_PART_STOP, IN_U, IN_U_STOP, IN_U_NEXT, IN_U_STOP_NEXT,
     IN_MEAN, IN_SLOPE, IN_Q, IN_DQ, IN_GAIN, IN_FLOW, IN_DFLOW, IN_PUSH, IN_OIL, IN_STIFF, IN_DX,
-) = ROWS.take(63)  # fmt: skip
+) = ROWS.take(68)  # fmt: skip
 
 # Of stages that can be skipped: lanes with commands of their own, any effect on the flow, a
 # specimen whose force is neither proportional nor has a gap only, the transducer, any expression
 # in the loop, one of a force.
 ON_LAG, ON_FLOW, ON_CURVED, ON_TRANSDUCER, ON_TERMS, ON_FORCE = SWITCHES.take(6)
+# A controller that is shown something else than the position, and one that is shown the record.
+ON_BEYOND, ON_FEEDBACK = SWITCHES.take(2)

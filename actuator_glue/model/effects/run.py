@@ -72,7 +72,7 @@ def tables(
     step = period / substeps
     out = np.zeros((blocks, assembly.SIZE + program.registers.size))
     coefficients.fill(parameters, stiffness, step, period, x, v, out)
-    if program.acts(machine.COMMAND, machine.FORCE):
+    if program.instructs:
         which = np.minimum(np.arange(blocks * rows.LANES), len(total) - 1)
         registers = program.start(values, which)
         registers[:, machine.STEP], registers[:, machine.K] = step, stiffness

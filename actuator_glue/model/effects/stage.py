@@ -47,6 +47,8 @@ class Stage:
             which it may only keep or make zero.
         gain: (w, n, time) -> factor of the flow; needs a switch of its own.
         limit: (w, n, flow, slope) -> the same after the effect, of the flow times all gains.
+        beyond: (w, n) -> what the controller's own transducer shows beyond the position, in the
+            middle of the step to come; called once before every step.
         sensed: (w, n, y) -> recorded displacement.
         own: switch that the effect has taken for itself (rows.SWITCHES).
         shared: switches of the scheme that it needs (rows.ON_...), beside that of its place.
@@ -57,6 +59,7 @@ class Stage:
     error: Callable[..., Any] | None = None
     gain: Callable[..., Any] | None = None
     limit: Callable[..., Any] | None = None
+    beyond: Callable[..., Any] | None = None
     sensed: Callable[..., Any] | None = None
     own: int | None = None
     shared: tuple[int, ...] = ()

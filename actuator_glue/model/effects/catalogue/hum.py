@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from actuator_glue.jit import njit
-from actuator_glue.model.effects.effect import Effect
+from actuator_glue.model.effects.terms.entry import term
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.records import Array
 
@@ -41,18 +42,21 @@ def _hum(p: Array, time: Array, y: Array) -> Array:
     return out
 
 
-EFFECT = Effect(
-    name='hum',
-    place='sensor',
-    equation='y = x + a cos(2 pi f t) + b sin(2 pi f t)',
-    parameters=(
-        Parameter('hum_cosine', 'm', -1e-3, 1e-3, 'cosine amplitude of the line', 0.0, 'line'),
-        Parameter('hum_sine', 'm', -1e-3, 1e-3, 'sine amplitude of the line', 0.0),
-        Parameter('hum_frequency', 'Hz', 1.0, 1000.0, 'frequency of the line', 50.0),
+_TURN = '(2*pi*hum_frequency*t)'
+EFFECT = replace(
+    term(
+        'hum',
+        f'sensor: y = y + hum_cosine*cos{_TURN} + hum_sine*sin{_TURN}',
+        (
+            Parameter('hum_cosine', 'm', -1e-3, 1e-3, 'cosine amplitude of the line', 0.0, 'line'),
+            Parameter('hum_sine', 'm', -1e-3, 1e-3, 'sine amplitude of the line', 0.0),
+            Parameter('hum_frequency', 'Hz', 1.0, 1000.0, 'frequency of the line', 50.0),
+        ),
+        group='hum',
+        signature='spectral line incoherent with the command',
+        source='IEEE Std 1057-2017 (sine fit)',
+        check=False,
     ),
-    group='hum',
-    signature='spectral line incoherent with the command',
-    source='IEEE Std 1057-2017 (sine fit)',
     starts=lambda s: (
         tuple(
             (0.001 * s.stroke, 0.001 * s.stroke, hz)

@@ -71,6 +71,11 @@ class Program:
     memory: tuple[int, ...]
     switches: tuple[tuple[int, tuple[str, ...], tuple[float, ...]], ...]
 
+    @property
+    def instructs(self) -> bool:
+        """Whether there are instructions for any place."""
+        return bool(len(self.code) > self.code[0, m.PREPARE])
+
     def acts(self, first: int, last: int) -> bool:
         """Whether the parts first .. last (machine.COMMAND, ...) have instructions."""
         return bool(self.code[0, last] > self.code[0, first - 1])
