@@ -1,8 +1,9 @@
-"""What names that cannot be told apart leave open in Eq. (2)'s parameters.
+"""What names that cannot be told apart leave open in the other parameters.
 
 A lag of the transducer and one of the valve fit the same motion beside other values of beta_1.
-Where a name has alternatives, an interval under that name alone says too much: Eq. (2)'s are
-those of the mixture of all structures, each with the weight of its name.
+Where a name has alternatives, an interval under that name alone says too much: those of Eq. (2)'s
+parameters, and of the sizes of other effects, are those of the mixture of all structures, each
+with the weight of its name.
 """
 
 from __future__ import annotations
@@ -13,10 +14,8 @@ import numpy as np
 
 from actuator_glue.diagnosis.pipeline import Conclusion
 from actuator_glue.diagnosis.search import Trial
-from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array
 
-_P = len(BASE)
 _ROUND = 1e-3  # odds below it move no interval
 
 
@@ -36,23 +35,31 @@ def alternatives(result: Conclusion) -> list[tuple[Trial, float]]:
 
 def mixed(
     draws: Array,
+    told: Trial,
     others: Sequence[tuple[Trial, float]],
     sample: Callable[[Trial], Array],
     rng: np.random.Generator,
 ) -> Array:
-    """Draws (m, p) with Eq. (2)'s parameters over all structures that may be the machine's.
+    """Draws (m, p) over all structures that may be the machine's, of what they have in common.
+
+    The size of an effect that an alternative lacks is that which it has where its name is right.
 
     Args:
-        draws: those of the structure that is told (m, p); sizes of its effects stay as they are.
+        draws: those of the structure that is told (m, p).
+        told: that structure.
         others: alternatives with their odds against it.
         sample: draws from the posterior of a structure.
         rng: random numbers.
     """
-    known = [draws] + [sample(trial) for trial, odds in others if odds > _ROUND]
-    odds = np.array([1.0, *(o for _, o in others if o > _ROUND)])
+    known = [(trial, odds) for trial, odds in others if odds > _ROUND]
+    odds = np.array([1.0, *(o for _, o in known)])
     which = rng.choice(len(odds), len(draws), p=odds / odds.sum())
-    out = draws.copy()
-    for i in range(1, len(odds)):
-        mine = np.flatnonzero(which == i)
-        out[mine, :_P] = known[i][rng.integers(0, len(known[i]), len(mine)), :_P]
+    names, out = [p.name for p in told.model.parameters], draws.copy()
+    for i, (trial, _) in enumerate(known, 1):
+        mine, theirs = np.flatnonzero(which == i), [p.name for p in trial.model.parameters]
+        drawn = sample(trial)
+        rows = drawn[rng.integers(0, len(drawn), len(mine))]
+        for j, name in enumerate(names):
+            if name in theirs:
+                out[mine, j] = rows[:, theirs.index(name)]
     return out

@@ -119,7 +119,7 @@ def diagnose(
     )
     space = Space(after.model, max(r.duration for r in data.records))
     others = alternatives.alternatives(result)
-    mixed = alternatives.mixed(after.draws, others, lambda trial: sample(trial)[0], rng)
+    mixed = alternatives.mixed(after.draws, final, others, lambda trial: sample(trial)[0], rng)
     estimates, held_at = _estimates(space, replace(after, draws=mixed)), _pressed(space, after)
     plain = Space(before.model, max(r.duration for r in data.records))
     experiments = _experiments(result, [trial for trial, _ in others])

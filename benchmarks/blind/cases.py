@@ -7,10 +7,11 @@ import plant
 from case import Case, kinds
 from equivalents import values
 from scipy import signal
-from sizing import NOISE, Array, base_residual, sized
+from sizing import NOISE, Array, base_residual, between, finer, sized
 
 STIFFNESS = (0.0, 250e3, 250e3)
 SAMPLES = int(60 * plant.RATE)
+_FINER = 16  # what the sensor does between samples
 
 # name -> (smallest, largest size, base share): sizes are relative to the scale in `_install`.
 SIZES: dict[str, tuple[float, float]] = {
@@ -147,13 +148,14 @@ def _sense(name: str, size: float, y: Array, rng: np.random.Generator) -> Array:
     t = np.arange(len(y)) / plant.RATE
     match name:
         case 'backlash':
-            return np.asarray(plant.play(y, size))
+            return np.asarray(plant.play(finer(y, _FINER), size)[::_FINER])
         case 'sensor-lag':
-            fine = np.repeat(y, 1)
-            pole = np.exp(-1.0 / (plant.RATE * size))
+            lag = _FINER * plant.RATE * size
+            pole = np.exp(-1.0 / lag)
             # Exact for a displacement linear between samples.
-            a = plant.RATE * size * (1.0 - pole)
-            return np.asarray(signal.lfilter([1.0 - a, a - pole], [1.0, -pole], fine))
+            a = lag * (1.0 - pole)
+            late = signal.lfilter([1.0 - a, a - pole], [1.0, -pole], finer(y, _FINER))
+            return np.asarray(late[::_FINER])
         case 'bias':
             return y + size
         case 'drift':
@@ -161,9 +163,9 @@ def _sense(name: str, size: float, y: Array, rng: np.random.Generator) -> Array:
         case 'hum':
             return y + np.sqrt(2) * size * np.sin(2 * np.pi * 50.0 * t + rng.uniform(0, 6.28))
         case 'clock-skew':
-            return np.interp(t * (1.0 + size), t, y)
+            return between(y, plant.RATE * t * (1.0 + size))
         case 'timing-jitter':
-            return np.interp(t + size * rng.standard_normal(len(t)), t, y)
+            return between(y, plant.RATE * (t + size * rng.standard_normal(len(t))))
         case 'frame-antiresonance':
             w = 2 * np.pi * 6.5
             num = [1.0, 2 * 0.05 * w, w * w]
@@ -194,7 +196,10 @@ def respond(
     e = np.array(list(plant.NEUTRAL.values()))
     for name, size in effects.items():
         _install(name, size, e, theta)
+    # What has corners converges slowly.
     dry = e[plant.COULOMB] > 0 or e[plant.STRIBECK] > 0
+    # Contact in the middle of a step leaves an error of first order.
+    substeps = 256 if e[plant.GAP] > 0 else 64 if dry else 16
     out = []
     for r, (command, k) in enumerate(zip(commands, STIFFNESS, strict=True)):
         rng = np.random.default_rng([seed, r, 7])
@@ -203,7 +208,7 @@ def respond(
             width = int(e[plant.STICK_TIME] * plant.RATE)
             for at in rng.integers(0, len(command), rng.poisson(60 * e[plant.STICK_RATE])):
                 sticks[at : at + width] = True
-        y = plant.respond(command, theta, k, e, 64 if dry else 16, sticks)
+        y = plant.respond(command, theta, k, e, substeps, sticks)
         for name, size in effects.items():
             y = _sense(name, size, y, rng)
         out.append(y)

@@ -221,8 +221,13 @@ def respond(command, theta, k, e, substeps, sticks):
             lag = e[DELAY]
             if e[WOBBLE] != 0.0:
                 lag += e[WOBBLE] * (1.0 + math.sin(2.0 * math.pi * e[WOBBLE_HZ] * t))
-            at = i - math.ceil(lag * RATE - j / substeps - 1e-9) if lag > 0.0 else i
+            late = i + j / substeps - lag * RATE + 1e-9
+            at = math.floor(late)
             u = command[at] if at >= 0 else 0.0
+            # The mean over the step, where the next sample arrives within it.
+            held = (at + 1 - late) * substeps
+            if held < 1.0 and at >= -1:
+                u = held * u + (1.0 - held) * command[at + 1]
             if e[RATE_GAIN] != 0.0 and at > 0:
                 u *= 1.0 + e[RATE_GAIN] * abs(command[at] - command[at - 1]) * RATE
             u *= e[GAIN]

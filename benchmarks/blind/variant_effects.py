@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import variant_plant as plant
 from scipy import signal
-from sizing import Array
+from sizing import Array, between, finer
 
 SIZES: dict[str, tuple[float, float]] = {
     'coulomb-friction': (5e-6, 300e-6),
@@ -173,14 +173,13 @@ def _sense(
     sign = forms.sign
     match name:
         case 'backlash':
-            return np.asarray(plant.play(y, size))
+            return np.asarray(plant.play(finer(y, 16), size)[::16])
         case 'sensor-lag':
             # A conditioner's pole, or an anti-alias filter of second order with its delay.
-            fine = np.interp(np.arange(16 * len(y)) / 16.0, np.arange(len(y)), y)
             order = 2 if forms.form == 2 else 1
             corner = order * 0.71 / (2.0 * np.pi * size) if order == 2 else 0.5 / np.pi / size
             sos = signal.butter(order, corner, fs=16 * plant.RATE, output='sos')
-            return np.asarray(signal.sosfilt(sos, fine)[::16])
+            return np.asarray(signal.sosfilt(sos, finer(y, 16))[::16])
         case 'bias':
             return y + sign * size
         case 'drift':
@@ -189,14 +188,14 @@ def _sense(
             phase = rng.uniform(0, 6.28)
             return y + np.sqrt(2) * size * np.sin(2 * np.pi * forms.hertz * t + phase)
         case 'clock-skew':
-            return np.interp(t * (1.0 + sign * size), t, y)
+            return between(y, plant.RATE * t * (1.0 + sign * size))
         case 'timing-jitter':
             late = (
                 rng.standard_normal(len(t)),
                 np.sqrt(3.0) * rng.uniform(-1, 1, len(t)),
                 rng.exponential(1.0, len(t)) - 1.0,
             )[forms.form]
-            return np.interp(t + size * late, t, y)
+            return between(y, plant.RATE * (t + size * late))
         case 'sensor-quadratic':
             return y + sign * size * (y / stroke) ** 2
         case 'sensor-cubic':

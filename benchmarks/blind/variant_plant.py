@@ -166,8 +166,13 @@ def respond(command, theta, k, first_e, later_e, onset):
         for j in range(SUBSTEPS):
             t = (i + j / SUBSTEPS) / RATE
             lag = e[DELAY] + e[AMPLITUDE_DELAY] * abs(command[i]) / 2e-3
-            at = i - math.ceil(lag * RATE - j / SUBSTEPS - 1e-9) if lag > 0.0 else i
+            late = i + j / SUBSTEPS - lag * RATE + 1e-9
+            at = math.floor(late)
             u = command[at] if at >= 0 else 0.0
+            # The mean over the step, where the next sample arrives within it.
+            held = (at + 1 - late) * SUBSTEPS
+            if held < 1.0 and at >= -1:
+                u = held * u + (1.0 - held) * command[at + 1]
             if e[RATE_GAIN] != 0.0 and at > 0:
                 u *= 1.0 + e[RATE_GAIN] * abs(command[at] - command[at - 1]) * RATE
             u *= e[GAIN]

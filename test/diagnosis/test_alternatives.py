@@ -1,4 +1,4 @@
-"""Intervals of Eq. (2)'s parameters hold what tied names, and the allowance itself, leave open."""
+"""Intervals hold what tied names of others, and the allowance itself, leave open."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -48,21 +48,24 @@ def test_a_tied_name_has_its_odds() -> None:
 
 
 def test_parameters_are_those_of_all_structures() -> None:
-    """Two thirds of the draws are those told, a third the alternative's; sizes stay."""
+    """Two thirds of the draws are those told, a third the alternative's, as far as it has them."""
     rng = np.random.default_rng(1)
-    draws = np.tile([1.0, 1.0, 1.0, 1.0, 7.0], (3000, 1))
-    others: Any = [('other', 0.5), ('hardly', 1e-6)]
+    draws = np.tile([1.0, 1.0, 1.0, 1.0, 7.0, 8.0], (3000, 1))
+    final: Any = SimpleNamespace(model=Structure(('delay', 'backlash')))
+    other: Any = SimpleNamespace(model=Structure(('sensor-lag', 'backlash')))
     asked = []
 
     def sample(trial: Any) -> np.ndarray:
         asked.append(trial)
-        return np.tile([2.0, 2.0, 2.0, 2.0, 9.0], (10, 1))
+        return np.tile([2.0, 2.0, 2.0, 2.0, 9.0, 3.0], (10, 1))
 
-    mixed = alternatives.mixed(draws, others, sample, rng)
-    assert asked == ['other']
+    mixed = alternatives.mixed(draws, final, [(other, 0.5), (final, 1e-6)], sample, rng)
+    assert asked == [other]
     assert np.mean(mixed[:, 0] == 2.0) == pytest.approx(1 / 3, abs=0.03)
-    assert (mixed[:, :4] == mixed[:, :1]).all() and (mixed[:, 4] == 7.0).all()
-    assert (alternatives.mixed(draws, [], sample, rng) == draws).all()
+    assert (mixed[:, :4] == mixed[:, :1]).all()
+    assert (mixed[:, 5] == np.where(mixed[:, 0] == 2.0, 3.0, 8.0)).all()  # play is in both
+    assert (mixed[:, 4] == 7.0).all()  # the delay is its own
+    assert (alternatives.mixed(draws, final, [], sample, rng) == draws).all()
 
 
 def test_what_an_allowance_moves_is_not_known_better() -> None:
