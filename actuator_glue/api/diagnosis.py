@@ -124,6 +124,7 @@ class DiagnosisOptions:
         drift: standard deviation by which the logarithm of each parameter may have moved in an
             hour since (random walk) [h^-1/2].
         prior_age: time since that calibration [s].
+        use_force: the recorded force chooses among names that the displacement leaves tied.
     """
 
     seed: int = 1
@@ -132,6 +133,7 @@ class DiagnosisOptions:
     prior: Calibration | Path | str | None = None
     drift: float = 0.02
     prior_age: float = 0.0
+    use_force: bool = False
 
     def __post_init__(self) -> None:
         if self.seed < 0:
@@ -179,7 +181,7 @@ def diagnose(
             seed=options.seed,
             each=pool.map,
             progress=progress,
-            settings=Thresholds(false_alarms=options.false_alarms),
+            settings=Thresholds(false_alarms=options.false_alarms, use_force=options.use_force),
             clock=time.perf_counter,
             prior=given_prior(options.prior, options.drift, options.prior_age),
         )

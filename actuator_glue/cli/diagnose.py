@@ -72,6 +72,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar='P',
         help='probability of an addition on a healthy machine (default 0.01)',
     )
+    parser.add_argument(
+        '--use-force',
+        action='store_true',
+        help='the recorded force chooses among effects that the displacement cannot tell apart',
+    )
     add_prior(parser)
     parser.add_argument('--seed', type=int, default=1, metavar='S', help='seed (default 1)')
     parser.add_argument(
@@ -107,6 +112,7 @@ def run(args: argparse.Namespace) -> int:
             jobs=args.jobs,
             progress=tell,
             false_alarms=args.false_alarms,
+            use_force=args.use_force,
             **prior_options(args),
         )
     command = shlex.join(['actuator-glue', *sys.argv[1:]])

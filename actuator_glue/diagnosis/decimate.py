@@ -108,7 +108,7 @@ def means(values: Array, count: int) -> Array:
 def decimated(record: Record, count: int) -> Record:
     """Return a record with one sample for `count`, the first at the same time.
 
-    The force is left out: nothing that looks at it comes after.
+    The force is left out; decimated beside it, it is a record of its own (diagnosis/force.py).
     """
     if count == 1:
         return record

@@ -25,6 +25,7 @@ from actuator_glue.diagnosis.base_prior import BasePrior
 from actuator_glue.diagnosis.detect import alarm_of
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.fit import UPPER, Space
+from actuator_glue.diagnosis.force import check_forces
 from actuator_glue.diagnosis.next_experiment import Experiment, ranked
 from actuator_glue.diagnosis.pipeline import (
     Conclusion,
@@ -80,6 +81,8 @@ def diagnose(
     held = [holdout] if isinstance(holdout, Record) else list(holdout or ())
     tell('check', 0.0)
     known = None if prior is None else BasePrior(prior.carried, UPPER)
+    if settings.use_force:
+        check_forces(records)
     first = conclude(prepare(records, held, known), settings, each, tell)
     first = with_the_right_hold(first, settings, each, tell)
     result = with_learned_terms(since_onset(first, settings, each, tell))

@@ -9,6 +9,7 @@ import numpy as np
 
 from actuator_glue.diagnosis.checks import pull, where
 from actuator_glue.diagnosis.data import Data, Model
+from actuator_glue.diagnosis.decimate import decimated
 from actuator_glue.errors import InputError
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.force_errors import recorded_force, shown
@@ -42,6 +43,13 @@ class ForceRecord(Record):
         values = {f.name: getattr(record, f.name) for f in fields(Record)}
         return cls(**{**values, 'measured': force / newtons}, base=record, newtons=newtons)
 
+    def slice(self, start: int, stop: int) -> ForceRecord:
+        """Return samples start:stop, as `Record.slice`."""
+        assert self.base is not None
+        part = Record.slice(self, start, stop)
+        assert isinstance(part, ForceRecord)
+        return replace(part, base=self.base.slice(start, stop))
+
     def simulate(self, model: Model, theta: Array, initial: Initial, origin: float) -> Array:
         """Return what the transducer shows of the simulated force, (m, n) [m]."""
         assert self.base is not None
@@ -69,6 +77,21 @@ def check_forces(records: Sequence[Record]) -> None:
             )
 
 
+def _forces(data: Data, newtons: float) -> list[ForceRecord]:
+    """Return the records' forces, of as many samples as became one of the displacement."""
+    out = []
+    for record, whole, count in zip(data.records, data.recorded, data.factors, strict=True):
+        force = decimated(ForceRecord.of(whole, newtons), count)
+        assert isinstance(force, ForceRecord)
+        out.append(replace(force, base=record))
+    return out
+
+
+def newtons_per_metre(data: Data) -> float:
+    """Return what of the forces in `with_forces` counts as much as a metre [N/m]."""
+    return next(r.newtons for r in data.records if isinstance(r, ForceRecord))
+
+
 def with_forces(data: Data, model: Model, theta: Array) -> Data:
     """Return data with the records' forces behind them, weighed as both errors of a fit are.
 
@@ -78,19 +101,16 @@ def with_forces(data: Data, model: Model, theta: Array) -> Data:
         theta: its parameters, (p,).
     """
     count, error = 0, 0.0
-    forces = []
-    rows = zip(data.records, data.initials, data.origins, data.masks, strict=True)
-    for record, initial, origin, mask in rows:
-        force = ForceRecord.of(record, 1.0)
+    rows = zip(_forces(data, 1.0), data.initials, data.origins, data.masks, strict=True)
+    for force, initial, origin, mask in rows:
         off = force.measured - force.simulate(model, theta[None], initial, origin)[0]
         error += force.newtons**2 * float((off[mask] ** 2).sum())
         count += int(mask.sum())
-        forces.append(force)
     size = data.target - data.simulate(model, theta)[0]
     newtons = float(np.sqrt(error / count / np.mean(size**2)))
     return replace(
         data,
-        records=(*data.records, *(ForceRecord.of(r, newtons) for r in data.records)),
+        records=(*data.records, *_forces(data, newtons)),
         masks=2 * data.masks,
         initials=2 * data.initials,
         recorded=2 * data.recorded,

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from actuator_glue.diagnosis import (
+    force_ranking,
     hum,
     learning,
     onset,
@@ -91,7 +92,11 @@ def _conclude(prepared: Prepared, settings: Thresholds, each: Each, tell: Progre
     if line is not None:
         search = Search(hum.without(prepared.fit, line), mean_effects(), each)
     selection = ModelSelection(search, settings, tell)
-    result = _conclusion(prepared, selection, selection.run(), line)
+    named = selection.run()
+    if settings.use_force:
+        named, told = force_ranking.decided(search, named, settings)
+        prepared = replace(prepared, notes=(*told, *prepared.notes))
+    result = _conclusion(prepared, selection, named, line)
     if result.decision.verdict != 'unexplained':
         return result
     tell('one record', 0.0)

@@ -28,6 +28,7 @@ class Thresholds:
         beam: structures carried on from one size to the next.
         evaluations: likelihood evaluations of the posterior; 0 takes the Laplace approximation.
         tried: refits per structure after the first stage, best screened first.
+        use_force: the recorded force chooses among tied names (diagnosis/force_ranking.py).
     """
 
     noise_share: float = 0.5
@@ -46,3 +47,4 @@ class Thresholds:
     beam: int = 3
     tried: int = 5
     evaluations: int = 4000
+    use_force: bool = False
