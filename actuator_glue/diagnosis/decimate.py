@@ -21,9 +21,10 @@ _PER_PERIOD = 12.0
 # Hz that stay in sight whatever moves: hum with its first overtone, and the dynamics of valves and
 # conditioners in the catalogue.
 _SEEN = 150.0
-_TAIL = 1e-4  # share of the command's power that may lie above its bandwidth: 1 % of its amplitude
+_TAIL = 1e-4  # share of a channel's power that may lie above its bandwidth: 1 % of its amplitude
+_NOISE = 1e-2  # share of a channel's power that may be white noise
 _COARSE = 1e-3  # s: what moves is slower
-_STEPS = 24  # natural frequencies tried, a decade to either side of the command's bandwidth
+_STEPS = 24  # natural frequencies tried, a decade to either side of the motion's bandwidth
 _DAMPINGS = (0.5, 0.9, 1.5)
 
 
@@ -38,13 +39,22 @@ def _coarse(record: Record) -> Record:
     return Record(u, y, size * record.period)
 
 
-def command_bandwidth(record: Record) -> float:
-    """Return the frequency [Hz] above which 0.01 % of the command's power lies."""
+def motion_bandwidth(record: Record) -> float:
+    """Return the frequency [Hz] above which 0.01 % of the power lies, in command or motion.
+
+    A command of steps, of a controller slower than its recorder, reaches further than what the
+    piston makes of it. White noise of a channel moves nothing and does not count.
+    """
     coarse = _coarse(record)
-    u = signal.detrend(coarse.command) * np.hanning(len(coarse))
-    power = np.cumsum(np.abs(np.fft.rfft(u)) ** 2)
-    at = int(np.searchsorted(power, (1.0 - _TAIL) * power[-1]))
-    return max(at, 1) / (len(u) * coarse.period)
+    window, lowest = np.hanning(len(coarse)), len(coarse)
+    for channel in (coarse.command, coarse.measured):
+        power = np.abs(np.fft.rfft(signal.detrend(channel) * window)) ** 2
+        noise = float(np.median(power)) / np.log(2.0)
+        if noise * len(power) < _NOISE * power.sum():  # else the motion fills the band
+            power -= noise
+        above = np.cumsum(power[::-1])[::-1]
+        lowest = min(lowest, int(np.flatnonzero(above > _TAIL * above[0])[-1]))
+    return max(lowest, 1) / (len(coarse) * coarse.period)
 
 
 def actuator_bandwidth(record: Record, near: float) -> float:
@@ -71,7 +81,7 @@ def actuator_bandwidth(record: Record, near: float) -> float:
 
 def needed_rate(record: Record) -> float:
     """Return the sample rate [Hz] that what moves in a record needs."""
-    moved = command_bandwidth(record)
+    moved = motion_bandwidth(record)
     return max(2.0 * _SEEN, _PER_PERIOD * max(moved, actuator_bandwidth(record, moved)))
 
 

@@ -194,7 +194,7 @@ def prepare(
         if count > 1:
             notes.append(
                 f'{where(record, i + 1)}: {record.rate:g} Hz are more than what moves in it needs '
-                f'(command up to {decimate.command_bandwidth(record):.3g} Hz): means over '
+                f'(motion up to {decimate.motion_bandwidth(record):.3g} Hz): means over '
                 f'{count} samples are fitted, at {every[-1].rate:.4g} Hz; errors and noise are '
                 'theirs'
             )
