@@ -12,12 +12,14 @@ from numpy.typing import NDArray
 
 from actuator_glue.diagnosis.data import Data, Model, chunks
 from actuator_glue.diagnosis.discrepancy import Discrepancy
-from actuator_glue.diagnosis.fit import Fit, Space, jacobian
+from actuator_glue.diagnosis.fit import Fit, Space
 from actuator_glue.diagnosis.fit import fit as fit_to
-from actuator_glue.diagnosis.identifiable import Straight, Working, coordinates
+from actuator_glue.diagnosis.identifiable import Straight, Working, coordinates, derivatives
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.search import Each
 from actuator_glue.inference import posterior
+from actuator_glue.inference.chains import Chains
+from actuator_glue.inference.convergence import quick_rhat_and_ess
 from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.inference.transforms import Composed
 from actuator_glue.inference.transforms.laplace import Laplace
@@ -26,6 +28,9 @@ from actuator_glue.records import Array
 
 _P = len(BASE)
 _STEPS = 8  # from the least-squares fit to the optimum of the likelihood
+# Draws will do for 95 % intervals and bands from here on (Vehtari et al. 2021), with few in each
+# of many chains.
+_ESS, _RHAT = 400.0, 1.05
 _HALVINGS = 40  # bring any point of it inside the bounds of the prior
 
 
@@ -51,14 +56,10 @@ def most_likely(data: Data, model: Model, found: Fit, scorer: Scorer) -> Fit:
 
     Under slow noise they are up to 12 nats apart; a covariance of the likelihood belongs to its
     own optimum. What is simulated and compared stays the least-squares fit: where structure
-    remains, it is nearer in the error itself.
+    remains, it is nearer in the error itself. Error and Jacobian of what is returned are whitened.
     """
     white = Whitened(**{f.name: getattr(data, f.name) for f in fields(Data)}, scorer=scorer)
-    best = fit_to(white, model, found.theta, iterations=_STEPS)
-    space = Space(model, max(r.duration for r in data.records))
-    output = data.simulate(model, best.theta[None])
-    jac = jacobian(data, model, space, best.z[None], output)[0]
-    return Fit(best.theta, data.target - output[0], jac, best.z)
+    return fit_to(white, model, found.theta, iterations=_STEPS)
 
 
 def inflation(error: Array) -> float:
@@ -109,6 +110,11 @@ def _loosened(
     return np.where(outside[:, None], theta, out)
 
 
+def _enough(chains: Chains) -> bool:
+    rhat, ess = quick_rhat_and_ess(chains.kept)
+    return bool(ess.min() >= _ESS and rhat.max() <= _RHAT)
+
+
 def sample(
     model: Model,
     fit: Fit,
@@ -128,8 +134,8 @@ def sample(
         scorer: the fitting part, and whitening filters of its noise.
         beside: what may be there beside the structure.
         rng: random numbers.
-        evaluations: likelihood evaluations; 0 returns draws of the Laplace approximation, and
-            not-a-number for R-hat.
+        evaluations: likelihood evaluations at most; 0 returns draws of the Laplace approximation,
+            and not-a-number for R-hat.
         progress: called with the share done.
         each: evaluates some draws at a time: `map`, or that of a pool of threads.
     """
@@ -138,11 +144,17 @@ def sample(
     space = Space(model, max(r.duration for r in data.records))
     around = coordinates(space, model, data, fit.z)
     phi = around.forward(fit.theta[None])[0]
-    slopes, error = around.slopes(phi), scorer.whiten(fit.error)
-    noise, jac = inflation(beside.without(error)), slopes @ scorer.whiten(fit.jacobian)
+    error, noise = fit.error, inflation(beside.without(fit.error))
+    size = math.sqrt(noise)
+
+    def response(theta: Array) -> Array:
+        found = scorer.whiten(data.simulate(model, theta))
+        if data.prior is None:
+            return found
+        return np.hstack([found, size * data.prior.pull(space.z(theta))])
+
+    jac = derivatives(around, space, phi, response)
     if data.prior is not None:
-        size = math.sqrt(noise)
-        jac = np.hstack([jac, size * slopes @ data.prior.slopes(len(slopes))])
         error = np.concatenate([error, -size * data.prior.pull(fit.z)])
     move, covariance = beside.gaussian(jac, error, noise, around.widest)
     centre = _inside(around, phi, move)
@@ -182,6 +194,7 @@ def sample(
         evaluations,
         settings=SamplerSettings(chains=32, population=128, steps=2, adaptation=20),
         archive=gaussian(320),
+        enough=_enough,
         progress=lambda done, all_: progress(done / all_),
     )
     draws = _loosened(around, chains.posterior(), centre - phi, rng)

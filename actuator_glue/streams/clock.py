@@ -23,7 +23,7 @@ STEP = 0.05
 SLEW = 1e-3
 FIRST_SLEW = 0.05
 # Held up this often in a row, messages are no longer waited for: the clock has been set.
-_PATIENCE = 3
+_PATIENCE = 2
 
 
 class ClockMap:

@@ -15,7 +15,7 @@ from actuator_glue.io.messages import deserialize
 
 # A band counts as good from here on; it is one of 95 %.
 GOOD = 0.85
-# A fault is told within this time [s]; a jump of a clock takes three stretches of a second.
+# A fault is told within this time [s]; a clock set back takes two stretches of a second.
 TOLD_SECONDS = 15.0
 WINDOW = 5.0  # s
 HOLE = 2.5  # s, bands come every second

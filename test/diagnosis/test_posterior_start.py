@@ -24,10 +24,10 @@ def test_chains_keep_the_spread_of_the_posterior(
     assert [e.name for e in found.effects] == [effect]
     rhat, ess = rhat_and_ess(found.posterior.reshape(-1, 32, found.posterior.shape[1]))
     assert found.rhat == pytest.approx(rhat.max(), rel=0.05) and np.isnan(quick.rhat)
-    # Over these cases and three seeds: R-hat up to 1.16, ESS from 166, ratios from 0.94 to 1.06
-    # for the effect and from 0.53 to 1.06 for beta_1.
-    assert rhat.max() < 1.3 and ess.min() > 80
-    for j, factor in ((0, 3.0), (4, 1.3)):
+    # Over these cases and three seeds: R-hat up to 1.06, ESS from 397, ratios from 0.88 to 1.04
+    # for the effect, 0.84 to 1.01 for beta_1 and 0.93 to 2.14 for what a ridge leaves open.
+    assert rhat.max() < 1.15 and ess.min() > 200
+    for j, factor in ((0, 1.4), (1, 3.0), (2, 3.0), (3, 3.0), (4, 1.3)):
         ratio = found.posterior[:, j].std() / quick.posterior[:, j].std()
         assert 1 / factor < ratio < factor, found.names[j]
     estimate = next(iter(found.effects[0].parameters.values()))
