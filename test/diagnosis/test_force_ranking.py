@@ -7,7 +7,9 @@ import pytest
 
 from actuator_glue.diagnosis import force_ranking
 from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.force import newtons_per_metre, with_forces
 from actuator_glue.diagnosis.model_selection import ModelSelection, Selection
+from actuator_glue.diagnosis.preparation import prepare
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.model.structure import Structure
@@ -75,3 +77,18 @@ def test_a_healthy_machine_has_no_unseen_force(rng_seed: int) -> None:
     """
     names = 'viscous-damping', 'coulomb-friction', 'specimen-hardening', 'backlash'
     assert decided(swept('', [], rng_seed), names)[2] == ()
+
+
+def test_a_fast_record_has_its_force_decimated_beside_it() -> None:
+    """Means of samples pass through a linear actuator as samples do: next to nothing is left."""
+    rate = 2000.0
+    t = np.arange(int(20 * rate)) / rate
+    command = 2e-3 * np.sin(np.pi * (10.0 / 20.0) * t**2)
+    still = Record(command, command, 1.0 / rate, 250e3)
+    x, f = (Structure(()).simulate(THETA, still, force=wanted) for wanted in (False, True))
+    noise = 1e-6 * np.random.default_rng(1).standard_normal(len(t))
+    data = prepare([replace(still, measured=x + noise, force=2.0 * f + 30.0)], []).fit
+    assert max(data.factors) > 1
+    both = with_forces(data, Structure(()), THETA)
+    left = (both.target - both.simulate(Structure(()), THETA)[0])[data.target.size :]
+    assert newtons_per_metre(both) * np.std(left) < 1e-4 * np.std(2.0 * f)
