@@ -94,7 +94,11 @@ def kernel(out: Path) -> dict[str, Any]:
     from benchmarks import effects
 
     rows, each = effects.run(), effects.each()
-    found: dict[str, Any] = {'against_effects': rows, 'each_effect': each}
+    found: dict[str, Any] = {
+        'against_effects': rows,
+        'each_effect': each,
+        'expressions': effects.written(),
+    }
     for which in ('ns', 'whole_core_ns'):
         found[f'linear_{which}'] = rows[0][which]
         found[f'one_effect_{which}'] = rows[1][which]

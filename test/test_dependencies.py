@@ -39,6 +39,7 @@ LIBRARIES = {
     'h5py': Names('h5py', 'python3-h5py'),
     'hypothesis': Names('hypothesis', 'python3-hypothesis'),
     'jinja2': Names('jinja2', 'python3-jinja2'),
+    'llvmlite': Names('llvmlite', None),
     'lz4': Names('lz4', None),
     'markupsafe': Names('markupsafe', None),
     'matplotlib': Names('matplotlib', 'python3-matplotlib'),

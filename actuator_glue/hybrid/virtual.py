@@ -144,7 +144,7 @@ class VirtualTest:
         rng = np.random.default_rng((self._seed, block))
         shared = (self._numerical, self._lanes(which), self._course, ats, rng, found)
         if self._curved:
-            program = self._structure.program.code
+            program = self._structure.program.parts
             on = self._structure.switches
             virtual_kernel.run_effects(*shared, on, program, self._substeps)
         else:

@@ -191,7 +191,7 @@ def run_effects(
     rng: Any,
     found: Found,
     on: NDArray[np.bool_],
-    code: machine.Code,
+    code: machine.Parts,
     substeps: int,
 ) -> None:
     """Run a block of actuators with any effects, as `run_linear`.

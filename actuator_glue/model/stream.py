@@ -140,7 +140,7 @@ class Stream:
             kernel.advance(
                 self._table,
                 self.structure.switches,
-                self.structure.program.code,
+                self.structure.program.parts,
                 *at,
                 self._substeps,
                 self.period,

@@ -11,7 +11,6 @@ import pytest
 from actuator_glue.errors import InputError
 from actuator_glue.model.commands import sweep
 from actuator_glue.model.effects import CATALOGUE, scale
-from actuator_glue.model.effects.terms import machine as m
 from actuator_glue.model.effects.terms.definition import entries, mapping
 from actuator_glue.model.effects.terms.entry import term
 from actuator_glue.model.effects.terms.expression import read
@@ -252,22 +251,3 @@ def test_time_counts_from_the_start_of_the_test() -> None:
     late = simulated('flow: q = q*max(1 + own*t, 0)', 0.02, origin=5.0)
     gain = simulated('flow: q = q*max(1 + own*(t + 5), 0)', 0.02)
     assert np.abs(late - gain).max() < 1e-15
-
-
-@pytest.mark.parametrize(
-    ('op', 'function', 'reach'),
-    [
-        (m.EXP, np.exp, 700.0),
-        (m.TANH, np.tanh, 25.0),
-        (m.SIN, np.sin, 50.0),
-        (m.COS, np.cos, 50.0),
-    ],
-)
-def test_functions_of_the_machine(op: int, function: np.ufunc, reach: float) -> None:
-    """Vector code of its own: 1e-11 of the library's, and what is no number stays so."""
-    x = np.random.default_rng(1).uniform(-reach, reach, 31)
-    g = np.zeros((m.FIXED + 2, 32))
-    g[m.FIXED, :31], g[m.FIXED, 31] = x, np.nan
-    m.execute(g, np.array([[op, m.FIXED + 1, m.FIXED, 0, 0, 0]], np.uint32), 0, 1)
-    np.testing.assert_allclose(g[m.FIXED + 1, :31], function(x), rtol=1e-11, atol=1e-13)
-    assert np.isnan(g[m.FIXED + 1, 31])

@@ -23,13 +23,13 @@ def expect(w: Array) -> None:
 
 
 @njit
-def keep(w: Array, g: Array, program: machine.Code, time: float, sensed: Array) -> None:
+def keep(w: Array, g: Array, parts: machine.Parts, time: float, sensed: Array) -> None:
     """Keep what the recorded transducer shows beyond the piston's position.
 
     Args:
         w: table.
         g: registers of the program.
-        program: effects written as expressions, those of the sensor among them.
+        parts: code of effects written as expressions, those of the sensor among them.
         time: of the end of the step, from the first sample [s].
         sensed: what compiled effects have made of the position, (LANES,) [m].
     """
@@ -37,8 +37,8 @@ def keep(w: Array, g: Array, program: machine.Code, time: float, sensed: Array) 
         g[machine.Y, n] = sensed[n]
     for n in range(r.LANES):
         g[machine.T, n] = time + g[machine.ORIGIN, n]
-    machine.execute(g, program, program[0, machine.FORCE], len(program))
-    shown = program[machine.SIGNAL, machine.SENSOR]
+    if parts[machine.SENSOR]:
+        machine.execute(parts[machine.SENSOR], g)
     for n in range(r.LANES):
         w[r.BEYOND_BEFORE + n] = w[r.BEYOND + n]
-        w[r.BEYOND + n] = g[shown, n] - (w[r.X + n] + w[r.X_EXACT + n] - w[r.X_TRAP + n])
+        w[r.BEYOND + n] = g[machine.Y, n] - (w[r.X + n] + w[r.X_EXACT + n] - w[r.X_TRAP + n])

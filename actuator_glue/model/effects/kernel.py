@@ -105,19 +105,28 @@ def _curved(w: Array, rate: float, yields: bool) -> None:
 
 @njit
 def _search(
-    w: Array, g: Array, program: machine.Code, rate: float, falls: bool, yields: bool, terms: bool
+    w: Array,
+    g: Array,
+    parts: machine.Parts,
+    rate: float,
+    falls: bool,
+    yields: bool,
+    terms: bool,
+    curved: bool,
 ) -> None:
-    """Sub-step against any specimen and friction: Newton steps, three unless all is smooth."""
+    """Sub-step against any specimen and friction: Newton steps, three unless all is smooth.
+
+    `terms`, `curved`: whether a force is an expression, and the specimen not proportional.
+    """
     for n in range(r.LANES):
         w[r.IN_DX + n] = w[r.DX + n]
-    for _ in range(program[0, machine.TIMES] if terms else 3 if falls else 2):
+    for _ in range(parts[machine.TIMES] if terms else 3 if falls else 2):
         if yields:
             for n in range(r.LANES):
                 moved = specimen_gap.passed(w, n, w[r.IN_DX + n], True)
                 specimen_yield.halfway(w, n, moved)
         if terms:
-            stage.force(w, g, program, rate, yields)
-        at, slope = program[machine.SIGNAL, machine.FORCE], program[machine.SLOPE, machine.FORCE]
+            stage.force(w, g, parts, rate, curved, yields)
         for n in range(r.LANES):
             push, stiff, guess = w[r.IN_PUSH + n], w[r.IN_STIFF + n], w[r.IN_DX + n]
             dry = w[r.COULOMB + n]
@@ -126,7 +135,7 @@ def _search(
             if terms:
                 # What weakens faster than the oil is stiff is not followed implicitly.
                 least = -0.5 * (stiff + w[r.DAMPING_2 + n])
-                force, tangent = g[at, n], max(g[slope, n], least)
+                force, tangent = g[machine.F, n], max(g[machine.D_F, n], least)
             else:
                 force, tangent = balance.specimen(w, n, guess, True, yields)
             w[r.IN_DX + n] = balance.look(w, n, push, stiff, dry, guess, force, tangent)
@@ -143,7 +152,7 @@ def _search(
 def substep(
     w: Array,
     g: Array,
-    program: machine.Code,
+    parts: machine.Parts,
     on: NDArray[np.bool_],
     mean: float,
     rate: float,
@@ -152,21 +161,17 @@ def substep(
     """Carry the nonlinear loop on by one sub-step; `time` is its middle."""
     flows, falls, gaps = on[r.ON_FLOW], on[stribeck_friction.ON], on[specimen_gap.ON]
     if on[r.ON_TERMS]:
-        stage.valve(w, g, program, mean, rate, time)
-        if flows:
-            stages.flow(w, on, time)
-        stage.flow(w, g, program, rate, flows)
-        flows = True
+        flows = stage.before_the_oil(w, g, parts, on, mean, rate, time)
     elif flows:
         for n in range(r.LANES):
             w[r.IN_Q + n], w[r.IN_DQ + n] = stages.valve(w, n, mean)
         stages.flow(w, on, time)
     if on[r.ON_FORCE]:
-        _begin(w, mean, True, False, False)
+        _begin(w, mean, flows, False, False)
         if falls or on[specimen_yield.ON]:
-            _search(w, g, program, rate, True, True, True)
+            _search(w, g, parts, rate, True, True, True, True)
         else:
-            _search(w, g, program, rate, False, False, True)
+            _search(w, g, parts, rate, False, False, True, gaps or on[r.ON_CURVED])
         return
     if not (falls or on[r.ON_CURVED]):
         if flows:
@@ -198,14 +203,14 @@ def substep(
         _begin(w, mean, False, False, False)
     if falls:
         if yields:
-            _search(w, g, program, rate, True, True, False)
+            _search(w, g, parts, rate, True, True, False, True)
         else:
-            _search(w, g, program, rate, True, False, False)
+            _search(w, g, parts, rate, True, False, False, True)
     elif gaps:
         if yields:
-            _search(w, g, program, rate, False, True, False)
+            _search(w, g, parts, rate, False, True, False, True)
         else:
-            _search(w, g, program, rate, False, False, False)
+            _search(w, g, parts, rate, False, False, False, True)
     elif yields:
         _curved(w, rate, True)
     else:
@@ -216,7 +221,7 @@ def substep(
 def advance(
     table: Array,
     on: NDArray[np.bool_],
-    program: machine.Code,
+    parts: machine.Parts,
     u: Array,
     offset: int,
     begin: int,
@@ -232,7 +237,7 @@ def advance(
         table: (assembly.SIZE + registers,), read and updated; its states stand at sample
             begin - 1, or at sample 0 where begin is 0.
         on: (assembly.SWITCHES,) which stages act.
-        program: instructions of effects written as expressions, which use the registers.
+        parts: code of effects written as expressions, which uses the registers.
         u: command samples [m]; u[0] is sample `offset` of the stream.
         offset: stream index of u[0].
         begin: stream index of the first sample written.
@@ -255,7 +260,7 @@ def advance(
             displacement[0, n] = w[r.X + n]
         if on[r.ON_FEEDBACK]:
             for _ in range(2):  # now, and a step before
-                feedback.keep(w, g, program, 0.0, displacement[0])
+                feedback.keep(w, g, parts, 0.0, displacement[0])
     for i in range(displacement.shape[0]):
         at = begin + i - 1  # the interval from sample `at` to the sample written now
         for j in range(substeps if at >= 0 else 0):
@@ -271,7 +276,7 @@ def advance(
                 mean = command.held(u, at - offset)
             if on[r.ON_BEYOND]:
                 feedback.expect(w)
-            substep(w, g, program, on, mean, rate, (at + (j + 0.5) * inverse) * period)
+            substep(w, g, parts, on, mean, rate, (at + (j + 0.5) * inverse) * period)
             if on[r.ON_TRANSDUCER]:
                 for n in range(r.LANES):
                     corrected = stages.chains(w, n, mean, slope)
@@ -281,7 +286,7 @@ def advance(
                     displacement[i, n] = stages.chains(w, n, mean, slope)
             if on[r.ON_FEEDBACK]:
                 time = (at + (j + 1.0) * inverse) * period
-                feedback.keep(w, g, program, time, displacement[i])
+                feedback.keep(w, g, parts, time, displacement[i])
         if want_force:
             for n in range(r.LANES):
                 force[i, n] = w[r.F + n]

@@ -70,9 +70,9 @@ def tables(
     blocks = -(-len(total) // rows.LANES)
     x, v = start[0] * one, start[1] * one
     step = period / substeps
-    out = np.zeros((blocks, assembly.SIZE + program.registers.size))
+    out = np.zeros((blocks, assembly.SIZE + program.rows * rows.LANES))
     coefficients.fill(parameters, stiffness, step, period, x, v, out)
-    if program.instructs:
+    if program.acts(machine.COMMAND, machine.SENSOR):
         which = np.minimum(np.arange(blocks * rows.LANES), len(total) - 1)
         registers = program.start(values, which)
         registers[:, machine.STEP], registers[:, machine.K] = step, stiffness
@@ -129,7 +129,7 @@ def blocks(
                 kernel.advance(
                     table,
                     on,
-                    program.code,
+                    program.parts,
                     command,
                     -1,
                     begin,

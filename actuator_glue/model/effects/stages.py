@@ -23,8 +23,13 @@ def valve(w: Array, n: int, mean: float) -> Any:
 
     The command's mean is `mean` plus what is the lane's own.
     """
-    u = w[r.GAIN + n] * (mean + w[r.IN_MEAN + n])
-    return spool(w, n, u + w[r.NULL + n] - w[r.X + n] - 0.5 * w[r.DX + n], -0.5)
+    return spool(w, n, error(w, n, w[r.GAIN + n] * (mean + w[r.IN_MEAN + n])), -0.5)
+
+
+@njit
+def error(w: Array, n: int, u: Any) -> Any:
+    """Mean control error over the step, of the command's mean, if the piston goes on."""
+    return u + w[r.NULL + n] - w[r.X + n] - 0.5 * w[r.DX + n]
 
 
 @njit

@@ -145,7 +145,7 @@ class _Sensor:
         for block, registers in enumerate(made.start(values, which)):
             lanes = slice(block * LANES, min((block + 1) * LANES, len(table)))
             made.prepare(registers)
-            m.sense(registers, made.code, when, y[:, lanes], out[:, lanes])
+            m.sense(registers, made.parts[m.SENSOR], when, y[:, lanes], out[:, lanes])
         return out
 
 
@@ -200,17 +200,14 @@ def _tried(
     for j, row in enumerate((m.BETA_1, m.ALPHA_1_BETA_0, m.ALPHA_2, m.ALPHA_3)):
         g[row] = scale.theta[j]
     made.prepare(g)
-    part = program.PART[place]
-    first = int(made.code[0, part - 1])
-    last = int(made.code[0, part]) if part <= m.FORCE else len(made.code)
-    row, left = motion[SIGNAL[place]][0], made.code[m.SIGNAL, part]
+    code, row = made.parts[program.PART[place]], motion[SIGNAL[place]][0]
     before, after = np.empty((_SAMPLES, 1)), np.empty((_SAMPLES, LANES))
     for i in range(_SAMPLES):
         for register, trace in motion.values():
             g[register] = trace[i]
         before[i] = g[row, 0]
-        m.execute(g, made.code, first, last)
-        after[i] = g[left]
+        m.once(code, g)
+        after[i] = g[row]
     return before, after
 
 

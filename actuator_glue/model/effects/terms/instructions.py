@@ -37,8 +37,8 @@ class Emitter:
         self.rows = m.FIXED
         self.constants: dict[float, int] = {}
         self.memory: list[int] = []
-        self.prepare: list[tuple[int, ...]] = []
-        self.code: list[tuple[int, ...]] = []
+        self.prepare: list[m.Instruction] = []
+        self.code: list[m.Instruction] = []
         self.symbols: dict[str, Dual] = {}
         self._held = set(held)
         self._prepared: dict[tuple[int, ...], int] = {}
@@ -72,7 +72,7 @@ class Emitter:
             kept = self.row() if memory else 0
             if memory:
                 self.memory.append(kept)
-            code.append((op, known[key], a, b, c, kept))
+            code.append(m.Instruction(op, known[key], a, b, c, kept))
         return known[key]
 
     def _times(self, a: int, slope: int | None) -> int | None:
@@ -113,6 +113,9 @@ class Emitter:
     def _two(self, name: str, a: int, da: int | None, b: int, db: int | None) -> Dual:
         if name == 'mul':
             return self.do(m.MUL, a, b), self._plus(self._times(b, da), self._times(a, db))
+        if name == 'div' and db is None and b in self._held and a not in self._held:
+            # A division costs as much as ten products, and this one is done in front.
+            return self._two('mul', a, da, self.do(m.DIV, self.constant(1.0), b), None)
         if name == 'div':
             out = self.do(m.DIV, a, b)
             top = self._plus(da, self._times(out, db), m.SUB)

@@ -7,7 +7,8 @@ depends on it d(value)/d(dx) is computed. What holds during a test is computed o
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from actuator_glue.model.effects.rows import LANES
 from actuator_glue.model.effects.terms import machine as m
 from actuator_glue.model.effects.terms.expression import SIGNAL, Expression
 from actuator_glue.model.effects.terms.instructions import Dual, Emitter
+from actuator_glue.model.effects.terms.native import Native, Part, native
 from actuator_glue.model.parameters import NAMES as BASE
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.records import Array
@@ -31,14 +33,27 @@ _END: Final[dict[str, int | float]] = {'x': 1.0, 'v': m.D_V_END}
 _SLOPE: Final = {'valve': _MIDDLE, 'flow': _MIDDLE, 'specimen': _END, 'piston': _END}
 # Signals whose slope counts there, too.
 _FOLLOWED: Final = {'valve': 'e', 'flow': 'eq', 'specimen': 'f', 'piston': 'f'}
-# Signals that are there only if an instruction of some part reads them.
+# Where a part finds its signal and its slope, and leaves them.
+_SIGNALS: Final[dict[str, Dual]] = {
+    'u': (m.U, None),
+    'e': (m.E, m.D_E),
+    'q': (m.Q, m.D_Q),
+    'f': (m.F, m.D_F),
+    'y': (m.Y, None),
+}
+# Signals that are there only if an instruction of some part reads them; what a part changes is.
 _NEEDS: Final = (
-    (m.NEEDS_T, m.T, (m.COMMAND, m.FORCE)),
-    (m.NEEDS_Q, m.Q, (m.COMMAND, m.VALVE)),
-    (m.NEEDS_F, m.F, (m.COMMAND, m.FLOW)),
-    (m.NEEDS_V, m.V, (m.COMMAND, m.FLOW)),
-    (m.NEEDS_V_END, m.V, (m.FORCE, m.FORCE)),
+    (m.NEEDS_T, m.T, m.COMMAND, m.FORCE),
+    (m.NEEDS_U, m.U, m.COMMAND, m.FORCE),
+    (m.NEEDS_E, m.E, m.FLOW, m.FORCE),
+    (m.NEEDS_Q, m.Q, m.COMMAND, m.VALVE),
+    (m.NEEDS_F, m.F, m.COMMAND, m.FLOW),
+    (m.NEEDS_X, m.X, m.COMMAND, m.FLOW),
+    (m.NEEDS_V, m.V, m.COMMAND, m.FLOW),
+    (m.NEEDS_FLOW, m.Q, m.FORCE, m.FORCE),
 )
+# d/d(dx) of the control error before any effect on it: the mean of the step.
+_E_SLOPE: Final = -0.5
 # Functions with a kink.
 _KINKS: Final = {'abs', 'sign', 'min', 'max', 'clip', 'dead', 'sqrt'}
 _HOLDS: Final = dict(zip((*BASE, 'k'), range(m.BETA_1, m.K + 1), strict=True))
@@ -56,33 +71,48 @@ class Program:
     """Instructions of some effects and the registers they work on.
 
     Attributes:
-        code: (machine.FIRST + instructions, machine.WIDTH); see machine.PREPARE for what is in
-            front.
-        registers: (rows, LANES) with the constants.
+        code: its parts, machine.PREPARE to machine.SENSOR.
+        constants: registers that hold a number, and the number.
+        times: how often the balance of forces is solved with it.
+        rows: number of registers.
         parameters: register of every parameter.
         memory: registers that remember.
         switches: per effect its register that says whether it acts, its parameters, and their
             neutral values: an effect all of whose parameters are neutral is not there.
     """
 
-    code: m.Code
-    registers: Array
+    code: tuple[Part, ...]
+    constants: tuple[tuple[int, float], ...]
+    times: int
+    rows: int
     parameters: Mapping[str, int]
     memory: tuple[int, ...]
     switches: tuple[tuple[int, tuple[str, ...], tuple[float, ...]], ...]
 
-    @property
-    def instructs(self) -> bool:
-        """Whether there are instructions for any place."""
-        return bool(len(self.code) > self.code[0, m.PREPARE])
+    def __getstate__(self) -> dict[str, object]:
+        """Native code is of one process."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}
+
+    @cached_property
+    def _native(self) -> Native:
+        return native(self.code, self.constants)
+
+    @cached_property
+    def parts(self) -> m.Parts:
+        """What the compiled step is told, see machine.PREPARE; valid as long as the program."""
+        needs = m.NEEDS_E * self.acts(m.COMMAND, m.VALVE)
+        needs |= m.NEEDS_FLOW * self.acts(m.FLOW, m.FLOW)
+        for flag, row, first, last in _NEEDS:
+            needs |= flag * any(part.reads(row) for part in self.code[first : last + 1])
+        return np.array([*self._native.addresses, self.times, needs])
 
     def acts(self, first: int, last: int) -> bool:
-        """Whether the parts first .. last (machine.COMMAND, ...) have instructions."""
-        return bool(self.code[0, last] > self.code[0, first - 1])
+        """Whether any of the parts first .. last (machine.COMMAND, ...) changes its signal."""
+        return any(part.left for part in self.code[first : last + 1])
 
     def prepare(self, registers: Array) -> None:
         """Compute what holds during a test, in registers (rows, LANES) of a block."""
-        m.execute(registers, self.code, m.FIRST, int(self.code[0, m.PREPARE]))
+        m.once(self.parts[m.PREPARE], registers)
 
     def start(self, values: Mapping[str, Array], which: NDArray[np.intp]) -> Array:
         """Return registers (blocks, rows, LANES) with the parameters of every lane.
@@ -91,7 +121,8 @@ class Program:
             values: parameters by name, each (m,).
             which: parameter set of every lane, (blocks x LANES,).
         """
-        out = np.repeat(self.registers[np.newaxis], len(which) // LANES, axis=0)
+        out = np.zeros((len(which) // LANES, self.rows, LANES))
+        out[:, m.D_E] = _E_SLOPE
         held = {'origin': m.ORIGIN, **_HOLDS, **self.parameters}
         for name, row in held.items():
             if name in values:
@@ -108,7 +139,8 @@ def compiled(effects: Iterable[Written]) -> Program:
     """Return the program of some effects."""
     builder, written = _Builder(), tuple(effects)
     for places in _PARTS:
-        builder.part(e for place in places for e in written if e.expression.place == place)
+        here = (e for place in places for e in written if e.expression.place == place)
+        builder.part(SIGNAL[places[0]], here)
     return builder.program()
 
 
@@ -117,23 +149,29 @@ class _Builder:
         self._emitter = Emitter({m.STEP, m.D_V_MIDDLE, m.D_V_END, *_HOLDS.values()})
         self._parameters: dict[str, int] = {}
         self._switches: list[tuple[int, tuple[str, ...], tuple[float, ...]]] = []
-        self._parts: list[list[tuple[int, ...]]] = []
+        self._parts: list[Part] = []
         self._times = 1
         # Where every signal and its slope are by now.
         self._signals: dict[str, Dual] = {
-            'u': (m.U, None),
-            'e': (m.E, self._emitter.constant(-0.5)),
-            'q': (m.Q, m.D_Q),
-            'f': (m.F, m.D_F),
-            'y': (m.Y, None),
+            **_SIGNALS,
+            'e': (m.E, self._emitter.constant(_E_SLOPE)),
         }
 
-    def part(self, effects: Iterable[Written]) -> None:
+    def part(self, signal: str, effects: Iterable[Written]) -> None:
         """Add a part; every effect takes the signal that the one before has made."""
         self._emitter.code = []
+        before = self._signals[signal]
         for effect in effects:
             self._add(effect)
-        self._parts.append(self._emitter.code)
+        (value, slope), (to, slope_to) = self._signals[signal], _SIGNALS[signal]
+        left = []
+        if value != before[0]:
+            left.append((to, value))
+        if slope is not None and slope_to is not None and slope != before[1]:
+            left.append((slope_to, slope))
+            slope = slope_to
+        self._signals[signal] = to, slope
+        self._parts.append(Part(tuple(self._emitter.code), tuple(left)))
         self._emitter.forget()
 
     def _add(self, effect: Written) -> None:
@@ -171,25 +209,18 @@ class _Builder:
 
     def program(self) -> Program:
         """Return what has been added."""
-        code = [*[(0,) * m.WIDTH] * m.FIRST, *self._emitter.prepare]
-        ends = [len(code)]
-        for part in self._parts:
-            code += part
-            ends.append(len(code))
-        table = np.array(code, dtype=np.uint32)
-        table[0, : m.TIMES] = ends[: m.TIMES]
-        # One Newton step where a force bends slowly, as for a hardening specimen; more for a
-        # kink, and for a force that follows the velocity, which may be steep.
-        table[0, m.TIMES] = self._times
-        for at, signal in enumerate('ueqfy', start=m.COMMAND):
-            row, slope = self._signals[signal]
-            table[[m.SIGNAL, m.SLOPE], at] = row, slope or m.NONE
-        for flag, row, (first, last) in _NEEDS:
-            read = table[ends[first - 1] : ends[last], 2:5]
-            table[m.SIGNAL, m.PREPARE] |= flag * bool((read == row).any())
-        registers = np.zeros((self._emitter.rows, LANES))
-        for value, row in self._emitter.constants.items():
-            registers[row] = value
+        into = self._emitter
+        read = [
+            step.result for step in into.prepare if any(p.reads(step.result) for p in self._parts)
+        ]
         return Program(
-            table, registers, self._parameters, tuple(self._emitter.memory), tuple(self._switches)
+            code=(Part(tuple(into.prepare), tuple((row, row) for row in read)), *self._parts),
+            constants=tuple((row, value) for value, row in into.constants.items()),
+            # One Newton step where a force bends slowly, as for a hardening specimen; more for a
+            # kink, and for a force that follows the velocity, which may be steep.
+            times=self._times,
+            rows=into.rows,
+            parameters=self._parameters,
+            memory=tuple(into.memory),
+            switches=tuple(self._switches),
         )

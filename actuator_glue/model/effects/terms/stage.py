@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from actuator_glue.jit import njit
 from actuator_glue.model.effects import balance, stages
 from actuator_glue.model.effects import rows as r
@@ -14,14 +17,13 @@ from actuator_glue.records import Array
 # The number of lanes is taken from the table: as a constant it would have short loops unrolled
 # before they can become vector code.
 @njit
-def valve(w: Array, g: Array, program: m.Code, mean: float, rate: float, time: float) -> None:
-    """Write the spool flow: command, control error and what moves in the middle of the step.
+def middle(w: Array, g: Array, parts: m.Parts, mean: float, rate: float, time: float) -> None:
+    """Write what moves in the middle of the step, as far as it is read.
 
     The step is not known yet; all is taken as if the piston went on as before, and linear in
     what it does otherwise. `mean` and `time` as in `stages.valve` and `stages.flow`.
     """
-    lanes, half, inverse = g.shape[1], 0.5 * rate, 1.0 / rate
-    needs = program[m.SIGNAL, m.PREPARE]
+    lanes, needs, half, inverse = g.shape[1], parts[m.NEEDS], 0.5 * rate, 1.0 / rate
     if needs & m.NEEDS_T:
         for n in range(lanes):
             g[m.T, n] = time + g[m.ORIGIN, n]
@@ -34,18 +36,12 @@ def valve(w: Array, g: Array, program: m.Code, mean: float, rate: float, time: f
     if needs & m.NEEDS_F:
         for n in range(lanes):
             g[m.F, n] = w[r.F + n] + 0.5 * w[r.DF + n]
-    for n in range(lanes):
-        g[m.X, n] = w[r.X + n] + 0.5 * w[r.DX + n]
-    for n in range(lanes):
-        g[m.U, n] = w[r.GAIN + n] * (mean + w[r.IN_MEAN + n])
-    m.execute(g, program, program[0, m.PREPARE], program[0, m.COMMAND])
-    u = program[m.SIGNAL, m.COMMAND]
-    for n in range(lanes):
-        g[m.E, n] = g[u, n] + w[r.NULL + n] - g[m.X, n]
-    m.execute(g, program, program[0, m.COMMAND], program[0, m.VALVE])
-    e, slope = program[m.SIGNAL, m.VALVE], program[m.SLOPE, m.VALVE]
-    for n in range(lanes):
-        w[r.IN_Q + n], w[r.IN_DQ + n] = stages.spool(w, n, g[e, n], g[slope, n])
+    if needs & m.NEEDS_X:
+        for n in range(lanes):
+            g[m.X, n] = w[r.X + n] + 0.5 * w[r.DX + n]
+    if needs & m.NEEDS_U:
+        for n in range(lanes):
+            g[m.U, n] = w[r.GAIN + n] * (mean + w[r.IN_MEAN + n])
 
 
 @njit
@@ -55,46 +51,94 @@ def _most(g: Array, n: int, rate: float) -> Any:
 
 
 @njit
-def flow(w: Array, g: Array, program: m.Code, rate: float, acted: bool) -> None:
+def valve(w: Array, g: Array, parts: m.Parts, mean: float, rate: float) -> None:
+    """Write the spool flow, and as if nothing acted on it that into the cylinder."""
+    lanes = g.shape[1]
+    if not parts[m.NEEDS] & m.NEEDS_E:
+        for n in range(lanes):
+            q, dq = stages.valve(w, n, mean)
+            w[r.IN_Q + n], w[r.IN_DQ + n] = q, dq
+            w[r.IN_FLOW + n], w[r.IN_DFLOW + n] = q, min(dq, _most(g, n, rate))
+        return
+    if parts[m.COMMAND]:
+        m.execute(parts[m.COMMAND], g)
+        for n in range(lanes):
+            g[m.E, n] = stages.error(w, n, g[m.U, n])
+    else:
+        for n in range(lanes):
+            g[m.E, n] = stages.error(w, n, w[r.GAIN + n] * (mean + w[r.IN_MEAN + n]))
+    if parts[m.VALVE]:
+        m.execute(parts[m.VALVE], g)
+    for n in range(lanes):
+        q, dq = stages.spool(w, n, g[m.E, n], g[m.D_E, n])
+        w[r.IN_Q + n], w[r.IN_DQ + n] = q, dq
+        w[r.IN_FLOW + n], w[r.IN_DFLOW + n] = q, min(dq, _most(g, n, rate))
+
+
+@njit
+def flow(w: Array, g: Array, parts: m.Parts, rate: float, acted: bool) -> None:
     """Write the flow into the cylinder, after compiled effects on it where those have acted.
 
     Feedback beyond `_most` is not followed implicitly.
     """
     lanes = g.shape[1]
-    if program[0, m.FLOW] > program[0, m.VALVE]:
-        first, d_first = (r.IN_FLOW, r.IN_DFLOW) if acted else (r.IN_Q, r.IN_DQ)
+    if parts[m.FLOW]:
+        if acted:
+            for n in range(lanes):
+                g[m.Q, n], g[m.D_Q, n] = w[r.IN_FLOW + n], w[r.IN_DFLOW + n]
+        else:
+            for n in range(lanes):
+                g[m.Q, n], g[m.D_Q, n] = w[r.IN_Q + n], w[r.IN_DQ + n]
+        m.execute(parts[m.FLOW], g)
         for n in range(lanes):
-            g[m.Q, n] = w[first + n]
-        for n in range(lanes):
-            g[m.D_Q, n] = w[d_first + n]
-        m.execute(g, program, program[0, m.VALVE], program[0, m.FLOW])
-        q, slope = program[m.SIGNAL, m.FLOW], program[m.SLOPE, m.FLOW]
-        for n in range(lanes):
-            w[r.IN_FLOW + n] = g[q, n]
-        for n in range(lanes):
-            w[r.IN_DFLOW + n] = min(g[slope, n], _most(g, n, rate))
-    elif acted:
-        for n in range(lanes):
-            w[r.IN_DFLOW + n] = min(w[r.IN_DFLOW + n], _most(g, n, rate))
+            w[r.IN_FLOW + n] = g[m.Q, n]
+            w[r.IN_DFLOW + n] = min(g[m.D_Q, n], _most(g, n, rate))
     else:
         for n in range(lanes):
-            w[r.IN_FLOW + n] = w[r.IN_Q + n]
-            w[r.IN_DFLOW + n] = min(w[r.IN_DQ + n], _most(g, n, rate))
+            g[m.Q, n] = w[r.IN_FLOW + n]
+            w[r.IN_DFLOW + n] = min(w[r.IN_DFLOW + n], _most(g, n, rate))
 
 
 @njit
-def force(w: Array, g: Array, program: m.Code, rate: float, yields: bool) -> None:
+def before_the_oil(
+    w: Array,
+    g: Array,
+    parts: m.Parts,
+    on: NDArray[np.bool_],
+    mean: float,
+    rate: float,
+    time: float,
+) -> bool:
+    """Write all up to the flow into the cylinder; return whether anything acts on that."""
+    flows = on[r.ON_FLOW]
+    middle(w, g, parts, mean, rate, time)
+    if not (flows or parts[m.NEEDS] & m.NEEDS_VALVE):
+        return False
+    valve(w, g, parts, mean, rate)
+    if flows:
+        stages.flow(w, on, time)
+    if flows or parts[m.NEEDS] & m.NEEDS_FLOW:
+        flow(w, g, parts, rate, flows)
+    return True
+
+
+@njit
+def force(w: Array, g: Array, parts: m.Parts, rate: float, curved: bool, yields: bool) -> None:
     """Write the force of specimen and piston at the end of a step by IN_DX, and its slope.
 
-    The velocity is that of the parabola through the last three positions: that of the scheme
-    itself may alternate from step to step.
+    `curved` unless the specimen is proportional. The velocity is that of the parabola through the
+    last three positions: that of the scheme itself may alternate from step to step.
     """
-    lanes = g.shape[1]
-    for n in range(lanes):
-        g[m.F, n], g[m.D_F, n] = balance.specimen(w, n, w[r.IN_DX + n], True, yields)
-    for n in range(lanes):
-        g[m.X, n] = w[r.X + n] + w[r.IN_DX + n]
-    if program[m.SIGNAL, m.PREPARE] & m.NEEDS_V_END:
+    lanes, quarter = g.shape[1], 0.25 * rate
+    if curved:
         for n in range(lanes):
-            g[m.V, n] = 0.25 * rate * (3.0 * w[r.IN_DX + n] - w[r.DX + n])
-    m.execute(g, program, program[0, m.FLOW], program[0, m.FORCE])
+            g[m.F, n], g[m.D_F, n] = balance.specimen(w, n, w[r.IN_DX + n], True, yields)
+            g[m.X, n] = w[r.X + n] + w[r.IN_DX + n]
+            g[m.V, n] = quarter * (3.0 * w[r.IN_DX + n] - w[r.DX + n])
+    else:
+        for n in range(lanes):
+            there = w[r.X + n] + w[r.IN_DX + n]
+            g[m.F, n], g[m.D_F, n] = w[r.STIFFNESS + n] * there, w[r.STIFFNESS + n]
+            g[m.X, n] = there
+            g[m.V, n] = quarter * (3.0 * w[r.IN_DX + n] - w[r.DX + n])
+    m.execute(parts[m.FORCE], g)

@@ -1,0 +1,125 @@
+"""What each operation of the machine computes, as formulas of lanes.
+
+They are elementary functions, too, of a few operations that every lane takes alike.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Final
+
+from actuator_glue.model.effects.terms import machine as m
+from actuator_glue.model.effects.terms.lanes import WHOLE, Lanes
+
+# Of the Taylor series of exp(r) - 1 and sin(a), with what the first leaves out at ln(2)/2 below
+# rounding, and the second at a quarter turn.
+_EXPM1: Final = [1.0 / math.factorial(n) for n in range(1, 14)]
+_SINE: Final = [(-1.0) ** (n // 2) / math.factorial(n) for n in range(3, 20, 2)]
+_TURN: Final = 1.0 / (2.0 * math.pi)
+# ln(2), and what that double leaves out.
+_LN2, _LN2_REST = math.log(2.0), 2.3190468138462996e-17
+
+
+def _series(x: Lanes, coefficients: list[float]) -> Lanes:
+    """c[0] + c[1] x + ..., each product added without rounding it."""
+    value: Lanes | float = coefficients[-1]
+    for c in reversed(coefficients[:-1]):
+        value = x.call('fma', value, c)
+    assert isinstance(value, Lanes)
+    return value
+
+
+def _at_most(x: Lanes, limit: float) -> Lanes:
+    return (x > limit).choose(limit, x)
+
+
+def _parted(x: Lanes) -> tuple[Lanes, Lanes]:
+    """2^k and exp(r) - 1 of x = k ln(2) + r, r at most ln(2)/2 in size."""
+    whole = x.call('fma', 1.0 / _LN2, WHOLE)
+    k = WHOLE - whole
+    r = k.call('fma', _LN2_REST, k.call('fma', _LN2, x))
+    return whole.power_of_two(), r * _series(r, _EXPM1)
+
+
+def _exp(x: Lanes) -> Lanes:
+    power, rest = _parted(_at_most((x < -708.0).choose(-708.0, x), 709.0))
+    return rest.call('fma', power, power)
+
+
+def _tanh(x: Lanes) -> Lanes:
+    power, rest = _parted(2.0 * _at_most(abs(x), 20.0))
+    m = rest.call('fma', power, power - 1.0)
+    return (m / (m + 2.0)).call('copysign', x)
+
+
+def _sine(turns: Lanes) -> Lanes:
+    """sin(2 pi turns): Taylor series up to a quarter turn, to rounding."""
+    part = turns - (turns + 0.5).call('floor')
+    rest = (part > 0.0).choose(0.5, -0.5) - part
+    a = 2.0 * math.pi * (abs(part) <= 0.25).choose(part, rest)
+    z = a * a
+    return a + a * z * _series(z, _SINE)
+
+
+def _sign(x: Lanes) -> Lanes:
+    return (x > 0.0).choose(1.0, 0.0) - (x < 0.0).choose(1.0, 0.0)
+
+
+# Result from operands a, b and c.
+PURE: Final[dict[int, Callable[[Lanes, Lanes, Lanes], Lanes]]] = {
+    m.COPY: lambda a, _b, _c: a,
+    m.ADD: lambda a, b, _: a + b,
+    m.SUB: lambda a, b, _: a - b,
+    m.MUL: lambda a, b, _: a * b,
+    m.DIV: lambda a, b, _: a / b,
+    m.NEG: lambda a, _b, _c: -a,
+    m.ABS: lambda a, _b, _c: abs(a),
+    m.SIGN: lambda a, _b, _c: _sign(a),
+    m.SQRT: lambda a, _b, _c: a.call('sqrt'),
+    m.EXP: lambda a, _b, _c: _exp(a),
+    m.LOG: lambda a, _b, _c: a.call('log'),
+    m.SIN: lambda a, _b, _c: _sine(a * _TURN),
+    m.COS: lambda a, _b, _c: _sine(a * _TURN + 0.25),
+    m.TANH: lambda a, _b, _c: _tanh(a),
+    m.ATAN: lambda a, _b, _c: a.call('atan'),
+    m.POW: lambda a, b, _: a.call('pow', b),
+    m.MIN: lambda a, b, _: ((a < b) | a.differs(a)).choose(a, b),
+    m.MAX: lambda a, b, _: ((a > b) | a.differs(a)).choose(a, b),
+    m.LESS: lambda a, b, _: (a < b).choose(1.0, 0.0),
+    m.EQUAL: lambda a, b, _: a.equals(b).choose(1.0, 0.0),
+    # Whether play drags.
+    m.EDGE: lambda a, b, c: (abs(a - b) >= c * (1.0 - 1e-9)).choose(1.0, 0.0),
+    m.SELECT: lambda a, b, c: c.differs(0.0).choose(a, b),
+}
+
+
+def _lag(a: Lanes, b: Lanes, c: Lanes, kept: Lanes) -> tuple[Lanes, Lanes]:
+    """Of a value held over the step: mean, and what it ends with."""
+    return a + (kept - a) * c, a + (kept - a) * b
+
+
+def _integral(a: Lanes, b: Lanes, _: Lanes, kept: Lanes) -> tuple[Lanes, Lanes]:
+    return kept + 0.5 * b * a, kept + b * a
+
+
+def _play(a: Lanes, b: Lanes, _: Lanes, kept: Lanes) -> tuple[Lanes, Lanes]:
+    low, high = a - b, a + b
+    kept = (low > kept).choose(low, kept)
+    kept = (high < kept).choose(high, kept)
+    return kept, kept
+
+
+def _limit(a: Lanes, b: Lanes, _: Lanes, kept: Lanes) -> tuple[Lanes, Lanes]:
+    change = a - kept
+    kept = (abs(change) <= b).choose(a, kept + b.call('copysign', change))
+    return kept, kept
+
+
+# Result, and what is remembered, from operands and what was.
+REMEMBERING: Final = {m.LAG: _lag, m.INTEGRAL: _integral, m.PLAY: _play, m.LIMIT: _limit}
+
+
+def remembered(operation: int, a: Lanes, kept: Lanes) -> Lanes:
+    """What an operation remembers that has not been executed yet, which is no number."""
+    return kept.differs(kept).choose(0.0 if operation == m.INTEGRAL else a, kept)
