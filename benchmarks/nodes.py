@@ -20,7 +20,7 @@ import numpy as np
 
 from actuator_glue.io.bag_reader import messages
 from actuator_glue.io.messages import deserialize
-from actuator_glue.online import wire
+from actuator_glue.sample_block import stamp_ns
 from benchmarks.stalls import awake, watched, withheld
 from examples.demonstration.domain import free_domain
 from examples.demonstration.processes import Node, Nodes
@@ -186,12 +186,12 @@ def twenty_times_a_second(seconds: float) -> dict[str, float]:
         said: dict[str, str] = {}
         for kind, stamp, message in _messages(run):
             if kind == SAMPLES:
-                end = wire.stamp_ns(message) + round(
+                end = stamp_ns(message.header) + round(
                     (len(message.command) - 1) * message.period * 1e9
                 )
                 arrived[end // 1_000_000] = stamp
             elif kind == POSTERIOR:
-                due[int(message.window)] = arrived.get(wire.stamp_ns(message) // 1_000_000, 0)
+                due[int(message.window)] = arrived.get(stamp_ns(message.header) // 1_000_000, 0)
             elif kind == BAND and not message.scored and message.kind == 'total':
                 if due.get(int(message.window)):
                     spans.append((due[int(message.window)], stamp))

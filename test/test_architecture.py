@@ -14,7 +14,7 @@ import actuator_glue
 ROOT = Path(actuator_glue.__file__).resolve().parent
 SOURCES = sorted(p for p in ROOT.rglob('*.py'))
 
-BOTTOM = {'errors', 'records', 'setups', 'jit', 'normal', 'json_value'}
+BOTTOM = {'errors', 'records', 'setups', 'sample_block', 'jit', 'normal', 'json_value'}
 CORE = BOTTOM | {'model', 'inference'}
 EVERYTHING = CORE | {
     'online', 'diagnosis', 'report', 'io', 'interfaces', 'workers', 'effects',
@@ -33,6 +33,7 @@ ARROWS = {
     'errors': set(),
     'records': {'errors'},
     'setups': {'records', 'errors'},
+    'sample_block': {'records', 'setups', 'errors'},
     'jit': set(),
     'normal': {'jit'},
     'json_value': set(),
@@ -44,7 +45,7 @@ ARROWS = {
     'diagnosis': CORE,
     'hybrid': CORE,
     'report': CORE | {'online', 'diagnosis', 'io'},
-    'io': {'records', 'setups', 'errors', 'json_value', 'interfaces', 'hybrid'},
+    'io': {'records', 'setups', 'sample_block', 'errors', 'json_value', 'interfaces', 'hybrid'},
     'streams': {'records', 'errors', 'io'},
     'view': {'records', 'errors', 'io', 'interfaces'},
     'workers': CORE | {'online'},
@@ -57,6 +58,7 @@ PURE = (
     'errors',
     'records',
     'setups',
+    'sample_block',
     'normal',
     'json_value',
     'model',

@@ -26,8 +26,9 @@ from actuator_glue.online.playback import Item, items, stream
 from actuator_glue.online.playback import replay as run
 from actuator_glue.online.published import Comparison, Published, compare, published
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.stream import Block, Rejected, check_block
+from actuator_glue.online.stream import Rejected
 from actuator_glue.records import Record
+from actuator_glue.sample_block import Block, check_block
 from actuator_glue.workers.reports import Reports
 
 INPUTS = ('SampleBlock', 'TestSetup')

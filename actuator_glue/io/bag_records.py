@@ -27,6 +27,7 @@ from actuator_glue.io.bag_samples import SAMPLE_BLOCK, BagBlock, BagSetup
 from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.io.messages import header, message
 from actuator_glue.records import Record
+from actuator_glue.sample_block import Block
 from actuator_glue.setups import Setups, StreamSetup
 
 CLOCK_TOLERANCE = 0.1  # s; a step between two blocks beyond this is a jump, not jitter
@@ -38,7 +39,9 @@ BLOCK = 64  # samples per message where nobody says otherwise
 class _Segment:
     """Blocks that follow each other without a gap, under one set-up."""
 
-    first: BagBlock
+    topic: str
+    actuator: str
+    first: Block
     setup: StreamSetup | None
     command: array[float] = field(default_factory=lambda: array('d'))
     measured: array[float] = field(default_factory=lambda: array('d'))
@@ -49,14 +52,14 @@ class _Segment:
     def next_index(self) -> int:
         return self.first.index + len(self.command)
 
-    def append(self, block: BagBlock) -> None:
-        self.next_stamp = block.stamp_ns + round(len(block.command) * block.period * 1e9)
+    def append(self, block: Block) -> None:
+        self.next_stamp = block.stamp_ns + round(len(block) * block.period * 1e9)
         self.command.frombytes(block.command.tobytes())
         self.measured.frombytes(block.measured.tobytes())
         if block.force is not None:
             self.force.frombytes(block.force.tobytes())
 
-    def fault_before(self, block: BagBlock) -> str:
+    def fault_before(self, block: Block) -> str:
         """Return what went wrong between this segment and a block, empty where nothing did."""
         at = f'at sample {block.index}'
         if block.index > self.next_index:
@@ -72,7 +75,7 @@ class _Segment:
             return f'the clock jumps by {jump:.3g} s {at}'
         return ''
 
-    def same_test(self, block: BagBlock, setup: StreamSetup | None) -> bool:
+    def same_test(self, block: Block, setup: StreamSetup | None) -> bool:
         """Whether a block belongs to the same test: it goes on under the same set-up."""
         return (
             block.index == self.next_index
@@ -90,7 +93,7 @@ class _Segment:
             period=self.first.period,
             stiffness=setup.stiffness if setup else None,
             hold=setup.hold if setup else 'zoh',
-            actuator=self.first.actuator or (setup.actuator if setup else '') or 'actuator',
+            actuator=self.actuator or (setup.actuator if setup else '') or 'actuator',
             start_ns=self.first.stamp_ns,
             first_index=self.first.index,
             source=source,
@@ -121,22 +124,22 @@ def read_records(
     setups = _setups(path, note, warn)
     open_segments: dict[str, _Segment] = {}
     done: list[_Segment] = []
-    for item, setup in _governed(path, setups):
-        segment = open_segments.get(item.topic)
+    for (topic, actuator, block), setup in _governed(path, setups):
+        segment = open_segments.get(topic)
         if segment is not None:
-            fault = segment.fault_before(item)
+            fault = segment.fault_before(block)
             if fault:
-                _tell(f'{path}: topic {item.topic}: {fault}', gap)
-            if fault or not segment.same_test(item, setup):
+                _tell(f'{path}: topic {topic}: {fault}', gap)
+            if fault or not segment.same_test(block, setup):
                 done.append(segment)
                 segment = None
         if segment is None:
-            segment = open_segments[item.topic] = _Segment(item, setup)
-        segment.append(item)
+            segment = open_segments[topic] = _Segment(topic, actuator, block, setup)
+        segment.append(block)
     done.extend(open_segments.values())
     long_enough = [segment for segment in done if len(segment.command) >= 2]
     records = [
-        segment.record(_source(path, segment.first.topic, len(open_segments), i, len(long_enough)))
+        segment.record(_source(path, segment.topic, len(open_segments), i, len(long_enough)))
         for i, segment in enumerate(long_enough, start=1)
     ]
     if not records:
@@ -172,10 +175,11 @@ def _governed(
     every = as_published(messages(path, types=TYPES, note=lambda _: None))
     for place, raw in enumerate(every):
         if raw.type == SAMPLE_BLOCK:
-            block = bag_samples.samples(raw, path)
-            if block.topic not in governing:
-                governing[block.topic] = _Governing(block.topic, setups)
-            yield from governing[block.topic].parts(block, place)
+            found = bag_samples.samples(raw, path)
+            if found.topic not in governing:
+                governing[found.topic] = _Governing(found.topic, setups)
+            for block, setup in governing[found.topic].parts(found.block, place):
+                yield found._replace(block=block), setup
 
 
 def _setups(path: Path | str, note: Note, warn: Note) -> list[tuple[int, BagSetup]]:
@@ -211,9 +215,9 @@ class _Governing:
         self._stamp_ns = 0
         self._next: int | None = None
 
-    def parts(self, block: BagBlock, place: int) -> Iterator[tuple[BagBlock, StreamSetup | None]]:
+    def parts(self, block: Block, place: int) -> Iterator[tuple[Block, StreamSetup | None]]:
         """Yield the parts of a block, at some place among the messages, with what governs them."""
-        last = block.stamp_ns + round((len(block.command) - 0.5) * block.period * 1e9)
+        last = block.stamp_ns + round((len(block) - 0.5) * block.period * 1e9)
         while self._left and (
             self._left[0][0] < place or self._stamp_ns < self._left[0][1].stamp_ns <= last
         ):
@@ -223,10 +227,10 @@ class _Governing:
                 self._current = taken.setup
         if self._next is not None and block.index < self._next:
             self._setups.forget()
-        for part, begun in self._setups.parts(block.index, len(block.command)):
+        for part, begun in self._setups.parts(block.index, len(block)):
             self._current = begun[-1] if begun else self._current
-            yield block.part(part), self._current
-        self._next = block.index + len(block.command)
+            yield block.part(part.start, part.stop), self._current
+        self._next = block.index + len(block)
 
 
 def write_record(

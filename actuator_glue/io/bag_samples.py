@@ -2,42 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
+from actuator_glue import sample_block
 from actuator_glue.errors import InputError
 from actuator_glue.io.bag_reader import BagMessage, Summary
-from actuator_glue.io.messages import deserialize, full_name, stamp_ns
-from actuator_glue.records import Array, check_period
+from actuator_glue.io.messages import deserialize, full_name
+from actuator_glue.records import check_period
+from actuator_glue.sample_block import Block, stamp_ns
 from actuator_glue.setups import StreamSetup, from_message
 
 SAMPLE_BLOCK = full_name('SampleBlock')
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class BagBlock:
-    """One SampleBlock: SI units, arrays of shape (n,)."""
+class BagBlock(NamedTuple):
+    """One SampleBlock, and whose samples it has."""
 
     topic: str
     actuator: str
-    stamp_ns: int
-    period: float
-    index: int
-    command: Array
-    measured: Array
-    force: Array | None
-
-    def part(self, part: slice) -> BagBlock:
-        """Return some of the samples as a block of its own."""
-        return replace(
-            self,
-            stamp_ns=self.stamp_ns + round(part.start * self.period * 1e9),
-            index=self.index + part.start,
-            command=self.command[part],
-            measured=self.measured[part],
-            force=None if self.force is None else self.force[part],
-        )
+    block: Block
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,23 +52,13 @@ def samples(found: BagMessage, path: Path | str) -> BagBlock:
     """
     where = f'{path}: topic {found.topic}'
     content = _content(found, where)
-    block = f'{where}: block at sample {content.index}'
-    check_period(content.period, block)
-    lengths = {len(content.command), len(content.measured)}
-    if len(content.force):
-        lengths.add(len(content.force))
-    if len(lengths) != 1:
-        raise InputError(f'{block} has channels of different lengths')
-    return BagBlock(
-        found.topic,
-        content.header.frame_id,
-        stamp_ns(content.header),
-        float(content.period),
-        int(content.index),
-        content.command,
-        content.measured,
-        content.force if len(content.force) else None,
-    )
+    block = sample_block.from_message(content)
+    at = f'{where}: block at sample {block.index}'
+    check_period(block.period, at)
+    channels = block.command, block.measured, block.force
+    if len({len(channel) for channel in channels if channel is not None}) != 1:
+        raise InputError(f'{at} has channels of different lengths')
+    return BagBlock(found.topic, content.header.frame_id, block)
 
 
 def setup(found: BagMessage, path: Path | str) -> BagSetup:

@@ -15,8 +15,8 @@ from rosbags.typesys.store import Typestore
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.bag_reader import BagMessage, Note, Summary, messages, refuse
-from actuator_glue.io.messages import stamp_ns
 from actuator_glue.records import Array
+from actuator_glue.sample_block import stamp_ns
 
 Stamps = Literal['header', 'published', 'logged']
 # Elements of one array that are offered as columns; a longer one is no set of channels.

@@ -159,11 +159,6 @@ def header(stamp_ns: int, frame_id: str) -> Any:
     return types['std_msgs/msg/Header'](stamp=stamp, frame_id=frame_id)
 
 
-def stamp_ns(head: Any) -> int:
-    """Return the stamp of a std_msgs/Header [ns]."""
-    return int(head.stamp.sec) * 1_000_000_000 + int(head.stamp.nanosec)
-
-
 def serialize(name: str, content: Any) -> bytes:
     """Return a message as CDR bytes."""
     return bytes(typestore().serialize_cdr(content, full_name(name)))

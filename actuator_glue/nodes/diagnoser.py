@@ -11,6 +11,7 @@ from actuator_glue_msgs.action import Diagnose
 from actuator_glue_msgs.srv import SetModel
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 
+from actuator_glue import sample_block
 from actuator_glue.diagnosis.verdict import against
 from actuator_glue.errors import InputError
 from actuator_glue.nodes import diagnosing, own_effects, spin, topics
@@ -112,7 +113,7 @@ class DiagnoserNode(WorkingNode):
 
     def _block(self, message: Any) -> None:
         self._setups.settle()
-        self._tell(self.collector.push(wire.block(message)))
+        self._tell(self.collector.push(sample_block.from_message(message)))
 
     def _tell(self, events: list[Event]) -> None:
         for event in events:

@@ -11,6 +11,7 @@ from typing import Any
 
 from actuator_glue_msgs.srv import SetModel
 
+from actuator_glue import sample_block
 from actuator_glue.errors import InputError
 from actuator_glue.inference.choice import ModelChoice, choose_model
 from actuator_glue.nodes import configuration, own_effects, spin, topics
@@ -108,7 +109,7 @@ class EstimatorNode(WorkingNode):
 
     def _block(self, message: Any) -> None:
         self._setups.settle()
-        block = wire.block(message)
+        block = sample_block.from_message(message)
         self.samples.add(len(block))
         if block.index and not self.estimator.tally.blocks:
             self.complain(

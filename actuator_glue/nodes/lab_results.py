@@ -7,7 +7,7 @@ from typing import Any
 
 from actuator_glue.nodes import topics
 from actuator_glue.nodes.base import SuiteNode
-from actuator_glue.online.wire import stamp_ns
+from actuator_glue.sample_block import stamp_ns
 from actuator_glue.streams.address import Allowed
 from actuator_glue.streams.results import FIELDS, connect
 from actuator_glue.streams.seal import read_key
@@ -58,7 +58,7 @@ class ResultsOut:
         self._values = {
             'coverage': self._values.get('coverage', float('nan')),
             'window': float(message.window),
-            'time': 1e-9 * stamp_ns(message),
+            'time': 1e-9 * stamp_ns(message.header),
             **{
                 name: float(getattr(message, name))
                 for name in FIELDS

@@ -15,7 +15,8 @@ from actuator_glue.io.partition import read_partition
 from actuator_glue.nodes import base, spin, topics
 from actuator_glue.nodes.messages import publish
 from actuator_glue.nodes.parameters import Spec
-from actuator_glue.online.wire import Head, stamp_ns
+from actuator_glue.online.wire import Head
+from actuator_glue.sample_block import stamp_ns
 
 SPECS = (
     Spec(
@@ -110,7 +111,7 @@ class MarginNode(base.SuiteNode):
         found = self.watch.take(draws, names, effects, message.ess_min)
         self.windows += 1
         self.last, self._seconds = found, time.monotonic() - started
-        head = Head(stamp_ns(message), message.header.frame_id)
+        head = Head(stamp_ns(message.header), message.header.frame_id)
         publish(self._out, head, self._fields(found, int(message.window)))
 
     def _fields(self, found: Watched, window: int) -> dict[str, Any]:

@@ -8,9 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.stream import Block, Event, Window
+from actuator_glue.online.stream import Event, Window
 from actuator_glue.online.windows import SlidingWindows
 from actuator_glue.records import Record
+from actuator_glue.sample_block import Block
 from actuator_glue.setups import StreamSetup
 
 PIECE = 0.5  # s; what is kept ends at most this long before the last sample

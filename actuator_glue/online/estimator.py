@@ -16,9 +16,10 @@ from actuator_glue.online.job import WindowResult
 from actuator_glue.online.knowledge import Knowledge
 from actuator_glue.online.sampling import Job, WindowFit
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.stream import Block, Dropped, Event, Failed, Preview, Rejected, Window
+from actuator_glue.online.stream import Dropped, Event, Failed, Preview, Rejected, Window
 from actuator_glue.online.windows import SlidingWindows, Tally
 from actuator_glue.records import MAX_DISPLACEMENT, Array
+from actuator_glue.sample_block import Block
 from actuator_glue.setups import StreamSetup
 
 # Forecasts wait for their samples for two or three hops; more only when windows are dropped.

@@ -5,16 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any, TypeAlias
 
+from actuator_glue import sample_block
 from actuator_glue.errors import InputError
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.choice import ModelChoice, choose_model
-from actuator_glue.online import wire
 from actuator_glue.online.estimator import Estimator, Schedule
 from actuator_glue.online.job import WindowResult, fit, report
 from actuator_glue.online.sampling import Job, WindowFit
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.stream import Block, Event, Failed, Preview, Rejected
+from actuator_glue.online.stream import Event, Failed, Preview, Rejected
 from actuator_glue.records import Record
+from actuator_glue.sample_block import Block
 from actuator_glue.setups import StreamSetup, from_message
 
 Item: TypeAlias = StreamSetup | Block | Preview
@@ -117,7 +118,7 @@ def items(messages: Iterable[Named], rejected: list[Rejected] | None = None) -> 
     for name, message in messages:
         kind = name.rpartition('/')[2]
         if kind == 'SampleBlock':
-            yield wire.block(message)
+            yield sample_block.from_message(message)
         elif kind == 'TestSetup':
             try:
                 yield from_message(message)

@@ -17,6 +17,7 @@ from actuator_glue.online.estimator import Schedule
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.records import check_period
+from actuator_glue.sample_block import stamp_ns
 
 
 @dataclass(slots=True)
@@ -44,7 +45,7 @@ class Published:
             return None
         done = {}
         for number, message in self.posteriors.items():
-            last = wire.stamp_ns(message)
+            last = stamp_ns(message.header)
             start = last - round((message.samples - 1) * message.period * 1e9)
             done[int(message.index), start] = (number, int(message.evaluations))
         return Schedule(done, tuple(sorted(self.models, key=lambda m: m[0])))

@@ -9,15 +9,14 @@ import numpy as np
 from actuator_glue.errors import InputError
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import (
-    Block,
     Event,
     Reason,
     Rejected,
     Restarted,
     Window,
-    check_block,
 )
 from actuator_glue.records import Array, Record
+from actuator_glue.sample_block import Block, check_block
 from actuator_glue.setups import Setups, StreamSetup
 
 

@@ -19,7 +19,7 @@ from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.online.forecast import Prediction
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.stream import Block, Preview
+from actuator_glue.online.stream import Preview
 from actuator_glue.records import Array
 
 Fields = dict[str, Any]
@@ -32,24 +32,6 @@ class Head(NamedTuple):
 
     stamp_ns: int
     frame_id: str
-
-
-def stamp_ns(message: Any) -> int:
-    """Return the stamp of a message's header [ns]."""
-    stamp = message.header.stamp
-    return int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
-
-
-def block(message: Any) -> Block:
-    """Return the block of a SampleBlock, unchecked."""
-    return Block(
-        index=int(message.index),
-        period=float(message.period),
-        stamp_ns=stamp_ns(message),
-        command=_array(message.command),
-        measured=_array(message.measured),
-        force=_array(message.force) if len(message.force) else None,
-    )
 
 
 def preview(message: Any) -> Preview:

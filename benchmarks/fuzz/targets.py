@@ -10,7 +10,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-from actuator_glue import setups
+from actuator_glue import sample_block, setups
 from actuator_glue.errors import InputError
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.io.bag_reader import messages
@@ -190,7 +190,7 @@ def _messages(_: Path) -> Use:
         if kind in TYPES:
             uses.append(lambda: intake.take(kind, message))
         if kind == 'SampleBlock':
-            uses.append(lambda: estimator.push(wire.block(message)))
+            uses.append(lambda: estimator.push(sample_block.from_message(message)))
         elif kind == 'TestSetup':
             uses.append(lambda: estimator.setup(setups.from_message(message)))
         elif kind == 'CommandPreview':

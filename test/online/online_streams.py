@@ -6,8 +6,8 @@ from actuator_glue.model import linear
 from actuator_glue.model.commands import noise
 from actuator_glue.online.playback import stream
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.stream import Block
 from actuator_glue.records import Record
+from actuator_glue.sample_block import Block
 from actuator_glue.setups import StreamSetup
 
 THETA = np.array([134.0, 1.1e9, 2.5e5, 0.5])

@@ -11,8 +11,8 @@ from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.fitting import batch
 from actuator_glue.online.job import run
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.stream import Block
 from actuator_glue.records import Record
+from actuator_glue.sample_block import Block
 from actuator_glue.setups import StreamSetup
 
 # Sizes that leave about 20 um where Eq. (2) alone is fitted, the demonstration's noise being 10.

@@ -13,7 +13,8 @@ from actuator_glue.online import wire
 from actuator_glue.online.estimator import Ahead
 from actuator_glue.online.playback import replay, stream
 from actuator_glue.online.published import differences
-from actuator_glue.online.stream import Block, Dropped, Failed, Preview
+from actuator_glue.online.stream import Dropped, Failed, Preview
+from actuator_glue.sample_block import Block
 from actuator_glue.setups import StreamSetup
 
 

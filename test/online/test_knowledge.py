@@ -17,8 +17,9 @@ from actuator_glue.online.estimator import Estimator, Schedule
 from actuator_glue.online.job import WindowResult, run
 from actuator_glue.online.playback import replay
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.stream import Block, Contradicted
+from actuator_glue.online.stream import Contradicted
 from actuator_glue.records import Record
+from actuator_glue.sample_block import Block
 from actuator_glue.setups import StreamSetup
 
 CALIBRATION = replace(SETTINGS, prior='calibration', drift=0.0)

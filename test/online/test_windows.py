@@ -8,8 +8,9 @@ from online_streams import RATE, block, setup
 
 from actuator_glue.errors import InputError
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.stream import MAX_BLOCK, Rejected, Restarted
+from actuator_glue.online.stream import Rejected, Restarted
 from actuator_glue.online.windows import SlidingWindows, Tail
+from actuator_glue.sample_block import MAX_BLOCK
 
 SETTINGS = EstimatorSettings(window=0.5, hop=0.2, settle=0.0, time_budget=0.1)
 WINDOW, HOP = 100, 40
