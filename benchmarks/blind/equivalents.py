@@ -20,7 +20,7 @@ _PLAIN = {
     'valve-hysteresis': 'valve_play',
     'command-lag': 'sensor_lag',
 }
-_SIGNED = {'valve-null': 'null_offset', 'bias': 'bias'}
+_SIGNED = {'valve-null': 'null_offset', 'bias': 'bias', 'flow-asymmetry': 'asymmetry'}
 _MINUTE = 60.0  # s in which what drifts does so by its size
 
 

@@ -94,8 +94,8 @@ def _overlap(error, width, form):
 def _orifice(q, f, x, s, t, e):
     """Flow into the cylinder of spool flow q."""
     out = q
-    if e[ASYMMETRY] != 0.0 and q > 0.0:
-        out *= 1.0 + 2.0 * e[ASYMMETRY]  # one side only: the mean belongs to the valve
+    if e[ASYMMETRY] != 0.0:
+        out *= 1.0 + e[ASYMMETRY] * (1.0 if q > 0.0 else -1.0)
     if e[POSITION_GAIN] != 0.0:
         out *= 1.0 + e[POSITION_GAIN] * (x / 2e-3) ** 2
     if e[GAIN_DRIFT] != 0.0:

@@ -26,6 +26,7 @@ SIZES = {
     'bias': 45e-6,
     'drift': 67e-6,
     'clock-skew': 58e-6,
+    'flow-asymmetry': 0.05,
 }
 
 
