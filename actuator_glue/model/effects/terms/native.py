@@ -62,7 +62,8 @@ class Native:
             self.addresses[i] = self._engine.get_function_address(f'part{i}')
 
 
-@lru_cache(maxsize=256)
+# More than there are forms of a learned term, each of which takes 0.7 MB.
+@lru_cache(maxsize=64)
 def native(parts: tuple[Part, ...], constants: tuple[tuple[int, float], ...]) -> Native:
     """Return the code of a program's parts; `constants` are registers and their values."""
     return Native(parts, dict(constants))
