@@ -12,7 +12,7 @@ from actuator_glue.diagnosis import false_alarms, regression
 from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.fit import Fit
 from actuator_glue.diagnosis.learned_term import is_learned
-from actuator_glue.diagnosis.ranking import compare, removed, spokesman
+from actuator_glue.diagnosis.ranking import compare, removed, spokesman, standard_error
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.search import Search, Trial
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -22,6 +22,7 @@ Progress = Callable[[str, float], None]
 _SWAPS = 4
 # Share of the bounds within which a parameter is at one of them.
 _AT_BOUND = 1e-3
+_SURE = 2.0  # standard errors over the blocks: what is less is not told apart
 # Share of the motion's power that passes for noise, above which a residual's may, too.
 _STATIONARY = 0.3
 
@@ -131,7 +132,8 @@ class ModelSelection:
             names = [n for n in self.search.names if n not in current.effects]
             screened = self.search.screened(current, names)
             self.progress(f'effect {stage}', i / len(beam))
-            for trial in self.search.additions(current, screened[: self.settings.tried]):
+            tried = screened[: self.settings.tried]
+            for trial in self.search.additions(current, tried, valves=False):
                 found.setdefault(trial.effects, trial)
         return sorted(found.values(), key=lambda t: -float(t.scores.sum()))
 
@@ -169,6 +171,8 @@ class ModelSelection:
     def concluded(self, current: Trial, base: Trial, singles: Sequence[Trial]) -> Selection:
         """Check each member against none and against its rivals, and say what it is worth."""
         current = self.pruned(current)
+        for name in current.effects:
+            current = self.search.polish(replace(current, added=name))
         current, rivals = self.spoken(*self.settle(current))
         gains, nats = {}, {}
         for name in current.effects:
@@ -192,7 +196,7 @@ class ModelSelection:
         """Swap members for better rivals until none is better; return rivals of each member."""
         for attempt in range(_SWAPS):
             rivals: dict[str, tuple[Rival, ...]] = {}
-            best = current
+            best, complete = current, self.left(current) < self.material
             for name in current.effects:
                 rest = self.search.without(current, name)
                 names = [n for n in self.search.names if n not in current.effects]
@@ -201,18 +205,32 @@ class ModelSelection:
                 trials = self.search.additions(rest, names)
                 rivals[name] = self._rivals(rest, current, name, trials)
                 for trial in trials:
-                    if trial.scores.sum() <= best.scores.sum():
-                        break
-                    if not self._pressed_form(trial, trial.added, name):
+                    pressed = self._pressed_form(trial, trial.added, name)
+                    if not pressed and self._ahead(trial, best, complete):
                         best = trial
-                        break
             if best is current:
-                best = self.simpler(current, rivals)
+                best = self.simpler(current, rivals, complete)
             # The last members stay, so that the rivals told are theirs.
             if best is current or attempt == _SWAPS - 1:
                 break
             current = best
         return current, rivals
+
+    def _ahead(self, trial: Trial, best: Trial, complete: bool) -> bool:
+        """Whether a structure is better: by nats, which are those of noise.
+
+        Where more remains than that they are of misfit, at the frequencies with the least noise.
+        It counts as noise then, and the error on blocks left out tells what the blocks cannot.
+        """
+        if complete:
+            return bool(trial.scores.sum() > best.scores.sum())
+        if removed(trial, best) >= self.material:
+            return False
+        scorer = self.search.with_misfit(best)
+        gain = scorer.block_scores(trial.fit) - scorer.block_scores(best.fit)
+        if abs(gain.sum()) > _SURE * standard_error(gain):
+            return bool(gain.sum() > 0.0)
+        return scorer.left_out_error(trial.fit) < scorer.left_out_error(best.fit)
 
     def spoken(
         self, current: Trial, rivals: dict[str, tuple[Rival, ...]]
@@ -240,8 +258,15 @@ class ModelSelection:
     def _rivals(
         self, rest: Trial, best: Trial, name: str, trials: Sequence[Trial]
     ) -> tuple[Rival, ...]:
-        assert self.search.scorer is not None
-        return compare(rest, best, name, trials, self.search.scorer, self.settings)
+        """Say how far behind the best each rival is; misfit that remains counts as noise."""
+        scorer = self.search.scorer
+        assert scorer is not None
+        if self.left(best) >= self.material:
+            scorer = self.search.with_misfit(best)
+            rest, best, *trials = (
+                replace(t, scores=scorer.block_scores(t.fit)) for t in (rest, best, *trials)
+            )
+        return compare(rest, best, name, trials, scorer, self.settings)
 
     def _pressed_form(self, trial: Trial, name: str, simpler: str) -> bool:
         """Whether an effect is a richer form of another only by a parameter at its bound.
@@ -257,16 +282,19 @@ class ModelSelection:
                 return True
         return False
 
-    def simpler(self, current: Trial, rivals: dict[str, tuple[Rival, ...]]) -> Trial:
+    def simpler(
+        self, current: Trial, rivals: dict[str, tuple[Rival, ...]], complete: bool
+    ) -> Trial:
         """Take a rival that these data cannot tell from a member: simpler, or a name for it."""
         for name, row in rivals.items():
             for rival in row:
                 effects = (*(n for n in current.effects if n != name), rival.name)
                 entries = self.search.entries
                 fewer = len(entries[rival.name].parameters) < len(entries[name].parameters)
-                alike = rival.nats < self.settings.tie_nats
+                alike = complete and rival.nats < self.settings.tie_nats
                 alike = alike or self._pressed_form(current, name, rival.name)
                 named = is_learned(entries[name]) and rival.name != name
+                named = named and rival.excess < self.material
                 if rival.tied and (named or (fewer and alike)):
                     return self.search.trial(effects, rival.name)
         return current

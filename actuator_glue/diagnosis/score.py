@@ -8,7 +8,7 @@ parameters (Cook 1977).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -37,8 +37,10 @@ class Scorer:
     blocks: tuple[slice, ...]
 
     @classmethod
-    def of(cls, data: Data, splits: list[Split]) -> Scorer:
-        """Take the noise of each record from the split of its residual."""
+    def of(cls, data: Data, splits: list[Split], *, misfit: bool = False) -> Scorer:
+        """Take the noise of each record from the split of its residual, or all that is in it."""
+        if misfit:
+            splits = [replace(s, psd=s.psd + np.maximum(s.excess, 0.0)) for s in splits]
         blocks = []
         for period, part in zip(data.periods, data.parts, strict=True):
             size = part.stop - part.start

@@ -12,7 +12,7 @@ import numpy as np
 from actuator_glue.diagnosis import global_search
 from actuator_glue.diagnosis.data import Data, Model
 from actuator_glue.diagnosis.fit import Fit, base_fit, fit, rms
-from actuator_glue.diagnosis.score import Scorer
+from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.screening import screen, signatures
 from actuator_glue.diagnosis.stretches import Part, stretches
 from actuator_glue.model.effects import CATALOGUE, Effect, Scale, scale
@@ -102,7 +102,7 @@ class Search:
     entries: dict[str, Effect] = field(default_factory=lambda: dict(CATALOGUE))
     _tried: dict[frozenset[str], Fit] = field(default_factory=dict)
     _signatures: dict[str, tuple[Array, Array]] = field(default_factory=dict)
-    _polished: set[frozenset[str]] = field(default_factory=set)
+    _polished: dict[frozenset[str], int] = field(default_factory=dict)
     _descended: set[tuple[frozenset[str], tuple[str, ...]]] = field(default_factory=set)
 
     def base(self) -> Fit:
@@ -124,6 +124,10 @@ class Search:
         assert self.scorer is not None
         found = self._tried[frozenset(effects)]
         return Trial(self.structure(*effects), added, found, self.scorer.block_scores(found))
+
+    def with_misfit(self, trial: Trial) -> Scorer:
+        """Return a scorer that counts all that a structure leaves as noise."""
+        return Scorer.of(self.data, splits_of(self.data, trial.fit.error), misfit=True)
 
     def known(self, effects: Iterable[str]) -> Trial | None:
         """Return a structure that was refitted, or None."""
@@ -147,15 +151,16 @@ class Search:
             self._tried[key] = found
         return self.trial(model.effects, name)
 
-    def polish(self, trial: Trial) -> Trial:
-        """Finish the refit of a trial that is in the running."""
+    def polish(self, trial: Trial, valves: bool = True) -> Trial:
+        """Finish the refit of a trial that is in the running, from other valves if need be."""
         key = frozenset(trial.effects)
-        if key not in self._polished:
-            valves = _VALVES if self.entries[trial.added].group in _POLES else _VALVES[:1]
-            starts = np.tile(self._tried[key].theta, (len(valves), 1))
-            starts[:, :2] *= np.array(valves)[:, None]
+        poles = valves and self.entries[trial.added].group in _POLES
+        factors = _VALVES if poles else _VALVES[:1]
+        if self._polished.get(key, 0) < len(factors):
+            starts = np.tile(self._tried[key].theta, (len(factors), 1))
+            starts[:, :2] *= np.array(factors)[:, None]
             self._tried[key] = fit(self.data, trial.structure, starts)
-            self._polished.add(key)
+            self._polished[key] = len(factors)
         return self.trial(trial.effects, trial.added)
 
     def _stand_in(self, model: Structure) -> Part:
@@ -224,8 +229,13 @@ class Search:
         current: Trial,
         names: Iterable[str] | None = None,
         progress: Callable[[float], None] | None = None,
+        *,
+        valves: bool = True,
     ) -> list[Trial]:
-        """Refit `current` with every further effect, best out-of-sample score first."""
+        """Refit `current` with every further effect, best out-of-sample score first.
+
+        Those near the best are finished, from a slower and a quicker valve too if need be.
+        """
         wanted = [n for n in (names or self.names) if n not in current.effects]
 
         def one(name: str) -> Trial:
@@ -241,7 +251,8 @@ class Search:
         near = 1.5 * out[0].mean_square if out else 0.0
         first = list(enumerate(out[:_POLISHED]))
         polished = self.each(
-            lambda t: self.polish(t[1]) if t[0] < 2 or t[1].mean_square < near else t[1], first
+            lambda t: self.polish(t[1], valves) if t[0] < 2 or t[1].mean_square < near else t[1],
+            first,
         )
         return sorted([*polished, *out[_POLISHED:]], key=_by_score)
 
@@ -269,5 +280,5 @@ class Search:
             known = self._tried.get(key)
             if known is None or again.rms < known.rms:
                 self._tried[key] = again
-            self._polished.add(key)
+            self._polished.setdefault(key, 1)
         return self.trial(effects)

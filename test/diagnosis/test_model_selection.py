@@ -1,6 +1,6 @@
 """What decides between structures: noise under stationary commands, forms held by a bound."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -13,7 +13,7 @@ from actuator_glue.diagnosis.fit import Fit
 from actuator_glue.diagnosis.learned_forms import forms
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.pipeline import mean_effects
-from actuator_glue.diagnosis.score import pooled, splits_of
+from actuator_glue.diagnosis.score import Scorer, pooled, splits_of
 from actuator_glue.diagnosis.search import Search, Trial
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.model.effects import CATALOGUE, Effect, Scale
@@ -113,7 +113,7 @@ def test_a_richer_form_at_its_bound_mends_the_other(ratio: float, speed: float, 
     }
     found = ModelSelection(Tried(trials), Thresholds(), lambda stage, share: None)  # type: ignore[arg-type]
     rivals = {stribeck[0]: (Rival(coulomb[0], 300.0, 20.0, 1e-6, True, 0.4),)}
-    assert found.simpler(trials[stribeck], rivals).effects == (name,)
+    assert found.simpler(trials[stribeck], rivals, True).effects == (name,)
 
 
 def trial(names: tuple[str, ...], rms: float) -> Trial:
@@ -129,14 +129,16 @@ def fit_of(error: Array, names: tuple[str, ...]) -> Fit:
 
 
 def test_a_name_takes_the_place_of_a_description_that_it_is_tied_with() -> None:
-    """Though neither is simpler; a description itself, or one that is not tied, stays."""
+    """Though neither is simpler; not one that leaves materially more, or is not tied."""
     names = ('learned-valve-e2',), ('flow-asymmetry',)
     tried = Tried({n: trial(n, 1e-5) for n in names}, ENTRIES)  # type: ignore[arg-type]
     found = ModelSelection(tried, Thresholds(), lambda stage, share: None)  # type: ignore[arg-type]
+    found.material = 3e-6
     own = Rival('learned-valve-e2', 0.0, 0.0, 0.0, True, 0.7)
-    for tied, chosen in ((True, names[1]), (False, names[0])):
-        row = own, Rival('flow-asymmetry', 60.0, 40.0, 1e-6, tied, 0.2)
-        simpler = found.simpler(tried.trials[names[0]], {'learned-valve-e2': row})
+    cases = (True, 1e-6, names[1]), (True, 4e-6, names[0]), (False, 1e-6, names[0])
+    for tied, excess, chosen in cases:
+        row = own, Rival('flow-asymmetry', 60.0, 40.0, excess, tied, 0.2)
+        simpler = found.simpler(tried.trials[names[0]], {'learned-valve-e2': row}, True)
         assert simpler.effects == chosen
 
 
@@ -179,3 +181,28 @@ def test_a_term_takes_no_place_of_what_has_a_name(
     both = trial(('flow-asymmetry', 'learned-valve-e2'), term)
     found = Displaced(term)
     assert learning._displaces(found, both, best) is displaces  # type: ignore[arg-type]
+
+
+def test_misfit_is_not_weighed_as_noise() -> None:
+    """Beside structure that remains, the smaller error counts, whatever nats of noise say."""
+    found = selection(stationary((), [], 3))
+    base = found.search.trial(())
+    noisy = replace(base.fit, error=1.1 * base.fit.error)
+    praised = replace(base, fit=noisy, scores=base.scores + 10.0)
+    assert found._ahead(praised, base, complete=True)
+    assert not found._ahead(praised, base, complete=False)
+    assert found._ahead(base, praised, complete=False)
+
+
+def test_all_that_remains_may_count_as_noise() -> None:
+    """Play of 40 um under a stationary command: what is left has unit variance then."""
+    found = selection(stationary(('backlash',), [4e-5], 4))
+    data, error = found.search.data, found.search.base().error
+    error = error * (1.0 + np.arange(len(error)) / len(error)) ** 4  # it grows: structure
+    splits = splits_of(data, error)
+    sizes = [
+        float(np.mean(Scorer.of(data, splits, misfit=misfit).whiten(error) ** 2))
+        for misfit in (True, False)
+    ]
+    assert sizes[0] == pytest.approx(1.0, rel=0.2)
+    assert sizes[1] > 1.25 * sizes[0]
