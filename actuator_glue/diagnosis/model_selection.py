@@ -173,7 +173,7 @@ class ModelSelection:
         current = self.pruned(current)
         for name in current.effects:
             current = self.search.polish(replace(current, added=name))
-        current, rivals = self.spoken(*self.settle(current))
+        current, rivals = self.spoken(*self.settle(self.search.finished(current)))
         gains, nats = {}, {}
         for name in current.effects:
             rest = self.search.without(current, name)

@@ -37,6 +37,7 @@ _TOLERANCE = 1e-4
 _FINISHED = 2  # iterations on all samples after those on stretches of them
 _PROMISING = 0.95  # of the error at most is left by friction that is looked at twice
 _POLISHED = 4
+_LAST = 60  # iterations at most of a structure that is told
 # What adds a pole may change places with the valve's: a second minimum, which a valve that is
 # slower or quicker by these factors, of the same bandwidth, leads to.
 _POLES = ('lag', 'gain', 'inertia')
@@ -161,6 +162,14 @@ class Search:
             starts[:, :2] *= np.array(factors)[:, None]
             self._tried[key] = fit(self.data, trial.structure, starts)
             self._polished[key] = len(factors)
+        return self.trial(trial.effects, trial.added)
+
+    def finished(self, trial: Trial) -> Trial:
+        """Go on with a refit until it gains nothing: a pole beside a zero creeps."""
+        key = frozenset(trial.effects)
+        self._tried[key] = fit(
+            self.data, trial.structure, self._tried[key].theta, iterations=_LAST
+        )
         return self.trial(trial.effects, trial.added)
 
     def _stand_in(self, model: Structure) -> Part:

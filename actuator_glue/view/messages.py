@@ -21,6 +21,7 @@ from actuator_glue.io.bag_reader import (
 )
 from actuator_glue.io.bag_samples import topics_of_actuator
 from actuator_glue.io.messages import deserialize, full_name
+from actuator_glue.sample_block import from_message
 from actuator_glue.view.history import History
 
 _DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
@@ -67,10 +68,12 @@ class Intake:
         with self.lock:
             getattr(self, f'_take_{TYPES[kind]}')(message)
 
-    def _take_samples(self, block: Any) -> None:
-        rows = {'command': block.command, 'measured': block.measured}
-        if len(block.measured) == len(block.command) > 0 and block.period > 0.0:
-            self.history.add_samples(int(block.index), float(block.period), rows)
+    def _take_samples(self, message: Any) -> None:
+        block = from_message(message)
+        # Shown as it came, NaN and all: a fault is what somebody looks for.
+        if len(block.measured) == len(block) > 0 and block.period > 0.0:
+            rows = {'command': block.command, 'measured': block.measured}
+            self.history.add_samples(block.index, block.period, rows)
 
     def _take_setup(self, setup: Any) -> None:
         content = {

@@ -15,7 +15,9 @@ def block(first: int, count: int) -> Any:
     """Return a SampleBlock of a slow sine of 2 mm, what is measured a little late."""
     time = np.arange(first, first + count) / RATE
     command, measured = (2e-3 * np.sin(6.0 * (time - late)) for late in (0.0, 0.03))
-    return Message(command=command, measured=measured, index=first, period=1 / RATE)
+    header = Message(stamp=Message(sec=0, nanosec=0))
+    channels = {'command': command, 'measured': measured, 'force': ()}
+    return Message(header=header, index=first, period=1 / RATE, **channels)
 
 
 def band(first: int, count: int, *, half: float = 0.4e-3) -> Any:
