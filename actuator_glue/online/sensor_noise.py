@@ -11,7 +11,9 @@ _DIFFERENCE_GAIN = 70.0  # variance of the 4th difference of white noise of unit
 _TAIL = 1e-4  # share of the command's power above its bandwidth
 # Frequencies from which one density is taken: it then scatters by a tenth, an rms by half of it.
 _BINS = 32
-_COLOURED = 1.25  # ratio to white noise from which on the noise is coloured, five times that
+# Ratio to white noise from which on the noise is filtered: less may be harmonics of what the model
+# lacks, beside noise that is white, and the alarm would not hear them.
+_FILTERED = 3.0
 
 
 def white_noise(measured: Array) -> float:
@@ -38,8 +40,8 @@ def sensor_noise(residual: Array, command: Array, white: float) -> float:
     Args:
         residual: measured less simulated displacement, shape (n,) [m].
         command: of the same samples, shape (n,) [m].
-        white: what `white_noise` says [m]; it is returned where the spectrum says no more, or
-            where too little of it lies above the command.
+        white: what `white_noise` says [m]; it is returned unless the spectrum says three times as
+            much, and where too little of it lies above the command.
     """
     taper: Array = np.hanning(len(residual)).astype(np.float64)
     moved = np.cumsum(_power(command, taper))
@@ -56,7 +58,7 @@ def sensor_noise(residual: Array, command: Array, white: float) -> float:
         found += density * (edge if below else 0) + density * (min(2 * edge, len(power)) - edge)
         edge, below = 2 * edge, False
     coloured = float(np.sqrt(2.0 * found / len(residual) / np.sum(taper**2)))
-    return coloured if coloured > _COLOURED * white else white
+    return coloured if coloured > _FILTERED * white else white
 
 
 def _power(x: Array, taper: Array) -> Array:
