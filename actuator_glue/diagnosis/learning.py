@@ -81,7 +81,8 @@ def _displaces(selection: ModelSelection, trial: Trial, best: Trial) -> bool:
     """Whether a term would only take the place of names that explain nearly the same.
 
     Beside the term they are not worth their parameters, though something remains: a smooth form
-    is closer to the machine than the catalogue's equation for what is one cause.
+    is closer to the machine than the catalogue's equation for what is one cause. What leaves
+    materially more than the term does not explain nearly the same.
     """
     search = selection.search
     after = selection.pruned(trial)
@@ -92,7 +93,8 @@ def _displaces(selection: ModelSelection, trial: Trial, best: Trial) -> bool:
         if name not in after.effects and not is_learned(search.entries[name]):
             rest = search.without(rest, name)
     nearly = 1.0 - selection.settings.tie_share
-    return removed(rest, best) ** 2 > nearly * removed(rest, after) ** 2
+    alike = removed(best, after) < selection.material
+    return alike and removed(rest, best) ** 2 > nearly * removed(rest, after) ** 2
 
 
 def _merit(trial: Trial) -> float:
