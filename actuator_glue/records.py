@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias, cast
+from typing import Literal, TypeAlias, TypeGuard, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,16 +19,26 @@ MAX_FORCE = 1e9  # N
 MAX_STIFFNESS = 1e12  # N/m
 
 
+def _kept(values: ArrayLike) -> TypeGuard[Array]:
+    """Whether nobody writes to these values any more: a column of another record."""
+    return (
+        isinstance(values, np.ndarray)
+        and values.dtype == np.float64
+        and values.flags.owndata
+        and not values.flags.writeable
+    )
+
+
 def _column(values: ArrayLike, name: str, unit: str, limit: float, source: str) -> Array:
     where = f'{source}: ' if source else ''
     try:
-        column = np.array(values, dtype=np.float64)
+        column = values if _kept(values) else np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError(f'{where}{name} is not a list of numbers ({error})') from error
     if column.ndim != 1:
         raise InputError(f'{where}{name} must be one-dimensional, got shape {column.shape}')
     # One pass where all is well: a NaN fails the comparison as well.
-    if column.size and not np.abs(column).max() <= limit:
+    if column.size and not max(column.max(), -column.min()) <= limit:
         bad = ~np.isfinite(column)
         if bad.any():
             raise InputError(

@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.data import Data, chunks
 from actuator_glue.diagnosis.fit import Fit
 from actuator_glue.diagnosis.noise import Split, split, whiten, whitener
 from actuator_glue.diagnosis.stretches import Part
@@ -54,10 +54,12 @@ class Scorer:
         return Scorer(part.data, tuple(self.taps[i] for i in part.records), ())
 
     def whiten(self, rows: Array) -> Array:
-        """Whiten joined rows (..., N), record by record."""
+        """Whiten joined rows (..., N), record by record, few at a time."""
         out = np.empty_like(rows)
+        table, found = (a.reshape(-1, rows.shape[-1]) for a in (rows, out))
         for part, taps in zip(self.data.parts, self.taps, strict=True):
-            out[..., part] = whiten(rows[..., part], taps)
+            for some in chunks(len(table), table.shape[1]):
+                found[some, part] = whiten(table[some, part], taps)
         return out
 
     def block_scores(self, fit: Fit) -> Array:

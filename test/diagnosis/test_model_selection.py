@@ -171,12 +171,12 @@ class Displaced:
 
 @pytest.mark.parametrize(
     ('named', 'term', 'displaces'),
-    [(9e-6, 8e-6, True), (9e-6, 1e-6, False), (14e-6, 8e-6, False)],
+    [(8.2e-6, 8e-6, True), (9e-6, 8e-6, False), (9e-6, 1e-6, False), (14e-6, 8e-6, False)],
 )
 def test_a_term_takes_no_place_of_what_has_a_name(
     named: float, term: float, displaces: bool
 ) -> None:
-    """Unless nothing material is left then, or the name does not explain nearly the same."""
+    """Unless nothing material is left then, or the name leaves materially more (2 um here)."""
     best = trial(('flow-asymmetry',), named)
     both = trial(('flow-asymmetry', 'learned-valve-e2'), term)
     found = Displaced(term)
