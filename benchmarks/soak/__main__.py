@@ -34,7 +34,7 @@ STALL = 3.0  # s
 # Shares of the run: until the first, processes are killed as well; after the second, memory is
 # watched. By then all kinds of faults have come, buffers are full (the viewer keeps 17 minutes),
 # and nobody's growth is that of a process just born.
-KILLS, WARM = 0.5, 0.6
+KILLS, WARM = 0.4, 0.6
 READY_SECONDS = 400.0
 
 
