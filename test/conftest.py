@@ -69,3 +69,24 @@ def overlapping_texts() -> Callable[..., list[tuple[str, str]]]:
         ]
 
     return overlapping
+
+
+@pytest.fixture
+def least_p() -> Callable[..., float]:
+    """Return a function: the least p-value of ranks that ought to be uniform, of all parameters.
+
+    Two tests each, chi-square of the counts and Kolmogorov-Smirnov (Talts et al. 2018), printed.
+    """
+    from scipy.stats import chisquare, kstest
+
+    def judge(name: str, ranks: np.ndarray, draws: int, bins: int, seed: int) -> float:
+        rng, least = np.random.default_rng(seed), 1.0
+        for column in ranks.T:
+            counts = np.bincount(column * bins // (draws + 1), minlength=bins)
+            smooth = (column + rng.random(len(column))) / (draws + 1)
+            p = float(chisquare(counts).pvalue), float(kstest(smooth, 'uniform').pvalue)
+            print(f'{name}: chi-square p {p[0]:.3f}, ECDF p {p[1]:.3f}, counts {counts.tolist()}')
+            least = min(least, *p)
+        return least
+
+    return judge

@@ -144,9 +144,9 @@ class VirtualTest:
         rng = np.random.default_rng((self._seed, block))
         shared = (self._numerical, self._lanes(which), self._course, ats, rng, found)
         if self._curved:
-            program = self._structure.program.parts
+            parts = self._structure.program.parts
             on = self._structure.switches
-            virtual_kernel.run_effects(*shared, on, program, self._substeps)
+            virtual_kernel.run_effects(*shared, on, parts, self._substeps)
         else:
             virtual_kernel.run_linear(*shared)
         return found

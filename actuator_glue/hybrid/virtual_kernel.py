@@ -191,7 +191,7 @@ def run_effects(
     rng: Any,
     found: Found,
     on: NDArray[np.bool_],
-    code: machine.Parts,
+    parts: machine.Parts,
     substeps: int,
 ) -> None:
     """Run a block of actuators with any effects, as `run_linear`.
@@ -204,7 +204,7 @@ def run_effects(
         rng: of the sensors' noise.
         found: receives the response.
         on: which stages act, (assembly.SWITCHES,).
-        code: effects written as expressions.
+        parts: effects written as expressions.
         substeps: of a sample.
     """
     s = len(structure.step)
@@ -240,7 +240,7 @@ def run_effects(
                 jump = (right - left) if share > 0.0 else 0.0
                 w[r.IN_MEAN + n] = left + jump * share
                 w[r.IN_SLOPE + n] = 6.0 * jump * share * (1.0 - share)
-            kernel.substep(w, g, code, on, 0.0, rate, (i + (j + 0.5) * inverse) * course.period)
+            kernel.substep(w, g, parts, on, 0.0, rate, (i + (j + 0.5) * inverse) * course.period)
             for n in range(LANES):
                 corrected = stages.chains(w, n, 0.0, 0.0)
                 work[0, n] = work[1, n] = corrected

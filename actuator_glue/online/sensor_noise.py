@@ -51,12 +51,11 @@ def sensor_noise(residual: Array, command: Array, white: float) -> float:
     edge = max(2 * bandwidth, _BINS)
     if 2 * edge > len(power):
         return white
-    found = 0.0
-    below = True
+    found, begin = 0.0, 0
     while edge < len(power):
         density = float(np.median(power[edge : 2 * edge])) / np.log(2.0)
-        found += density * (edge if below else 0) + density * (min(2 * edge, len(power)) - edge)
-        edge, below = 2 * edge, False
+        found += density * (min(2 * edge, len(power)) - begin)
+        begin = edge = 2 * edge
     coloured = float(np.sqrt(2.0 * found / len(residual) / np.sum(taper**2)))
     return coloured if coloured > _FILTERED * white else white
 

@@ -112,18 +112,15 @@ class Soak:
             # None so late that nothing could be seen of it any more.
             if now >= due and now < end - 25.0:
                 young = now - start < KILLS * (end - start)
-                order = [k for k in order if young or k not in KILLED] or self._kinds(young)
-                kind = order.pop()
+                kinds = [k for k in (*WIRE, *NODES) if young or k not in KILLED]
+                order = [k for k in order if k in kinds] or list(self.rng.permutation(kinds))
+                kind = str(order.pop())
                 print(f'{now - start:7.1f} s  {kind}', flush=True)
                 begun = time.time()
                 seconds = self._fault(kind, wire)()
                 self.faults.append(judge.Fault(kind, begun, seconds))
                 due = now + seconds + self.args.every * float(self.rng.uniform(0.7, 1.3))
             time.sleep(1.0)
-
-    def _kinds(self, young: bool) -> list[str]:
-        kinds = [k for k in (*WIRE, *NODES) if young or k not in KILLED]
-        return [str(k) for k in self.rng.permutation(kinds)]
 
     def _all_there(self) -> None:
         for name, node in self.running.items():
