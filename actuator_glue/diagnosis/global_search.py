@@ -19,7 +19,7 @@ from actuator_glue.model.effects import scale
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 
-_POPULATION = 32  # as many as the kernel works on at a time
+_POPULATION = 64  # of 32, one in 200 searches ended in a valley beside the lowest
 _GENERATIONS = 40
 _SEED = 0
 
