@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 from pathlib import Path
+from typing import Literal
 
 from actuator_glue.errors import InputError
 
@@ -25,6 +26,11 @@ def number(text: str) -> float:
     if not math.isfinite(float(text)):
         raise argparse.ArgumentTypeError(f'{text!r} is not finite')
     return float(text)
+
+
+def number_or_auto(text: str) -> float | Literal['auto']:
+    """Return a finite number, or 'auto'."""
+    return 'auto' if text == 'auto' else number(text)
 
 
 class Output(str):

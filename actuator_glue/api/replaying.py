@@ -25,7 +25,7 @@ from actuator_glue.online.job import WindowResult
 from actuator_glue.online.playback import Item, items, stream
 from actuator_glue.online.playback import replay as run
 from actuator_glue.online.published import Comparison, Published, compare, published
-from actuator_glue.online.settings import EstimatorSettings
+from actuator_glue.online.settings import AUTOMATIC, EstimatorSettings
 from actuator_glue.online.stream import Rejected
 from actuator_glue.records import Record
 from actuator_glue.sample_block import Block, check_block
@@ -70,7 +70,8 @@ def replay(
         namespace: whose samples, where a bag has several actuators.
         tracking: whether each window tells how the actuator followed its command.
         progress: called with the share of the messages read.
-        settings: window [s], hop [s], settle [s], shaping_factor, evaluations, seed.
+        settings: window [s], hop [s], settle [s], shaping_factor ('auto': of each window's
+            residual), evaluations, seed.
 
     Raises:
         InputError: unusable bag, record or setting, or not one window could be estimated.
@@ -81,6 +82,8 @@ def replay(
             f'replay has no setting {", ".join(unknown)}; it has {", ".join(OVERRIDES)}'
         )
     asked = {name: value for name, value in settings.items() if value is not None}
+    if asked.get('shaping_factor') == 'auto':
+        asked['shaping_factor'] = AUTOMATIC
     under_way = _open(source, namespace, compare_live=not asked)
     under_way.tracking = tracking
     started = time.perf_counter()

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
-from actuator_glue.arguments import Output, number
+from actuator_glue.arguments import Output, number, number_or_auto
 from actuator_glue.cli._effects_file import add_effects_file, load_effects
 from actuator_glue.cli._output import add_json, note, progress, say, table
 from actuator_glue.cli._prior import add_prior, prior_options
@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_records(parser)
     parser.add_argument(
         '--shaping-factor',
-        type=_shaping,
+        type=number_or_auto,
         default='auto',
         metavar='G',
         help='G of L = -G ln Var[E], Eq. (4); the paper shows 256 (default auto: half of the '
@@ -158,11 +158,6 @@ def bounds(given: Sequence[str]) -> dict[str, tuple[float, float]]:
             raise InputError(f'--bounds {text}: {name} has bounds already')
         out[name] = (lower, upper)
     return out
-
-
-def _shaping(text: str) -> float | Literal['auto']:
-    """Return G, or 'auto'."""
-    return 'auto' if text == 'auto' else number(text)
 
 
 def _show(found: Calibration, args: argparse.Namespace) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
-from actuator_glue.arguments import number
+from actuator_glue.arguments import number, number_or_auto
 from actuator_glue.cli._output import add_json, note, progress, say, table
 from actuator_glue.cli._records import add_reading, load
 from actuator_glue.io.json_file import write_json
@@ -34,7 +34,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument('--window', type=number, metavar='S', help='length of a window')
     group.add_argument('--hop', type=number, metavar='S', help='time between windows')
     group.add_argument('--settle', type=number, metavar='S', help='uncounted start of a window')
-    group.add_argument('--shaping-factor', type=number, metavar='G', help='G of Eq. (4)')
+    group.add_argument(
+        '--shaping-factor',
+        type=number_or_auto,
+        metavar='G',
+        help="G of Eq. (4); 'auto': half of the samples that each window's residual is worth",
+    )
     group.add_argument('--evaluations', type=int, metavar='N', help='evaluations per window')
     group.add_argument('--seed', type=int, metavar='S', help='seed of the sampler')
     add_json(parser)

@@ -40,6 +40,7 @@ class WindowResult:
         prior_dominated: True where the window says little more than the prior, shape (p,).
         rms_error: rms of measured minus best simulated displacement, mean removed [m].
         nrmse: rms_error over the standard deviation of the measured displacement.
+        shaping_factor: G of Eq. (4) the window was sampled with; NaN for a formal likelihood.
         noise: standard deviation of the sensor noise [m].
         evaluations: likelihood evaluations done.
         stopped_early: the time budget ended the sampling.
@@ -64,6 +65,7 @@ class WindowResult:
     prior_dominated: tuple[bool, ...] = ()
     rms_error: float = float('nan')
     nrmse: float = float('nan')
+    shaping_factor: float = float('nan')
     noise: float = 0.0
     evaluations: int = 0
     stopped_early: bool = False
@@ -150,6 +152,7 @@ def _report(job: Job, fitted: WindowFit, limits: bool) -> WindowResult:
         ess=ess,
         rms_error=fitted.rms_error,
         nrmse=fitted.nrmse,
+        shaping_factor=fitted.shaping_factor,
         noise=frozen.noise,
         evaluations=chains.evaluations,
         stopped_early=not fitted.complete,

@@ -23,7 +23,8 @@ from actuator_glue.model import linear
 from actuator_glue.online import fitting
 from actuator_glue.online.forecast import Frozen
 from actuator_glue.online.sensor_noise import sensor_noise, white_noise
-from actuator_glue.online.settings import EstimatorSettings
+from actuator_glue.online.settings import AUTOMATIC, EstimatorSettings
+from actuator_glue.online.shaping import automatic
 from actuator_glue.online.stream import Window
 from actuator_glue.records import Array, Record
 
@@ -96,6 +97,7 @@ class WindowFit:
         chains: draws of the physical parameters, with log likelihoods.
         rms_error: rms of measured minus best simulated displacement, mean removed [m].
         nrmse: rms_error over the standard deviation of the measured displacement.
+        shaping_factor: G of Eq. (4); NaN for a formal likelihood.
         frozen: the posterior, to be held against later samples.
         archive: points to start from, shape (m, p).
         learned: the posterior, for the priors of later windows; None where none is wanted.
@@ -109,6 +111,7 @@ class WindowFit:
     chains: Chains | None = None
     rms_error: float = float('nan')
     nrmse: float = float('nan')
+    shaping_factor: float = float('nan')
     frozen: Frozen | None = None
     archive: Array | None = None
     learned: Carried | None = None
@@ -131,7 +134,11 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> WindowFit:
     settle = round(job.settings.settle / record.period)
     white = white_noise(record.measured)
     moved = _check_excited(record, settle, white)
-    target = _target(job)
+    near = None
+    if job.archive is not None:
+        near = np.sort(job.archive, axis=0)[len(job.archive) // 2]
+    shaping = _shaping(job, settle, near)
+    target = _target(job, shaping, near)
     chains, complete = _sample(job, target, expired)
     posterior = chains.posterior()
     best = fitting.simulate(job.model, chains.best[np.newaxis], record)[0]
@@ -144,6 +151,7 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> WindowFit:
         chains=chains,
         rms_error=rms_error,
         nrmse=rms_error / moved,
+        shaping_factor=shaping,
         frozen=Frozen(
             number=job.window.number,
             segment=job.window.segment,
@@ -180,17 +188,24 @@ def _past(job: Job, start: int) -> Record:
     return record.slice(max(0, begin), len(record))
 
 
-def _target(job: Job) -> Target:
+def _shaping(job: Job, settle: int, near: Array | None) -> float:
+    """Return G: given, or of this window; NaN where the likelihood has none."""
+    settings = job.settings
+    if settings.likelihood != 'glue':
+        return float('nan')
+    if settings.shaping_factor != AUTOMATIC:
+        return settings.shaping_factor
+    return automatic(job.window.record, job.model, settle, near)
+
+
+def _target(job: Job, shaping: float, near: Array | None) -> Target:
     """Return what is sampled."""
     settings, model, record = job.settings, job.model, job.window.record
-    near = None
-    if job.archive is not None:
-        near = np.sort(job.archive, axis=0)[len(job.archive) // 2]
     return Problem(
         records=(record,),
         model=model,
         likelihood=settings.likelihood,
-        shaping_factor=settings.shaping_factor,
+        shaping_factor=shaping,
         initial='measured',
         settle=settings.settle,
         first_index=record.first_index,

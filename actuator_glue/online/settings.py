@@ -15,6 +15,9 @@ from actuator_glue.inference.carried import Drift
 Likelihood: TypeAlias = Literal['glue', 'gaussian']
 PriorMode: TypeAlias = Literal['box', 'calibration', 'sequential']
 Contradiction: TypeAlias = Literal['widen', 'restart', 'alarm']
+# Shaping factor that each window takes from its own residual.
+AUTOMATIC = 0.0
+
 CHOICES: dict[str, tuple[str, ...]] = {
     'likelihood': get_args(Likelihood),
     'prior': get_args(PriorMode),
@@ -45,7 +48,9 @@ LIMITS: dict[str, Limit] = {
     'hop': Limit('s', 0.01, 600.0, 'time from one window to the next'),
     'settle': Limit('s', 0.0, 60.0, 'start of a window that only lets the state be forgotten'),
     'time_budget': Limit('s', 1e-3, 600.0, 'longest time one window may be computed'),
-    'shaping_factor': Limit('1', 1e-3, 1e9, 'G of L = -G ln Var[E], Eq. (4)'),
+    'shaping_factor': Limit(
+        '1', 0.0, 1e9, 'G of L = -G ln Var[E], Eq. (4); 0: half of what the residual is worth'
+    ),
     'evaluations': Limit('1', 2000, 10_000_000, 'evaluations of a window of Eq. (2), at most'),
     'start_evaluations': Limit('1', 2000, 10_000_000, 'evaluations of a window sampled afresh'),
     'chains': Limit('1', 3, 256, 'Markov chains'),
@@ -86,7 +91,7 @@ class EstimatorSettings:
     hop: float = 1.0
     settle: float = 0.5
     time_budget: float = 0.8
-    shaping_factor: float = 256.0
+    shaping_factor: float = AUTOMATIC
     evaluations: int = 4000
     start_evaluations: int = 30_000
     chains: int = 8

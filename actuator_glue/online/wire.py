@@ -128,7 +128,7 @@ def posterior(result: WindowResult, seconds: float) -> tuple[Head, Fields]:
         result: a result that has a posterior.
         seconds: time the window took [s].
     """
-    moments, record, settings = result.moments, result.window.record, result.settings
+    moments, record = result.moments, result.window.record
     assert moments is not None and result.rhat is not None and result.ess is not None
     assert result.best is not None
     fields: Fields = {
@@ -151,7 +151,7 @@ def posterior(result: WindowResult, seconds: float) -> tuple[Head, Fields]:
         'ess_min': float(result.ess.min()),
         'rms_error': result.rms_error,
         'nrmse': result.nrmse,
-        'shaping_factor': settings.shaping_factor if settings.likelihood == 'glue' else _NAN,
+        'shaping_factor': result.shaping_factor,
         'evaluations': result.evaluations,
         'seconds': seconds,
         'converged': result.converged,

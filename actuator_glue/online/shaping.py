@@ -1,0 +1,77 @@
+"""The shaping factor G of one window: given, or from the autocorrelation of its own residual."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import least_squares
+from scipy.stats import qmc
+
+from actuator_glue.errors import InputError
+from actuator_glue.inference.choice import ModelChoice
+from actuator_glue.inference.effective_size import effective_size
+from actuator_glue.online import fitting
+from actuator_glue.records import Array, Record
+
+# Trial points of the box, where no earlier window says where to look.
+_TRIALS = 64
+_ITERATIONS = 12
+# Finite differences, as shares of the box.
+_STEP = 1e-4
+# What diverges is this far out: as bad as any other.
+_ABSURD = 1.0  # m
+
+
+def automatic(record: Record, model: ModelChoice, settle: int, near: Array | None) -> float:
+    """Return half of the independent samples that the residual of the best fit is worth.
+
+    The fit is by least squares, from an earlier window's posterior where there is one. The same
+    samples and the same start give the same factor: a replay has it, too.
+
+    Args:
+        record: samples of the window, n.
+        model: what is fitted, p parameters.
+        settle: samples at the start that do not count.
+        near: parameters (p,) near the best fit, where known.
+
+    Raises:
+        InputError: as `fitting.simulate`.
+    """
+    lower, upper = model.bounds
+    width = upper - lower
+    measured = record.measured[settle:]
+
+    def respond(shares: Array) -> Array:
+        with np.errstate(over='ignore', invalid='ignore'):
+            found = fitting.simulate(model, lower + shares * width, record)[:, settle:]
+        return np.clip(np.nan_to_num(found, nan=_ABSURD), -_ABSURD, _ABSURD)
+
+    def error(shares: Array) -> Array:
+        return np.asarray(measured - respond(shares[np.newaxis])[0])
+
+    def slopes(shares: Array) -> Array:
+        # Inwards at the upper bound.
+        steps = np.where(shares + _STEP > 1.0, -_STEP, _STEP)
+        found = respond(np.vstack([shares, shares + np.diag(steps)]))
+        return np.asarray((found[1:] - found[0]) / steps[:, np.newaxis])
+
+    def descent(shares: Array) -> Array:
+        return -slopes(shares).T
+
+    if near is None:
+        trials = qmc.Sobol(len(width), scramble=False).random(_TRIALS)
+        start = trials[np.argmin(((measured - respond(trials)) ** 2).sum(axis=1))]
+    else:
+        start = (near - lower) / width
+    best = least_squares(
+        error,
+        np.clip(start, 1e-6, 1.0 - 1e-6),
+        jac=descent,
+        bounds=(0.0, 1.0),
+        x_scale='jac',
+        max_nfev=_ITERATIONS,
+    )
+    try:
+        return 0.5 * effective_size([best.fun], [slopes(best.x)])
+    except InputError:
+        # Nothing is left to explain: every sample counts.
+        return 0.5 * len(measured)
