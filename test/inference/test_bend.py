@@ -51,8 +51,8 @@ def test_normal_points_do_not_bend(dimension: int, size: int, rng_seed: int) -> 
 def test_chains_start_wider_than_they_end(rng_seed: int) -> None:
     """R-hat compares chains that began further apart than the posterior is wide.
 
-    300 chains: the variance of their starts, about twice that of the posterior, scatters by a
-    tenth.
+    The variance of 300 starts is 1.53 +- 0.10 of the posterior's over 150 seeds, that of their
+    ends 0.96 +- 0.06: outside of these limits by chance once in 5000 runs.
     """
     target = targets.equicorrelated(4)
     rng = np.random.default_rng(rng_seed)
@@ -60,5 +60,5 @@ def test_chains_start_wider_than_they_end(rng_seed: int) -> None:
     state = init(rng, target.log_density, target.lower, target.upper, settings)
     started = ((state.now.x / target.sd) ** 2).mean()
     state, _ = stretch(rng, state, 60)
-    assert started > 1.3
+    assert started > 1.15
     assert ((state.now.x / target.sd) ** 2).mean() == pytest.approx(1.0, abs=0.25)
