@@ -7,7 +7,6 @@ from pathlib import Path
 
 import actuator_glue as ag
 from actuator_glue.api.simulation import Command
-from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.records import Array
 
 # Quicker than real time: they are simulated, like the actuator itself.
@@ -42,8 +41,6 @@ def calibrate(
     found = ag.calibrate(
         records,
         evaluations=EVALUATIONS,
-        # As careful as the windows that follow.
-        shaping_factor=EstimatorSettings().shaping_factor,
         seed=seed,
         progress=lambda made: tell(made / EVALUATIONS),
     )
