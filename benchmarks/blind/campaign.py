@@ -25,8 +25,8 @@ sys.path.insert(0, str(HERE))
 sys.path.insert(0, str(HERE.parents[1]))
 
 
-def one(seed: int, cache: Path, generator: str) -> dict[str, Any]:
-    """Build, diagnose and cache one case."""
+def one(seed: int, cache: Path, generator: str, options: dict[str, Any]) -> dict[str, Any]:
+    """Build, diagnose and cache one case; options are those of the generator."""
     path = cache / f'{seed}.json'
     if path.exists():
         return dict(json.loads(path.read_text()))
@@ -37,7 +37,7 @@ def one(seed: int, cache: Path, generator: str) -> dict[str, Any]:
     from actuator_glue.model.parameters import NAMES
     from actuator_glue.records import Record
 
-    case = import_module(generator).build(seed)
+    case = import_module(generator).build(seed, **options)
     names = ('first', 'second', 'held')
     rows = zip(case.commands, case.measured, case.stiffness, names, strict=True)
     records = [Record(u, y, 1.0 / case.rate, stiffness=k, source=s) for u, y, k, s in rows]
@@ -85,14 +85,28 @@ def main() -> int:
         help='cases: one effect on one test; variant: other forms, other tests; mixed: several '
         'effects, spikes, onsets',
     )
+    parser.add_argument(
+        '--effects',
+        nargs='+',
+        default=[],
+        help='machines of `variant` with these effects instead of those that the seeds draw',
+    )
+    parser.add_argument('--bare', action='store_true', help='those machines have no specimen')
     parser.add_argument('--out', type=Path, default=Path('out/blind'))
     args = parser.parse_args()
     seeds = range(args.first, args.first + args.cases)
     generator = args.generator
     out = args.out if generator == 'cases' else args.out / generator
+    options: dict[str, Any] = {}
+    if args.effects:
+        options['asked'] = tuple(args.effects)
+        out /= '+'.join(args.effects)
+    if args.bare:
+        options['stiffness'] = (0.0, 0.0, 0.0)
+        out /= 'bare'
     results = []
     with ProcessPoolExecutor(args.jobs) as pool:
-        futures = [pool.submit(one, seed, out / 'cases', generator) for seed in seeds]
+        futures = [pool.submit(one, seed, out / 'cases', generator, options) for seed in seeds]
         for i, future in enumerate(as_completed(futures)):
             result = future.result()
             results.append(result)

@@ -30,7 +30,12 @@ def catalogued(name: str) -> str:
 
 
 def values(
-    sizes: dict[str, float], theta: Array, stroke: float, sign: float = 1.0, form: int = 0
+    sizes: dict[str, float],
+    theta: Array,
+    stroke: float,
+    sign: float = 1.0,
+    form: int = 0,
+    frame: tuple[float, float] = (0.0, 0.0),
 ) -> dict[str, float]:
     """Return the true parameters of effects whose equation is the catalogue's, by name [SI].
 
@@ -40,6 +45,7 @@ def values(
         stroke: largest command of the first record [m].
         sign: of effects that have two.
         form: which way an effect with several is written.
+        frame: natural frequency [Hz] and damping ratio of the reaction frame.
     """
     out: dict[str, float] = {}
     for name, size in sizes.items():
@@ -66,6 +72,9 @@ def values(
                 out['sensor_even'] = sign * size / stroke**2
             case 'sensor-cubic':
                 out['sensor_odd'] = sign * size / stroke**3
+            case 'frame-mode':
+                out['frame_compliance'], out['frame_seen'] = size / 250e3, 0.5 * form
+                out['frame_frequency'], out['frame_damping'] = frame
             case _ if name in _PLAIN:
                 out[_PLAIN[name]] = size
             case _ if name in _SIGNED:

@@ -13,7 +13,7 @@ from case import Case, kinds
 from equivalents import values
 from scipy import signal
 from sizing import NOISE, Array, base_residual, sized
-from variant_effects import SIZES, UNKNOWN, Forms, respond
+from variant_effects import ASKED, SIZES, UNKNOWN, Forms, respond
 
 STIFFNESS = (0.0, 250e3, 250e3)
 
@@ -90,10 +90,14 @@ def noise(rng: np.random.Generator, n: int, kind: int) -> Array:
     return np.asarray(NOISE * (np.sqrt(0.5) * white + np.sqrt(0.5) * slow))
 
 
-def build(seed: int) -> Case:
-    """Build one case from its seed alone."""
+def build(
+    seed: int, asked: tuple[str, ...] = (), stiffness: tuple[float, ...] = STIFFNESS
+) -> Case:
+    """Build one case from its seed, and with the effects that are asked for instead of its own."""
     rng = np.random.default_rng([seed, 11])
     kind, names = kinds(seed, tuple(SIZES), tuple(UNKNOWN))
+    if asked:
+        kind, names = 'single' if len(asked) == 1 else 'pair', asked
     theta = draw_plant(rng)
     inputs = commands(rng)
     forms = Forms.draw(rng)
@@ -102,21 +106,29 @@ def build(seed: int) -> Case:
     ratio = 0.0
 
     def left(outputs: list[Array]) -> float:
-        return base_residual(theta, inputs, outputs, STIFFNESS, plant.RATE) / NOISE
+        return base_residual(theta, inputs, outputs, stiffness, plant.RATE) / NOISE
+
+    def outputs_of(tried: dict[str, float]) -> list[Array]:
+        return respond(theta, tried, inputs[:2], stiffness, forms, seed)
 
     def ratio_of(tried: dict[str, float]) -> float:
-        outputs = respond(theta, tried, inputs[:2], STIFFNESS, forms, seed)
+        outputs = outputs_of(others | tried)
+        if others:  # what it adds to theirs; without a payload a frame feels no force at k = 0
+            rows = zip(outputs, outputs_of(others), outputs_of({}), strict=True)
+            outputs = [y - without + base for y, without, base in rows]
         return left(outputs) if all(np.isfinite(y).all() for y in outputs) else np.inf
 
+    others: dict[str, float] = {}
     if kind == 'none' and rng.random() < 0.5:
         sizes = {'coulomb-friction': min(20.0 / theta[2], 2e-6), 'backlash': 3e-6}
     target = float(np.exp(rng.uniform(np.log(0.7), np.log(8.0))))
     for name in names:
+        others = sizes if asked else {}
         own = max(target, 2.0) if kind == 'pair' else target
-        size, shares[name] = sized((name,), SIZES | UNKNOWN, ratio_of, own)
+        size, shares[name] = sized((name,), SIZES | UNKNOWN | ASKED, ratio_of, own)
         sizes |= size
         ratio = shares[name] if len(names) == 1 else 0.0
-    clean = respond(theta, sizes, inputs, STIFFNESS, forms, seed)
+    clean = respond(theta, sizes, inputs, stiffness, forms, seed)
     if 'payload-inertia' in sizes:
         theta = forms.heavy(theta)
     colour = int(rng.integers(4))
@@ -139,7 +151,7 @@ def build(seed: int) -> Case:
         names,
         theta,
         plant.RATE,
-        STIFFNESS,
+        stiffness,
         inputs,
         measured,
         clean,
@@ -147,5 +159,5 @@ def build(seed: int) -> Case:
         float(colour),
         sizes,
         shares,
-        values(sizes, theta, float(np.abs(inputs[0]).max()), forms.sign, forms.form),
+        values(sizes, theta, float(np.abs(inputs[0]).max()), forms.sign, forms.form, forms.frame),
     )

@@ -63,6 +63,10 @@ NEUTRAL = {
     'command_rate': 0.0,  # s/m, one over the fastest command
     'loop_lag': 0.0,  # s, pole of the controller's own transducer
     'turbulent_leak': 0.0,  # N^0.5/s, leakage as through an orifice
+    'frame_compliance': 0.0,  # m/N, of the frame that holds the cylinder
+    'frame_speed': 1.0,  # rad/s
+    'frame_damping': 0.0,
+    'frame_seen': 0.0,  # share of its motion that the recorded transducer sees
 }
 INDEX = {name: i for i, name in enumerate(NEUTRAL)}
 (
@@ -71,7 +75,8 @@ INDEX = {name: i for i, name in enumerate(NEUTRAL)}
     POSITION_GAIN, DROOP, DROOP_FORM, DROOP_FLOW, DROOP_TIME, GAIN_DRIFT, DRIFT_FORM, COULOMB,
     FRICTION_FORM, STRIBECK, STRIBECK_SPEED, SUPPORT_STICK, VISCOUS, RETURN_DAMPING, MASS, GAP,
     HARDENING, YIELD_X, YIELD_RATIO, YIELD_POWER, YIELD_GAMMA, LOOSENING, LOOSENING_AT,
-    COMMAND_LAG, COMMAND_RATE, LOOP_LAG, TURBULENT_LEAK,
+    COMMAND_LAG, COMMAND_RATE, LOOP_LAG, TURBULENT_LEAK, FRAME, FRAME_SPEED, FRAME_DAMPING,
+    FRAME_SEEN,
 ) = range(len(NEUTRAL))  # fmt: skip
 _SLIP = 1e-3  # m/s
 _PRESLIDING = 5e-6  # m
@@ -157,11 +162,11 @@ def respond(command, theta, k, first_e, later_e, onset):
     h = 1.0 / (RATE * SUBSTEPS)
     b1, n0, a2, a3 = theta[0], theta[1], theta[2], theta[3]
     q = q2 = f = x = v = z = w = s = total = 0.0
-    felt = uplay = vplay = ulag = urate = 0.0
+    felt = uplay = vplay = ulag = urate = frame = frame_v = 0.0
     out = np.empty(n)
     for i in range(n):
-        out[i] = x
         e = first_e if i / RATE < onset else later_e
+        out[i] = x + e[FRAME_SEEN] * frame
         dry = e[COULOMB] + e[STRIBECK] + (e[SUPPORT_STICK] if k > 0.0 else 0.0)
         for j in range(SUBSTEPS):
             t = (i + j / SUBSTEPS) / RATE
@@ -184,7 +189,7 @@ def respond(command, theta, k, first_e, later_e, onset):
                 ulag += (u - ulag) * (1.0 - math.exp(-h / e[COMMAND_LAG]))
                 u = ulag
             uplay = _play(uplay, u, e[COMMAND_PLAY])
-            read = _play(felt, x, e[LOOP_PLAY])
+            read = _play(felt, x + frame, e[LOOP_PLAY])
             if e[LOOP_LAG] > 0.0:
                 read = felt + (read - felt) * (1.0 - math.exp(-h / e[LOOP_LAG]))
             felt = read
@@ -212,7 +217,7 @@ def respond(command, theta, k, first_e, later_e, onset):
                 else:  # emptied by flow, refilled at a fixed rate, never overfull
                     s += h * (abs(flow) / e[DROOP_FLOW] - 0.4) / e[DROOP_TIME]
                     s = min(max(s, 0.0), 1.5)
-            pull = f + h * (flow - a3 * f)
+            pull = f + h * (flow - a3 * f - a2 * frame_v)
             if e[TURBULENT_LEAK] > 0.0:
                 pull -= h * math.copysign(e[TURBULENT_LEAK] * math.sqrt(abs(f)), f)
             limit = e[COULOMB] + e[STRIBECK] * math.exp(-abs(v) / e[STRIBECK_SPEED])
@@ -251,6 +256,12 @@ def respond(command, theta, k, first_e, later_e, onset):
             x += h * v
             z += h * v * hard
             f = pull - h * a2 * v
+            if e[FRAME] > 0.0:
+                # The cylinder gives way to what it pushes the piston with.
+                w2 = e[FRAME_SPEED] ** 2
+                frame_v += h * w2 * (e[FRAME] * f - frame)
+                frame_v /= 1.0 + 2.0 * h * e[FRAME_DAMPING] * e[FRAME_SPEED]
+                frame += h * frame_v
         if not -1.0 < x < 1.0:
             out[i:] = np.nan
             break

@@ -49,3 +49,36 @@ def test_generator_and_catalogue_agree(name: str, monkeypatch: pytest.MonkeyPatc
     for stiffness, seen in zip(cases.STIFFNESS[:2], outputs[:2], strict=True):
         y = model.simulate(full, Record(command, seen, 1.0 / plant.RATE, stiffness))
         assert np.sqrt(np.mean((y - seen) ** 2)) < 0.5e-6
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(('form', 'payload'), [(0, False), (2, False), (1, True)])
+def test_frames_agree(form: int, payload: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A frame seen not at all, half and wholly by the transducer; with a payload at k = 0, too.
+
+    They were 0.13 to 0.37 um apart.
+    """
+    monkeypatch.syspath_prepend(str(BLIND))
+    equivalents, effects, plant = map(
+        import_module, ('equivalents', 'variant_effects', 'variant_plant')
+    )
+    theta = np.array([128.0, 1.01e9, 2.42e5, 0.3])
+    command = commands.sweep(plant.RATE, 20.0, 0.1, 9.0, 2e-3)
+    forms = effects.Forms(1.0, form, late=False, hertz=50.0, frame=(14.0, 0.02))
+    sizes, stiffnesses = {'frame-mode': 0.05}, (100e3, 250e3)
+    known = equivalents.values(sizes, theta, 2e-3, form=form, frame=forms.frame)
+    true = theta
+    if payload:
+        sizes, stiffnesses, true = (
+            {'payload-inertia': 0.2} | sizes,
+            (0.0, 250e3),
+            forms.heavy(theta),
+        )
+        mass = 0.2 * true[3] * theta[2] ** 2 / (theta[0] * theta[1])
+        known |= {'mass': mass, 'mass_damping': 0.0}
+    outputs = effects.respond(theta, sizes, [command] * 2, stiffnesses, forms, 1)
+    model = Structure(tuple(sizes))
+    full = np.append(true, [known[n] for n in model.names[4:]])
+    for stiffness, seen in zip(stiffnesses, outputs, strict=True):
+        y = model.simulate(full, Record(command, seen, 1.0 / plant.RATE, stiffness))
+        assert np.sqrt(np.mean((y - seen) ** 2)) < 0.5e-6
