@@ -192,7 +192,7 @@ def sample(
         posterior.Target(log_likelihood, bounds, transform),
         [int(word) for word in rng.integers(0, 2**32, 3)],
         evaluations,
-        settings=SamplerSettings(chains=32, population=128, steps=2, adaptation=20),
+        settings=SamplerSettings(chains=32, population=128, steps=2, adaptation=20, parts=48),
         archive=gaussian(320),
         enough=_enough,
         progress=lambda done, all_: progress(done / all_),

@@ -26,7 +26,7 @@ class Thresholds:
             nothing remains: 5 of 111 blind cases (docs/diagnosis.md).
         most: most effects added.
         beam: structures carried on from one size to the next.
-        evaluations: likelihood evaluations of the posterior; 0 takes the Laplace approximation.
+        evaluations: of the posterior's likelihood, at most; 0 takes the Laplace approximation.
         tried: refits per structure after the first stage, best screened first.
         use_force: the recorded force chooses among tied names (diagnosis/force_ranking.py).
     """
@@ -46,5 +46,5 @@ class Thresholds:
     most: int = 6
     beam: int = 3
     tried: int = 5
-    evaluations: int = 4000
+    evaluations: int = 12_000
     use_force: bool = False

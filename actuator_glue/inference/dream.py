@@ -35,8 +35,8 @@ from actuator_glue.records import Array
 # Evaluations of a compiled likelihood between two questions whether to stop: 0.2 ms; and in one go
 # where nobody asks: the uniforms of more would leave the cache.
 _PATIENCE, _MOST = 200, 2000
-# Shares of the steps after which a run may have drawn enough.
-_LOOKS = tuple(k / 16.0 for k in range(5, 16))
+# Parts of a run in which no draws are enough.
+_FIRST = 5
 
 __all__ = ['Chains', 'Info', 'SamplerSettings', 'State', 'Watchers', 'init', 'sample', 'step']
 
@@ -209,7 +209,7 @@ class Watchers(NamedTuple):
     Attributes:
         stop: asked after every step, or about every 200 evaluations where the likelihood has a
             compiled form, always at the same ones; True ends the run.
-        enough: asked at every sixteenth of the run from the fifth on whether its draws will do;
+        enough: asked after every of the settings' parts, from the fifth on, whether its draws do;
             True ends it.
         progress: called now and then with (evaluations made, evaluations at most).
     """
@@ -270,7 +270,8 @@ def sample(
     if stop is not None:
         most = 1 if compiled(log_density) is None else -(-_PATIENCE // n)
     every = max(steps // 100, 1)
-    looks = [int(share * steps) for share in _LOOKS] if enough is not None else []
+    parts = range(_FIRST, settings.parts) if enough is not None else range(0)
+    looks = [int(k / settings.parts * steps) for k in parts]
 
     def so_far(done: int) -> Chains:
         return Chains(

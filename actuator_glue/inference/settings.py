@@ -35,6 +35,7 @@ class SamplerSettings:
             warm start takes a quarter. None: 50 p^1.5 for p parameters, 200 to 2000.
         steps: steps of each point's chain per temperature.
         survivors: share of the population that the weights of the next temperature may leave.
+        parts: of the run, at whose ends, from the fifth on, it is asked whether that will do.
     """
 
     chains: int = 20
@@ -51,6 +52,7 @@ class SamplerSettings:
     population: int | None = None
     steps: int = 10
     survivors: float = 0.6
+    parts: int = 16
 
     def __post_init__(self) -> None:
         for name, lowest in (
@@ -60,6 +62,7 @@ class SamplerSettings:
             ('thinning', 1),
             ('adaptation', 0),
             ('steps', 1),
+            ('parts', 1),
         ):
             if getattr(self, name) < lowest:
                 raise InputError(f'sampler setting {name}={getattr(self, name)} is below {lowest}')
