@@ -11,12 +11,7 @@ import numpy as np
 from actuator_glue.api.spread import Spread, spread
 from actuator_glue.diagnosis.data import chunks
 from actuator_glue.hybrid.actuator import actuator, table_of
-from actuator_glue.hybrid.indicators import (
-    criteria,
-    energy_error,
-    frequency_evaluation,
-    tracking_indicator,
-)
+from actuator_glue.hybrid.indicators import Target, energy_error, tracking_indicator
 from actuator_glue.hybrid.stability import tracking
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
@@ -120,11 +115,12 @@ def record_tracking(
     counted = record.slice(settle, len(record))
     drawn: list[dict[str, float]] = []
     if np.ptp(counted.command) > 0.0:
+        target = Target(counted.command, record.period)
         for part in chunks(len(some), len(record)):  # all at once a long test takes gigabytes
             moved = structure.simulate(some[part], record, initial=initial, origin=origin)
             finite = np.isfinite(moved[:, settle:]).all(axis=1)
-            drawn += [_numbers(counted, x) for x in moved[finite, settle:]]
-    measured = _numbers(counted, counted.measured) if drawn else {}
+            drawn += [_numbers(counted, target, x) for x in moved[finite, settle:]]
+    measured = _numbers(counted, target, counted.measured) if drawn else {}
     if drawn:
         predicted |= {n: spread(np.array([d[n] for d in drawn])) for n in drawn[0]}
     return RecordTracking(source_name(record.source), predicted, measured)
@@ -150,20 +146,19 @@ def window_tracking(
     )
 
 
-def _numbers(record: Record, moved: Array) -> dict[str, float]:
-    target, period = record.command, record.period
-    index, j = frequency_evaluation(target, moved, period), criteria(target, moved, period)
+def _numbers(record: Record, target: Target, moved: Array) -> dict[str, float]:
+    index, j = target.frequency_evaluation(moved), target.criteria(moved)
     out = {
         'fei_amplitude': index.amplitude,
         'fei_delay_s': index.delay,
         'J1_s': j.j1,
         'J2': j.j2,
         'J3': j.j3,
-        'ti_m2': float(tracking_indicator(target, moved)[-1]),
+        'ti_m2': float(tracking_indicator(record.command, moved)[-1]),
     }
     k = record.known_stiffness()
     if k > 0.0:
-        out['hsem'] = float(energy_error(target, moved, k * moved, k)[-1])
+        out['hsem'] = float(energy_error(record.command, moved, k * moved, k)[-1])
     return out
 
 

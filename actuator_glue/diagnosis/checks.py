@@ -58,8 +58,9 @@ def refuse_repeats(records: Sequence[Record], held: Sequence[Record] = ()) -> No
     """
     seen: dict[bytes, int] = {}
     for i, record in enumerate((*records, *held)):
-        key = hashlib.sha256(record.command.tobytes() + record.measured.tobytes()).digest()
-        first = seen.setdefault(key, i)
+        samples = hashlib.sha256(record.command.data)
+        samples.update(record.measured.data)
+        first = seen.setdefault(samples.digest(), i)
         if first == i:
             continue
         names = where((*records, *held)[first], first + 1), where(record, i + 1)

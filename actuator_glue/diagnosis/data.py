@@ -137,6 +137,24 @@ class Data:
             slice(int(e) - int(m.sum()), int(e)) for e, m in zip(ends, self.masks, strict=True)
         )
 
+    @cached_property
+    def _runs(self) -> tuple[list[tuple[slice, slice]], ...]:
+        """Where each record's counted samples lie, run by run, and where in the joined vectors.
+
+        A few runs are copied several times as quickly as a mask is gone through.
+        """
+        out = []
+        for mask, part in zip(self.masks, self.parts, strict=True):
+            edges = np.flatnonzero(np.diff(mask, prepend=False, append=False)).reshape(-1, 2)
+            ends = part.start + np.cumsum(edges[:, 1] - edges[:, 0])
+            out.append(
+                [
+                    (slice(a, b), slice(end - (b - a), end))
+                    for (a, b), end in zip(edges.tolist(), ends.tolist(), strict=True)
+                ]
+            )
+        return tuple(out)
+
     def simulate(self, model: Model, theta: Array) -> Array:
         """Simulate all records free-run and return the counted samples (m, N) [m].
 
@@ -145,11 +163,12 @@ class Data:
         """
         table = np.atleast_2d(theta)
         out = np.empty((len(table), self.target.size))
-        rows = zip(self.records, self.initials, self.origins, self.masks, self.parts, strict=True)
-        for record, initial, origin, mask, part in rows:
+        rows = zip(self.records, self.initials, self.origins, self._runs, strict=True)
+        for record, initial, origin, runs in rows:
             for some in chunks(len(table), len(record)):
                 y = simulated(model, table[some], record, initial, origin)
-                out[some, part] = y[:, mask]
+                for run, at in runs:
+                    out[some, at] = y[:, run]
         return out
 
     def split(self, errors: Array) -> list[Array]:

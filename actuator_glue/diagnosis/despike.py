@@ -59,7 +59,7 @@ def without_impulses(
             notes.append(f'{where(record, i + 1)}: {_told(found, record)}')
             record = replace(record, measured=measured)
         records.append(record)
-    return replace(data, records=tuple(records)), tuple(counts), notes
+    return (replace(data, records=tuple(records)) if notes else data), tuple(counts), notes
 
 
 def without_frozen(data: Data, model: Model, theta: Array) -> tuple[Data, list[str]]:
@@ -71,9 +71,13 @@ def without_frozen(data: Data, model: Model, theta: Array) -> tuple[Data, list[s
     records, notes = [], []
     rows = zip(data.records, data.recorded, data.factors, data.initials, strict=True)
     for i, (record, whole, count, initial) in enumerate(rows):
+        records.append(record)
+        repeated = frozen.repeats(whole.measured)
+        if not len(repeated.first):
+            continue
         output = model.simulate(theta[None], record, initial=initial, origin=data.origins[i])[0]
         fine = output if count == 1 else np.interp(whole.time, record.time, output)
-        found = frozen.find(whole, fine)
+        found = frozen.while_moving(repeated, whole, fine)
         if len(found.first):
             sizes = found.last + 1 - found.first
             notes.append(
@@ -82,9 +86,8 @@ def without_frozen(data: Data, model: Model, theta: Array) -> tuple[Data, list[s
                 f'up to {1e3 * float(sizes.max()) * whole.period:.3g} ms): a frozen channel; the '
                 "model's motion stands in their place"
             )
-            record = replace(record, measured=frozen.bridged(record, found, output, count))
-        records.append(record)
-    return replace(data, records=tuple(records)), notes
+            records[i] = replace(record, measured=frozen.bridged(record, found, output, count))
+    return (replace(data, records=tuple(records)) if notes else data), notes
 
 
 def _told(found: Impulses, record: Record) -> str:

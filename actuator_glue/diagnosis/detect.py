@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy import signal, stats
+from scipy.fft import next_fast_len
 
 from actuator_glue.diagnosis.completeness import Decision
 from actuator_glue.diagnosis.data import Data
@@ -12,6 +13,7 @@ from actuator_glue.diagnosis.model_selection import Selection
 from actuator_glue.diagnosis.noise import Split, split
 from actuator_glue.diagnosis.result import Alarm
 from actuator_glue.diagnosis.score import splits_of
+from actuator_glue.diagnosis.search import Each
 from actuator_glue.records import Array
 
 _RESAMPLES = 99
@@ -20,28 +22,30 @@ _LAGS = 20
 
 def surrogate(part: Split, size: int, period: float, rng: np.random.Generator) -> Array:
     """Gaussian noise (size,) with the noise density of a split: the null of the alarm [m]."""
-    frequency = np.fft.rfftfreq(size, period)
+    whole = next_fast_len(size, real=True)
+    frequency = np.fft.rfftfreq(whole, period)
     density = np.interp(frequency, part.frequency, part.psd)
     # One-sided density S: E|X|^2 = S n / (2 T) of the unnormalised transform.
-    spectrum = np.sqrt(0.25 * density * size / period) * (
+    spectrum = np.sqrt(0.25 * density * whole / period) * (
         rng.standard_normal(len(frequency)) + 1j * rng.standard_normal(len(frequency))
     )
     spectrum[0] = 0.0
-    return np.fft.irfft(spectrum, size)
+    return np.fft.irfft(spectrum, whole)[:size]
 
 
-def p_value(data: Data, splits: list[Split], seed: int) -> float:
+def p_value(data: Data, splits: list[Split], seed: int, each: Each = map) -> float:
     """Bootstrap p-value of the structure of all records under stationary noise."""
-    rng = np.random.default_rng([seed, 2])
     observed = sum(s.mean_square - s.noise**2 for s in splits)
-    above = 1
-    for _ in range(_RESAMPLES):
-        total = 0.0
+
+    def by_chance(number: int) -> float:
+        rng, total = np.random.default_rng([seed, 2, number]), 0.0
         for part, where, period in zip(splits, data.parts, data.periods, strict=True):
             again = split(surrogate(part, where.stop - where.start, period, rng), period)
             total += again.mean_square - again.noise**2
-        above += total >= observed
-    return above / (_RESAMPLES + 1)
+        return total
+
+    above = sum(total >= observed for total in each(by_chance, range(_RESAMPLES)))
+    return (1 + above) / (_RESAMPLES + 1)
 
 
 def ljung_box(error: Array) -> float:
@@ -116,6 +120,7 @@ def alarm_of(
     data: Data,
     seed: int,
     level: float,
+    each: Each = map,
 ) -> Alarm:
     """Describe the alarm that the decision stands on; `level` is that of false alarms."""
     error = found.base.fit.error
@@ -124,7 +129,7 @@ def alarm_of(
         structured=max([found.structure, *found.removed.values(), *(m.rms for m in seen)]),
         threshold=found.material,
         noise=found.noise,
-        p_value=p_value(data, splits_of(data, error), seed),
+        p_value=p_value(data, splits_of(data, error), seed, each),
         false_alarms=level,
         nats=found.nats,
         tests=statistics(data, error),

@@ -145,7 +145,7 @@ def diagnose(
         error=error,
         candidates=findings.candidates(found, result.seen),
         coverage=coverage,
-        alarm=alarm_of(found, result.seen, decision, data, seed, settings.false_alarms),
+        alarm=alarm_of(found, result.seen, decision, data, seed, settings.false_alarms, each),
         advice=(
             *([used.contradiction()] if used and used.contradicted else []),
             *advice.at_bound(held_at, estimates),

@@ -30,24 +30,32 @@ class Frozen:
     last: NDArray[np.intp]
 
 
-def find(record: Record, output: Array) -> Frozen:
-    """Return where readings repeat while a model's output moves beyond noise and grid.
+def repeats(values: Array) -> Frozen:
+    """Return where a channel (n,) repeats a reading, often enough to ask whether it is frozen."""
+    same = np.concatenate([[False], values[1:] == values[:-1], [False]])
+    first, last = np.flatnonzero(same[1:] != same[:-1]).reshape(-1, 2).T
+    long = last - first >= _REPEATS - 1
+    return Frozen(first[long] + 1, last[long])
+
+
+def while_moving(repeated: Frozen, record: Record, output: Array) -> Frozen:
+    """Return those repeats in which a model's output moves beyond noise and grid.
 
     Args:
+        repeated: see `repeats`; one at least.
         record: as it was sampled.
         output: of a model that was fitted, at the same times, (n,) [m].
     """
-    y = record.measured
-    moved = np.diff(y) != 0.0
-    changes = np.concatenate([[0], np.flatnonzero(moved) + 1, [len(y)]])
-    first, last = changes[:-1], changes[1:] - 1
+    y, first, last = record.measured, repeated.first - 1, repeated.last
     off = y - output
     noise = 1.4826 * float(np.median(np.abs(off - np.median(off))))
-    steps = np.abs(np.diff(y)[moved])
-    grid = float(steps.min()) if len(steps) else 0.0
-    motion = np.maximum.reduceat(output, first) - np.minimum.reduceat(output, first)
-    far = (motion > max(_BEYOND * noise, _STEPS * grid)) & (last - first >= _REPEATS - 1)
-    return Frozen(first[far] + 1, last[far])
+    steps = np.abs(np.diff(y))
+    grid = float(steps[steps > 0.0].min(initial=np.inf))
+    edges = np.stack([first, last + 1], axis=1).ravel()
+    edges = edges[edges < len(y)]
+    motion = np.maximum.reduceat(output, edges) - np.minimum.reduceat(output, edges)
+    far = motion[::2] > max(_BEYOND * noise, _STEPS * grid)
+    return Frozen(repeated.first[far], last[far])
 
 
 def bridged(record: Record, found: Frozen, output: Array, samples_each: int = 1) -> Array:
@@ -58,7 +66,7 @@ def bridged(record: Record, found: Frozen, output: Array, samples_each: int = 1)
     Args:
         record: one sample for `samples_each` of the record that was searched (means of twice as
             many).
-        found: see `find`.
+        found: see `while_moving`.
         output: of the model, (n,) [m].
         samples_each: how many samples were made one.
     """
@@ -75,7 +83,10 @@ def bridged(record: Record, found: Frozen, output: Array, samples_each: int = 1)
 
 def every_which(values: Array) -> int:
     """Return every which sample a channel (n,) changes; 1 where it may change at every one."""
-    at = np.flatnonzero(np.diff(values)) + 1
+    moved = values[1:] != values[:-1]
+    if 1.5 * np.count_nonzero(moved) > len(values) + 2:  # half of the changes follow another
+        return 1
+    at = np.flatnonzero(moved) + 1
     if len(at) < _SLOWEST:
         return 1
     every = round(float(np.median(np.diff(at))))

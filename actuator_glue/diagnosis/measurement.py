@@ -6,6 +6,7 @@ variance that follows the squared velocity at frequencies where the mean respons
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,8 @@ from actuator_glue.diagnosis.hum import Line
 from actuator_glue.records import Array, Record
 
 _ROUNDING = 1e-6  # of a step: values are written with so many digits
+_PIECE = 1 << 18  # samples filtered at a time: what a long record takes is its means
+_FADE = 256  # samples after which the filter has forgotten, to the last digit, where it began
 _CLEAR_STEP = 60.0  # of the median power, as for a line in time (lines.py)
 
 
@@ -40,8 +43,11 @@ class Measured:
 
 def grid(record: Record) -> float:
     """Return the spacing of the measured values [m]; 0 where they lie on no coarse grid."""
+    most = len(record) // 4
+    if len(np.unique(record.measured[::3])) > most:
+        return 0.0
     values = np.unique(record.measured)
-    if len(values) < 2 or len(values) > len(record) // 4:
+    if len(values) < 2 or len(values) > most:
         return 0.0
     gaps = np.diff(values)
     gaps = gaps[gaps > 1e-6 * (values[-1] - values[0])]
@@ -70,13 +76,13 @@ def quantisation(data: Data) -> Measured | None:
     return Measured('quantisation', step / np.sqrt(12.0), nats, (step,), (knowledge**-0.5,))
 
 
-def staircase(data: Data, errors: Array) -> Measured | None:
+def staircase(data: Data, errors: Array, simulated: Array) -> Measured | None:
     """Return the converter's step where noise was added after it: an error periodic in position.
 
     Rounding adds the sawtooth d (round(y/d) - y/d) of the noise-free position y, whose first
     harmonic over y has the amplitude d/pi: a period and an amplitude that must agree.
     """
-    parts = list(zip(data.split(errors), data.split(data.target - errors), strict=True))
+    parts = list(zip(data.split(errors), data.split(simulated), strict=True))
     reach = max(float(np.ptp(y)) for _, y in parts)
     bins = 1 << 13
     cell = 2.0 * reach / bins  # padded to twice the range: periods are resolved by half a cycle
@@ -110,6 +116,15 @@ def staircase(data: Data, errors: Array) -> Measured | None:
     return Measured('quantisation', rms, nats, (step,), (float(spread),))
 
 
+def _pieces(samples: int, size: int) -> Iterator[tuple[slice, slice]]:
+    """Yield which samples to filter at a time, and which of those to keep: whole blocks."""
+    stop = samples // size * size
+    step = max(1, _PIECE // size) * size
+    for begin in range(0, stop, step):
+        end, first = min(begin + step, stop), max(0, begin - _FADE)
+        yield slice(first, end + size + _FADE), slice(begin - first, end - first)
+
+
 def jitter(data: Data, errors: Array, simulated: Array) -> Measured | None:
     """Return timing jitter: high-frequency variance growing with the squared velocity.
 
@@ -117,16 +132,16 @@ def jitter(data: Data, errors: Array, simulated: Array) -> Measured | None:
     independent errors of the sample times do.
     """
     tops, speeds = [], []
+    sos = signal.butter(6, 0.6, 'highpass', output='sos')
     rows = zip(data.split(errors), data.split(simulated), data.periods, strict=True)
     for error, y, period in rows:
-        sos = signal.butter(6, 0.6, 'highpass', output='sos')
-        top = signal.sosfiltfilt(sos, error) ** 2 / 0.4
-        speed = np.gradient(y, period) ** 2
         # Means over 0.25 s: the variance needs averaging, the speed stays.
         size = max(8, round(0.25 / period))
-        count = len(error) // size
-        tops.append(top[: count * size].reshape(count, size).mean(axis=1))
-        speeds.append(speed[: count * size].reshape(count, size).mean(axis=1))
+        for wide, kept in _pieces(len(error), size):
+            top = signal.sosfiltfilt(sos, error[wide])[kept] ** 2 / 0.4
+            speed = np.gradient(y[wide], period)[kept] ** 2
+            tops.append(top.reshape(-1, size).mean(axis=1))
+            speeds.append(speed.reshape(-1, size).mean(axis=1))
     top, speed = np.concatenate(tops), np.concatenate(speeds)
     basis = np.stack([np.ones_like(speed), speed])
     weights = 1.0 / np.maximum(np.median(top), 1e-30) * np.ones_like(top)
@@ -159,9 +174,10 @@ def find(
         line: hum that was found in the data.
     """
     hum = Measured('hum', line.rms, line.nats, line.values, line.stddev) if line else None
+    simulated = data.target - errors
     found = (
-        quantisation(data) or staircase(data, errors),
+        quantisation(data) or staircase(data, errors, simulated),
         hum,
-        jitter(data, errors, data.target - errors),
+        jitter(data, errors, simulated),
     )
     return tuple(m for m in found if m is not None and m.rms >= material and m.nats >= 25.0)

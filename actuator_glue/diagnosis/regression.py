@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Container, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.fit import Fit
+from actuator_glue.diagnosis.noise import whiten
 from actuator_glue.diagnosis.score import Scorer, evidence
 from actuator_glue.diagnosis.search import Trial
 from actuator_glue.json_value import Json, json_value
@@ -17,6 +20,7 @@ from actuator_glue.records import Array, Record
 
 _TELLING = 0.3  # share of the squared error a surrogate must remove to point at a place
 _FORECAST = 12  # features of a forecast
+_PIECE = 1 << 13  # samples whose products are taken at a time
 
 
 @dataclass(frozen=True)
@@ -98,28 +102,36 @@ def _motions(x: Array, command: Array, period: float, stiffness: float) -> dict[
     return out
 
 
-def library(data: Data, theta: Array) -> dict[str, Array]:
-    """Features of the motion that Eq. (2) simulates, counted samples of all records joined (N,).
+def library(
+    data: Data, theta: Array, wanted: Container[str] | None = None
+) -> Iterator[tuple[int, str, Array]]:
+    """Yield features of the motion that Eq. (2) simulates, at the counted samples (n,).
 
     Each is taken as it is (a sensor's place), passed through the closed loop (a command's
     place) and as the derivative of that (a flow's or a force's place).
+
+    Args:
+        data: counted samples.
+        theta: Eq. (2) (4,).
+        wanted: names of the features; None for all.
+
+    Yields:
+        Which record, name, and feature.
     """
     model = Structure(())
-    parts: dict[str, list[Array]] = {}
-    for record, mask in zip(data.records, data.masks, strict=True):
+    for i, (record, mask) in enumerate(zip(data.records, data.masks, strict=True)):
         x = np.asarray(model.simulate(theta, record)).reshape(-1)
         stroke = float(np.abs(record.command).max()) or 1.0
         motions = _motions(x, record.command, record.period, record.known_stiffness())
         for name, raw in motions.items():
+            texts = name, f'loop({name})', f'd/dt loop({name})'
+            if wanted is not None and not any(text in wanted for text in texts):
+                continue
             passed = _passed(model, theta, record, stroke * raw)
             rate = np.gradient(passed, record.period)
-            for text, c in (
-                (name, stroke * raw),
-                (f'loop({name})', passed),
-                (f'd/dt loop({name})', rate),
-            ):
-                parts.setdefault(text, []).append(np.asarray(c)[mask])
-    return {name: np.concatenate(parts.pop(name)) for name in list(parts)}
+            for text, c in zip(texts, (stroke * raw, passed, rate), strict=True):
+                if wanted is None or text in wanted:
+                    yield i, text, c[mask]
 
 
 def _passed(model: Structure, theta: Array, record: Record, command: Array) -> Array:
@@ -137,18 +149,16 @@ def compare(data: Data, scorer: Scorer, base: Trial, structure: Trial) -> Surrog
     which favours the surrogate by little: tens of features against thousands of samples.
     """
     count = len(structure.fit.theta) - len(base.fit.theta)
-    features = library(data, base.fit.theta)
-    names = list(features)
-    fit, chosen = _regressed(np.stack([features.pop(n) for n in names]), scorer, base.fit, count)
+    fit, chosen, tried = _regressed(data, base.fit.theta, scorer, base.fit, count)
     left, whole = scorer.left_out_error(fit), scorer.left_out_error(base.fit)
     return Surrogate(
-        features=tuple(names[i] for i in chosen),
+        features=tuple(chosen),
         structure=structure.effects,
         error=left,
         structure_error=scorer.left_out_error(structure.fit),
         explained=max(0.0, 1.0 - (left / whole) ** 2) if whole > 0.0 else 0.0,
         nats=evidence(scorer.block_scores(fit), structure.scores),
-        tried=len(names),
+        tried=tried,
     )
 
 
@@ -165,42 +175,67 @@ def forecast(data: Data, scorer: Scorer, theta: Array, fit: Fit, nats: float) ->
         fit: the structure.
         nats: evidence of any addition.
     """
-    rows = np.stack(list(library(data, theta).values()))
-    found, chosen = _regressed(rows, scorer, fit, _FORECAST)
+    found, chosen, tried = _regressed(data, theta, scorer, fit, _FORECAST)
     gained = evidence(scorer.block_scores(found), scorer.block_scores(fit))
-    if gained < nats + len(chosen) * math.log(len(rows)):
+    if gained < nats + len(chosen) * math.log(tried):
         return math.inf
     return scorer.left_out_error(found)
 
 
-def _regressed(rows: Array, scorer: Scorer, fit: Fit, count: int) -> tuple[Fit, list[int]]:
-    """Regress a residual on the best of some features (f, N), parameters refitted with them.
+def _regressed(
+    data: Data, theta: Array, scorer: Scorer, fit: Fit, count: int
+) -> tuple[Fit, list[str], int]:
+    """Regress a residual on the best of all features, parameters refitted with them.
+
+    Features are chosen by their products with each other: the table of a long record's features
+    is the largest that a diagnosis holds, so it is gone through once and kept in short numbers,
+    whose rounding is 1e-14 of a feature's power.
 
     Returns:
-        The residual that is left, with the Jacobian of parameters and weights, and which features
-        were chosen, best first.
+        The residual that is left, with the Jacobian of parameters and weights; which features
+        were chosen, best first; how many there were.
     """
-    error = scorer.whiten(fit.error)
-    own, free = scorer.whiten(fit.jacobian), scorer.whiten(rows)
-    start = np.einsum('pn,pn->p', free, free)
-    q = np.linalg.qr(own.T)[0]
-    for row in free:  # one by one: a table of a long record's features is large
-        row -= q @ (row @ q)
-    chosen: list[int] = []
+    error, own = scorer.whiten(fit.error), scorer.whiten(fit.jacobian)
+    table: dict[str, NDArray[np.float32]] = {}
+    for i, name, feature in library(data, theta):
+        row = table.setdefault(name, np.empty(len(error), dtype=np.float32))
+        row[data.parts[i]] = whiten(feature, scorer.taps[i])
+    known = np.vstack([np.linalg.qr(own.T)[0].T, error])
+    gram, cross = _products(list(table.values()), known)
+    names, start = list(table), np.diag(gram).copy()
+    del table
+    gram -= cross[:, :-1] @ cross[:, :-1].T  # what is free of the parameters
+    pull = cross[:, -1] - cross[:, :-1] @ (known[:-1] @ error)
+    chosen: list[str] = []
     for _ in range(count):
-        power = np.einsum('pn,pn->p', free, free)
+        power = np.diag(gram)
         usable = power > 1e-6 * np.maximum(start, 1e-300)
-        merit = np.where(usable, (free @ error) ** 2 / np.maximum(power, 1e-300), -1.0)
+        merit = np.where(usable, pull**2 / np.maximum(power, 1e-300), -1.0)
         best = int(np.argmax(merit))
         if merit[best] <= 0.0:
             break
-        chosen.append(best)
-        unit = free[best] / np.sqrt(power[best])
-        for row in free:
-            row -= (row @ unit) * unit
-    raw = np.concatenate([fit.jacobian, rows[chosen]])
-    white = np.concatenate([own, scorer.whiten(rows[chosen])])
+        chosen.append(names[best])
+        along = gram[best] / np.sqrt(power[best])
+        pull = pull - along * (pull[best] / np.sqrt(power[best]))
+        gram = gram - np.outer(along, along)
+    rows = np.empty((len(chosen), len(error)))
+    for i, name, feature in library(data, theta, chosen):
+        rows[chosen.index(name), data.parts[i]] = feature
+    raw = np.concatenate([fit.jacobian, rows])
+    white = np.concatenate([own, scorer.whiten(rows)])
     scale = np.sqrt(np.einsum('pn,pn->p', white, white))
     scale = np.where(scale > 0.0, scale, 1.0)
     weights, *_ = np.linalg.lstsq((white / scale[:, None]).T, error, rcond=1e-10)
-    return Fit(fit.theta, fit.error - (weights / scale) @ raw, raw, fit.z), chosen
+    left = Fit(fit.theta, fit.error - (weights / scale) @ raw, raw, fit.z)
+    return left, chosen, len(names)
+
+
+def _products(rows: Sequence[NDArray[np.float32]], known: Array) -> tuple[Array, Array]:
+    """Products of rows (f, N) with each other (f, f) and with known ones (p, N), (f, p)."""
+    gram, cross = np.zeros((len(rows), len(rows))), np.zeros((len(rows), len(known)))
+    for begin in range(0, known.shape[1], _PIECE):
+        piece = slice(begin, begin + _PIECE)
+        some = np.array([row[piece] for row in rows], dtype=np.float64)
+        gram += some @ some.T
+        cross += some @ known[:, piece].T
+    return gram, cross

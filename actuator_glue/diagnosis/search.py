@@ -108,9 +108,9 @@ class Search:
 
     def base(self) -> Fit:
         """Fit Eq. (2)."""
-        best = base_fit(self.data)
-        self._tried[frozenset()] = best
-        return best
+        if frozenset() not in self._tried:
+            self._tried[frozenset()] = base_fit(self.data)
+        return self._tried[frozenset()]
 
     def scale(self) -> Scale:
         """Sizes of this test at the fitted base."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from actuator_glue.diagnosis import hum
 from actuator_glue.diagnosis.data import Data, Model, chunks
@@ -100,22 +101,15 @@ def _sham(
         seed: seed of the phases.
     """
     count, tried = max(1, sizes[0]), max(1, sizes[1])
-    features = []
-    for data in (fit, held):
-        rng = np.random.default_rng([seed, 5])
-        # As many responses as shams: each sham takes `count` that stand side by side.
-        rows = np.empty((max(tried, count), data.target.size), dtype=np.float32)
-        for row in rows:
-            parts = []
-            for record, mask in zip(data.records, data.masks, strict=True):
-                spectrum = np.fft.rfft(record.command)
-                turn = np.exp(2j * np.pi * rng.random(len(spectrum)))
-                turn[0] = 0.0  # a mean would do what a bias does
-                fake = np.fft.irfft(spectrum * turn, len(record))
-                y = side.model.simulate(side.theta, replace(record, command=fake))
-                parts.append(y[mask])
-            row[:] = np.concatenate(parts)
-        features.append(rows)
+    # As many responses as shams: each sham takes `count` that stand side by side.
+    here = _responses(fit, side, max(tried, count), seed)
+    commands = [[id(record.command) for record in data.records] for data in (fit, held)]
+    folded = commands[0] == commands[1]  # stretches of the same records
+    there = here if folded else _responses(held, side, max(tried, count), seed)
+    features = [
+        np.hstack([rows[:, mask] for rows, mask in zip(found, data.masks, strict=True)])
+        for data, found in ((fit, here), (held, there))
+    ]
     left, out = np.inf, 0.0
     for first in range(tried):
         use = np.arange(first, first + count) % len(features[0])
@@ -123,6 +117,20 @@ def _sham(
         fitted = rms(errors[0] - weights @ features[0][use])
         if fitted < left:
             left, out = fitted, rms(errors[1] - weights @ features[1][use])
+    return out
+
+
+def _responses(data: Data, side: Side, count: int, seed: int) -> list[NDArray[np.float32]]:
+    """Responses to phase-randomised copies of each record's command, (count, n) a record [m]."""
+    rng = np.random.default_rng([seed, 5])
+    out = [np.empty((count, len(record)), dtype=np.float32) for record in data.records]
+    spectra = [np.fft.rfft(record.command) for record in data.records]
+    for i in range(count):
+        for record, spectrum, rows in zip(data.records, spectra, out, strict=True):
+            turn = np.exp(2j * np.pi * rng.random(len(spectrum)))
+            turn[0] = 0.0  # a mean would do what a bias does
+            fake = np.fft.irfft(spectrum * turn, len(record))
+            rows[i] = side.model.simulate(side.theta, replace(record, command=fake))
     return out
 
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from scipy.signal import correlate
+from numpy.typing import NDArray
+from scipy.fft import irfft, next_fast_len, rfft
 
 from actuator_glue.errors import InputError
 from actuator_glue.records import Array
@@ -33,22 +35,72 @@ class Criteria(NamedTuple):
     j3: float
 
 
-def frequency_evaluation(target: Array, measured: Array, period: float) -> FrequencyEvaluation:
-    """Return the frequency evaluation index (Guo et al. 2014), its angle by atan2.
+class Target:
+    """A target, for many displacements that are compared with it: its spectra are taken once.
 
-    The gain measured over target at every frequency, weighted with the target's power.
+    Args:
+        displacement: asked for, (n,) [m].
+        period: between samples [s].
 
     Raises:
         InputError: as `_checked`.
     """
-    target, measured = _checked(target, measured)
-    x, y = np.fft.rfft(target)[1:], np.fft.rfft(measured)[1:]
-    power = np.abs(x) ** 2
-    index = (y * x.conj()).sum() / power.sum()
-    frequency = float(power @ np.fft.rfftfreq(len(target), period)[1:] / power.sum())
-    return FrequencyEvaluation(
-        float(abs(index)), float(-np.angle(index) / (2.0 * np.pi * frequency)), frequency
-    )
+
+    def __init__(self, displacement: Array, period: float) -> None:
+        self._target, _ = _checked(displacement, displacement)
+        self._period = period
+
+    @cached_property
+    def _positive(self) -> tuple[NDArray[np.complex128], float]:
+        """Weights (n,) of a displacement in the index, and the equivalent frequency [Hz].
+
+        The sum of its transform times the target's conjugate over positive frequencies is a sum
+        over samples: many displacements need no transform of their own.
+        """
+        n = len(self._target)
+        x = np.fft.rfft(self._target)
+        x[0] = 0.0
+        power = np.abs(x) ** 2
+        frequency = float(power @ np.fft.rfftfreq(n, self._period) / power.sum())
+        return np.fft.ifft(x, n).conj() * (n / power.sum()), frequency
+
+    @cached_property
+    def _reversed(self) -> tuple[NDArray[np.complex128], int]:
+        """Transform of the reversed target for correlations, and its length."""
+        size = next_fast_len(2 * len(self._target) - 1, real=True)
+        return rfft(self._target[::-1], size), size
+
+    def frequency_evaluation(self, measured: Array) -> FrequencyEvaluation:
+        """Return the frequency evaluation index (Guo et al. 2014), its angle by atan2.
+
+        The gain measured over target at every frequency, weighted with the target's power.
+
+        Raises:
+            InputError: as `_checked`.
+        """
+        _, measured = _checked(self._target, measured)
+        weights, frequency = self._positive
+        index = weights.real @ measured + 1j * (weights.imag @ measured)
+        return FrequencyEvaluation(
+            float(abs(index)), float(-np.angle(index) / (2.0 * np.pi * frequency)), frequency
+        )
+
+    def criteria(self, measured: Array) -> Criteria:
+        """Return J1 to J3.
+
+        Raises:
+            InputError: as `_checked`.
+        """
+        target, measured = _checked(self._target, measured)
+        spectrum, size = self._reversed
+        found = irfft(rfft(measured, size) * spectrum, size)[: 2 * len(target) - 1]
+        lag = int(np.argmax(found)) - (len(target) - 1)
+        error = measured - target
+        return Criteria(
+            lag * self._period,
+            float(np.sqrt(np.mean(error**2) / np.mean(target**2))),
+            float(np.abs(error).max() / np.abs(target).max()),
+        )
 
 
 def tracking_indicator(target: Array, measured: Array) -> Array:
@@ -64,22 +116,6 @@ def tracking_indicator(target: Array, measured: Array) -> Array:
     area = 0.5 * (target[1:] + target[:-1]) * np.diff(measured)
     other = 0.5 * (measured[1:] + measured[:-1]) * np.diff(target)
     return np.concatenate([[0.0], np.cumsum(0.5 * (area - other))])
-
-
-def criteria(target: Array, measured: Array, period: float) -> Criteria:
-    """Return J1 to J3.
-
-    Raises:
-        InputError: as `_checked`.
-    """
-    target, measured = _checked(target, measured)
-    lag = int(np.argmax(correlate(measured, target, method='fft'))) - (len(target) - 1)
-    error = measured - target
-    return Criteria(
-        lag * period,
-        float(np.sqrt(np.mean(error**2) / np.mean(target**2))),
-        float(np.abs(error).max() / np.abs(target).max()),
-    )
 
 
 def energy_error(target: Array, measured: Array, force: Array, stiffness: float) -> Array:

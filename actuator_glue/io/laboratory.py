@@ -56,6 +56,8 @@ def read(
         if stiffness is None:
             stiffness = _noted_stiffness(notes, path)
     first = float(values['time'][0]) if 'time' in values else 0.0
+    for column in values.values():
+        column.flags.writeable = False  # nobody else has them: the record need not copy them
     # Record refuses another.
     chosen = cast('Hold', hold or notes.get('hold', 'zoh'))
     return Record(
@@ -86,11 +88,13 @@ def _by_name(path: Path) -> tuple[dict[str, Array], dict[str, str], float]:
     columns = choose(labels, units, str(path), timed=table.period is not None)
     raw = table.values([at for at, _ in columns.values()])
     scales = [scale for _, scale in columns.values()]
-    values = {role: c * s for role, c, s in zip(columns, raw, scales, strict=True)}
+    values = {r: c if s == 1.0 else c * s for r, c, s in zip(columns, raw, scales, strict=True)}
+    notes, period = table.notes, table.period
+    del raw, table  # a long file's columns as they were read are not held beside these
     if 'time' in values:
-        return values, table.notes, uniform_period(values['time'], str(path))
-    assert table.period is not None  # or `choose` had missed the times
-    return values, table.notes, table.period
+        return values, notes, uniform_period(values['time'], str(path))
+    assert period is not None  # or `choose` had missed the times
+    return values, notes, period
 
 
 def _mapped(path: Path, channels: ChannelMap) -> tuple[dict[str, Array], float]:

@@ -50,8 +50,11 @@ def uniform_period(time: Array, where: str) -> float:
             f'{where}: {steps[at]:.4g} s without samples after sample {at} ({time[at]:.9g} s); '
             'cut the record there and give the parts as records of their own'
         )
+    del steps, gap  # of a long record they are large
     period = float((time[-1] - time[0]) / (len(time) - 1))
-    off = np.abs(time - time[0] - period * np.arange(len(time)))
+    off = time - time[0]
+    off -= period * np.arange(len(time))
+    np.abs(off, out=off)
     if float(off.max()) > _TOLERANCE * period:
         at = int(off.argmax())
         raise InputError(

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from actuator_glue import replay as replayed
-from actuator_glue.hybrid.indicators import criteria
+from actuator_glue.hybrid.indicators import Target
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.io import messages
 from actuator_glue.io.bag_records import read_records, write_record
@@ -144,7 +144,7 @@ def test_each_window_tells_how_the_actuator_followed(run, estimated: Callable[..
     for window in windows:
         start = window['index'] - record.first_index + round(0.5 / record.period)
         part = record.slice(start, window['index'] - record.first_index + window['samples'])
-        j = criteria(part.command, part.measured, part.period)
+        j = Target(part.command, part.period).criteria(part.measured)
         tracking = window['tracking']
         assert tracking['measured']['J2'] == pytest.approx(j.j2)
         assert tracking['measured']['J1_s'] == pytest.approx(j.j1)

@@ -82,7 +82,7 @@ def test_a_grid_under_later_noise_is_found(step: float) -> None:
     e = step * np.round(Y / step) - Y + SIGMA * np.random.default_rng(8).standard_normal(len(T))
     seen = data(e)
     assert grid(seen.records[0]) == 0.0
-    found = staircase(seen, e)
+    found = staircase(seen, e, Y)
     assert found is not None
     assert found.values[0] == pytest.approx(step, rel=1e-3)
 

@@ -4,12 +4,7 @@ import numpy as np
 import pytest
 
 from actuator_glue.errors import InputError
-from actuator_glue.hybrid.indicators import (
-    criteria,
-    energy_error,
-    frequency_evaluation,
-    tracking_indicator,
-)
+from actuator_glue.hybrid.indicators import Target, energy_error, tracking_indicator
 
 PERIOD = 1e-3
 TIME = PERIOD * np.arange(4000)
@@ -19,11 +14,28 @@ TIME = PERIOD * np.arange(4000)
 def test_a_delayed_sine(delay: float) -> None:
     """Delay and amplitude, also beyond a quarter of the period, where an arctangent folds."""
     target, measured = (np.sin(2 * np.pi * 2.0 * t) for t in (TIME, TIME - delay))
-    found = frequency_evaluation(target, 0.9 * measured, PERIOD)
+    asked = Target(target, PERIOD)
+    found = asked.frequency_evaluation(0.9 * measured)
     assert found == pytest.approx((0.9, delay, 2.0), rel=1e-9)
-    assert criteria(target, measured, PERIOD).j1 == pytest.approx(delay, abs=2 * PERIOD)
+    assert asked.criteria(measured).j1 == pytest.approx(delay, abs=2 * PERIOD)
     j2 = 2.0 * abs(np.sin(2 * np.pi * delay))
-    assert criteria(target, measured, PERIOD)[1:] == pytest.approx((j2, j2), rel=1e-3)
+    assert asked.criteria(measured)[1:] == pytest.approx((j2, j2), rel=1e-3)
+
+
+def test_the_index_is_the_ratio_of_spectra() -> None:
+    """Guo et al. (2014), of noise of an odd and of an even length."""
+    rng = np.random.default_rng()
+    for size in (501, 500):
+        target, measured = rng.standard_normal((2, size))
+        x, y = np.fft.rfft(target)[1:], np.fft.rfft(measured)[1:]
+        index = (y * x.conj()).sum() / (np.abs(x) ** 2).sum()
+        found = Target(target, PERIOD).frequency_evaluation(measured)
+        assert found.amplitude == pytest.approx(abs(index), rel=1e-9)
+        angle = -2.0 * np.pi * found.frequency * found.delay
+        assert np.exp(1j * angle) == pytest.approx(index / abs(index), rel=1e-9)
+        assert Target(target, PERIOD).criteria(target[::-1]).j1 == PERIOD * (
+            int(np.argmax(np.correlate(target[::-1], target, 'full'))) - (size - 1)
+        )
 
 
 def test_the_area_of_an_ellipse() -> None:
@@ -38,7 +50,7 @@ def test_rows_that_cannot_be_compared() -> None:
     """Lengths, NaN, rest."""
     for wrong in (np.zeros(4000), TIME[:10], np.full(4000, np.nan)):
         with pytest.raises(InputError):
-            criteria(wrong, TIME, PERIOD)
+            Target(wrong, PERIOD).criteria(TIME)
 
 
 @pytest.mark.parametrize('lag', [0.05, -0.08])

@@ -96,7 +96,7 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
 
     def values(wanted: list[int]) -> list[Array]:
         chosen = [places[at] for at in wanted]
-        return [matrix_column(arrays[n], i).astype(np.float64) for n, i in chosen]
+        return [matrix_column(arrays[n], i).astype(np.float64, copy=False) for n, i in chosen]
 
     return FileTable(columns, notes, values)
 
