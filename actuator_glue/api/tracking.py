@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuator_glue.api.spread import Spread, spread
-from actuator_glue.diagnosis.data import chunks
+from actuator_glue.diagnosis.data import LANES, chunks
 from actuator_glue.hybrid.actuator import actuator, table_of
 from actuator_glue.hybrid.indicators import Target, energy_error, tracking_indicator
 from actuator_glue.hybrid.stability import tracking
@@ -116,7 +116,9 @@ def record_tracking(
     drawn: list[dict[str, float]] = []
     if np.ptp(counted.command) > 0.0:
         target = Target(counted.command, record.period)
-        for part in chunks(len(some), len(record)):  # all at once a long test takes gigabytes
+        for part in chunks(
+            len(some), len(record), LANES
+        ):  # all at once a long test takes gigabytes
             moved = structure.simulate(some[part], record, initial=initial, origin=origin)
             finite = np.isfinite(moved[:, settle:]).all(axis=1)
             drawn += [_numbers(counted, target, x) for x in moved[finite, settle:]]

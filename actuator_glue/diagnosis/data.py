@@ -59,14 +59,15 @@ def simulated(
     return model.simulate(theta, record, initial=initial, origin=origin)
 
 
-# Numbers of a block that is worked on at a time, and the least of rows: the kernels' lanes.
+# Numbers of a block that is worked on at a time, where that is not fewer rows than these.
 _BLOCK = 1 << 21
-_ROWS = 8
+LANES = 32  # of the kernels, which take as long for fewer
+_ROWS = LANES // 2  # two threads share the draws of one step
 
 
-def chunks(rows: int, columns: int) -> Iterator[slice]:
-    """Yield slices of rows, of so few that their columns stay within a block, by full lanes."""
-    size = max(1, _BLOCK // max(columns, 1) // _ROWS) * _ROWS
+def chunks(rows: int, columns: int, least: int = _ROWS) -> Iterator[slice]:
+    """Yield slices of rows, of so few that their columns stay within a block, or of `least`."""
+    size = max(1, _BLOCK // max(columns, 1) // least) * least
     for begin in range(0, rows, size):
         yield slice(begin, begin + size)
 
@@ -159,13 +160,14 @@ class Data:
         """Simulate all records free-run and return the counted samples (m, N) [m].
 
         Few parameter sets at a time: beyond some 20 MB the memory of a simulation goes back to
-        the system each time, and asking for it anew costs as much as the simulation.
+        the system each time, and asking for it anew costs time; but no fewer than the kernels work
+        on at once.
         """
         table = np.atleast_2d(theta)
         out = np.empty((len(table), self.target.size))
         rows = zip(self.records, self.initials, self.origins, self._runs, strict=True)
         for record, initial, origin, runs in rows:
-            for some in chunks(len(table), len(record)):
+            for some in chunks(len(table), len(record), LANES):
                 y = simulated(model, table[some], record, initial, origin)
                 for run, at in runs:
                     out[some, at] = y[:, run]

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuator_glue.diagnosis.data import Data, Model
+from actuator_glue.diagnosis.data import LANES, Data, Model
 from actuator_glue.model.parameters import BASE
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
@@ -93,10 +93,28 @@ def sum_of_squares(error: Array) -> Array:
 
 def jacobian(data: Data, model: Model, space: Space, z: Array, output: Array) -> Array:
     """Finite differences of the simulation at z (s, p) with output (s, N): (s, p, N)."""
-    s, p = z.shape
     steps = space.steps(z)
-    moved = z[:, None, :] + steps[:, :, None] * np.eye(p)
-    out = data.simulate(model, space.theta(moved.reshape(s * p, p))).reshape(s, p, -1)
+    out = _simulated(data, model, space, _moved(z, steps))
+    return _differences(out, output, steps)
+
+
+def _with_jacobian(data: Data, model: Model, space: Space, z: Array) -> tuple[Array, Array]:
+    """Simulation at z (s, p), (s, N), and its finite differences (s, p, N), in one go."""
+    steps = space.steps(z)
+    out = _simulated(data, model, space, np.concatenate([z[:, None], _moved(z, steps)], axis=1))
+    return out[:, 0], _differences(out[:, 1:], out[:, 0], steps)
+
+
+def _moved(z: Array, steps: Array) -> Array:
+    return np.asarray(z[:, None, :] + steps[:, :, None] * np.eye(z.shape[1]))
+
+
+def _simulated(data: Data, model: Model, space: Space, z: Array) -> Array:
+    return data.simulate(model, space.theta(z.reshape(-1, z.shape[-1]))).reshape(*z.shape[:2], -1)
+
+
+@np.errstate(over='ignore', invalid='ignore')
+def _differences(out: Array, output: Array, steps: Array) -> Array:
     out -= output[:, None, :]
     out /= steps[:, :, None]
     np.nan_to_num(out, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
@@ -176,7 +194,8 @@ def fit(
     """
     space = Space(model, max(r.duration for r in data.records))
     z = space.z(np.atleast_2d(starts))
-    output = data.simulate(model, space.theta(z))
+    found, ahead = _tried(data, model, space, z[:, None])
+    output = found[:, 0]
     error = data.target - output
     sse = sum_of_squares(error)
     alive = np.isfinite(sse)
@@ -190,19 +209,23 @@ def fit(
         return Fit(space.theta(first), np.ones(size), np.zeros((p, size)), first)
     damping = np.full(len(z), 1e-2)
     active = np.ones(len(z), dtype=np.bool_)
+    slopes = [None if ahead is None else ahead[i, 0] for i in np.flatnonzero(alive)]
     for iteration in range(iterations):
         rows = np.flatnonzero(active)
         if not rows.size:
             break
-        jac = jacobian(data, model, space, z[rows], output[rows])
+        new = [r for r in rows if slopes[r] is None]
+        if new:
+            for r, jac in zip(new, jacobian(data, model, space, z[new], output[new]), strict=True):
+                slopes[r] = jac
         tries = np.stack(
             [
-                _proposals(*_informed(data, z[r], j, error[r], sse[r]), z[r], damping[r], space)
-                for j, r in zip(jac, rows, strict=True)
+                _proposals(*_informed(data, z[r], jac, error[r], sse[r]), z[r], damping[r], space)
+                for r in rows
+                if (jac := slopes[r]) is not None
             ]
         )
-        tried = data.simulate(model, space.theta(tries.reshape(-1, z.shape[1])))
-        tried = tried.reshape(len(rows), len(_DAMPINGS), -1)
+        tried, ahead = _tried(data, model, space, tries)
         for i, r in enumerate(rows):
             errors = data.target - tried[i]
             sums = sum_of_squares(errors)
@@ -212,6 +235,7 @@ def fit(
                 gain = (cost[r] - costs[best]) / cost[r]
                 z[r], output[r] = tries[i, best], tried[i, best]
                 error[r], sse[r], cost[r] = errors[best], sums[best], costs[best]
+                slopes[r] = None if ahead is None else ahead[i, best].copy()
                 damping[r] = min(max(damping[r] * _DAMPINGS[best] * 0.3, 1e-9), 1e6)
                 active[r] = gain > tolerance
             else:
@@ -221,8 +245,24 @@ def fit(
             # A start that is far behind the best and no longer moves fast is given up.
             active &= cost < 1.5 * cost.min()
     best = int(np.argmin(cost))
-    final = jacobian(data, model, space, z[best : best + 1], output[best : best + 1])[0]
+    final = slopes[best]
+    if final is None:
+        final = jacobian(data, model, space, z[best : best + 1], output[best : best + 1])[0]
     return Fit(space.theta(z[best]), error[best], final, z[best])
+
+
+def _tried(data: Data, model: Model, space: Space, tries: Array) -> tuple[Array, Array | None]:
+    """Simulate steps tried (s, d, p): (s, d, N).
+
+    With their finite differences (s, d, p, N), of which the next step needs one in d, where the
+    kernels take no longer for all of them; else None.
+    """
+    s, d, p = tries.shape
+    flat = tries.reshape(-1, p)
+    if len(flat) * (p + 1) > LANES:
+        return data.simulate(model, space.theta(flat)).reshape(s, d, -1), None
+    out, slopes = _with_jacobian(data, model, space, flat)
+    return out.reshape(s, d, -1), slopes.reshape(s, d, p, -1)
 
 
 def base_starts(data: Data) -> Array:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.diagnosis import hum
-from actuator_glue.diagnosis.data import Data, Model, chunks
+from actuator_glue.diagnosis.data import LANES, Data, Model, chunks
 from actuator_glue.diagnosis.fit import rms
 from actuator_glue.diagnosis.hum import Line
 from actuator_glue.diagnosis.result import HeldOutError, Trace
@@ -67,7 +67,7 @@ def _spread(data: Data, side: Side, rng: np.random.Generator) -> Array:
     rows = rng.integers(0, len(side.draws), min(_DRAWS, len(side.draws)))
     centre = data.simulate(side.model, side.theta)[0]
     count, total, squares = 0, np.zeros_like(centre), np.zeros_like(centre)
-    for some in chunks(len(rows), data.target.size):
+    for some in chunks(len(rows), data.target.size, LANES):
         off = data.simulate(side.model, side.draws[rows[some]]) - centre
         off = off[np.isfinite(off).all(axis=1)]
         count += len(off)
