@@ -119,8 +119,9 @@ def responses(search: Search, size: float) -> dict[str, Array]:
         Per name the response (N,) [m]; effects without one are left out.
     """
     data, base = search.data, search.scale().theta
-    off, found = data.simulate(search.structure(), base)[0], {}
-    for name in search.names:
+    off = data.simulate(search.structure(), base)[0]
+
+    def one(name: str) -> Array:
         alone = search.structure(name)
         starts, seen = search.signature(name)
         neutral = alone.parameters[len(base)].neutral or 0.0
@@ -129,10 +130,11 @@ def responses(search: Search, size: float) -> dict[str, Array]:
         # Its shape about that size: play and friction have another when they are large.
         share = min(1.0, size / max(rms(seen[nearest]), 1e-12))
         theta[len(base)] = neutral + (theta[len(base)] - neutral) * share
-        response = data.simulate(alone, theta)[0] - off
-        if 0.0 < rms(response) < 1.0:
-            found[name] = response * (size / rms(response))
-    return found
+        return np.asarray(data.simulate(alone, theta)[0] - off)
+
+    found = dict(zip(search.names, search.each(one, search.names), strict=True))
+    sizes = {name: rms(response) for name, response in found.items()}
+    return {n: r * (size / sizes[n]) for n, r in found.items() if 0.0 < sizes[n] < 1.0}
 
 
 def beside(small: Mapping[str, Array], effects: Container[str], scorer: Scorer) -> Discrepancy:

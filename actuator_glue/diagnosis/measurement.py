@@ -76,6 +76,10 @@ def quantisation(data: Data) -> Measured | None:
     return Measured('quantisation', step / np.sqrt(12.0), nats, (step,), (knowledge**-0.5,))
 
 
+def _cuts(samples: int) -> list[slice]:
+    return [slice(begin, begin + _PIECE) for begin in range(0, samples, _PIECE)]
+
+
 def staircase(data: Data, errors: Array, simulated: Array) -> Measured | None:
     """Return the converter's step where noise was added after it: an error periodic in position.
 
@@ -88,8 +92,11 @@ def staircase(data: Data, errors: Array, simulated: Array) -> Measured | None:
     cell = 2.0 * reach / bins  # padded to twice the range: periods are resolved by half a cycle
     power = np.zeros(bins // 2 + 1)
     for e, y in parts:
-        at = np.minimum(((y - y.min()) / cell).astype(np.int64), bins - 1)
-        power += np.abs(np.fft.rfft(np.bincount(at, e - e.mean(), bins))) ** 2
+        total, mean, lowest = np.zeros(bins), e.mean(), y.min()
+        for piece in _cuts(len(e)):
+            at = np.minimum(((y[piece] - lowest) / cell).astype(np.int64), bins - 1)
+            total += np.bincount(at, e[piece] - mean, bins)
+        power += np.abs(np.fft.rfft(total)) ** 2
     density = np.fft.rfftfreq(bins, cell)
     level = ndimage.median_filter(power, 201, mode='reflect') + 1e-300
     inside = (density > 20.0 / reach) & (density < 0.15 / cell)
@@ -99,7 +106,8 @@ def staircase(data: Data, errors: Array, simulated: Array) -> Measured | None:
         return None
 
     def amplitude(inverse: float) -> float:
-        sums = [abs(np.sum(e * np.exp(2j * np.pi * inverse * y))) for e, y in parts]
+        turns = 2j * np.pi * inverse
+        sums = [abs(sum(e[p] @ np.exp(turns * y[p]) for p in _cuts(len(e)))) for e, y in parts]
         return float(2.0 * np.sum(sums) / len(errors))
 
     inverse = float(density[at])

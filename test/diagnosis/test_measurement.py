@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis import hum
+from actuator_glue.diagnosis import hum, measurement
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.measurement import find, grid, jitter, quantisation, staircase
 from actuator_glue.records import Record
@@ -97,3 +97,15 @@ def test_jitter_is_variance_with_velocity() -> None:
     assert found is not None
     assert found.values[0] == pytest.approx(late, rel=0.15)
     assert found.nats > 25.0
+
+
+def test_jitter_of_a_long_record_is_found_piece_by_piece(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The filter forgets where a piece began: the numbers are those of the whole."""
+    e = SIGMA * np.random.default_rng().standard_normal(len(T)) * (1.0 + T)
+    whole = jitter(data(e), e, Y)
+    monkeypatch.setattr(measurement, '_PIECE', 500)
+    pieces = jitter(data(e), e, Y)
+    assert whole is not None
+    assert pieces is not None
+    assert pieces.values == pytest.approx(whole.values, rel=1e-9)
+    assert pieces.nats == pytest.approx(whole.nats, rel=1e-9)
