@@ -229,6 +229,19 @@ def test_blocks_and_neighbours_change_nothing(equation: str) -> None:
     assert np.array_equal(np.concatenate(parts), own)
 
 
+@pytest.mark.parametrize('change', ['own*tanh(v/1e-2)', 'own*x*v', '0.1*own'])
+def test_a_proportional_specimen_is_one_that_hardens_by_nothing(change: str) -> None:
+    """The balance of forces with a force is native code there, and compiled here."""
+    equation = f'force: f = f + {change}'
+    own = simulated(equation, 1000.0)
+    record = Record(U, U, 1 / 256.0, K)
+    plain = Structure(()).simulate(TABLE_2, record)
+    general = Structure(('own-effect', 'specimen-hardening'))
+    y = general.simulate([*TABLE_2, 1000.0, 1e-9], record)
+    assert np.abs(own - plain).max() > 1e-6, 'the case must show the effect'
+    assert np.abs(own - y).max() < 1e-14
+
+
 @pytest.mark.parametrize('place', ['command: u', 'valve: e', 'flow: q', 'force: f', 'sensor: y'])
 def test_two_at_one_place_follow_one_another(place: str) -> None:
     """The second takes what the first has made: two gains are their product."""

@@ -133,15 +133,14 @@ def test_every_signal_known_at_a_place_acts_there(place: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ('name', 'most'),
+    'name',
     [
-        ('valve: e = tanh(own*e)/own', 2.0),
-        ('flow: q = q*(1 + own*sign(q))', 2.0),
-        ('specimen: f = f + k*own*x**3', 2.0),
-        # Three Newton steps, with a tanh each, beside two.
-        ('force: f = f + own*tanh(v/1e-2)', 3.0),
+        'valve: e = tanh(own*e)/own',
+        'flow: q = q*(1 + own*sign(q))',
+        'specimen: f = f + k*own*x**3',
+        'force: f = f + own*tanh(v/1e-2)',
     ],
 )
-def test_an_expression_costs_at_most_twice_a_compiled_effect(name: str, most: float) -> None:
-    """Of its kind, in turns, so that a machine which slows down slows both; the best of three."""
-    assert any(written([name], 5)[name]['ratio'] < most for _ in range(3))
+def test_an_expression_costs_at_most_twice_a_compiled_effect(name: str) -> None:
+    """Of its kind, in turns, so that a machine which slows down slows both; the best of six."""
+    assert any(written([name], 5)[name]['ratio'] < 2.0 for _ in range(6))

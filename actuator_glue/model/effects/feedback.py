@@ -38,7 +38,7 @@ def keep(w: Array, g: Array, parts: machine.Parts, time: float, sensed: Array) -
     for n in range(r.LANES):
         g[machine.T, n] = time + g[machine.ORIGIN, n]
     if parts[machine.SENSOR]:
-        machine.execute(parts[machine.SENSOR], g)
+        machine.execute(parts[machine.SENSOR], g, w)
     for n in range(r.LANES):
         w[r.BEYOND_BEFORE + n] = w[r.BEYOND + n]
         w[r.BEYOND + n] = g[machine.Y, n] - (w[r.X + n] + w[r.X_EXACT + n] - w[r.X_TRAP + n])

@@ -112,11 +112,10 @@ def _search(
     falls: bool,
     yields: bool,
     terms: bool,
-    curved: bool,
 ) -> None:
     """Sub-step against any specimen and friction: Newton steps, three unless all is smooth.
 
-    `terms`, `curved`: whether a force is an expression, and the specimen not proportional.
+    `terms`: whether a force is an expression.
     """
     for n in range(r.LANES):
         w[r.IN_DX + n] = w[r.DX + n]
@@ -126,7 +125,7 @@ def _search(
                 moved = specimen_gap.passed(w, n, w[r.IN_DX + n], True)
                 specimen_yield.halfway(w, n, moved)
         if terms:
-            stage.force(w, g, parts, rate, curved, yields)
+            stage.force(w, g, parts, rate, yields)
         for n in range(r.LANES):
             push, stiff, guess = w[r.IN_PUSH + n], w[r.IN_STIFF + n], w[r.IN_DX + n]
             dry = w[r.COULOMB + n]
@@ -167,11 +166,18 @@ def substep(
             w[r.IN_Q + n], w[r.IN_DQ + n] = stages.valve(w, n, mean)
         stages.flow(w, on, time)
     if on[r.ON_FORCE]:
-        _begin(w, mean, flows, False, False)
-        if falls or on[specimen_yield.ON]:
-            _search(w, g, parts, rate, True, True, True, True)
+        if flows:
+            _begin(w, mean, True, False, False)
         else:
-            _search(w, g, parts, rate, False, False, True, gaps or on[r.ON_CURVED])
+            _begin(w, mean, False, False, False)
+        if falls or on[specimen_yield.ON]:
+            _search(w, g, parts, rate, True, True, True)
+        elif gaps or on[r.ON_CURVED]:
+            _search(w, g, parts, rate, False, False, True)
+        else:
+            stage.proportional(w, g, parts)
+            for n in range(r.LANES):
+                _end(w, n, rate, w[r.IN_DX + n])
         return
     if not (falls or on[r.ON_CURVED]):
         if flows:
@@ -203,14 +209,14 @@ def substep(
         _begin(w, mean, False, False, False)
     if falls:
         if yields:
-            _search(w, g, parts, rate, True, True, False, True)
+            _search(w, g, parts, rate, True, True, False)
         else:
-            _search(w, g, parts, rate, True, False, False, True)
+            _search(w, g, parts, rate, True, False, False)
     elif gaps:
         if yields:
-            _search(w, g, parts, rate, False, True, False, True)
+            _search(w, g, parts, rate, False, True, False)
         else:
-            _search(w, g, parts, rate, False, False, False, True)
+            _search(w, g, parts, rate, False, False, False)
     elif yields:
         _curved(w, rate, True)
     else:

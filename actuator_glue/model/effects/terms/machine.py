@@ -1,8 +1,9 @@
 """Instructions and registers that effects written as expressions are programs of.
 
 Registers are the rows of a table (rows, LANES); an instruction is (operation, result, a, b, c,
-memory), all but the first of them registers. native.py makes code of the processor of a program,
-which works on all lanes; here is how compiled functions call it.
+memory), all but the first of them registers. A negative register is a row of the compiled step's
+own table: -rows.X is row X there. native.py makes code of the processor of a program, which works
+on all lanes; here is how compiled functions call it.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ BETA_1, ALPHA_1_BETA_0, ALPHA_2, ALPHA_3, K = range(16, 21)
 FIXED: Final = 21
 # The parts of a program, and what the compiled step is told (`Parts`): where the code of each is,
 # 0 if it has none; how often the balance of forces is solved with it; which of `NEEDS` it reads.
-PREPARE, COMMAND, VALVE, FLOW, FORCE, SENSOR, TIMES, NEEDS = range(8)
+PREPARE, COMMAND, VALVE, FLOW, FORCE, SENSOR, BALANCE, TIMES, NEEDS = range(9)
 NEEDS_T, NEEDS_U, NEEDS_E, NEEDS_Q, NEEDS_F, NEEDS_X, NEEDS_V, NEEDS_FLOW = (
     1 << i for i in range(8)
 )
@@ -47,23 +48,24 @@ class Instruction(NamedTuple):
 
 
 @intrinsic
-def execute(_: Any, code: Any, g: Any) -> Any:
-    """Execute the code at an address, an integer, on registers g (rows, LANES)."""
+def execute(_: Any, code: Any, g: Any, w: Any) -> Any:
+    """Execute the code at an address, an integer, on registers g and the step's table w."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
-        data = context.make_array(g)(context, builder, arguments[1]).data
-        kind = ir.FunctionType(ir.VoidType(), [data.type])
-        builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), [data])
+        tables = zip((g, w), arguments[1:], strict=True)
+        data = [context.make_array(kind)(context, builder, table).data for kind, table in tables]
+        kind = ir.FunctionType(ir.VoidType(), [pointer.type for pointer in data])
+        builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), data)
         return context.get_dummy_value()
 
-    return types.void(types.int64, g), generate
+    return types.void(types.int64, g, w), generate
 
 
 @njit
 def once(code: int, g: Array) -> None:
-    """Execute the code at an address, if any, on registers g (rows, LANES)."""
+    """Execute the code at an address, if any, on registers g (rows, LANES) alone."""
     if code:
-        execute(code, g)
+        execute(code, g, g)
 
 
 @njit(nogil=True)
@@ -74,6 +76,6 @@ def sense(g: Array, code: int, time: Array, y: Array, out: Array) -> None:
             g[Y, n] = y[i, n]
             g[T, n] = time[i]
         if code:
-            execute(code, g)
+            execute(code, g, g)
         for n in range(y.shape[1]):
             out[i, n] = g[Y, n]

@@ -70,14 +70,14 @@ def native(parts: tuple[Part, ...], constants: tuple[tuple[int, float], ...]) ->
 
 
 class _Writer:
-    """Writes a function of a table of registers: a loop over vectors of lanes."""
+    """Writes a function of registers and the step's table: a loop over vectors of lanes."""
 
     def __init__(self, module: Any, name: str, constants: Mapping[int, float]) -> None:
-        kind = ir.FunctionType(ir.VoidType(), [ir.DoubleType().as_pointer()])
+        kind = ir.FunctionType(ir.VoidType(), [ir.DoubleType().as_pointer()] * 2)
         function = ir.Function(module, kind, name)
         entry, self._loop, self._end = (function.append_basic_block() for _ in range(3))
         ir.IRBuilder(entry).branch(self._loop)
-        self._code, self._table = ir.IRBuilder(self._loop), function.args[0]
+        self._code, self._tables = ir.IRBuilder(self._loop), function.args
         self._lane = self._code.phi(_INDEX)
         self._lane.add_incoming(_INDEX(0), entry)
         self._known = {
@@ -104,8 +104,9 @@ class _Writer:
         ir.IRBuilder(self._end).ret_void()
 
     def _address(self, row: int) -> Any:
-        place = self._code.add(self._lane, _INDEX(row * LANES))
-        return self._code.bitcast(self._code.gep(self._table, [place]), VECTOR.as_pointer())
+        table, begin = self._tables[row < 0], -row if row < 0 else row * LANES
+        place = self._code.add(self._lane, _INDEX(begin))
+        return self._code.bitcast(self._code.gep(table, [place]), VECTOR.as_pointer())
 
     def _read(self, row: int) -> Lanes:
         if row not in self._known:

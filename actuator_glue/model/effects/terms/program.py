@@ -14,7 +14,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.model.effects.rows import LANES
+from actuator_glue.model.effects import rows as r
 from actuator_glue.model.effects.terms import machine as m
 from actuator_glue.model.effects.terms.expression import SIGNAL, Expression
 from actuator_glue.model.effects.terms.instructions import Dual, Emitter
@@ -52,6 +52,9 @@ _NEEDS: Final = (
     (m.NEEDS_V, m.V, m.COMMAND, m.FLOW),
     (m.NEEDS_FLOW, m.Q, m.FORCE, m.FORCE),
 )
+# What weakens faster than the oil is stiff is not followed implicitly: the least slope of a force
+# over the stiffness of what drives it.
+_LEAST: Final = -0.5
 # d/d(dx) of the control error before any effect on it: the mean of the step.
 _E_SLOPE: Final = -0.5
 # Functions with a kink.
@@ -71,7 +74,7 @@ class Program:
     """Instructions of some effects and the registers they work on.
 
     Attributes:
-        code: its parts, machine.PREPARE to machine.SENSOR.
+        code: its parts, machine.PREPARE to machine.BALANCE.
         constants: registers that hold a number, and the number.
         times: how often the balance of forces is solved with it.
         rows: number of registers.
@@ -121,17 +124,17 @@ class Program:
             values: parameters by name, each (m,).
             which: parameter set of every lane, (blocks x LANES,).
         """
-        out = np.zeros((len(which) // LANES, self.rows, LANES))
+        out = np.zeros((len(which) // r.LANES, self.rows, r.LANES))
         out[:, m.D_E] = _E_SLOPE
         held = {'origin': m.ORIGIN, **_HOLDS, **self.parameters}
         for name, row in held.items():
             if name in values:
-                out[:, row] = values[name][which].reshape(-1, LANES)
+                out[:, row] = values[name][which].reshape(-1, r.LANES)
         for row, names, neutral in self.switches:
             on = np.zeros(len(which), dtype=np.bool_)
             for name, off in zip(names, neutral, strict=True):
                 on |= values[name][which] != off
-            out[:, row] = on.reshape(-1, LANES)
+            out[:, row] = on.reshape(-1, r.LANES)
         return out
 
 
@@ -141,6 +144,7 @@ def compiled(effects: Iterable[Written]) -> Program:
     for places in _PARTS:
         here = (e for place in places for e in written if e.expression.place == place)
         builder.part(SIGNAL[places[0]], here)
+    builder.balance()
     return builder.program()
 
 
@@ -173,6 +177,34 @@ class _Builder:
         self._signals[signal] = to, slope
         self._parts.append(Part(tuple(self._emitter.code), tuple(left)))
         self._emitter.forget()
+
+    def balance(self) -> None:
+        """Add a Newton step of the balance of forces, `balance.look`, around the force part.
+
+        That is against a proportional specimen. The velocity is that of the parabola through the
+        last three positions: that of the scheme itself may alternate from step to step.
+        """
+        into, force = self._emitter, self._parts[m.FORCE - 1]
+        if not force.left:
+            self._parts.append(Part((), ()))
+            return
+        dx, stiffness, dry = -r.IN_DX, -r.STIFFNESS, -r.COULOMB
+        into.code = code = []
+        before = into.do(m.MUL, into.constant(1.0 / 3.0), -r.DX)
+        code.append(m.Instruction(m.ADD, m.X, -r.X, dx))
+        code.append(m.Instruction(m.MUL, m.V, m.D_V_END, into.do(m.SUB, dx, before)))
+        code.append(m.Instruction(m.MUL, m.F, stiffness, m.X))
+        code.append(m.Instruction(m.COPY, m.D_F, stiffness))
+        code.extend(force.code)
+        left = dict(force.left)
+        oil = into.do(m.ADD, -r.IN_STIFF, -r.DAMPING_2)
+        least = into.do(m.MUL, into.constant(_LEAST), oil)
+        tangent = into.do(m.MAX, left.get(m.D_F, m.D_F), least)
+        trial = into.do(m.SUB, -r.IN_PUSH, left[m.F])
+        trial = into.do(m.ADD, trial, into.do(m.MUL, tangent, dx))
+        taken = into.do(m.MIN, into.do(m.MAX, trial, into.do(m.NEG, dry)), dry)
+        moved = into.do(m.DIV, into.do(m.SUB, trial, taken), into.do(m.ADD, oil, tangent))
+        self._parts.append(Part(tuple(code), ((dx, moved),)))
 
     def _add(self, effect: Written) -> None:
         into, names = self._emitter, tuple(p.name for p in effect.parameters)

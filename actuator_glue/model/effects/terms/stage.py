@@ -61,14 +61,14 @@ def valve(w: Array, g: Array, parts: m.Parts, mean: float, rate: float) -> None:
             w[r.IN_FLOW + n], w[r.IN_DFLOW + n] = q, min(dq, _most(g, n, rate))
         return
     if parts[m.COMMAND]:
-        m.execute(parts[m.COMMAND], g)
+        m.execute(parts[m.COMMAND], g, w)
         for n in range(lanes):
             g[m.E, n] = stages.error(w, n, g[m.U, n])
     else:
         for n in range(lanes):
             g[m.E, n] = stages.error(w, n, w[r.GAIN + n] * (mean + w[r.IN_MEAN + n]))
     if parts[m.VALVE]:
-        m.execute(parts[m.VALVE], g)
+        m.execute(parts[m.VALVE], g, w)
     for n in range(lanes):
         q, dq = stages.spool(w, n, g[m.E, n], g[m.D_E, n])
         w[r.IN_Q + n], w[r.IN_DQ + n] = q, dq
@@ -89,7 +89,7 @@ def flow(w: Array, g: Array, parts: m.Parts, rate: float, acted: bool) -> None:
         else:
             for n in range(lanes):
                 g[m.Q, n], g[m.D_Q, n] = w[r.IN_Q + n], w[r.IN_DQ + n]
-        m.execute(parts[m.FLOW], g)
+        m.execute(parts[m.FLOW], g, w)
         for n in range(lanes):
             w[r.IN_FLOW + n] = g[m.Q, n]
             w[r.IN_DFLOW + n] = min(g[m.D_Q, n], _most(g, n, rate))
@@ -123,22 +123,24 @@ def before_the_oil(
 
 
 @njit
-def force(w: Array, g: Array, parts: m.Parts, rate: float, curved: bool, yields: bool) -> None:
+def force(w: Array, g: Array, parts: m.Parts, rate: float, yields: bool) -> None:
     """Write the force of specimen and piston at the end of a step by IN_DX, and its slope.
 
-    `curved` unless the specimen is proportional. The velocity is that of the parabola through the
-    last three positions: that of the scheme itself may alternate from step to step.
+    The velocity is that of the parabola through the last three positions: that of the scheme
+    itself may alternate from step to step.
     """
     lanes, quarter = g.shape[1], 0.25 * rate
-    if curved:
-        for n in range(lanes):
-            g[m.F, n], g[m.D_F, n] = balance.specimen(w, n, w[r.IN_DX + n], True, yields)
-            g[m.X, n] = w[r.X + n] + w[r.IN_DX + n]
-            g[m.V, n] = quarter * (3.0 * w[r.IN_DX + n] - w[r.DX + n])
-    else:
-        for n in range(lanes):
-            there = w[r.X + n] + w[r.IN_DX + n]
-            g[m.F, n], g[m.D_F, n] = w[r.STIFFNESS + n] * there, w[r.STIFFNESS + n]
-            g[m.X, n] = there
-            g[m.V, n] = quarter * (3.0 * w[r.IN_DX + n] - w[r.DX + n])
-    m.execute(parts[m.FORCE], g)
+    for n in range(lanes):
+        g[m.F, n], g[m.D_F, n] = balance.specimen(w, n, w[r.IN_DX + n], True, yields)
+        g[m.X, n] = w[r.X + n] + w[r.IN_DX + n]
+        g[m.V, n] = quarter * (3.0 * w[r.IN_DX + n] - w[r.DX + n])
+    m.execute(parts[m.FORCE], g, w)
+
+
+@njit
+def proportional(w: Array, g: Array, parts: m.Parts) -> None:
+    """Write the increment against a proportional specimen and the force, after Newton steps."""
+    for n in range(r.LANES):
+        w[r.IN_DX + n] = w[r.DX + n]
+    for _ in range(parts[m.TIMES]):
+        m.execute(parts[m.BALANCE], g, w)
