@@ -98,6 +98,6 @@ EFFECT = Effect(
         for hz in (8.0, 14.0, 25.0, 50.0)
         for seen in (0.0, 1.0)
     ),
-    searched=False,  # not scored blind; out of the command's reach next to nothing of it is left
+    searched=False,  # seldom within reach, and its intervals are too narrow (docs/diagnosis.md)
     stage=Stage(_fill, beyond=_beyond, sensed=_sensed, shared=(r.ON_BEYOND,)),
 )
