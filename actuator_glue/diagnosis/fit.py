@@ -248,7 +248,8 @@ def fit(
     final = slopes[best]
     if final is None:
         final = jacobian(data, model, space, z[best : best + 1], output[best : best + 1])[0]
-    return Fit(space.theta(z[best]), error[best], final, z[best])
+    # Copies: views would keep what all starts left.
+    return Fit(space.theta(z[best]), error[best].copy(), final.copy(), z[best].copy())
 
 
 def _tried(data: Data, model: Model, space: Space, tries: Array) -> tuple[Array, Array | None]:
