@@ -139,7 +139,7 @@ class Data:
         )
 
     @cached_property
-    def _runs(self) -> tuple[list[tuple[slice, slice]], ...]:
+    def runs(self) -> tuple[list[tuple[slice, slice]], ...]:
         """Where each record's counted samples lie, run by run, and where in the joined vectors.
 
         A few runs are copied several times as quickly as a mask is gone through.
@@ -165,7 +165,7 @@ class Data:
         """
         table = np.atleast_2d(theta)
         out = np.empty((len(table), self.target.size))
-        rows = zip(self.records, self.initials, self.origins, self._runs, strict=True)
+        rows = zip(self.records, self.initials, self.origins, self.runs, strict=True)
         for record, initial, origin, runs in rows:
             for some in chunks(len(table), len(record), LANES):
                 y = simulated(model, table[some], record, initial, origin)

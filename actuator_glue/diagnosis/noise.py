@@ -87,8 +87,12 @@ def whitener(parts: list[Split]) -> Array:
 
 
 def whiten(rows: Array, taps: Array) -> Array:
-    """Filter rows (..., n) with a zero-phase whitening filter, length kept."""
-    filtered = signal.oaconvolve(np.atleast_2d(rows), taps[None, :], mode='full', axes=-1)
-    start = len(taps) // 2
-    out = filtered[:, start : start + rows.shape[-1]]
-    return np.asarray(out.reshape(rows.shape))
+    """Filter rows (..., n) with a zero-phase whitening filter, length kept.
+
+    Beyond its ends a row goes on as it ended: with zeros there slow noise would leap at both ends,
+    by many times what it moves from sample to sample.
+    """
+    half, count = len(taps) // 2, rows.shape[-1]
+    longer = np.pad(np.atleast_2d(rows), ((0, 0), (half, half)), mode='edge')
+    filtered = signal.oaconvolve(longer, taps[None, :], mode='valid', axes=-1)
+    return np.asarray(filtered[:, -count:].reshape(rows.shape))

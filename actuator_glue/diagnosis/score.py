@@ -56,12 +56,13 @@ class Scorer:
         return Scorer(part.data, tuple(self.taps[i] for i in part.records), ())
 
     def whiten(self, rows: Array) -> Array:
-        """Whiten joined rows (..., N), record by record, few at a time."""
+        """Whiten joined rows (..., N), each run without a gap by itself, few at a time."""
         out = np.empty_like(rows)
         table, found = (a.reshape(-1, rows.shape[-1]) for a in (rows, out))
-        for part, taps in zip(self.data.parts, self.taps, strict=True):
-            for some in chunks(len(table), table.shape[1]):
-                found[some, part] = whiten(table[some, part], taps)
+        for taps, runs in zip(self.taps, self.data.runs, strict=True):
+            for _, run in runs:
+                for some in chunks(len(table), table.shape[1]):
+                    found[some, run] = whiten(table[some, run], taps)
         return out
 
     def block_scores(self, fit: Fit) -> Array:
