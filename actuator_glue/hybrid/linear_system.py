@@ -52,11 +52,6 @@ def closed(loop: System) -> Array:
     return loop.A - loop.B[:, :, None] * (loop.C / (1.0 + loop.D)[:, None])[:, None]
 
 
-def rightmost(loop: System) -> Array:
-    """Return the real part of the rightmost characteristic root of 1 + L(s) = 0, (m,) [1/s]."""
-    return np.asarray(np.linalg.eigvals(closed(loop)).real.max(axis=1))
-
-
 def crossings(system: System) -> Array:
     """Return every angular frequency at which the gain is 1, (m, 2n) [rad/s]; NaN fills the rows.
 
