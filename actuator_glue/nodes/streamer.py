@@ -100,7 +100,8 @@ class Streamer(base.SuiteNode):
         now = time.monotonic()
         if missing != self._waited_for or (missing and now - self._told > REMINDER_SECONDS):
             self._waited_for, self._told = missing, now
-            self.get_logger().info(f'waiting for {missing}' if missing else 'the stream begins')
+            if missing:
+                self.get_logger().info(f'waiting for {missing}')
         return not missing
 
     def introduce(self) -> None:
@@ -112,11 +113,15 @@ class Streamer(base.SuiteNode):
         """
         if self.parameters['wait_for']:
             self._wait_until_taken(self._setup_out)
+        if not self._introduced:
+            # Not before: whoever waits for this line sends at once.
+            self.get_logger().info('the stream begins')
+        self._introduced = True
 
     def do_activate(self) -> None:
         """Begin the stream."""
         self.samples = Rate()
-        self._waited_for = None
+        self._waited_for, self._introduced = None, False
         clock = self._simulated if self.simulated_time else None
         self.pacer = Pacer(
             self.stream(), self.ready, self.speed, self._ended, clock, self.clock_jumped
