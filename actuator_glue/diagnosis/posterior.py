@@ -166,7 +166,8 @@ def sample(
             outside = ~np.isfinite(transform.inverse(w)[1])
             if not outside.any():
                 break
-            w[outside] *= 0.5
+            w[outside] = rng.standard_normal((int(outside.sum()), len(phi)))
+        w[~np.isfinite(transform.inverse(w)[1])] = 0.0
         return w
 
     if evaluations <= 0:

@@ -233,7 +233,8 @@ def test_results_go_back_to_the_controller(start, probe, tmp_path):
     assert 0.0 <= risk['p_unstable'] <= risk['p_unstable_upper'] <= 1.0
     probe.until(lambda: probe.number('lab_bridge', 'samples') == len(record), 30, 'all samples')
     assert sender.wait(30) in (0, 1)
-    assert 0.0 < values['delay'] < 0.1 and 0.5 < values['amplitude'] < 1.5
+    # At 5 Hz this actuator goes 0.5002 of the way.
+    assert 0.0 < values['delay'] < 0.1 and 0.4 < values['amplitude'] < 0.6
     assert abs(values['time'] - time.time()) < 60
     assert 20.0 < values['beta_1_mean'] < 400.0 and values['beta_1_stddev'] > 0.0
     print(f'last sample to band: median {np.median(late):.3f} s, worst {max(late):.3f} s')
