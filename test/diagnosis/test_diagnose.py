@@ -102,14 +102,14 @@ def test_noise_of_the_measurement_is_no_missing_effect() -> None:
 
 
 def test_an_effect_pressed_against_its_bound_is_told_first() -> None:
-    """More play than the catalogue allows for: the size found is that of the bound."""
-    widest = CATALOGUE['backlash'].parameters[0].upper
-    a, b, held = make(['backlash'], [1.3 * widest], 19)
+    """A valve further off its null than the catalogue allows for: the size is that of the bound."""
+    furthest = CATALOGUE['valve-null'].parameters[0].upper
+    a, b, held = make(['valve-null'], [1.3 * furthest], 19)
     found = diagnose([a, b], held, settings=Thresholds(evaluations=2000))
     (held_at,) = [p for p in found.at_bound if not p.physical]
-    assert (held_at.name, held_at.side, held_at.bound) == ('backlash', 'upper', widest)
-    assert 'backlash is pressed against the upper bound' in found.advice[0]
-    assert found.to_json()['at_bound'][0]['name'] == 'backlash'
+    assert (held_at.name, held_at.side, held_at.bound) == ('null_offset', 'upper', furthest)
+    assert 'null_offset is pressed against the upper bound' in found.advice[0]
+    assert found.to_json()['at_bound'][0]['name'] == 'null_offset'
 
 
 def test_play_is_named_and_removed() -> None:
