@@ -2,6 +2,7 @@
 
 import importlib.util
 import json
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -27,6 +28,22 @@ def test_what_the_fuzzer_begins_with_can_be_used(name, tmp_path):
             refused.append(str(error))
     # Layouts of datagrams and of OpenFresco are none of lines.
     assert len(refused) < len(seeds), refused
+
+
+def test_effects_can_be_tried_where_nothing_is_compiled(tmp_path):
+    """The fuzzer sees Python only: what functions of numba call natively must do without numba."""
+    code = (
+        'import sys; from pathlib import Path; from benchmarks.fuzz.targets import TARGETS\n'
+        'target, folder = TARGETS["effects"], Path(sys.argv[1])\n'
+        'use = target.user(folder)\n'
+        'print(sum(use(seed) is None for seed in target.seeds(folder)[:2]))'
+    )
+    environment = {**os.environ, 'NUMBA_DISABLE_JIT': '1'}
+    command = [sys.executable, '-c', code, str(tmp_path)]
+    done = subprocess.run(
+        command, cwd=ROOT, env=environment, capture_output=True, text=True, check=False
+    )
+    assert done.stdout.split()[-1:] == ['2'], done.stderr
 
 
 @pytest.mark.slow

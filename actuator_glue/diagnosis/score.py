@@ -22,6 +22,8 @@ from actuator_glue.diagnosis.stretches import Part
 from actuator_glue.records import Array
 
 BLOCK = 2.0  # s
+# Long rows that are whitened at once: more take as long, and memory.
+_WHITENED = 4
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,7 @@ class Scorer:
         table, found = (a.reshape(-1, rows.shape[-1]) for a in (rows, out))
         for taps, runs in zip(self.taps, self.data.runs, strict=True):
             for _, run in runs:
-                for some in chunks(len(table), table.shape[1]):
+                for some in chunks(len(table), table.shape[1], _WHITENED):
                     found[some, run] = whiten(table[some, run], taps)
         return out
 

@@ -53,6 +53,7 @@ class Streamer(base.SuiteNode):
         self.samples = Rate()
         self.pacer: Pacer | None = None
         self._waited_for: str | None = None
+        self._introduced = False
         self._told = 0.0
 
     def stream(self) -> Iterator[Step]:

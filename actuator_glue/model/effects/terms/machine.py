@@ -8,10 +8,11 @@ on all lanes; here is how compiled functions call it.
 
 from __future__ import annotations
 
+import ctypes
 from typing import Any, Final, NamedTuple
 
 from llvmlite import ir
-from numba import types
+from numba import config, types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
@@ -48,7 +49,7 @@ class Instruction(NamedTuple):
 
 
 @intrinsic
-def execute(_: Any, code: Any, g: Any, w: Any) -> Any:
+def _compiled(_: Any, code: Any, g: Any, w: Any) -> Any:
     """Execute the code at an address, an integer, on registers g and the step's table w."""
 
     def generate(context: Any, builder: Any, signature: Any, arguments: Any) -> Any:
@@ -59,6 +60,15 @@ def execute(_: Any, code: Any, g: Any, w: Any) -> Any:
         return context.get_dummy_value()
 
     return types.void(types.int64, g, w), generate
+
+
+def _called(code: int, g: Array, w: Array) -> None:
+    """As `_compiled`, where functions are not compiled (NUMBA_DISABLE_JIT)."""
+    signature = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
+    signature(int(code))(g.ctypes.data, w.ctypes.data)
+
+
+execute = _called if config.DISABLE_JIT else _compiled
 
 
 @njit
