@@ -102,7 +102,7 @@ def test_noise_of_the_measurement_is_no_missing_effect() -> None:
 
 
 def test_an_effect_pressed_against_its_bound_is_told_first() -> None:
-    """A valve further off its null than the catalogue allows for: the size is that of the bound."""
+    """A valve further off its null than the catalogue allows: the size is that of the bound."""
     furthest = CATALOGUE['valve-null'].parameters[0].upper
     a, b, held = make(['valve-null'], [1.3 * furthest], 19)
     found = diagnose([a, b], held, settings=Thresholds(evaluations=2000))
