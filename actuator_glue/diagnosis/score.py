@@ -98,7 +98,7 @@ class Scorer:
         scale = np.sqrt(np.einsum('pn,pn->p', jac, jac))
         room = np.multiply([[-np.inf], [np.inf]], np.ones(len(jac)))
         room[:, : fit.room.shape[1]] = fit.room
-        known = scale > 0
+        known = (scale > 0) & np.isfinite(scale)
         scale = scale[known]
         jac, room = jac[known] / scale[:, None], room[:, known] * scale
         # Prior of the shift, 30 of these nats wide: keeps directions no block fixes at rest.
