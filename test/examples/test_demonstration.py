@@ -6,6 +6,7 @@ import signal
 import socket
 import subprocess
 import sys
+import tempfile
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -102,9 +103,14 @@ def test_results_are_not_overwritten_unasked(
     assert (tmp_path / 'summary.json').read_text() == 'precious'
 
 
-def test_two_processes_never_share_a_domain(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_two_processes_never_share_a_domain(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
     """Nor is one taken where a participant of somebody else listens."""
     two = range(1, 3)
+    # Locks of their own: other tests of this machine hold domains, too.
+    monkeypatch.setattr(tempfile, 'tempdir', str(tmp_path))
+    monkeypatch.setenv('TMPDIR', str(tmp_path))
     monkeypatch.setattr(domain, 'DOMAINS', two)
     monkeypatch.setattr(domain, '_inhabited', lambda number: False)
     text = (
