@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from actuator_glue.diagnosis.finding import Rival
-from actuator_glue.diagnosis.posterior import inflation, most_likely
+from actuator_glue.diagnosis.posterior import inflation
 from actuator_glue.diagnosis.score import Scorer, evidence
 from actuator_glue.diagnosis.search import Trial
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -133,13 +133,11 @@ def _limit(trial: Trial, name: str, scorer: Scorer) -> tuple[str, float] | None:
     _, parameter, value = effect.holds
     at = next(i for i, p in enumerate(trial.model.parameters) if p.name == parameter)
     bounds = trial.model.parameters[at]
-    found = most_likely(scorer.data, trial.model, trial.fit, scorer)
-    scale = np.sqrt(np.maximum(np.einsum('pn,pn->p', found.jacobian, found.jacobian), 1e-300))
-    jac = found.jacobian / scale[:, None]
+    jac, error = scorer.whiten(trial.fit.jacobian), scorer.whiten(trial.fit.error)
+    scale = np.sqrt(np.maximum(np.einsum('pn,pn->p', jac, jac), 1e-300))
+    jac /= scale[:, None]
     inverse = np.linalg.pinv(jac @ jac.T, rcond=1e-10, hermitian=True)
-    spread = (
-        _NORMAL_95 * float(np.sqrt(inflation(found.error) * inverse[at, at])) / float(scale[at])
-    )
-    fitted = float(found.theta[at])
+    spread = _NORMAL_95 * float(np.sqrt(inflation(error) * inverse[at, at])) / float(scale[at])
+    fitted = float(trial.fit.theta[at])
     limit = fitted + spread if fitted >= value else fitted - spread
     return parameter, float(np.clip(limit, bounds.lower, bounds.upper))

@@ -1,15 +1,13 @@
 """Out-of-sample evidence of refitted structures, in nats of independent samples.
 
 The residual is whitened by its own noise density, so that a coloured background does not count
-twice. Each block is scored with parameters fitted without it: those of the optimum of the whitened
-error of all other blocks, d = (J J' - J_b J_b')^-1 (J e - J_b e_b) away from the fit, exact where
-the model is linear in its parameters (Cook 1977, for a fit that is itself the optimum: J e = 0).
-The fit is least squares on the plain error, and under slow noise up to tens of nats from it.
+twice. Each block is scored with parameters fitted without it: for least squares that refit is
+the influence formula d = (J J' - J_b J_b')^-1 J_b e_b, exact where the model is linear in its
+parameters (Cook 1977).
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -68,62 +66,44 @@ class Scorer:
         return out
 
     def block_scores(self, fit: Fit) -> Array:
-        """Log density of each block under parameters fitted without it (B,), up to a constant.
-
-        Those are most likely without it: the noise's density weighs the error, which in the fit
-        itself is plain.
-        """
-        out = []
-        for e, left in self._left_out(fit, self.whiten(fit.error), self.whiten(fit.jacobian)):
+        """Log density of each block under parameters fitted without it (B,), up to a constant."""
+        error, jac = self.whiten(fit.error), self.whiten(fit.jacobian)
+        scale = np.sqrt(np.einsum('pn,pn->p', jac, jac))
+        jac = jac[scale > 0] / scale[scale > 0, None]
+        out = np.empty(len(self.blocks))
+        for i, (block, shift) in enumerate(
+            zip(self.blocks, self._shifts(error, jac), strict=True)
+        ):
+            e = error[block]
+            predicted = e + jac[:, block].T @ shift
             # A block that alone fixes a parameter must not explode: it is scored as fitted.
             worst = 4.0 * float(e @ e) + 8.0
-            out.append(-0.5 * min(float(left @ left), worst))
-        return np.array(out)
+            out[i] = -0.5 * min(float(predicted @ predicted), worst)
+        return out
 
     def left_out_error(self, fit: Fit) -> float:
-        """Rms error of all blocks, each under least-squares parameters fitted without it [m].
-
-        What is compared in metres is fitted in metres, as the structures themselves are.
-        """
-        total = 0.0
-        for e, left in self._left_out(fit, fit.error, fit.jacobian):
-            total += min(float(left @ left), 4.0 * float(e @ e))
-        return float(np.sqrt(total / len(fit.error)))
-
-    def _left_out(self, fit: Fit, error: Array, jac: Array) -> Iterator[tuple[Array, Array]]:
-        """Yield the error of each block as fitted, and at the optimum of all other blocks.
-
-        One Gauss-Newton step leads there, from wherever the fit stands and within its bounds.
-        """
+        """Rms error of all blocks, each under parameters fitted without it [m]."""
+        error, jac = self.whiten(fit.error), self.whiten(fit.jacobian)
         scale = np.sqrt(np.einsum('pn,pn->p', jac, jac))
-        room = np.multiply([[-np.inf], [np.inf]], np.ones(len(jac)))
-        room[:, : fit.room.shape[1]] = fit.room
-        known = (scale > 0) & np.isfinite(scale)
-        scale = scale[known]
-        jac, room = jac[known] / scale[:, None], room[:, known] * scale
+        known = scale > 0
+        jac, raw = jac[known] / scale[known, None], fit.jacobian[known] / scale[known, None]
+        total = 0.0
+        for block, shift in zip(self.blocks, self._shifts(error, jac), strict=True):
+            e = fit.error[block]
+            predicted = e + raw[:, block].T @ shift
+            total += min(float(predicted @ predicted), 4.0 * float(e @ e))
+        return float(np.sqrt(total / len(error)))
+
+    def _shifts(self, error: Array, jac: Array) -> list[Array]:
+        """What each block moves the parameters by (whitened rows of unit length)."""
+        normal = jac @ jac.T
         # Prior of the shift, 30 of these nats wide: keeps directions no block fixes at rest.
-        normal, pull = jac @ jac.T + 1e-3 * np.eye(len(jac)), jac @ error
-        if self.data.prior is not None:
-            size = np.sqrt(np.mean(error**2))
-            slopes = size * self.data.prior.slopes(len(known))[known] / scale[:, None]
-            normal += slopes @ slopes.T
-            pull -= slopes @ (size * self.data.prior.pull(fit.z))
+        ridge = 1e-3 * np.eye(len(jac))
+        out: list[Array] = []
         for block in self.blocks:
-            e, j = error[block], jac[:, block]
-            yield e, e - _step(normal - j @ j.T, pull - j @ e, room) @ j
-
-
-def _step(normal: Array, pull: Array, room: Array) -> Array:
-    """Return the Gauss-Newton step (p,); what would leave its room (2, p) stops at its end."""
-    step, free = np.zeros(len(pull)), np.ones(len(pull), dtype=np.bool_)
-    while free.any():
-        rest = pull - normal[:, ~free] @ step[~free]
-        step[free] = np.linalg.solve(normal[np.ix_(free, free)], rest[free])
-        out = free & ((step < room[0]) | (step > room[1]))
-        if not out.any():
-            break
-        step, free = np.clip(step, *room), free & ~out
-    return step
+            j = jac[:, block]
+            out.append(np.asarray(np.linalg.solve(normal - j @ j.T + ridge, j @ error[block])))
+        return out
 
 
 def evidence(scores: Array, reference: Array) -> float:
