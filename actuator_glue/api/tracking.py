@@ -116,9 +116,8 @@ def record_tracking(
     drawn: list[dict[str, float]] = []
     if np.ptp(counted.command) > 0.0:
         target = Target(counted.command, record.period)
-        for part in chunks(
-            len(some), len(record), LANES
-        ):  # all at once a long test takes gigabytes
+        # All at once a long test takes gigabytes.
+        for part in chunks(len(some), len(record), LANES):
             moved = structure.simulate(some[part], record, initial=initial, origin=origin)
             finite = np.isfinite(moved[:, settle:]).all(axis=1)
             drawn += [_numbers(counted, target, x) for x in moved[finite, settle:]]
