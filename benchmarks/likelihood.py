@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from scipy import signal
 
-from actuator_glue.model import linear, problem_r
+from actuator_glue.model import linear, reference_problem
 from actuator_glue.model.exact import ExactErrors
 from actuator_glue.model.fast import FastErrors
 from actuator_glue.records import Array, Record
@@ -64,7 +64,7 @@ def run(repeats: int = 25) -> dict[str, Any]:
     draws, `fallback_posterior` and `fallback_prior` the shares of evaluations left to the exact
     kernel; `samples`.
     """
-    short, long = problem_r.records(), problem_r.records(duration=600.0)
+    short, long = reference_problem.records(), reference_problem.records(duration=600.0)
     fast, fast_long, exact = FastErrors(short), FastErrors(long), ExactErrors(short)
     linear_hold = ExactErrors([_with_hold(record) for record in short])
     many, some, one = draws(1024), draws(512), draws(1)[0]
@@ -118,7 +118,7 @@ def cost_against_length(seconds: tuple[float, ...], repeats: int = 9) -> list[di
     tasks: dict[str, Callable[[], object]] = {}
     samples = []
     for i, duration in enumerate(seconds):
-        records = problem_r.records(duration=duration)
+        records = reference_problem.records(duration=duration)
         fast, exact = FastErrors(records), ExactErrors(records)
         samples.append(float(exact.sizes.sum()))
         tasks[f'fast_us {i}'] = partial(fast, many)
@@ -142,7 +142,7 @@ def _with_hold(record: Record) -> Record:
 
 def _window() -> Record:
     """Return 10 s at 1 kHz from the middle of problem R's second test."""
-    return problem_r.records(rate=1000.0)[1].slice(30_000, 40_000)
+    return reference_problem.records(rate=1000.0)[1].slice(30_000, 40_000)
 
 
 def main() -> int:

@@ -198,6 +198,9 @@ def twenty_times_a_second(seconds: float) -> dict[str, float]:
             elif kind == HEALTH:
                 said |= _said(message, 'estimator')
     settled = spans[40:]
+    if not settled:
+        why = said.get('window (last)') or said.get('deadline (last)') or 'no samples came'
+        raise RuntimeError(f'{len(spans)} bands in {seconds:g} s, 41 are needed: {why}')
     after = np.array([stamp - due for due, stamp in settled]) * 1e-6
     excused = withheld(settled, stalls) * 1e-6
     # Compiling, before the stream, is held up by the kernel's limit on real-time priority.

@@ -22,7 +22,7 @@ from actuator_glue.inference.dream import SamplerSettings, sample  # noqa: E402 
 from actuator_glue.inference.likelihood import GlueLikelihood  # noqa: E402 - after the threads are set
 from actuator_glue.inference.moves import PUBLISHED  # noqa: E402 - after the threads are set
 from actuator_glue.inference.transforms.log import Log  # noqa: E402 - after the threads are set
-from actuator_glue.model import problem_r  # noqa: E402 - after the threads are set
+from actuator_glue.model import reference_problem  # noqa: E402 - after the threads are set
 from actuator_glue.model.fast import FastErrors  # noqa: E402 - after the threads are set
 from actuator_glue.model.parameters import bounds  # noqa: E402 - after the threads are set
 from actuator_glue.records import Array  # noqa: E402 - after the threads are set
@@ -37,7 +37,7 @@ def evaluation(
     settings: SamplerSettings, evaluations: int = 300_000, repeats: int = REPEATS
 ) -> float:
     """Processor time of one evaluation of a run, the likelihood and all else included [us]."""
-    density = GlueLikelihood(FastErrors(problem_r.records()), G)
+    density = GlueLikelihood(FastErrors(reference_problem.records()), G)
     taken = []
     for seed in range(repeats):
         began = time.process_time()
@@ -59,7 +59,7 @@ def run() -> dict[str, Any]:
     8 to 64 chains; `first_call_s` with compilation or its cache.
     """
     began = time.perf_counter()
-    density = GlueLikelihood(FastErrors(problem_r.records()), G)
+    density = GlueLikelihood(FastErrors(reference_problem.records()), G)
     first = sample(np.random.default_rng(0), density, *bounds(), evaluations=40_000)
     first_call = time.perf_counter() - began
 
@@ -141,7 +141,7 @@ def importance(
 
 def history(size: int = 2000) -> Array:
     """Posterior draws that peers may start from, (size, 4)."""
-    density = GlueLikelihood(FastErrors(problem_r.records()), G)
+    density = GlueLikelihood(FastErrors(reference_problem.records()), G)
     draws = sample(np.random.default_rng(9), density, *bounds(), evaluations=60_000).posterior()
     return np.asarray(draws[np.linspace(0, len(draws) - 1, size).astype(int)])
 

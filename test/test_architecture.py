@@ -4,6 +4,7 @@ import ast
 import re
 import subprocess
 import sys
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -161,6 +162,19 @@ def test_files_stay_small(path: Path) -> None:
             named = [a for a in given if a.arg not in ('self', 'cls')]
             compiled = 'njit' in how or '_strict' in how
             assert compiled or len(named) <= 8, f'{identifier(path)}:{node.lineno} {node.name}'
+
+
+def test_a_name_means_one_thing() -> None:
+    """No two classes of one name, and no file name three times: whoever searches finds one."""
+    classes = Counter(
+        node.name
+        for path in SOURCES
+        for node in ast.walk(ast.parse(path.read_text(encoding='utf-8')))
+        if isinstance(node, ast.ClassDef)
+    )
+    files = Counter(path.name for path in SOURCES if path.name != '__init__.py')
+    assert not [name for name, count in classes.items() if count > 1]
+    assert not [name for name, count in files.items() if count > 2]
 
 
 def test_layout_is_left_to_the_formatter() -> None:

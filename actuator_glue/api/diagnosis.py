@@ -76,11 +76,16 @@ class Diagnosis(DiagnosisData, Result):
 
     @property
     def inference_data(self) -> arviz.InferenceData:
-        """Draws of the augmented model for arviz, one chain; bounds and units as attributes."""
+        """Draws of the augmented model for arviz, one chain.
+
+        Bounds, units and what drew them are attributes. Draws of importance sampling are
+        independent but for those that are equal: `effective_draws` says what they are worth.
+        """
         import arviz as az
 
         draws = {n: self.posterior[None, :, i] for i, n in enumerate(self.names)}
         data = az.from_dict(posterior=draws)
+        data.posterior.attrs.update({k: v for k, v in self.sampler.items() if v is not None})
         known = dict(self.base)
         for effect in self.effects:
             known |= effect.parameters

@@ -30,7 +30,7 @@ DDS_SLOW = 0.01  # s
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class Check:
     """One answer.
 
     Attributes:
@@ -46,13 +46,13 @@ class Finding:
     remedy: str = ''
 
 
-def examine(folder: Path) -> Iterator[Finding]:
+def examine(folder: Path) -> Iterator[Check]:
     """Yield the answers one by one; none depends on whether the machine has ROS.
 
     Args:
         folder: where bags will be written.
     """
-    checks: tuple[Callable[[], Finding], ...] = (
+    checks: tuple[Callable[[], Check], ...] = (
         ros,
         messages,
         dds,
@@ -66,10 +66,10 @@ def examine(folder: Path) -> Iterator[Finding]:
             yield check()
         except Exception as error:  # a check that fails is an answer, not the end of the others
             text = f'could not be looked at ({type(error).__name__}: {error})'
-            yield Finding(getattr(check, '__name__', 'disk'), 'missing', text)
+            yield Check(getattr(check, '__name__', 'disk'), 'missing', text)
 
 
-def ros() -> Finding:
+def ros() -> Check:
     """Whether rclpy can be imported, and whose it is."""
     code = 'import rclpy, os; print(rclpy.__file__, os.environ.get("ROS_DISTRO") or "wheels")'
     done = _python('-c', code)
@@ -77,38 +77,38 @@ def ros() -> Finding:
         remedy = (
             'source ROS 2 (. /opt/ros/jazzy/setup.bash), or `make setup` and . install/setup.bash'
         )
-        return Finding('ros', 'missing', _last(done.stderr), remedy)
-    return Finding('ros', 'ok', f'rclpy, {done.stdout.split()[-1]}')
+        return Check('ros', 'missing', _last(done.stderr), remedy)
+    return Check('ros', 'ok', f'rclpy, {done.stdout.split()[-1]}')
 
 
-def messages() -> Finding:
+def messages() -> Check:
     """Whether the message package is built and on the path."""
     done = _python('-c', 'from actuator_glue_msgs.msg import SampleBlock; SampleBlock()')
     if done.returncode:
         remedy = '`make setup` or colcon build, then . install/setup.bash in this shell'
-        return Finding('messages', 'missing', _last(done.stderr), remedy)
-    return Finding('messages', 'ok', 'actuator_glue_msgs is on the path')
+        return Check('messages', 'missing', _last(done.stderr), remedy)
+    return Check('messages', 'ok', 'actuator_glue_msgs is on the path')
 
 
-def dds() -> Finding:
+def dds() -> Check:
     """Whether messages pass between two participants of this machine, and how fast."""
     remedy = 'look at ROS_DOMAIN_ID, ROS_AUTOMATIC_DISCOVERY_RANGE and the firewall; docs/dds.md'
     done = _python('-m', 'actuator_glue.nodes.loopback')
     if done.returncode:
-        return Finding('dds', 'missing', _last(done.stderr), remedy)
+        return Check('dds', 'missing', _last(done.stderr), remedy)
     found = json.loads(done.stdout.splitlines()[-1])
     if found['received'] < found['sent']:
         text = f'{found["received"]} of {found["sent"]} messages arrived'
-        return Finding('dds', 'missing', text, remedy)
+        return Check('dds', 'missing', text, remedy)
     text = (
         f'{found["received"]} of {found["sent"]} messages, {1e3 * found["median"]:.2f} ms median, '
         f'found each other in {found["discovery"]:.1f} s'
     )
     slow = found['median'] > DDS_SLOW
-    return Finding('dds', 'advice' if slow else 'ok', text, remedy if slow else '')
+    return Check('dds', 'advice' if slow else 'ok', text, remedy if slow else '')
 
 
-def compiled() -> Finding:
+def compiled() -> Check:
     """Whether the estimator starts at once, or compiles first."""
     began = time.monotonic()
     code = 'from actuator_glue.workers.warm import warm_windows; warm_windows(swap=False)'
@@ -117,20 +117,20 @@ def compiled() -> Finding:
     except subprocess.TimeoutExpired:
         text = f'cold: the estimator was not ready after {WARM_SECONDS:g} s'
         remedy = 'start the estimator once and wait for "ready", a few minutes (`make setup` does)'
-        return Finding('compiled', 'advice', text, remedy)
+        return Check('compiled', 'advice', text, remedy)
     if done.returncode:
-        return Finding('compiled', 'missing', _last(done.stderr), 'pip install actuator_glue')
-    return Finding('compiled', 'ok', f'warm: ready in {time.monotonic() - began:.1f} s')
+        return Check('compiled', 'missing', _last(done.stderr), 'pip install actuator_glue')
+    return Check('compiled', 'ok', f'warm: ready in {time.monotonic() - began:.1f} s')
 
 
-def realtime() -> Finding:
+def realtime() -> Check:
     """Whether processes of this user may ask for a realtime priority."""
     soft, _ = resource.getrlimit(resource.RLIMIT_RTPRIO)
     # Asked for in a child: this process stays as it is.
     done = _python('-c', 'import os; os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(1))')
     if done.returncode == 0:
-        return Finding('realtime', 'ok', f'granted (rtprio limit {soft})')
-    return Finding(
+        return Check('realtime', 'ok', f'granted (rtprio limit {soft})')
+    return Check(
         'realtime',
         'advice',
         f'not granted (rtprio limit {soft}); nodes run at normal priority',
@@ -138,13 +138,13 @@ def realtime() -> Finding:
     )
 
 
-def receive_buffer() -> Finding:
+def receive_buffer() -> Check:
     """Whether datagrams can wait while the computer does something else."""
     path = Path('/proc/sys/net/core/rmem_max')
     granted = int(path.read_text())
     if granted >= RECEIVE_BUFFER:
-        return Finding('receive_buffer', 'ok', f'{granted / 1e6:.1f} MB for live streams by UDP')
-    return Finding(
+        return Check('receive_buffer', 'ok', f'{granted / 1e6:.1f} MB for live streams by UDP')
+    return Check(
         'receive_buffer',
         'advice',
         f'{granted / 1e6:.2f} MB: 10 kHz outlast a stall of {granted / 768 / 10_000:.2g} s',
@@ -152,7 +152,7 @@ def receive_buffer() -> Finding:
     )
 
 
-def disk(folder: Path) -> Finding:
+def disk(folder: Path) -> Check:
     """How fast the folder of bags can be written, and how much room it has."""
     while not folder.exists():
         folder = folder.parent
@@ -170,7 +170,7 @@ def disk(folder: Path) -> Finding:
             room = os.statvfs(folder)
     except OSError as error:
         text = f'{folder}: {error.strerror}'
-        return Finding('disk', 'missing', text, 'name another folder with --bags')
+        return Check('disk', 'missing', text, 'name another folder with --bags')
     free = room.f_bavail * room.f_frsize
     text = (
         f'{folder}: {speed / 1e6:.0f} MB/s, slowest MB {1e3 * worst:.0f} ms, '
@@ -178,7 +178,7 @@ def disk(folder: Path) -> Finding:
     )
     slow = speed < DISK_SPEED or free < DISK_FREE or worst > DISK_STALL
     remedy = 'record to a faster or emptier disk' if slow else ''
-    return Finding('disk', 'advice' if slow else 'ok', text, remedy)
+    return Check('disk', 'advice' if slow else 'ok', text, remedy)
 
 
 def _python(*args: str, patience: float = PATIENCE) -> subprocess.CompletedProcess[str]:

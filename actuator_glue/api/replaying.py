@@ -24,7 +24,7 @@ from actuator_glue.io.load import load_records
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.playback import Item, items, stream
 from actuator_glue.online.playback import replay as run
-from actuator_glue.online.published import Comparison, Published, compare, published
+from actuator_glue.online.replay_comparison import Published, ReplayComparison, compare, published
 from actuator_glue.online.settings import AUTOMATIC, EstimatorSettings
 from actuator_glue.online.stream import Rejected
 from actuator_glue.records import Record
@@ -154,7 +154,7 @@ def _settings(live: Published | None, asked: dict[str, Any]) -> EstimatorSetting
     return EstimatorSettings.from_mapping(asked, 'options')
 
 
-def _estimate(out: _Run, settings: EstimatorSettings, done: Progress) -> Comparison | None:
+def _estimate(out: _Run, settings: EstimatorSettings, done: Progress) -> ReplayComparison | None:
     """Run the estimator, filling in what is told of windows; compare with the live run."""
     live = out.live
 

@@ -11,7 +11,7 @@ import numpy as np
 from actuator_glue.api.spread import Spread, spread
 from actuator_glue.diagnosis.data import LANES, chunks
 from actuator_glue.hybrid.actuator import actuator, table_of
-from actuator_glue.hybrid.indicators import Target, energy_error, tracking_indicator
+from actuator_glue.hybrid.indicators import TargetMotion, energy_error, tracking_indicator
 from actuator_glue.hybrid.stability import tracking
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
@@ -115,7 +115,7 @@ def record_tracking(
     counted = record.slice(settle, len(record))
     drawn: list[dict[str, float]] = []
     if np.ptp(counted.command) > 0.0:
-        target = Target(counted.command, record.period)
+        target = TargetMotion(counted.command, record.period)
         # All at once a long test takes gigabytes.
         for part in chunks(len(some), len(record), LANES):
             moved = structure.simulate(some[part], record, initial=initial, origin=origin)
@@ -147,7 +147,7 @@ def window_tracking(
     )
 
 
-def _numbers(record: Record, target: Target, moved: Array) -> dict[str, float]:
+def _numbers(record: Record, target: TargetMotion, moved: Array) -> dict[str, float]:
     index, j = target.frequency_evaluation(moved), target.criteria(moved)
     out = {
         'fei_amplitude': index.amplitude,

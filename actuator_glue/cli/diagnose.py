@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from actuator_glue.arguments import Output
 from actuator_glue.cli._effects_file import add_effects_file, load_effects
+from actuator_glue.cli._heap import give_back
 from actuator_glue.cli._output import add_json, note, progress, say, table
 from actuator_glue.cli._prior import add_prior, prior_options
 from actuator_glue.cli._records import add_records, load
@@ -93,6 +94,7 @@ def run(args: argparse.Namespace) -> int:
     """
     load_effects(args)
     records, held = _load(args)
+    give_back([*records, *held])
 
     from actuator_glue.api.diagnosis import diagnose
 

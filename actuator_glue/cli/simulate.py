@@ -174,7 +174,7 @@ def _truth(
 
 
 def _problem_r(args: argparse.Namespace) -> list[Record]:
-    from actuator_glue.model.problem_r import NOISE, RATE, STIFFNESS, records
+    from actuator_glue.model.reference_problem import NOISE, RATE, STIFFNESS, records
 
     noise = NOISE if args.noise_mm is None else args.noise_mm * 1e-3
     made = records(args.seed, noise=noise, rate=args.rate or RATE, duration=args.duration or 60.0)

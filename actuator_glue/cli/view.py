@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
         raise InputError(f'--port {args.port}: a port is a number from 0 to 65535')
     if args.live:
         return _live(args)
-    from actuator_glue.view.messages import read_bag
+    from actuator_glue.view.intake import read_bag
     from actuator_glue.view.server import PageServer
 
     server = PageServer(read_bag(args.bag, args.namespace, note=note), args.port)

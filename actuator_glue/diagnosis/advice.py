@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -163,13 +164,16 @@ def unconverged(rhat: float) -> tuple[str, ...]:
 
 
 def contradicted(error: HeldOutError, material: float) -> tuple[str, ...]:
-    """Say so where the held-out part shows far more than noise."""
-    if not misses(error, material):
+    """Say so where the held-out part shows materially more than noise, and what it may be."""
+    if not misses(replace(error, unsure=0.0), material):
         return ()
+    why = 'it may show what the fitting records do not'
+    if not misses(error, material):
+        why = f'the parameters leave up to {1e6 * error.unsure:.1f} um open there'
     return (
         f'the held-out part leaves {1e6 * error.after:.1f} um where '
-        f'{1e6 * error.noise_floor:.1f} um are noise: it may show what the fitting records do '
-        'not; add a record like it to them',
+        f'{1e6 * error.noise_floor:.1f} um are noise: {why}; add a record '
+        'like it to them',
     )
 
 

@@ -27,7 +27,7 @@ def alternatives(result: Conclusion) -> list[tuple[Trial, float]]:
         row = {rival.name: rival for rival in result.found.rivals[name]}
         rest = [n for n in final.effects if n != name]
         for rival in row.values():
-            trial = search.known((*rest, rival.name)) if rival.tied else None
+            trial = search.known((*rest, *rival.effects)) if rival.tied else None
             if trial is not None and rival.name != name:
                 out.append((trial, rival.probability / max(row[name].probability, _ROUND)))
     return out

@@ -43,7 +43,7 @@ class Model(Protocol):
 
 
 @runtime_checkable
-class Channel(Protocol):
+class ObservedChannel(Protocol):
     """A record that shows something else than the displacement (see diagnosis/force.py)."""
 
     def simulate(self, model: Model, theta: Array, initial: Initial, origin: float) -> Array:
@@ -54,7 +54,7 @@ def simulated(
     model: Model, theta: Array, record: Record, initial: Initial, origin: float = 0.0
 ) -> Array:
     """Return what a record's measured channel shows of theta (m, p), free-run, (m, n) [m]."""
-    if isinstance(record, Channel):
+    if isinstance(record, ObservedChannel):
         return record.simulate(model, theta, initial, origin)
     return model.simulate(theta, record, initial=initial, origin=origin)
 

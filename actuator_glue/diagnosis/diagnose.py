@@ -43,7 +43,7 @@ from actuator_glue.diagnosis.verify import Side, traces, verify
 from actuator_glue.inference.at_bound import Pressed, pressed
 from actuator_glue.inference.prior_use import GivenPrior
 from actuator_glue.model.parameters import BASE
-from actuator_glue.records import Array, Record
+from actuator_glue.records import Record
 
 Clock = Callable[[], float]
 
@@ -95,9 +95,7 @@ def diagnose(
     own = decision.final.own is not None
     small = {} if own else discrepancy.responses(result.selection.search, size)
 
-    def sample(
-        trial: Trial, evaluations: int = 0, stage: str = 'posterior'
-    ) -> tuple[Array, float]:
+    def sample(trial: Trial, evaluations: int = 0, stage: str = 'posterior') -> posterior.Draws:
         return posterior.sample(
             trial.model,
             trial.fit,
@@ -110,11 +108,11 @@ def diagnose(
         )
 
     final = decision.final
-    draws, rhat = sample(found.base, stage='posterior before')
-    before = after = Side(found.base.model, found.base.fit.theta, draws)
+    draws = sample(found.base, stage='posterior before')
+    before = after = Side(found.base.model, found.base.fit.theta, draws.points)
     if final.effects:
-        draws, rhat = sample(final, settings.evaluations)
-        after = Side(final.model, final.fit.theta, draws)
+        draws = sample(final, settings.evaluations)
+        after = Side(final.model, final.fit.theta, draws.points)
     still = [rest.noise_at_rest(r, rest_samples(r)) for r in data.records]
     tell('held-out', 0.0)
     error, coverage, curves = verify(
@@ -122,7 +120,7 @@ def diagnose(
     )
     space = Space(after.model, max(r.duration for r in data.records))
     others = alternatives.alternatives(result)
-    mixed = alternatives.mixed(after.draws, final, others, lambda trial: sample(trial)[0], rng)
+    mixed = alternatives.mixed(after.draws, final, others, lambda trial: sample(trial).points, rng)
     estimates, held_at = _estimates(space, replace(after, draws=mixed)), _pressed(space, after)
     plain = Space(before.model, max(r.duration for r in data.records))
     experiments = _experiments(result, [trial for trial, _ in others])
@@ -154,7 +152,7 @@ def diagnose(
             *advice.of(decision, found, result.generic, stretches, experiments),
             *advice.contradicted(error, found.material),
             *advice.unidentified(data, estimates),
-            *advice.unconverged(rhat),
+            *advice.unconverged(draws.rhat),
             *rest.compared(data.records, still, decision.noise),
             *([used.remark()] if used else []),
             *prepared.notes,
@@ -172,7 +170,8 @@ def diagnose(
         prior=used,
         names=tuple(p.name for p in after.model.parameters),
         posterior=after.draws,
-        rhat=rhat,
+        rhat=draws.rhat,
+        sampler=draws.told(),
         best=after.theta,
         traces=(
             *traces(prepared.fit, False, curves),

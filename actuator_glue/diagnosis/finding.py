@@ -8,13 +8,15 @@ from dataclasses import dataclass
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.json_value import Json, JsonObject, json_fields, json_value
 
+BESIDE = ' + '  # between the names of two effects that stand for one
+
 
 @dataclass(frozen=True, slots=True)
 class Rival:
     """An effect in the place of another, everything refitted: how far behind the best it is.
 
     Attributes:
-        name: the effect.
+        name: the effect, or two of them together: `viscous-damping + delay`.
         nats: evidence of the best over it (0 for the best itself).
         stderr: standard error of that over the blocks [nats].
         excess: rms error it leaves beyond the best [m].
@@ -31,6 +33,11 @@ class Rival:
     tied: bool
     probability: float
     limit: tuple[str, float] | None = None
+
+    @property
+    def effects(self) -> tuple[str, ...]:
+        """Names of its effects: one, or two."""
+        return tuple(self.name.split(BESIDE))
 
     def to_json(self) -> Json:
         """Return the JSON object of one rival."""

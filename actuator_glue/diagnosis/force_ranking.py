@@ -17,7 +17,7 @@ from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.fit import fit, rms
 from actuator_glue.diagnosis.force import newtons_per_metre, with_forces
 from actuator_glue.diagnosis.model_selection import Selection
-from actuator_glue.diagnosis.ranking import compare, removed
+from actuator_glue.diagnosis.ranking import compare, worth
 from actuator_glue.diagnosis.score import Scorer, evidence, splits_of
 from actuator_glue.diagnosis.search import Search, Trial
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -49,7 +49,8 @@ def decided(
     notes = []
     for name in found.final.effects:
         rest = [n for n in found.final.effects if n != name]
-        tied = [r.name for r in found.rivals[name] if r.tied and r.name != name]
+        row = [r for r in found.rivals[name] if len(r.effects) == 1]
+        tied = [r.name for r in row if r.tied and r.name != name]
         known = [trial for n in tied if (trial := search.known((*rest, n))) is not None]
         if not known or found.final.own is not None:
             continue
@@ -94,10 +95,7 @@ def _swapped(search: Search, found: Selection, name: str, ranked: Ranked) -> Sel
     told = [replace(r, probability=share * r.probability) for r in ranked.rivals]
     rivals = {n: row for n, row in found.rivals.items() if n != name}
     rivals[best.added] = (*told, *others)
-    gains, nats = {}, {}
-    for n in final.effects:
-        without = search.without(final, n)
-        gains[n], nats[n] = removed(without, final), evidence(final.scores, without.scores)
+    gains, nats = worth(search, final)
     return replace(found, final=final, rivals=rivals, removed=gains, evidence=nats)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from actuator_glue.diagnosis.data import Data, Model
 from actuator_glue.diagnosis.fit import Space
-from actuator_glue.inference.transforms.ridge import Ridge
+from actuator_glue.inference.transforms.inverse_response import Ridge
 from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array
 
@@ -117,8 +117,8 @@ class Straight:
 
 def derivatives(
     around: Working | Straight, space: Space, phi: Array, response: Callable[[Array], Array]
-) -> Array:
-    """Return derivatives of a response to coordinates (p,) that lie inside: (p, N).
+) -> tuple[Array, Array]:
+    """Return a response (N,) and its derivatives to coordinates (p,) that lie inside, (p, N).
 
     To either side, where both are inside. Differences to one side bend with the response, by some
     1e-4 of it, and that is more than noise leaves to see along a ridge: it looked ten to forty
@@ -144,4 +144,4 @@ def derivatives(
     sides = 2 - outside[:count].astype(int) - outside[count:-1]
     difference = found[:count] - found[count:-1]
     difference /= (sizes * np.maximum(sides, 1))[:, None]
-    return np.nan_to_num(difference, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
+    return found[-1], np.nan_to_num(difference, copy=False, nan=0.0, posinf=0.0, neginf=0.0)

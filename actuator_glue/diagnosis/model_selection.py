@@ -8,11 +8,11 @@ from functools import cached_property
 
 import numpy as np
 
-from actuator_glue.diagnosis import false_alarms, regression
+from actuator_glue.diagnosis import false_alarms, pairs, regression
 from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.fit import Fit
 from actuator_glue.diagnosis.learned_term import is_learned
-from actuator_glue.diagnosis.ranking import compare, removed, spokesman, standard_error
+from actuator_glue.diagnosis.ranking import compare, removed, spokesman, standard_error, worth
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.search import Search, Trial
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -174,11 +174,7 @@ class ModelSelection:
         for name in current.effects:
             current = self.search.polish(replace(current, added=name))
         current, rivals = self.spoken(*self.settle(self.search.finished(current)))
-        gains, nats = {}, {}
-        for name in current.effects:
-            rest = self.search.without(current, name)
-            gains[name] = removed(rest, current)
-            nats[name] = evidence(current.scores, rest.scores)
+        gains, nats = worth(self.search, current)
         return Selection(
             base, tuple(singles), current, rivals, gains, nats,
             self.first, self.left(current), self.noise, self.material, self.nats,
@@ -203,8 +199,9 @@ class ModelSelection:
                 if len(current.effects) > 1:
                     names = self.search.screened(rest, names)[: self.settings.tried]
                 trials = self.search.additions(rest, names)
-                rivals[name] = self._rivals(rest, current, name, trials)
-                for trial in trials:
+                two = pairs.rivals(self.search, name, trials, self.settings.tried)
+                rivals[name] = self._rivals(rest, current, name, [*trials, *two])
+                for trial in (*trials, *pairs.ahead(self, name, rivals[name], two)):
                     pressed = self._pressed_form(trial, trial.added, name)
                     if not pressed and self._ahead(trial, best, complete):
                         best = trial
@@ -219,18 +216,16 @@ class ModelSelection:
     def _ahead(self, trial: Trial, best: Trial, complete: bool) -> bool:
         """Whether a structure is better: by nats, which are those of noise.
 
-        Where more remains than that they are of misfit, at the frequencies with the least noise.
-        It counts as noise then, and the error on blocks left out tells what the blocks cannot.
+        Where more remains than that they are of misfit, at the frequencies with the least noise:
+        what has the smaller error on blocks left out is better then, unless the blocks exclude
+        it though all that remains counts as noise.
         """
         if complete:
             return bool(trial.scores.sum() > best.scores.sum())
-        if removed(trial, best) >= self.material:
-            return False
         scorer = self.search.with_misfit(best)
         gain = scorer.block_scores(trial.fit) - scorer.block_scores(best.fit)
-        if abs(gain.sum()) > _SURE * standard_error(gain):
-            return bool(gain.sum() > 0.0)
-        return scorer.left_out_error(trial.fit) < scorer.left_out_error(best.fit)
+        excluded = gain.sum() < -_SURE * standard_error(gain)
+        return not excluded and scorer.left_out_error(trial.fit) < scorer.left_out_error(best.fit)
 
     def spoken(
         self, current: Trial, rivals: dict[str, tuple[Rival, ...]]
@@ -240,14 +235,14 @@ class ModelSelection:
         for name, row in list(rivals.items()):
             other = spokesman(name, row, groups)
             rest = [n for n in current.effects if n != name]
-            known = [self.search.known((*rest, r.name)) for r in row]
+            known = [self.search.known((*rest, *r.effects)) for r in row]
             best = self.search.known((*rest, other))
             if other == name or best is None:
                 continue
             trials = [
                 replace(t, added=r.name)
                 for t, r in zip(known, row, strict=True)
-                if t is not None and r.name != other
+                if t is not None and other not in r.effects
             ]
             alone = self.search.without(current, name)
             rivals = {n: r for n, r in rivals.items() if n != name}
@@ -266,15 +261,16 @@ class ModelSelection:
             rest, best, *trials = (
                 replace(t, scores=scorer.block_scores(t.fit)) for t in (rest, best, *trials)
             )
-        return compare(rest, best, name, trials, scorer, self.settings)
+        cost = pairs.price(len(self.search.names))
+        return compare(rest, best, name, trials, scorer, self.settings, cost)
 
     def _pressed_form(self, trial: Trial, name: str, simpler: str) -> bool:
         """Whether an effect is a richer form of another only by a parameter at its bound.
 
         No equation is the machine's: such a form mends that of the other, it is not found.
         """
-        entry = self.search.entries[name]
-        if entry.holds is None or entry.holds[0] != simpler:
+        entry = self.search.entries.get(name)
+        if entry is None or entry.holds is None or entry.holds[0] != simpler:
             return False
         columns = trial.structure.columns(name)
         for p, value in zip(entry.parameters, trial.fit.theta[columns], strict=True):
@@ -287,7 +283,7 @@ class ModelSelection:
     ) -> Trial:
         """Take a rival that these data cannot tell from a member: simpler, or a name for it."""
         for name, row in rivals.items():
-            for rival in row:
+            for rival in (r for r in row if len(r.effects) == 1):
                 effects = (*(n for n in current.effects if n != name), rival.name)
                 entries = self.search.entries
                 fewer = len(entries[rival.name].parameters) < len(entries[name].parameters)

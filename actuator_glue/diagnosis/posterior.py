@@ -1,4 +1,7 @@
-"""Posterior of base and effect parameters by DREAM(ZS) around the best fit."""
+"""Posterior of base and effect parameters around the best fit.
+
+Where it is nearly normal importance sampling draws from it, and knows that it did; else DREAM(ZS).
+"""
 
 from __future__ import annotations
 
@@ -6,23 +9,25 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.diagnosis.data import Data, Model, chunks
+from actuator_glue.diagnosis.data import LANES, Data, Model, chunks
 from actuator_glue.diagnosis.discrepancy import Discrepancy
 from actuator_glue.diagnosis.fit import Fit, Space
 from actuator_glue.diagnosis.fit import fit as fit_to
 from actuator_glue.diagnosis.identifiable import Straight, Working, coordinates, derivatives
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.search import Each
-from actuator_glue.inference import posterior
+from actuator_glue.inference import importance, posterior
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.convergence import quick_rhat_and_ess
 from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.inference.transforms import Composed
 from actuator_glue.inference.transforms.laplace import Laplace
+from actuator_glue.json_value import Json, json_value
 from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array
 
@@ -32,6 +37,39 @@ _STEPS = 8  # from the least-squares fit to the optimum of the likelihood
 # of many chains.
 _ESS, _RHAT = 400.0, 1.05
 _HALVINGS = 40  # bring any point of it inside the bounds of the prior
+# From the optimum of the whitened error to that of the likelihood: a step that gains less than
+# this is none.
+_NATS, _MOST_STEPS = 0.5, 10
+
+
+class Draws(NamedTuple):
+    """Draws of a posterior and what tells how good they are.
+
+    Attributes:
+        points: (m, p), physical units.
+        method: what drew them.
+        evaluations: of the likelihood.
+        effective: how many draws they are worth, the least of all parameters.
+        rhat: largest R-hat of chains, else not-a-number.
+        pareto_k: shape of the tail of importance weights, else not-a-number.
+    """
+
+    points: Array
+    method: Literal['laplace', 'importance', 'dream']
+    evaluations: int = 0
+    effective: float = math.nan
+    rhat: float = math.nan
+    pareto_k: float = math.nan
+
+    def told(self) -> Json:
+        """Return how they were drawn, as JSON."""
+        return {
+            'method': self.method,
+            'evaluations': self.evaluations,
+            'effective_draws': json_value(self.effective),
+            'rhat': json_value(self.rhat),
+            'pareto_k': json_value(self.pareto_k),
+        }
 
 
 @dataclass(frozen=True)
@@ -92,6 +130,33 @@ def _inside(around: Working | Straight, phi: Array, move: Array) -> Array:
     return phi
 
 
+def _optimum(
+    around: Working | Straight,
+    phi: Array,
+    linearised: Callable[[Array], tuple[float, Array, Array]],
+) -> tuple[Array, Array]:
+    """Return the optimum (p,) of a likelihood from where it is linear about, and a covariance.
+
+    The allowance may take a long record thousands of nats from the optimum without it, over which
+    no response is linear.
+
+    Args:
+        around: the coordinates.
+        phi: where to begin, (p,).
+        linearised: of coordinates (p,) the log density, the move to the optimum were all linear,
+            and the covariance.
+    """
+    centre, best, new, covariance = phi, -math.inf, phi, np.empty(0)
+    for step in range(_MOST_STEPS):
+        value, move, found = linearised(new)
+        # The first move is to a mean, from where there may be next to nothing to gain.
+        if step > 0 and not value > best + (_NATS if step > 1 else -_NATS):
+            break
+        centre, best, covariance = new, value, found
+        new = _inside(around, centre, move)
+    return centre, covariance
+
+
 def _loosened(
     around: Working | Straight, theta: Array, move: Array, rng: np.random.Generator
 ) -> Array:
@@ -125,8 +190,8 @@ def sample(
     evaluations: int,
     progress: Callable[[float], None],
     each: Each = map,
-) -> tuple[Array, float]:
-    """Draw (m, p) from the posterior, physical units; return the largest R-hat with the draws.
+) -> Draws:
+    """Draw from the posterior of a structure.
 
     Args:
         model: the structure.
@@ -134,8 +199,8 @@ def sample(
         scorer: the fitting part, and whitening filters of its noise.
         beside: what may be there beside the structure.
         rng: random numbers.
-        evaluations: likelihood evaluations at most; 0 returns draws of the Laplace approximation,
-            and not-a-number for R-hat.
+        evaluations: likelihood evaluations of chains at most; 0 returns draws of the Laplace
+            approximation.
         progress: called with the share done.
         each: evaluates some draws at a time: `map`, or that of a pool of threads.
     """
@@ -144,8 +209,9 @@ def sample(
     space = Space(model, max(r.duration for r in data.records))
     around = coordinates(space, model, data, fit.z)
     phi = around.forward(fit.theta[None])[0]
-    error, noise = fit.error, inflation(beside.without(fit.error))
-    size = math.sqrt(noise)
+    noise = inflation(beside.without(fit.error))
+    size, target = math.sqrt(noise), data.target
+    whitened = scorer.whiten(target)
 
     def response(theta: Array) -> Array:
         found = scorer.whiten(data.simulate(model, theta))
@@ -153,11 +219,31 @@ def sample(
             return found
         return np.hstack([found, size * data.prior.pull(space.z(theta))])
 
-    jac = derivatives(around, space, phi, response)
-    if data.prior is not None:
-        error = np.concatenate([error, -size * data.prior.pull(fit.z)])
-    move, covariance = beside.gaussian(jac, error, noise, around.widest)
-    centre = _inside(around, phi, move)
+    def of_some(theta: Array) -> Array:
+        error = data.simulate(model, theta)
+        with np.errstate(all='ignore'):
+            error = scorer.whiten(np.subtract(target, error, out=error))
+            likely = beside.log_likelihood(error, noise)
+        return np.where(np.isfinite(likely), likely, -np.inf)
+
+    def log_likelihood(theta: Array) -> Array:
+        # As many as the kernels take at once, where there are more than chains.
+        least = LANES if len(theta) > 2 * LANES else LANES // 2
+        parts = chunks(len(theta), target.size, least)
+        found = np.concatenate(list(each(of_some, [theta[some] for some in parts])))
+        # Uniform in the logarithms otherwise.
+        return found if data.prior is None else found + data.prior.log_density(theta)
+
+    def linearised(phi: Array) -> tuple[float, Array, Array]:
+        seen, jac = derivatives(around, space, phi, response)
+        error = np.concatenate([whitened, np.zeros(len(seen) - len(whitened))]) - seen
+        theta, log_prior = around.inverse(phi[None])
+        likely = beside.log_likelihood(error[None, : len(whitened)], noise) + log_prior
+        if data.prior is not None:
+            likely += data.prior.log_density(theta)
+        return float(likely[0]), *beside.gaussian(jac, error, noise, around.widest)
+
+    centre, covariance = _optimum(around, phi, linearised)
     transform = Composed(around, Laplace(centre, covariance, around.widest))
 
     def gaussian(count: int) -> Array:
@@ -170,33 +256,29 @@ def sample(
         w[~np.isfinite(transform.inverse(w)[1])] = 0.0
         return w
 
+    def loosened(points: Array) -> Array:
+        return _loosened(around, points, centre - phi, rng)
+
     if evaluations <= 0:
-        draws = transform.inverse(gaussian(500))[0]
-        return _loosened(around, draws, centre - phi, rng), math.nan
-
-    target = data.target
-
-    def of_some(theta: Array) -> Array:
-        error = scorer.whiten(target - data.simulate(model, theta))
-        with np.errstate(all='ignore'):
-            likely = beside.log_likelihood(error, noise)
-        return np.where(np.isfinite(likely), likely, -np.inf)
-
-    def log_likelihood(theta: Array) -> Array:
-        parts = chunks(len(theta), target.size)
-        found = np.concatenate(list(each(of_some, [theta[some] for some in parts])))
-        # Uniform in the logarithms otherwise.
-        return found if data.prior is None else found + data.prior.log_density(theta)
+        return Draws(loosened(transform.inverse(gaussian(500))[0]), 'laplace')
 
     bounds = space.theta(space.lower), space.theta(space.upper)
+    goal = posterior.Target(log_likelihood, bounds, transform)
+    seed = [int(word) for word in rng.integers(0, 2**32, 3)]
+    found = importance.sample(
+        np.random.default_rng((*seed, 1)), goal.density(), len(phi), _ESS, progress
+    )
+    if found is not None:
+        points = loosened(transform.inverse(found.points)[0])
+        return Draws(points, 'importance', len(points), found.effective, pareto_k=found.pareto_k)
     chains = posterior.sample(
-        posterior.Target(log_likelihood, bounds, transform),
-        [int(word) for word in rng.integers(0, 2**32, 3)],
+        goal,
+        seed,
         evaluations,
         settings=SamplerSettings(chains=32, population=128, steps=2, adaptation=20, parts=48),
         archive=gaussian(320),
         enough=_enough,
         progress=lambda done, all_: progress(done / all_),
     )
-    draws = _loosened(around, chains.posterior(), centre - phi, rng)
-    return draws, float(chains.rhat.max())
+    rhat, effective = float(chains.rhat.max()), float(chains.ess.min())
+    return Draws(loosened(chains.posterior()), 'dream', chains.evaluations, effective, rhat)

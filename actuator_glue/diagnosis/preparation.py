@@ -98,9 +98,9 @@ def zeroed(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
     for i, (rest, record) in enumerate(zip(rests, records, strict=True)):
         command = float(np.median(record.command[:rest]))
         measured = float(np.median(record.measured[:rest]))
-        out.append(
-            replace(record, command=record.command - command, measured=record.measured - measured)
-        )
+        # Most commands begin at zero: no copy of those.
+        still = record.command - command if command else record.command
+        out.append(replace(record, command=still, measured=record.measured - measured))
         notes.append(
             f'{where(record, i + 1)}: rest offsets removed, command {1e6 * command:.1f} um, '
             f'measured {1e6 * measured:.1f} um'

@@ -12,10 +12,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from actuator_glue.diagnosis.finding import Rival
+from actuator_glue.diagnosis.finding import BESIDE, Rival
 from actuator_glue.diagnosis.posterior import inflation
 from actuator_glue.diagnosis.score import Scorer, evidence
-from actuator_glue.diagnosis.search import Trial
+from actuator_glue.diagnosis.search import Search, Trial
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.records import Array
@@ -30,6 +30,15 @@ _SAME = 0.5  # of what the best removes: a rival that removes less is none
 def removed(before: Trial, after: Trial) -> float:
     """Rms error that a larger structure removes [m]."""
     return float(np.sqrt(max(0.0, before.mean_square - after.mean_square)))
+
+
+def worth(search: Search, final: Trial) -> tuple[dict[str, float], dict[str, float]]:
+    """Return rms error [m] and nats that each effect takes away beside the others."""
+    gains, nats = {}, {}
+    for name in final.effects:
+        rest = search.without(final, name)
+        gains[name], nats[name] = removed(rest, final), evidence(final.scores, rest.scores)
+    return gains, nats
 
 
 def standard_error(difference: Array) -> float:
@@ -57,6 +66,7 @@ def compare(
     trials: Sequence[Trial],
     scorer: Scorer,
     settings: Thresholds,
+    cost: float = 0.0,
 ) -> tuple[Rival, ...]:
     """Say how far behind the best each rival is, best first.
 
@@ -67,9 +77,13 @@ def compare(
         trials: structures with another effect in its place.
         scorer: noise that they were scored with.
         settings: thresholds.
+        cost: nats that a pair of effects pays for being one of many.
     """
     whole = removed(rest, best)
-    scores = weights(np.stack([t.scores for t in (best, *trials, rest)]))
+    odds = np.array([math.exp(-cost) if BESIDE in t.added else 1.0 for t in trials])
+    scores = np.stack([t.scores for t in (best, *trials, rest)])
+    scores[1:-1] += np.log(odds)[:, None] / scores.shape[1]
+    known = weights(scores)
     excess = [removed(t, best) for t in trials]
     limits = [_limit(t, name, scorer) for t in trials]
     # A richer form that gains nothing is no alternative, unless it holds the effect itself.
@@ -80,7 +94,11 @@ def compare(
         for t, limit in zip(trials, limits, strict=True)
     ]
     alike = [math.inf if i else e for i, e in zip(idle, excess, strict=True)]
-    known = _tolerant(scores, alike, settings.tie_share * whole)
+    tolerance = settings.tie_share * whole
+    for pair, weight, chance in zip(trials, known[1:-1], odds, strict=True):
+        if chance < 1.0 and weight > known[0]:  # not told, but better by the blocks
+            known[0] = max(known[0], weight * _near(removed(best, pair), tolerance))
+    known = _tolerant(known, alike, tolerance, odds)
     out = [Rival(name, 0.0, 0.0, 0.0, True, float(known[0]))]
     for i, trial in enumerate(trials):
         near = known[1 + i] > math.exp(-settings.tie_nats) * known[0]
@@ -92,15 +110,23 @@ def compare(
     return tuple(sorted(out, key=lambda r: (r.nats, r.name != name)))
 
 
-def _tolerant(known: Array, excess: Sequence[float], tolerance: float) -> Array:
+def _near(excess: float | Array, tolerance: float) -> Array:
+    """Share of another's weight that a structure has which leaves this much more error [m]."""
+    near = np.exp(-2.0 * (np.asarray(excess) / max(tolerance, 1e-15)) ** 2)
+    return np.where(near > _NOT_NEAR, near, 0.0)
+
+
+def _tolerant(
+    known: Array, excess: Sequence[float], tolerance: float, odds: float | Array = 1.0
+) -> Array:
     """Let rivals that leave as good as the same error share the best's weight (K + 2,).
 
     The catalogue's equations are not the machine's: differences well below the share at which
     two effects count as tied are its form's, whatever the nats.
     """
-    near = np.exp(-2.0 * (np.array(excess) / max(tolerance, 1e-15)) ** 2)
     out = known.copy()
-    out[1:-1] = np.maximum(out[1:-1], known[0] * np.where(near > _NOT_NEAR, near, 0.0))
+    shared = known[0] * odds * _near(np.array(excess), tolerance)
+    out[1:-1] = np.maximum(out[1:-1], shared)
     return np.asarray(out / out.sum())
 
 

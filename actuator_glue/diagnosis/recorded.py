@@ -38,7 +38,8 @@ def find(
     if max(data.factors) == 1:
         return measurement.find(data, found.final.fit.error, found.material, line)
     whole = data.as_recorded
-    errors = whole.target - whole.simulate(_model(data, found.final), found.final.fit.theta)[0]
+    errors = whole.simulate(_model(data, found.final), found.final.fit.theta)[0]
+    np.subtract(whole.target, errors, out=errors)  # as recorded they are large
     if line is not None:
         errors = hum.regressed(whole, errors, line)
     noise = float(np.sqrt(max(np.mean(errors**2) - found.left**2, found.noise**2)))

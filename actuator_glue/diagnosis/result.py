@@ -42,6 +42,8 @@ class HeldOutError:
         after_without_hum: `after` with the hum that was found regressed out of the held-out part
             (frequency known, phase not); None without hum.
         split: 'held-out' where data were set aside.
+        unsure: rms error that the uncertainty of the parameters alone makes, in 95 % of draws at
+            most.
     """
 
     before: float
@@ -55,6 +57,7 @@ class HeldOutError:
     records: tuple[tuple[str, float, float], ...] = ()
     after_without_hum: float | None = None
     split: str = 'held-out'
+    unsure: float = 0.0
 
     def to_json(self) -> Json:
         """Return the JSON object of the held-out error."""
@@ -127,7 +130,8 @@ class DiagnosisData:
         structure: effect names of the augmented model.
         names: parameter names of the columns of `posterior`.
         posterior: draws of base and effect parameters, shape (m, p).
-        rhat: largest R-hat of the draws; NaN where they are of the Laplace approximation.
+        rhat: largest R-hat of chains; NaN where the draws are not of chains.
+        sampler: what drew them (`method`: 'importance', 'dream', 'laplace') and how well.
         best: best-fit parameters, shape (p,).
         traces: curves for the report.
         surrogate: a generic regression of equal flexibility and what it leaves out of sample.
@@ -171,6 +175,7 @@ class DiagnosisData:
     provenance: dict[str, str] = field(default_factory=dict)
     onset: Onset | None = None
     prior: PriorUse | None = None
+    sampler: Json = field(default_factory=dict)
 
     def to_json(self) -> Json:
         """Return the object of schema `actuator_glue.diagnosis/1` (curves and draws left out)."""
@@ -192,6 +197,7 @@ class DiagnosisData:
             'responses': [r.to_json() for r in self.responses],
             'experiments': [e.to_json() for e in self.experiments],
             'rhat': json_value(self.rhat),
+            'sampler': self.sampler,
             'sampling': list(self.sampling),
             'at_bound': [p.to_json() for p in self.at_bound],
             'structure': list(self.structure),

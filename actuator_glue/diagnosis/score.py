@@ -13,15 +13,13 @@ from itertools import pairwise
 
 import numpy as np
 
-from actuator_glue.diagnosis.data import Data, chunks
+from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.fit import Fit
 from actuator_glue.diagnosis.noise import Split, split, whiten, whitener
 from actuator_glue.diagnosis.stretches import Part
 from actuator_glue.records import Array
 
 BLOCK = 2.0  # s
-# Long rows that are whitened at once: more take as long, and memory.
-_WHITENED = 4
 
 
 @dataclass(frozen=True)
@@ -56,13 +54,12 @@ class Scorer:
         return Scorer(part.data, tuple(self.taps[i] for i in part.records), ())
 
     def whiten(self, rows: Array) -> Array:
-        """Whiten joined rows (..., N), each run without a gap by itself, few at a time."""
+        """Whiten joined rows (..., N), each run without a gap by itself."""
         out = np.empty_like(rows)
         table, found = (a.reshape(-1, rows.shape[-1]) for a in (rows, out))
         for taps, runs in zip(self.taps, self.data.runs, strict=True):
             for _, run in runs:
-                for some in chunks(len(table), table.shape[1], _WHITENED):
-                    found[some, run] = whiten(table[some, run], taps)
+                found[:, run] = whiten(table[:, run], taps)
         return out
 
     def block_scores(self, fit: Fit) -> Array:

@@ -213,8 +213,10 @@ class Search:
         alive = np.nan_to_num(np.abs(every), nan=np.inf).max(axis=1) < 1.0
         return every[alive], jacobian, self.scorer.of_part(part)
 
-    def screen(self, current: Trial, name: str) -> tuple[float, Array]:
+    def screen(self, current: Trial, name: str, *, beside: bool = False) -> tuple[float, Array]:
         """Project the residual on an effect's signatures (see diagnosis/screening.py).
+
+        They are those with Eq. (2) alone, or `beside` the effects of the present structure.
 
         Returns:
             The largest share of the squared error that one of the effect's starting sizes can
@@ -223,15 +225,20 @@ class Search:
         model = self.structure(*current.effects, name)
         part, fit = self._stand_in(self.structure(name)), current.fit
         sizes, seen = self._signature(name, part)
-        share, best = screen(
-            self.entries[name].parameters, sizes, seen, fit.error[part.rows],
-            fit.jacobian[:, part.rows],
-        )  # fmt: skip
-        names = [p.name for p in self.entries[name].parameters]
-        new = np.array([p.name in names for p in model.parameters])
-        thetas = np.empty((len(best), len(new)))
-        thetas[:, new], thetas[:, ~new] = best, fit.theta
-        return share, thetas
+        new = np.zeros(len(model.parameters), dtype=np.bool_)
+        new[model.columns(name)] = True
+
+        def with_others(own: Array) -> Array:
+            thetas = np.empty((len(own), len(new)))
+            thetas[:, new], thetas[:, ~new] = own, fit.theta
+            return thetas
+
+        error = fit.error[part.rows]
+        if beside:
+            seen = part.data.simulate(model, with_others(sizes)) - (part.data.target - error)
+        parameters, jacobian = self.entries[name].parameters, fit.jacobian[:, part.rows]
+        share, best = screen(parameters, sizes, seen, error, jacobian)
+        return share, with_others(best)
 
     def additions(
         self,

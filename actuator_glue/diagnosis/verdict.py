@@ -2,30 +2,38 @@
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING
+
+from actuator_glue.diagnosis.thresholds import Thresholds
 
 if TYPE_CHECKING:
     from actuator_glue.diagnosis.result import DiagnosisData, HeldOutError, Verdict
 
-# Held-out errors beyond this many times the noise say that the fitting records lack something.
-_BEYOND = 2.0
+_LATER = Thresholds().later_share  # of what was removed: less is small change
 # Share of the removable error that is printed as 0.0 %.
 _NOTHING = 5e-4
 
 
 def misses(error: HeldOutError, material: float) -> bool:
-    """Whether the held-out part shows more than noise, by what counts as material [m]."""
+    """Whether the held-out part shows more than noise: as much as an addition must remove.
+
+    That is `material` [m] and a share of what was removed; and not by one stretch of it alone,
+    nor by as much as the parameters are not known.
+    """
     floor = error.noise_floor
-    return error.after > _BEYOND * floor and error.after**2 - floor**2 > material**2
+    removed = max(0.0, error.before**2 - error.after**2)
+    matters = error.after**2 - floor**2 > max(material**2, _LATER**2 * removed)
+    return matters and error.after_ci[0] > math.hypot(floor, error.unsure)
 
 
 def conclude(verdict: Verdict, moved: bool, error: HeldOutError, material: float) -> Verdict:
     """Return the verdict of both parts.
 
     Additions were chosen on the fitting part alone and stay in the model. Where they take nothing
-    away in the held-out part, the records contradict each other. Where that part shows much more
-    than noise, no answer is complete: additions that took error away there beyond chance are a
-    part of it (`unexplained`), without any the records contradict each other.
+    away in the held-out part, the records contradict each other. Where that part shows materially
+    more than noise, no answer is complete: additions that took error away there beyond chance are
+    a part of it (`unexplained`), without any the records contradict each other.
 
     Args:
         verdict: what the fitting part says.

@@ -62,20 +62,26 @@ def bootstrap(
     ]
 
 
-def _spread(data: Data, side: Side, rng: np.random.Generator) -> Array:
-    """Standard deviation of the simulation over posterior draws, (N,) [m]."""
+def _spread(data: Data, side: Side, rng: np.random.Generator) -> tuple[Array, float]:
+    """Standard deviation of the simulation over posterior draws, (N,) [m].
+
+    And the rms distance from the best fit [m] that 95 % of them keep within.
+    """
     rows = rng.integers(0, len(side.draws), min(_DRAWS, len(side.draws)))
     centre = data.simulate(side.model, side.theta)[0]
     count, total, squares = 0, np.zeros_like(centre), np.zeros_like(centre)
+    distances: list[float] = []
     for some in chunks(len(rows), data.target.size, LANES):
         off = data.simulate(side.model, side.draws[rows[some]]) - centre
         off = off[np.isfinite(off).all(axis=1)]
         count += len(off)
         total += off.sum(axis=0)
         squares += np.einsum('mn,mn->n', off, off)
+        distances += [rms(row) for row in off]
     if count < 2:
-        return np.zeros_like(centre)
-    return np.asarray(np.sqrt(np.maximum(squares / count - (total / count) ** 2, 0.0)))
+        return np.zeros_like(centre), 0.0
+    variance = np.maximum(squares / count - (total / count) ** 2, 0.0)
+    return np.asarray(np.sqrt(variance)), float(np.quantile(distances, 0.95))
 
 
 def _sham(
@@ -134,10 +140,28 @@ def _responses(data: Data, side: Side, count: int, seed: int) -> list[NDArray[np
     return out
 
 
-def noise_floor(held: Data, error: Array, fitted: float) -> float:
-    """Noise of the held-out part: its stationary residual, at most what the fit knew [m]."""
-    here = pooled(held, splits_of(held, error))[1]
-    return min(here, max(fitted, 1e-12)) if fitted > 0 else here
+def noise_floor(fit: Data, held: Data, errors: tuple[Array, Array], fitted: float) -> float:
+    """Noise of the held-out part: its stationary residual, at most what the fit knew [m].
+
+    Its records may be noisier: that shows at most frequencies, the motion at few.
+
+    Args:
+        fit: the fitting part.
+        held: the held-out part.
+        errors: what one structure leaves of each [m].
+        fitted: noise of the fitting part [m].
+    """
+    known, seen = splits_of(fit, errors[0]), splits_of(held, errors[1])
+    here = pooled(held, seen)[1]
+    if not fitted > 0.0:
+        return here
+    louder = [
+        np.median(s.psd / np.mean([np.interp(s.frequency, k.frequency, k.psd) for k in known], 0))
+        for s in seen
+    ]
+    sizes = [part.stop - part.start for part in held.parts]
+    times = float(np.average(np.maximum(louder, 1.0), weights=sizes))
+    return min(here, max(fitted, 1e-12) * float(np.sqrt(times)))
 
 
 def verify(
@@ -167,12 +191,14 @@ def verify(
     for key, side in (('before', before), ('after', after)):
         sims[key] = held.simulate(side.model, side.theta)[0]
         errors[key] = held.target - sims[key]
-    floor = noise_floor(held, errors['after'], noise)
+    left = fit.target - fit.simulate(after.model, after.theta)[0]
+    floor = noise_floor(fit, held, (left, errors['after']), noise)
     curves = {}
     for key, side in (('before', before), ('after', after)):
-        halves[key] = _NORMAL_95 * np.sqrt(_spread(held, side, rng) ** 2 + floor**2)
+        spread, unsure = _spread(held, side, rng)
+        halves[key] = _NORMAL_95 * np.sqrt(spread**2 + floor**2)
         inner = fit.simulate(side.model, side.theta)[0]
-        width = _NORMAL_95 * np.sqrt(_spread(fit, side, rng) ** 2 + noise**2)
+        width = _NORMAL_95 * np.sqrt(_spread(fit, side, rng)[0] ** 2 + noise**2)
         curves[key] = (inner, width, sims[key], halves[key])
     intervals = bootstrap((errors['before'], errors['after']), floor, held, rng)
     first, last = rms(errors['before']), rms(errors['after'])
@@ -202,6 +228,7 @@ def verify(
         sham=sham,
         after_without_hum=rms(hum.regressed(held, errors['after'], line)) if line else None,
         records=per_record,
+        unsure=unsure,
     )
     coverage = tuple(
         float(np.mean(np.abs(errors[key]) <= halves[key])) for key in ('before', 'after')

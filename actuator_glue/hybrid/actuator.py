@@ -9,8 +9,8 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.hybrid.linear_system import System
-from actuator_glue.model.effects import CATALOGUE, Effect, lti
-from actuator_glue.model.effects.lti_step import STATES
+from actuator_glue.model.effects import CATALOGUE, Effect, linear_effects
+from actuator_glue.model.effects.linear_step import STATES
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 
@@ -84,14 +84,14 @@ def actuator(
     ):
         if name != 'damping' or 'payload-inertia' not in structure.effects:
             values[name] = np.maximum(values[name], least)
-    rows = np.zeros(len(oil), lti.KIND)
-    for name in lti.NAMES:
+    rows = np.zeros(len(oil), linear_effects.KIND)
+    for name in linear_effects.NAMES:
         rows[name] = values[name]
     m, n = len(rows), len(used)
     A, B = np.empty((m, n, n)), np.empty((m, n))
     a, b, f = np.empty((STATES, STATES)), np.empty(STATES), np.empty(STATES)
     for i, (one, k) in enumerate(zip(rows, stiffness, strict=True)):
-        lti.system(one, float(k), a, b, row, f)
+        linear_effects.system(one, float(k), a, b, row, f)
         A[i], B[i] = a[np.ix_(used, used)], b[used]
     piston, shown = np.zeros((m, n)), np.zeros(n)
     piston[:, 0] = 1.0

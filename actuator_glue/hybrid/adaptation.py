@@ -13,7 +13,7 @@ import numpy as np
 
 from actuator_glue.hybrid.compensator import HIGHEST, LOWEST
 from actuator_glue.jit import njit
-from actuator_glue.model.effects.rows import LANES
+from actuator_glue.model.effects.layout import LANES
 from actuator_glue.records import Array
 
 WINDOW = 1.0  # s

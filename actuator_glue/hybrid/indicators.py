@@ -35,7 +35,7 @@ class Criteria(NamedTuple):
     j3: float
 
 
-class Target:
+class TargetMotion:
     """A target, for many displacements that are compared with it: its spectra are taken once.
 
     Args:

@@ -15,7 +15,7 @@ from actuator_glue.hybrid.compensator import Compensator
 from actuator_glue.hybrid.partition import Partition
 from actuator_glue.hybrid.sampled import Plants, numerical, plants, reference
 from actuator_glue.hybrid.virtual_kernel import LANES
-from actuator_glue.hybrid.virtual_lanes import Course, Found, Lanes
+from actuator_glue.hybrid.virtual_lanes import Found, Lanes, SharedInputs
 from actuator_glue.model.effects import run
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
@@ -106,7 +106,7 @@ class VirtualTest:
         stride = max(1, -(-len(ground) * floors // _KEPT))
         self.time = np.asarray(np.arange(0, len(ground), stride) * partition.period)
         noise = np.array([partition.displacement_noise, partition.force_noise])
-        self._course = Course(
+        self._course = SharedInputs(
             np.ascontiguousarray(ground),
             partition.period,
             noise,

@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from actuator_glue.hybrid import adaptation
 from actuator_glue.hybrid.sampled import Numerical
-from actuator_glue.hybrid.virtual_lanes import Course, Found, Lanes
+from actuator_glue.hybrid.virtual_lanes import Found, Lanes, SharedInputs
 from actuator_glue.jit import njit
 from actuator_glue.model.effects import assembly, kernel, stages
-from actuator_glue.model.effects import rows as r
+from actuator_glue.model.effects import layout as r
 from actuator_glue.model.effects.terms import machine
 from actuator_glue.records import Array
 
@@ -116,7 +116,7 @@ def _exchange(
     i: int,
     structure: Numerical,
     lanes: Lanes,
-    course: Course,
+    course: SharedInputs,
     rng: Any,
     z: Array,
     whole: Array,
@@ -146,7 +146,7 @@ def _exchange(
 
 @njit(nogil=True)
 def run_linear(
-    structure: Numerical, lanes: Lanes, course: Course, ats: Array, rng: Any, found: Found
+    structure: Numerical, lanes: Lanes, course: SharedInputs, ats: Array, rng: Any, found: Found
 ) -> None:
     """Run a block of linear actuators through the record.
 
@@ -186,7 +186,7 @@ def run_linear(
 def run_effects(
     structure: Numerical,
     lanes: Lanes,
-    course: Course,
+    course: SharedInputs,
     ats: Array,
     rng: Any,
     found: Found,

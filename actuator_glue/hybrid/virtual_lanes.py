@@ -31,7 +31,7 @@ class Lanes(NamedTuple):
     lag: Array
 
 
-class Course(NamedTuple):
+class SharedInputs(NamedTuple):
     """What all lanes share.
 
     Attributes:

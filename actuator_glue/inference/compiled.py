@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from actuator_glue.inference.evaluate import LogDensity
 from actuator_glue.inference.mixture_density import NO_MIXTURE, Mixture, log_mixture
 from actuator_glue.jit import njit
-from actuator_glue.model import kernel, kernel_lanes, ridge
+from actuator_glue.model import identifiable, kernel, kernel_lanes
 from actuator_glue.model.fast import laguerre, quadratic
-from actuator_glue.model.fast.errors import Samples
+from actuator_glue.model.fast.errors import JoinedSamples
 from actuator_glue.records import Array
 
 
@@ -36,7 +36,7 @@ class Compiled(NamedTuple):
     """
 
     rows: Array
-    samples: Samples
+    samples: JoinedSamples
     tolerance: float
     size: float
     shaping: float
@@ -91,7 +91,7 @@ def likelihoods(sums: Array, size: float, shaping: float, sigma: float) -> Array
 
 
 @njit(fastmath=False)
-def _exactly(rows: Array, samples: Samples, theta: Array, slack: Array, sums: Array) -> None:
+def _exactly(rows: Array, samples: JoinedSamples, theta: Array, slack: Array, sums: Array) -> None:
     """Overwrite the error sums (m, R, 2) of thetas (m, p) where slack (R, m) is not 0."""
     for r in range(len(rows)):
         which = np.flatnonzero(slack[r])
@@ -115,7 +115,7 @@ def _exactly(rows: Array, samples: Samples, theta: Array, slack: Array, sums: Ar
             sums[which[i], r] = out[i]
 
 
-class Scratch(NamedTuple):
+class DensityScratch(NamedTuple):
     """What `log_densities` of m points writes to, so that a loop allocates nothing.
 
     Attributes:
@@ -134,9 +134,9 @@ class Scratch(NamedTuple):
 
 
 @njit
-def scratch(records: int, count: int) -> Scratch:
+def scratch(records: int, count: int) -> DensityScratch:
     """Return room for so many points' errors over so many records."""
-    return Scratch(
+    return DensityScratch(
         np.empty((count, 4)),
         np.empty(count, np.int64),
         np.zeros(count),
@@ -167,7 +167,12 @@ def _hopeless(density: Compiled, sums: Array, slack: Array, floor: float) -> boo
 
 @njit(fastmath=False)
 def log_densities(
-    density: Compiled, x: Array, log_jacobian: Array, floor: Array, values: Array, scratch: Scratch
+    density: Compiled,
+    x: Array,
+    log_jacobian: Array,
+    floor: Array,
+    values: Array,
+    scratch: DensityScratch,
 ) -> None:
     """Fill values (m,) with the log densities of points x (m, p).
 
@@ -181,7 +186,7 @@ def log_densities(
         if log_jacobian[i] == -np.inf:
             continue
         if density.mapped:
-            inner[count] = ridge.physical(
+            inner[count] = identifiable.physical(
                 x[i], density.stiffness, density.low, density.high, theta[count]
             )
             if inner[count] == -np.inf:

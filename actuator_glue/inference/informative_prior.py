@@ -20,8 +20,8 @@ from actuator_glue.inference.mixture_density import (
     with_covariances,
 )
 from actuator_glue.inference.transforms import Transform
+from actuator_glue.inference.transforms.inverse_response import Ridge
 from actuator_glue.inference.transforms.log import Log
-from actuator_glue.inference.transforms.ridge import Ridge
 from actuator_glue.records import Array
 
 # Share of the draws that may lie outside the prior's box before the box contradicts them.

@@ -24,7 +24,7 @@ from actuator_glue.inference.likelihood import (
 )
 from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.inference.transforms import Composed, Transform
-from actuator_glue.inference.transforms.ridge import Ridge
+from actuator_glue.inference.transforms.inverse_response import Ridge
 from actuator_glue.inference.transforms.triangular import Triangular
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.fast import FastErrors
@@ -57,6 +57,11 @@ class Target:
     bounds: tuple[Array, Array]
     transform: Transform | None = None
     prior: InformativePrior | None = None
+
+    def density(self) -> LogDensity:
+        """Return the log posterior density (m,) of coordinates (m, p), up to a constant."""
+        assert self.transform is not None
+        return _Density(self.log_likelihood, self.transform, self.prior)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -185,7 +190,7 @@ def sample(
     if transform is not None:
         if archive is None:
             settings, archive = _cold(target, transform, seed, settings)
-        density = _Density(density, transform, target.prior)
+        density = target.density()
         bounds = transform.lower, transform.upper
     elif target.prior is not None:
         density = _Informed(density, target.prior)

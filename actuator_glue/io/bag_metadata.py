@@ -91,7 +91,7 @@ class BagTopic:
 
 
 @dataclass(slots=True)
-class Part:
+class BagFile:
     """One file of a bag: name, first and last log time [ns], number of messages."""
 
     name: str
@@ -111,7 +111,7 @@ class Metadata:
     """What metadata.yaml says."""
 
     topics: list[BagTopic] = field(default_factory=list)
-    parts: list[Part] = field(default_factory=list)
+    parts: list[BagFile] = field(default_factory=list)
     custom: dict[str, str] = field(default_factory=dict)
     ros_distro: str = 'jazzy'
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple, NoReturn
 
 from actuator_glue.errors import InputError
 from actuator_glue.io import bag_metadata
-from actuator_glue.io.bag_metadata import BagTopic, Part
+from actuator_glue.io.bag_metadata import BagFile, BagTopic
 from actuator_glue.io.mcap_scan import Scan
 from actuator_glue.io.messages import deserialize, full_name
 
@@ -47,7 +47,7 @@ class Summary:
 
     topics: dict[str, BagTopic] = field(default_factory=dict)
     definitions: dict[str, str] = field(default_factory=dict)
-    parts: list[Part] = field(default_factory=list)
+    parts: list[BagFile] = field(default_factory=list)
     finished: bool = True
     damage: list[str] = field(default_factory=list)
 
@@ -142,7 +142,7 @@ def messages(
     """
     for file in bag_files(path, note):
         scan = Scan(file, note)
-        part = Part(file.name)
+        part = BagFile(file.name)
         if summary is not None:
             summary.parts.append(part)
         for schema, channel, message in scan.messages():

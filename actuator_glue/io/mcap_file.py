@@ -14,7 +14,7 @@ import yaml
 from mcap.writer import CompressionType, Writer
 
 from actuator_glue.errors import InputError
-from actuator_glue.io.bag_metadata import BagTopic, Part
+from actuator_glue.io.bag_metadata import BagFile, BagTopic
 
 CHUNK_BYTES = 64 * 1024
 
@@ -36,7 +36,7 @@ class McapFile:
     """
 
     def __init__(self, path: Path, bag: Path) -> None:
-        self.part = Part(path.name)
+        self.part = BagFile(path.name)
         self.size = 0
         self.flushes = 0
         self._bag = bag

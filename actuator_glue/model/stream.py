@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from actuator_glue.errors import InputError
-from actuator_glue.model.effects import kernel, lti, lti_step, rows, run
+from actuator_glue.model.effects import kernel, layout, linear_effects, linear_step, run
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Hold, check_stiffness
 
@@ -83,7 +83,9 @@ class Stream:
         start = (0.0, 0.0)
         if self.structure.linear:
             linear = self.hold == 'linear'
-            self._table = lti.tables(self._values, self.stiffness, self.period, linear, start)[0]
+            self._table = linear_effects.tables(
+                self._values, self.stiffness, self.period, linear, start
+            )[0]
         else:
             self._table = run.tables(
                 self._values,
@@ -118,7 +120,7 @@ class Stream:
             parts = [self.step(sample) for sample in block[:, np.newaxis]]
             return np.concatenate([y for y, _ in parts]), np.concatenate([f for _, f in parts])
         u = np.concatenate([self._history, block])
-        out = np.empty((len(block), rows.LANES))
+        out = np.empty((len(block), layout.LANES))
         force = np.empty_like(out)
         self._advance(u, out, force)
         samples = np.arange(self._begin, self._begin + len(block), dtype=np.float64)
@@ -127,7 +129,7 @@ class Stream:
         y = self.structure.sensed(self.theta[np.newaxis], samples * self.period, out[:, :1])[:, 0]
         measured = self._measured(y)
         if self._heard and len(block):
-            self._table[rows.HELD : rows.HELD + rows.LANES] = measured[-1] - y[-1]
+            self._table[layout.HELD : layout.HELD + layout.LANES] = measured[-1] - y[-1]
         return measured, force[:, 0].copy()
 
     def _advance(self, u: Array, out: Array, force: Array) -> None:
@@ -135,7 +137,7 @@ class Stream:
         at = u, self._offset, self._begin
         if self.structure.linear:
             third, delayed = self.structure.exact
-            lti_step.advance(self._table, third, delayed, *at, out, force)
+            linear_step.advance(self._table, third, delayed, *at, out, force)
         else:
             kernel.advance(
                 self._table,

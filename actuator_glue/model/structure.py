@@ -9,7 +9,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from actuator_glue.errors import InputError
 from actuator_glue.model import linear
-from actuator_glue.model.effects import CATALOGUE, Effect, Scale, assembly, lti_step, rows, run
+from actuator_glue.model.effects import (
+    CATALOGUE,
+    Effect,
+    Scale,
+    assembly,
+    layout,
+    linear_step,
+    run,
+)
 from actuator_glue.model.effects.effect import Onset
 from actuator_glue.model.effects.terms import machine
 from actuator_glue.model.effects.terms.program import Written, compiled
@@ -66,8 +74,8 @@ class Structure:
             Written(e.expression, e.parameters) for e in self.entries if e.expression is not None
         )
         if self.program.acts(machine.COMMAND, machine.FORCE):
-            self._on[rows.ON_TERMS] = True
-            self._on[rows.ON_FORCE] = self.program.acts(machine.FORCE, machine.FORCE)
+            self._on[layout.ON_TERMS] = True
+            self._on[layout.ON_FORCE] = self.program.acts(machine.FORCE, machine.FORCE)
         self._plain = all(e.variance is not None for e in self.entries)
         self.linear = all(e.linear for e in self.entries)
 
@@ -203,7 +211,7 @@ class Structure:
     @property
     def exact(self) -> tuple[int, bool]:
         """States beside x and q, and whether there is a delay, for a linear structure's steps."""
-        return lti_step.third(e.exact for e in self.entries), bool(self._on[rows.ON_LAG])
+        return linear_step.third(e.exact for e in self.entries), bool(self._on[layout.ON_LAG])
 
     @property
     def switches(self) -> NDArray[np.bool_]:
@@ -268,7 +276,6 @@ class Structure:
                     values |= onset(values, origin)
             values['origin'] = np.full(len(table), origin)
             blocks = run.blocks(values, self._on, self.program, record, start, rate, force)
-        time = record.time + origin
         for which, begin, x in blocks:
-            now = time[begin : begin + len(x)]
+            now = np.asarray(np.arange(begin, begin + len(x)) * record.period + origin)
             yield which, begin, x if force else self.sensed(table[which], now, x)

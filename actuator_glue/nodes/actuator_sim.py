@@ -19,7 +19,7 @@ from actuator_glue.model.plant import MeasuredPlant, Plant
 from actuator_glue.model.sensor import SensorSpec
 from actuator_glue.model.stream import Stream
 from actuator_glue.model.structure import Structure
-from actuator_glue.nodes import folders, own_effects, spin, streamer, undeclared
+from actuator_glue.nodes import folders, hidden_effects, own_effects, spin, streamer
 from actuator_glue.nodes.blocks import BlockPublisher
 from actuator_glue.nodes.pacer import Step
 from actuator_glue.nodes.parameters import Parameters, Spec
@@ -145,7 +145,7 @@ class SimulatorNode(streamer.Streamer):
             given = self._values['sealed_file']
             self._sealed = Path(given) if given else folders.unnamed('truth', '.json')
             self.get_logger().info(f'the truth is sealed in {self._sealed}')
-        undeclared.seal(self._sealed, structure, theta)
+        hidden_effects.seal(self._sealed, structure, theta)
 
     # Below runs in the pacer's thread.
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from actuator_glue.nodes import topics
 from actuator_glue.nodes.messages import publish
-from actuator_glue.online.wire import Fields, Head
+from actuator_glue.online.conversion import Fields, Head
 from actuator_glue.records import Array, Hold
 
 

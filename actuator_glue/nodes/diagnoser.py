@@ -14,12 +14,12 @@ from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from actuator_glue import sample_block
 from actuator_glue.diagnosis.verdict import against
 from actuator_glue.errors import InputError
-from actuator_glue.nodes import diagnosing, own_effects, spin, topics
+from actuator_glue.nodes import diagnoser_worker, own_effects, spin, topics
 from actuator_glue.nodes.health import ERROR
 from actuator_glue.nodes.latched import Newest
 from actuator_glue.nodes.messages import publish
 from actuator_glue.nodes.working import WorkingNode
-from actuator_glue.online import wire
+from actuator_glue.online import conversion
 from actuator_glue.online.alarm import CoverageAlarm, SwapWatch
 from actuator_glue.online.collect import Collector
 from actuator_glue.online.stream import Event, Rejected, Restarted
@@ -35,9 +35,9 @@ class DiagnoserNode(WorkingNode):
 
     def __init__(self) -> None:
         self._goal: Any = None
-        self._request: diagnosing.Request | None = None
+        self._request: diagnoser_worker.Request | None = None
         self._swap: Any = None
-        super().__init__('diagnoser', diagnosing.SPECS)
+        super().__init__('diagnoser', diagnoser_worker.SPECS)
 
     def check(self, values: Mapping[str, Any]) -> None:
         """Read the user's own effects."""
@@ -45,7 +45,7 @@ class DiagnoserNode(WorkingNode):
 
     def do_configure(self) -> None:
         """Start the worker; offer the action."""
-        self.employ(diagnosing.warm_up, nice=5)
+        self.employ(diagnoser_worker.warm_up, nice=5)
         self._diagnosis = self.publisher(topics.DIAGNOSIS)
         self._model_client = self.create_client(
             SetModel, f'{self.parameters["estimator"]}/set_model'
@@ -91,7 +91,7 @@ class DiagnoserNode(WorkingNode):
             seconds = time.monotonic() - self._last
             text = f'given up after {seconds:.0f} s: the node was deactivated'
             self.complain('diagnosis', f'{text}; a launch waits longer with linger:=SECONDS')
-            self._finish(diagnosing.Outcome(message=text))
+            self._finish(diagnoser_worker.Outcome(message=text))
 
     def do_report(self) -> None:
         """Coverage and what is being done."""
@@ -149,7 +149,9 @@ class DiagnoserNode(WorkingNode):
         self._pending = False
         self.get_logger().info('diagnosing what was received lately')
         self._start(
-            diagnosing.Request(records=tuple(records), seed=values['seed'], apply=values['apply'])
+            diagnoser_worker.Request(
+                records=tuple(records), seed=values['seed'], apply=values['apply']
+            )
         )
 
     # Diagnosing.
@@ -165,15 +167,15 @@ class DiagnoserNode(WorkingNode):
         self._goal = handle
         try:
             live = () if handle.request.records else tuple(self.collector.records())
-            self._start(diagnosing.asked(handle.request, live))
+            self._start(diagnoser_worker.asked(handle.request, live))
         except InputError as error:
-            self._finish(diagnosing.Outcome(message=str(error)))
+            self._finish(diagnoser_worker.Outcome(message=str(error)))
 
-    def _start(self, request: diagnosing.Request) -> None:
+    def _start(self, request: diagnoser_worker.Request) -> None:
         self._request = request
-        self._overall = diagnosing.Overall()
+        self._overall = diagnoser_worker.Overall()
         self._last = time.monotonic()
-        self.worker.submit(diagnosing.work, request)
+        self.worker.submit(diagnoser_worker.work, request)
 
     def answered(self, answer: Answer) -> None:
         """Take progress, the diagnosis, or that there is none."""
@@ -184,7 +186,7 @@ class DiagnoserNode(WorkingNode):
         elif answer.kind in (DIED, FAILED):
             if answer.kind == FAILED:
                 self.complain('diagnosis', str(answer.payload), ERROR)
-            self._finish(diagnosing.Outcome(message=str(answer.payload)))
+            self._finish(diagnoser_worker.Outcome(message=str(answer.payload)))
         else:
             self._diagnosed(answer.payload)
 
@@ -194,14 +196,14 @@ class DiagnoserNode(WorkingNode):
             fraction = self._overall(stage, share)
             self._goal.publish_feedback(Diagnose.Feedback(stage=stage, fraction=fraction))
 
-    def _diagnosed(self, outcome: diagnosing.Outcome) -> None:
+    def _diagnosed(self, outcome: diagnoser_worker.Outcome) -> None:
         request = self._request
         if outcome.diagnosis is None or request is None:
             self.complain('diagnosis', outcome.message)
             self._finish(outcome)
             return
-        head = wire.Head(self.get_clock().now().nanoseconds, outcome.actuator)
-        publish(self._diagnosis, head, diagnosing.fields(outcome))
+        head = conversion.Head(self.get_clock().now().nanoseconds, outcome.actuator)
+        publish(self._diagnosis, head, diagnoser_worker.fields(outcome))
         self.get_logger().info(outcome.message)
         why_not = against(outcome.diagnosis)
         if request.apply and not why_not:
@@ -211,7 +213,7 @@ class DiagnoserNode(WorkingNode):
             self.get_logger().info(f'the estimator goes on as it is: {why_not}')
         self._finish(outcome)
 
-    def _apply(self, outcome: diagnosing.Outcome) -> None:
+    def _apply(self, outcome: diagnoser_worker.Outcome) -> None:
         diagnosis = outcome.diagnosis
         assert diagnosis is not None
         if not self._model_client.service_is_ready():
@@ -235,7 +237,7 @@ class DiagnoserNode(WorkingNode):
                 self.complain('set_model', f'the estimator refuses: {response.message}')
             self._finish(outcome)
 
-        self._swap = self._model_client.call_async(diagnosing.augmented(diagnosis))
+        self._swap = self._model_client.call_async(diagnoser_worker.augmented(diagnosis))
         self._swap.add_done_callback(self.guarded(answered))
         self._swap_end = time.monotonic() + ANSWER_SECONDS
 
@@ -254,11 +256,11 @@ class DiagnoserNode(WorkingNode):
         """Give up what is cancelled, and waiting for an answer that was lost."""
         if self._goal is not None and self._request is not None and self._goal.is_cancel_requested:
             self.give_up()
-            self._finish(diagnosing.Outcome(message='cancelled'))
+            self._finish(diagnoser_worker.Outcome(message='cancelled'))
         if self._swap is not None and time.monotonic() > self._swap_end:
             self._swap.cancel()
 
-    def _finish(self, outcome: diagnosing.Outcome) -> None:
+    def _finish(self, outcome: diagnoser_worker.Outcome) -> None:
         self._request = self._swap = None
         self._outcome = outcome
         self.health.values['last diagnosis'] = outcome.message
@@ -274,8 +276,8 @@ class DiagnoserNode(WorkingNode):
             applied=outcome.applied,
         )
         if outcome.diagnosis is not None:
-            head = wire.Head(self.get_clock().now().nanoseconds, outcome.actuator)
-            diagnosing.fill_message(result.diagnosis, head, outcome)
+            head = conversion.Head(self.get_clock().now().nanoseconds, outcome.actuator)
+            diagnoser_worker.fill_message(result.diagnosis, head, outcome)
         if handle.is_cancel_requested:
             handle.canceled()
         elif outcome.diagnosis is not None:

@@ -15,13 +15,13 @@ from actuator_glue import sample_block
 from actuator_glue.errors import InputError
 from actuator_glue.inference.choice import ModelChoice, choose_model
 from actuator_glue.nodes import configuration, own_effects, spin, topics
-from actuator_glue.nodes.estimating import Computed, compute, warm_up
+from actuator_glue.nodes.estimator_worker import Computed, compute, warm_up
 from actuator_glue.nodes.health import ERROR, Rate
 from actuator_glue.nodes.latched import Newest
 from actuator_glue.nodes.messages import publish
 from actuator_glue.nodes.tracking import publish_tracking
 from actuator_glue.nodes.working import WorkingNode
-from actuator_glue.online import wire
+from actuator_glue.online import conversion
 from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.fitting import identifiable
 from actuator_glue.online.job import WindowResult
@@ -105,7 +105,7 @@ class EstimatorNode(WorkingNode):
             )
 
     def _preview(self, message: Any) -> None:
-        self._tell(self.estimator.preview(wire.preview(message)))
+        self._tell(self.estimator.preview(conversion.preview(message)))
 
     def _block(self, message: Any) -> None:
         self._setups.settle()
@@ -164,7 +164,7 @@ class EstimatorNode(WorkingNode):
         arrival = self._arrival.get(job.window.number, now)
         self._arrival = {n: t for n, t in self._arrival.items() if n > job.window.number}
         self._started = arrival
-        self.worker.submit(compute, job, arrival + self.settings.time_budget, self._frequencies)
+        self.worker.submit(compute, job, arrival + job.seconds, self._frequencies)
 
     def _too_late(self, window: Window, now: float) -> bool:
         """Whether a window could not be published in time any more, or only cut short."""
@@ -193,11 +193,11 @@ class EstimatorNode(WorkingNode):
         self.last = result
         self.windows.add()
         actuator = result.window.record.actuator
-        publish(self._out[topics.POSTERIOR], *wire.posterior(result, seconds))
-        publish(self._out[topics.DRAWS], *wire.draws(result))
+        publish(self._out[topics.POSTERIOR], *conversion.posterior(result, seconds))
+        publish(self._out[topics.DRAWS], *conversion.draws(result))
         for prediction in (*result.scored, *result.forecast):
-            publish(self._out[topics.BAND], *wire.prediction(prediction, actuator))
-        publish(self._out[topics.RESPONSE], *wire.response(result))
+            publish(self._out[topics.BAND], *conversion.prediction(prediction, actuator))
+        publish(self._out[topics.RESPONSE], *conversion.response(result))
         for complaint in publish_tracking(self._out, computed, self._frequencies):
             self.complain('tracking', complaint)
         latency = time.monotonic() - self._started
@@ -222,8 +222,8 @@ class EstimatorNode(WorkingNode):
             record = job.window.record
             number, index = job.window.number, record.first_index
             stamp, actuator = record.start_ns, record.actuator
-        fields = wire.estimator_setup(self.settings, model, number, index, self._carried)
-        publish(self._out[topics.ESTIMATOR_SETUP], wire.Head(stamp, actuator), fields)
+        fields = conversion.estimator_setup(self.settings, model, number, index, self._carried)
+        publish(self._out[topics.ESTIMATOR_SETUP], conversion.Head(stamp, actuator), fields)
 
     def _set_model(self, request: Any, response: Any) -> Any:
         try:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from actuator_glue.online.wire import Head
+from actuator_glue.online.conversion import Head
 
 
 def fill(message: Any, head: Head, fields: Mapping[str, Any]) -> Any:

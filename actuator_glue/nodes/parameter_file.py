@@ -10,7 +10,7 @@ from actuator_glue.nodes import (
     actuator_sim,
     base,
     configuration,
-    diagnosing,
+    diagnoser_worker,
     lab_bridge,
     margin,
     recorder,
@@ -25,7 +25,7 @@ NODES = {
     'recorder': recorder.SPECS,
     'replay': replay.SPECS,
     'lab_bridge': lab_bridge.SPECS,
-    'diagnoser': diagnosing.SPECS,
+    'diagnoser': diagnoser_worker.SPECS,
     'margin': margin.SPECS,
     'viewer': viewer.SPECS,
 }

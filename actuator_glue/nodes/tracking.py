@@ -9,10 +9,10 @@ import numpy as np
 
 from actuator_glue.api.tracking import RecordTracking
 from actuator_glue.nodes import topics
-from actuator_glue.nodes.estimating import Computed
+from actuator_glue.nodes.estimator_worker import Computed
 from actuator_glue.nodes.messages import publish
+from actuator_glue.online.conversion import Head
 from actuator_glue.online.job import WindowResult
-from actuator_glue.online.wire import Head
 
 # Field in the message: name in `RecordTracking`.
 _NUMBERS = {

@@ -9,7 +9,7 @@ from actuator_glue.nodes import base, spin, topics
 from actuator_glue.nodes.health import Rate
 from actuator_glue.nodes.parameters import Spec
 from actuator_glue.view.history import History
-from actuator_glue.view.messages import LIVE_SAMPLES, TYPES, Intake
+from actuator_glue.view.intake import LIVE_SAMPLES, TYPES, Intake
 from actuator_glue.view.server import PORT, PageServer
 
 SPECS = (

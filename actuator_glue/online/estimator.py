@@ -11,7 +11,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.online.fitting import starting_points
-from actuator_glue.online.forecast import Frozen
+from actuator_glue.online.forecast import FrozenPosterior
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.knowledge import Knowledge
 from actuator_glue.online.sampling import Job, WindowFit
@@ -49,7 +49,7 @@ class _Memory:
     archive: Array | None = None
     model: ModelChoice | None = None
     epoch: int = -1
-    frozen: list[Frozen] = field(default_factory=list)
+    frozen: list[FrozenPosterior] = field(default_factory=list)
 
 
 class Estimator:
@@ -205,7 +205,7 @@ class Estimator:
         old = self._waiting.pop(0)
         return Dropped(old.number, old.record.first_index)
 
-    def _judged(self, window: Window) -> tuple[Frozen, ...]:
+    def _judged(self, window: Window) -> tuple[FrozenPosterior, ...]:
         """Return the earlier posteriors whose forecasts a window's samples judge."""
         first = window.recent.first_index
         # All commands since their windows' ends are known.

@@ -6,7 +6,7 @@ import numpy as np
 
 from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.model import linear
-from actuator_glue.model.effects.rows import LANES
+from actuator_glue.model.effects.layout import LANES
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 

@@ -22,7 +22,7 @@ TINY = 1e-12  # m; a residual is never exactly nothing
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Frozen:
+class FrozenPosterior:
     """A posterior as it stood when its window closed, kept to be held against later samples.
 
     Attributes:
@@ -82,7 +82,7 @@ class Prediction:
 
 
 def predictions(
-    frozen: Frozen,
+    frozen: FrozenPosterior,
     simulated: Array,
     *,
     levels: tuple[float, ...],

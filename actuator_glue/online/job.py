@@ -14,7 +14,7 @@ from actuator_glue.inference.convergence import rhat_and_ess
 from actuator_glue.inference.moments import Moments, moments
 from actuator_glue.inference.prior_conflict import Conflict
 from actuator_glue.online import fitting, sampling
-from actuator_glue.online.forecast import Frozen, Prediction, predictions
+from actuator_glue.online.forecast import FrozenPosterior, Prediction, predictions
 from actuator_glue.online.response import ResponseBand, response_band
 from actuator_glue.online.sampling import Job, WindowFit
 from actuator_glue.online.settings import EstimatorSettings
@@ -73,7 +73,7 @@ class WindowResult:
     response: ResponseBand | None = None
     scored: tuple[Prediction, ...] = ()
     forecast: tuple[Prediction, ...] = ()
-    frozen: Frozen | None = None
+    frozen: FrozenPosterior | None = None
     archive: Array | None = None
     learned: Carried | None = None
     conflict: Conflict | None = None
@@ -169,7 +169,7 @@ def _report(job: Job, fitted: WindowFit, limits: bool) -> WindowResult:
     )
 
 
-def _score(job: Job, old: Frozen) -> list[Prediction]:
+def _score(job: Job, old: FrozenPosterior) -> list[Prediction]:
     """Hold an earlier posterior against the samples of its forecast, as this window holds them."""
     record = job.window.recent
     end, start, stop = (i - record.first_index for i in (old.end, old.start, old.stop))
@@ -182,7 +182,7 @@ def _score(job: Job, old: Frozen) -> list[Prediction]:
     )
 
 
-def _forecast(job: Job, frozen: Frozen) -> list[Prediction]:
+def _forecast(job: Job, frozen: FrozenPosterior) -> list[Prediction]:
     """Bands over the samples to come, where their commands are known."""
     if job.ahead is None:
         return []
@@ -194,7 +194,7 @@ def _forecast(job: Job, frozen: Frozen) -> list[Prediction]:
     )
 
 
-def _respond(frozen: Frozen, ahead: Array) -> Array:
+def _respond(frozen: FrozenPosterior, ahead: Array) -> Array:
     """Response of frozen draws over their forecast, shape (m, n) [m].
 
     Args:

@@ -21,7 +21,7 @@ from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.inference.state import State
 from actuator_glue.model import linear
 from actuator_glue.online import fitting
-from actuator_glue.online.forecast import Frozen
+from actuator_glue.online.forecast import FrozenPosterior
 from actuator_glue.online.sensor_noise import sensor_noise, white_noise
 from actuator_glue.online.settings import AUTOMATIC, EstimatorSettings
 from actuator_glue.online.shaping import automatic
@@ -32,6 +32,9 @@ from actuator_glue.records import Array, Record
 EXCITATION = 3.0
 # Steps in which a sampler that starts from the last posterior adapts.
 ADAPT = 20
+# Time a model's first window may take [s], whatever the budget: before there is a posterior
+# nothing is late, and a window that is cut short leaves the next one where it began itself.
+FIRST = 1.0
 # Share of the last posterior's points, spread, that must be alive in the next: so few that mostly
 # one temperature leads there.
 SURVIVORS = 0.35
@@ -62,7 +65,7 @@ class Job:
     afresh: bool = True
     stop_at: int | None = None
     ahead: Array | None = None
-    frozen: tuple[Frozen, ...] = ()
+    frozen: tuple[FrozenPosterior, ...] = ()
     prior: Carried | None = None
 
     @property
@@ -71,6 +74,12 @@ class Job:
         steps = self.settings.evaluations // self.settings.chains
         usual = max(self.settings.evaluations, steps * self.chains)
         return max(self.settings.start_evaluations, usual) if self.afresh else usual
+
+    @property
+    def seconds(self) -> float:
+        """Longest time the window may be computed [s]."""
+        budget = self.settings.time_budget
+        return max(budget, FIRST) if self.afresh else budget
 
     @property
     def forecast(self) -> tuple[int, int]:
@@ -112,7 +121,7 @@ class WindowFit:
     rms_error: float = float('nan')
     nrmse: float = float('nan')
     shaping_factor: float = float('nan')
-    frozen: Frozen | None = None
+    frozen: FrozenPosterior | None = None
     archive: Array | None = None
     learned: Carried | None = None
     conflict: Conflict | None = None
@@ -152,7 +161,7 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> WindowFit:
         rms_error=rms_error,
         nrmse=rms_error / moved,
         shaping_factor=shaping,
-        frozen=Frozen(
+        frozen=FrozenPosterior(
             number=job.window.number,
             segment=job.window.segment,
             start=start,

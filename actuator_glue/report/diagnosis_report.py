@@ -2,13 +2,27 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from actuator_glue.diagnosis.result import DiagnosisData
+from actuator_glue.json_value import Json
 from actuator_glue.records import source_name
 from actuator_glue.report import diagnosis_figures as figures
 from actuator_glue.report.diagnosis_summary import closing, summary
 from actuator_glue.report.html import Block, Note, Page, Picture, Section, Table, Text
+
+_SAMPLERS = {
+    'importance': '{effective_draws:.0f} effective draws by importance sampling, k {pareto_k:.2f}',
+    'dream': '{effective_draws:.0f} effective draws by DREAM(ZS), R-hat {rhat:.3f}',
+    'laplace': 'Laplace approximation',
+}
+
+
+def _drawn(sampler: Json) -> str:
+    """Say how a posterior was drawn; chains that stand still have no R-hat."""
+    known = {k: math.nan if v is None else v for k, v in sampler.items()}
+    return _SAMPLERS.get(sampler.get('method', ''), 'draws').format(**known)
 
 
 def _um(value: float) -> str:
@@ -101,8 +115,9 @@ def _effects(found: DiagnosisData) -> Section:
         )
         blocks.append(_posterior(found))
         if len(found.names) > 4:
+            drawn = _drawn(found.sampler)
             blocks.append(
-                Picture.of(figures.posteriors(found), 'Posterior of the effects (DREAM(ZS)).')
+                Picture.of(figures.posteriors(found), f'Posterior of the effects ({drawn}).')
             )
     blocks.append(
         Picture.of(figures.ranking(found), 'Every candidate added alone, everything refitted.')

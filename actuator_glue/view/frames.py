@@ -16,7 +16,7 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.view.history import ROWS
-from actuator_glue.view.messages import Intake
+from actuator_glue.view.intake import Intake
 
 _POINTS = 4000  # at most, whatever the page asks for
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from actuator_glue.errors import InputError
 from actuator_glue.view.frames import Wanted, frame, parse_wanted
-from actuator_glue.view.messages import Intake
+from actuator_glue.view.intake import Intake
 
 try:
     from aiohttp import WSMsgType, web

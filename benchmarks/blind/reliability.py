@@ -46,7 +46,8 @@ def named(results: Iterable[Json]) -> list[tuple[float, bool, bool]]:
         true = truths(result)
         for effect in result['diagnosis']['effects']:
             if effect['probability'] is not None:
-                held = true & {effect['name'], *effect['alternatives']}
+                others = [n for pair in effect['alternatives'] for n in pair.split(' + ')]
+                held = true & {effect['name'], *others}
                 out.append((effect['probability'], effect['name'] in true, bool(held)))
     return out
 

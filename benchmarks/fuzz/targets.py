@@ -17,7 +17,7 @@ from actuator_glue.io.bag_reader import messages
 from actuator_glue.io.messages import deserialize
 from actuator_glue.io.partition import read_partition
 from actuator_glue.io.yaml_file import parse
-from actuator_glue.online import wire
+from actuator_glue.online import conversion
 from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.streams.address import Allowed
@@ -29,7 +29,7 @@ from actuator_glue.streams.reception import Reception
 from actuator_glue.streams.transports import Terms, source
 from actuator_glue.streams.transports.openfresco import Copy, usual
 from actuator_glue.view.history import History
-from actuator_glue.view.messages import TYPES, Intake
+from actuator_glue.view.intake import TYPES, Intake
 from benchmarks.fuzz.files import FORMATS
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -194,12 +194,12 @@ def _messages(_: Path) -> Use:
         elif kind == 'TestSetup':
             uses.append(lambda: estimator.setup(setups.from_message(message)))
         elif kind == 'CommandPreview':
-            uses.append(lambda: estimator.preview(wire.preview(message)))
+            uses.append(lambda: estimator.preview(conversion.preview(message)))
         elif kind == 'EstimatorSetup':
             uses += [
-                lambda: wire.estimator_settings(message),
-                lambda: wire.carried(message),
-                lambda: wire.model_choice(message),
+                lambda: conversion.estimator_settings(message),
+                lambda: conversion.carried(message),
+                lambda: conversion.model_choice(message),
             ]
         for use in uses:
             with suppress(InputError):

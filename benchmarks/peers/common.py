@@ -13,7 +13,7 @@ from scipy import signal
 
 from actuator_glue.inference.convergence import ess_bulk, rhat
 from actuator_glue.inference.likelihood import GlueLikelihood
-from actuator_glue.model import linear, problem_r
+from actuator_glue.model import linear, reference_problem
 from actuator_glue.model.fast import FastErrors
 from actuator_glue.model.parameters import bounds
 from actuator_glue.records import Array
@@ -47,7 +47,7 @@ class Sampler:
 
 def lfilter_density() -> LogDensity:
     """The log likelihood as a user writes it: one scipy.signal.lfilter per record and theta."""
-    records = problem_r.records()
+    records = reference_problem.records()
 
     def one(theta: Array) -> float:
         errors = []
@@ -61,7 +61,7 @@ def lfilter_density() -> LogDensity:
 
 def fast_density() -> LogDensity:
     """The log likelihood of this project's fast path."""
-    return inside(GlueLikelihood(FastErrors(problem_r.records()), G))
+    return inside(GlueLikelihood(FastErrors(reference_problem.records()), G))
 
 
 def processor_seconds() -> float:

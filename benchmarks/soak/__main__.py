@@ -23,7 +23,7 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from benchmarks.soak import judge, memory, text
-from benchmarks.soak.wire import RATE, STIFFNESS, Wire
+from benchmarks.soak.udp_controller import RATE, STIFFNESS, Wire
 from examples.demonstration.domain import own_domain
 from examples.demonstration.processes import Node, Nodes, end_in_order
 

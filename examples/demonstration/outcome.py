@@ -17,7 +17,7 @@ from actuator_glue.io.bag_reader import decoded
 from actuator_glue.model.parameters import NAMES
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.playback import items, replay, stream
-from actuator_glue.online.published import Comparison, compare, published
+from actuator_glue.online.replay_comparison import ReplayComparison, compare, published
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.records import Array
 from actuator_glue.report.bag_content import Content
@@ -39,7 +39,7 @@ INPUTS = ('SampleBlock', 'TestSetup')
 RESULTS = ('EstimatorSetup', 'PosteriorMoments', 'PredictionBand')
 
 
-def replay_bag(bag: Path) -> Comparison:
+def replay_bag(bag: Path) -> ReplayComparison:
     """Run a bag through the estimator and hold every number against the published one.
 
     Raises:
@@ -47,7 +47,7 @@ def replay_bag(bag: Path) -> Comparison:
     """
     live = published(decoded(bag, RESULTS))
     if live.settings is None or not live.models:
-        return Comparison(differing=['no estimator published its settings into this bag'])
+        return ReplayComparison(differing=['no estimator published its settings into this bag'])
     streamed, model = items(decoded(bag, INPUTS)), live.models[0][1]
     with Reports() as reports:
         results = replay(streamed, live.settings, model, live.schedule(), reports, live.carried)
@@ -87,7 +87,7 @@ class SessionOutcome:
     source: str
     sent: int
     content: Content
-    comparison: Comparison
+    comparison: ReplayComparison
     truth: Array | None = None
     diagnosis: DiagnosisData | None = None
     seconds: float = float('nan')

@@ -18,8 +18,8 @@ from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.model import commands, linear
 from actuator_glue.model.exact import ExactErrors
 from actuator_glue.model.parameters import BASE, NAMES, TABLE_2, bounds
-from actuator_glue.model.problem_r import EQUATION_3, NOISE, RATE, STIFFNESS
-from actuator_glue.model.problem_r import records as reconstructed_tests
+from actuator_glue.model.reference_problem import EQUATION_3, NOISE, RATE, STIFFNESS
+from actuator_glue.model.reference_problem import records as reconstructed_tests
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 

@@ -20,7 +20,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.structure import Structure
-from actuator_glue.online import wire
+from actuator_glue.online import conversion
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.records import Record
 from actuator_glue.report import html
@@ -102,11 +102,11 @@ def test_a_bag_says_what_its_model_is(own: str) -> None:
     """EstimatorSetup holds the definition: a replay needs no file."""
     effects.load_effects(own)
     settings, model = EstimatorSettings(), choose_model(('bent-sensor',))
-    message = SimpleNamespace(**wire.estimator_setup(settings, model, 0, 0))
+    message = SimpleNamespace(**conversion.estimator_setup(settings, model, 0, 0))
     CATALOGUE.unregister('bent-sensor')
-    assert wire.model_choice(message) == model
-    assert wire.estimator_settings(message) == settings
-    plain = wire.estimator_setup(settings, choose_model(('delay',)), 0, 0)
+    assert conversion.model_choice(message) == model
+    assert conversion.estimator_settings(message) == settings
+    plain = conversion.estimator_setup(settings, choose_model(('delay',)), 0, 0)
     assert 'definitions' not in json.loads(plain['settings'])
 
 

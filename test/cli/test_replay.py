@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 
 from actuator_glue import replay as replayed
-from actuator_glue.hybrid.indicators import Target
+from actuator_glue.hybrid.indicators import TargetMotion
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.io import messages
 from actuator_glue.io.bag_records import read_records, write_record
 from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.model import linear
 from actuator_glue.model.parameters import NAMES
-from actuator_glue.online import wire
+from actuator_glue.online import conversion
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.playback import replay, stream
 from actuator_glue.online.settings import EstimatorSettings
@@ -23,13 +23,15 @@ from actuator_glue.online.settings import EstimatorSettings
 SETTINGS = EstimatorSettings(window=4.0, hop=2.0, evaluations=6000, start_evaluations=12_000)
 
 
-def put(writer: BagWriter, topic: str, name: str, head: wire.Head, fields: wire.Fields) -> None:
+def put(
+    writer: BagWriter, topic: str, name: str, head: conversion.Head, fields: conversion.Fields
+) -> None:
     """Write one message the way a node publishes it."""
     content = messages.message(name, header=messages.header(*head), **completed(name, fields))
     writer.write(topic, content, head.stamp_ns)
 
 
-def completed(name: str, fields: wire.Fields) -> wire.Fields:
+def completed(name: str, fields: conversion.Fields) -> conversion.Fields:
     """Return fields with zeros where nothing was said, as ROS does, and arrays as arrays."""
     kinds = messages.typestore().fielddefs[messages.full_name(name)][1]
     arrays = {'float64': np.float64, 'bool': np.bool_}
@@ -51,7 +53,7 @@ def estimated(short_bag: Path, tmp_path_factory: pytest.TempPathFactory) -> Call
     results = [r for r in replay(stream(record), SETTINGS, model) if isinstance(r, WindowResult)]
     assert len(results) == 3
 
-    def make(name: str, change: Callable[[wire.Fields], Any] = lambda fields: None) -> Path:
+    def make(name: str, change: Callable[[conversion.Fields], Any] = lambda fields: None) -> Path:
         bag = tmp_path_factory.mktemp('live') / name
         with BagWriter(bag) as writer:
             write_record(writer, record)
@@ -61,15 +63,15 @@ def estimated(short_bag: Path, tmp_path_factory: pytest.TempPathFactory) -> Call
                 ('/prediction_band', 'PredictionBand'),
             ):
                 writer.add_topic(topic, kind)
-            head = wire.Head(record.start_ns, record.actuator)
-            setup = wire.estimator_setup(SETTINGS, model, 0, 0)
+            head = conversion.Head(record.start_ns, record.actuator)
+            setup = conversion.estimator_setup(SETTINGS, model, 0, 0)
             put(writer, '/estimator_setup', 'EstimatorSetup', head, setup)
             for result in results:
-                head, fields = wire.posterior(result, 0.1)
+                head, fields = conversion.posterior(result, 0.1)
                 change(fields)
                 put(writer, '/posterior', 'PosteriorMoments', head, fields)
                 for prediction in result.scored:
-                    head, fields = wire.prediction(prediction, record.actuator)
+                    head, fields = conversion.prediction(prediction, record.actuator)
                     change(fields)
                     put(writer, '/prediction_band', 'PredictionBand', head, fields)
         return bag
@@ -93,7 +95,7 @@ def test_a_replay_is_identical_bit_by_bit(run, estimated: Callable[..., Path]) -
 def test_one_other_bit_is_found(run, estimated: Callable[..., Path]) -> None:
     """The smallest difference in one published number is exit 1 and named."""
 
-    def change(fields: wire.Fields) -> None:
+    def change(fields: conversion.Fields) -> None:
         if fields['window'] == 1 and 'mean' in fields:
             fields['mean'] = np.nextafter(fields['mean'], np.inf)
         if fields['window'] == 0 and fields.get('kind') == 'noise':
@@ -144,7 +146,7 @@ def test_each_window_tells_how_the_actuator_followed(run, estimated: Callable[..
     for window in windows:
         start = window['index'] - record.first_index + round(0.5 / record.period)
         part = record.slice(start, window['index'] - record.first_index + window['samples'])
-        j = Target(part.command, part.period).criteria(part.measured)
+        j = TargetMotion(part.command, part.period).criteria(part.measured)
         tracking = window['tracking']
         assert tracking['measured']['J2'] == pytest.approx(j.j2)
         assert tracking['measured']['J1_s'] == pytest.approx(j.j1)

@@ -41,7 +41,7 @@ def test_what_is_immaterial_is_in_the_intervals() -> None:
         found = search.base()
         scorer = Scorer.of(search.data, splits_of(search.data, found.error))
         for hits, small in ((inside, discrepancy.responses(search, 5e-6)), (plain, {})):
-            draws, _ = posterior.sample(
+            draws = posterior.sample(
                 Structure(()),
                 found,
                 scorer,
@@ -50,7 +50,7 @@ def test_what_is_immaterial_is_in_the_intervals() -> None:
                 evaluations=0,
                 progress=lambda share: None,
             )
-            low, high = np.quantile(draws, [0.025, 0.975], axis=0)
+            low, high = np.quantile(draws.points, [0.025, 0.975], axis=0)
             hits.append((low <= base) & (base <= high))
     assert np.sum(inside) >= 19
     assert np.sum(plain) <= 12
@@ -80,7 +80,7 @@ def test_intervals_under_slow_noise_hold_the_truth() -> None:
         data = Data.whole(records)
         found = fit(data, model, theta)
         scorer = Scorer.of(data, splits_of(data, found.error))
-        draws, _ = posterior.sample(
+        draws = posterior.sample(
             model,
             found,
             scorer,
@@ -89,6 +89,6 @@ def test_intervals_under_slow_noise_hold_the_truth() -> None:
             evaluations=0,
             progress=lambda share: None,
         )
-        low, high = np.quantile(draws, [0.025, 0.975], axis=0)
+        low, high = np.quantile(draws.points, [0.025, 0.975], axis=0)
         inside.append((low <= theta) & (theta <= high))
     assert np.mean(inside) >= 124 / 140

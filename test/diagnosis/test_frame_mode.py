@@ -23,9 +23,10 @@ SWEEP = 2e-3 * np.sin(np.pi * (10.0 / 20.0) * T**2)
     [('frame-mode', [4e-7, 8.0, 0.03, 0.0]), ('payload-inertia', [25.0, 30.0])],
 )
 def test_a_mode_has_its_name(effect: str, sizes: list[float], rng_seed: int) -> None:
-    """Eq. (2) refitted leaves two to three times the noise; no other name is tied.
+    """Eq. (2) refitted leaves two to three times the noise; no other single name is tied.
 
-    12 runs of 12 before this was written.
+    12 runs of 12 before this was written. Two lags leave 1 to 2 um of a payload where 25 um are
+    noise: as a pair they may share its probability.
     """
     still = Record(SWEEP, SWEEP, 1.0 / RATE, 250e3)
     moved = Structure((effect,)).simulate([*THETA, *sizes], still)
@@ -35,4 +36,4 @@ def test_a_mode_has_its_name(effect: str, sizes: list[float], rng_seed: int) -> 
     found = ModelSelection(Search(data, names), Thresholds(), lambda stage, share: None).run()
     assert found.final.effects == (effect,)
     assert found.final.fit.rms < 1.1 * NOISE
-    assert [r.name for r in found.rivals[effect] if r.tied] == [effect]
+    assert [r.name for r in found.rivals[effect] if r.tied and len(r.effects) == 1] == [effect]

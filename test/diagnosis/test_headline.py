@@ -9,9 +9,10 @@ import pytest
 
 from actuator_glue.api import diagnosis as module
 from actuator_glue.cli.main import main
+from actuator_glue.diagnosis.advice import contradicted
 from actuator_glue.diagnosis.finding import Finding
 from actuator_glue.diagnosis.result import Alarm, DiagnosisData, HeldOutError, Verdict
-from actuator_glue.diagnosis.verdict import against, conclude
+from actuator_glue.diagnosis.verdict import against, conclude, misses
 
 NONE = np.empty((0, 4))
 
@@ -22,12 +23,18 @@ def finding(name: str, noise: float | None = None) -> Finding:
 
 
 def diagnosis(
-    verdict: Verdict, before: float, after: float, *effects: Finding, noise: float = 10e-6
+    verdict: Verdict,
+    before: float,
+    after: float,
+    *effects: Finding,
+    noise: float = 10e-6,
+    scatter: float = 0.05,
 ) -> DiagnosisData:
     """A diagnosis with held-out errors before and after [m]."""
     removed = (before**2 - after**2) / max(before**2 - noise**2, 1e-12)
     about = (removed - 0.1, removed + 0.1)
-    error = HeldOutError(before, (0, 1), after, (0, 1), noise, removed, about, before)
+    interval = ((1.0 - scatter) * after, (1.0 + scatter) * after)
+    error = HeldOutError(before, (0, 1), after, interval, noise, removed, about, before)
     alarm = Alarm(verdict != 'none', 1e-5, 5e-6, noise, 0.01)
     judged = conclude(verdict, any(e.noise is None for e in effects), error, alarm.threshold)
     return module.Diagnosis(
@@ -75,6 +82,33 @@ def diagnosis(
             'added, but not the whole story: backlash; held-out error 80.0 -> 40.0 um, 4.0 times '
             'the noise of 10.0 um; 12.0 um of structure in the fitting records remain',
             False,
+        ),
+        (
+            diagnosis('missing-effect', 60e-6, 18.7e-6, finding('backlash'), noise=10.9e-6),
+            'added, but not the whole story: backlash; held-out error 60.0 -> 18.7 um, 1.7 times '
+            'the noise of 10.9 um; 12.0 um of structure in the fitting records remain',
+            False,
+        ),
+        (
+            diagnosis('missing-effect', 60e-6, 18.7e-6, finding('backlash'), scatter=0.5),
+            'missing: backlash; held-out error 60.0 -> 18.7 um, noise 10.0 um',
+            True,
+        ),
+        (
+            diagnosis('missing-effect', 300e-6, 18.7e-6, finding('backlash')),
+            'missing: backlash; held-out error 300.0 -> 18.7 um, noise 10.0 um',
+            True,
+        ),
+        (
+            diagnosis('none', 12.5e-6, 12.5e-6),
+            'undecided: the fitting records ask for nothing; held-out error 12.5 um, 1.2 times '
+            'the noise of 10.0 um',
+            False,
+        ),
+        (
+            diagnosis('none', 11.0e-6, 11.0e-6),
+            'the model is enough: held-out error 11.0 um, noise 10.0 um',
+            True,
         ),
         (
             diagnosis('missing-effect', 10.1e-6, 10.1e-6, finding('backlash')),
@@ -127,6 +161,17 @@ def test_the_headline_follows_the_held_out_part(
     assert (content['summary'], content['verdict']) == (says, found.verdict)
     assert code == (0 if complete else 1)
     assert content['complete'] is complete
+
+
+def test_what_the_parameters_leave_open_contradicts_nothing() -> None:
+    """A record that asks for a parameter which the fitting ones do not fix."""
+    error = diagnosis('none', 15e-6, 15e-6).error
+    assert misses(error, 5e-6)
+    assert 'may show' in contradicted(error, 5e-6)[0]
+    error = replace(error, unsure=11e-6)
+    assert not misses(error, 5e-6)
+    assert 'leave up to 11.0 um open' in contradicted(error, 5e-6)[0]
+    assert not contradicted(error, 12e-6)
 
 
 def test_only_what_the_held_out_part_bears_out_is_applied() -> None:

@@ -35,6 +35,30 @@ def test_whitened_noise_is_white() -> None:
     assert abs(np.corrcoef(e[1:], e[:-1])[0, 1]) > 0.3
 
 
+@pytest.mark.parametrize('count', [40, 700, 9000])
+def test_whitening_is_a_convolution_with_its_ends_held(count: int) -> None:
+    """Rows shorter than the filter, of one block, and of several; all rows of a table."""
+    rng = np.random.default_rng(count)
+    taps = whitener([split(noise(rng, 0.5, 3.0), 1 / RATE)])
+    rows, half = rng.standard_normal((3, count)), len(taps) // 2
+    expected = [
+        np.convolve(np.pad(row, half, mode='edge'), taps, mode='valid')[-count:] for row in rows
+    ]
+    assert whiten(rows, taps) == pytest.approx(np.array(expected), abs=1e-12)
+    assert whiten(rows[0], taps) == pytest.approx(expected[0], abs=1e-12)
+
+
+def test_the_density_of_white_noise_is_flat_to_its_ends() -> None:
+    """At 0 and Nyquist, too: half of it there made intervals of what acts slowly too narrow.
+
+    Means of 40 densities that scatter by 0.2: 0.2 off by chance once in 10^9.
+    """
+    rng = np.random.default_rng(11)
+    parts = [split(rng.standard_normal(N), 1 / RATE) for _ in range(40)]
+    density = np.mean([0.5 * RATE * s.psd for s in parts], axis=0)
+    assert density[[0, 1, 2, -2, -1]] == pytest.approx(1.0, abs=0.2)
+
+
 def test_the_ends_of_a_drift_are_white_too() -> None:
     """A random walk 20 steps off zero; with zeros beyond it the mean squares were above 50.
 

@@ -22,11 +22,17 @@ def test_chains_keep_the_spread_of_the_posterior(
     records = [make([effect], [size], 31)[i] for i in which]
     quick, found = diagnose(records, settings=QUICK, seed=2), diagnose(records, seed=2)
     assert [e.name for e in found.effects] == [effect]
-    rhat, ess = rhat_and_ess(found.posterior.reshape(-1, 32, found.posterior.shape[1]))
-    assert found.rhat == pytest.approx(rhat.max(), rel=0.05) and np.isnan(quick.rhat)
-    # Over these cases and three seeds: R-hat up to 1.06, ESS from 397, ratios from 0.88 to 1.04
-    # for the effect, 0.84 to 1.01 for beta_1 and 0.93 to 2.14 for what a ridge leaves open.
-    assert rhat.max() < 1.15 and ess.min() > 200
+    assert quick.sampler['method'] == 'laplace' and np.isnan(quick.rhat)
+    told = found.sampler
+    if told['method'] == 'dream':
+        rhat, ess = rhat_and_ess(found.posterior.reshape(-1, 32, found.posterior.shape[1]))
+        assert found.rhat == pytest.approx(rhat.max(), rel=0.05)
+        assert rhat.max() < 1.15 and ess.min() > 200
+    else:
+        assert told['effective_draws'] >= 400 and told['pareto_k'] < 0.5 and np.isnan(found.rhat)
+    # Over these cases and three seeds of DREAM(ZS): R-hat up to 1.06, ESS from 397, ratios from
+    # 0.88 to 1.04 for the effect, 0.84 to 1.01 for beta_1 and 0.93 to 2.14 for what a ridge leaves
+    # open.
     for j, factor in ((0, 1.4), (1, 3.0), (2, 3.0), (3, 3.0), (4, 1.3)):
         ratio = found.posterior[:, j].std() / quick.posterior[:, j].std()
         assert 1 / factor < ratio < factor, found.names[j]

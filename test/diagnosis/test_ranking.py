@@ -19,6 +19,13 @@ from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.records import Array, Record
 
 
+def trial(name: str, rms: float, scores: Array) -> Trial:
+    """A structure of which only name, error and scores matter."""
+    fit = SimpleNamespace(theta=np.zeros(5), z=np.zeros(5))
+    found = SimpleNamespace(added=name, mean_square=rms**2, scores=scores, fit=fit)
+    return cast('Trial', found)
+
+
 def test_a_rival_within_its_standard_error_keeps_a_probability() -> None:
     """Two standard errors of 100 nats behind is not excluded, whatever the nats are.
 
@@ -75,12 +82,6 @@ def test_an_alternative_has_a_probability() -> None:
 
     Two blocks hold nearly all the evidence, so that its standard error is near its sum.
     """
-
-    def trial(name: str, rms: float, scores: Array) -> Trial:
-        fit = SimpleNamespace(theta=np.zeros(5), z=np.zeros(5))
-        found = SimpleNamespace(added=name, mean_square=rms**2, scores=scores, fit=fit)
-        return cast('Trial', found)
-
     against = np.full(15, 400.0)
     against[:2] = 45e3
     rest = trial('', 40e-6, np.full(15, -10e3) - against)
@@ -99,8 +100,10 @@ def test_an_alternative_has_a_probability() -> None:
 
 def test_held_out_records_that_contradict_lower_the_certainty() -> None:
     """Names that leave three times the noise where nothing was fitted are not certain."""
-    error = HeldOutError(95e-6, (0, 1), 31e-6, (0, 1), 10e-6, 0.9, (0.8, 1.0), 95e-6)
+    error = HeldOutError(95e-6, (0, 1), 31e-6, (25e-6, 37e-6), 10e-6, 0.9, (0.8, 1.0), 95e-6)
     assert verdict.certainty(0.95, error, 5e-6) == pytest.approx(0.9)
+    # What one stretch of it shows alone is none of that.
+    assert verdict.certainty(0.95, replace(error, after_ci=(9e-6, 50e-6)), 5e-6) == 0.95
     good = replace(error, after=11e-6, removable_removed=0.99)
     assert verdict.certainty(0.95, good, 5e-6) == 0.95
 
@@ -115,3 +118,32 @@ def test_three_of_a_kind_speak_for_what_is_tied() -> None:
     assert ranking.spokesman('damping', rows[:2], groups) == 'damping'
     apart = [rows[0], *(replace(r, tied=False) for r in rows[1:])]
     assert ranking.spokesman('damping', apart, groups) == 'damping'
+
+
+def test_a_pair_pays_for_being_one_of_many() -> None:
+    """As good by blocks and error, one of ten pairs to an effect has a tenth of its weight."""
+    level, even = cast('Scorer', None), np.zeros(15)
+    rest, best = trial('', 40e-6, np.full(15, -500.0)), trial('payload-inertia', 10e-6, even)
+    pair = trial('viscous-damping + delay', 10e-6, even)
+    found = ranking.compare(
+        rest, best, 'payload-inertia', [pair], level, Thresholds(), float(np.log(10.0))
+    )
+    told = {r.name: r for r in found}
+    assert told['payload-inertia'].probability == pytest.approx(10 / 11, rel=1e-3)
+    assert told['viscous-damping + delay'].probability == pytest.approx(1 / 11, rel=1e-3)
+    assert told['viscous-damping + delay'].effects == ('viscous-damping', 'delay')
+    assert told['viscous-damping + delay'].tied
+
+
+def test_what_a_pair_is_ahead_of_keeps_its_share_where_their_errors_are_alike() -> None:
+    """300 nats behind a pair that is not told: half the weight at the same error, or none."""
+    level, ahead = cast('Scorer', None), np.full(15, 20.0)
+    rest, best = trial('', 40e-6, np.full(15, -500.0)), trial('payload-inertia', 10e-6, 0 * ahead)
+    for rms, low, high in ((9.99e-6, 0.45, 0.5), (4e-6, 0.0, 1e-6)):
+        pair = trial('viscous-damping + delay', rms, ahead)
+        found = ranking.compare(
+            rest, best, 'payload-inertia', [pair], level, Thresholds(), float(np.log(10.0))
+        )
+        told = {r.name: r.probability for r in found}
+        assert low <= told['payload-inertia'] <= high
+        assert told['viscous-damping + delay'] == pytest.approx(1 - told['payload-inertia'])

@@ -1,6 +1,8 @@
-"""The control of a held-out look: as many shams as there were candidates, the best of them."""
+"""A held-out look: its noise, and its control, the best of as many shams as candidates."""
 
 import numpy as np
+import pytest
+from scipy import signal
 
 from actuator_glue.diagnosis import verify
 from actuator_glue.diagnosis.data import Data
@@ -28,3 +30,24 @@ def test_the_sham_is_the_best_of_as_many_as_were_tried() -> None:
     # The choice is the fitting part's: elsewhere it adds to an error that it never saw.
     other = rng.standard_normal(len(T))
     assert verify._sham(data, data, side, (error, other), (1, 16), seed=4) > rms(other)
+
+
+def test_the_noise_of_other_records_is_theirs_and_what_is_missed_is_not() -> None:
+    """Twice the noise is noise; what a random command makes of a wrong model is as stationary.
+
+    The floor scatters by 2 % over seeds.
+    """
+    rng = np.random.default_rng(8)
+    data = Data.whole([Record(0.0 * T, 0.0 * T, 1 / RATE, stiffness=0.0)])
+    known = 1e-5 * rng.standard_normal(len(T))
+    other = 1e-5 * rng.standard_normal(len(T))
+    band = signal.butter(4, [1.0, 5.0], 'bandpass', fs=RATE, output='sos')
+    missed = signal.sosfilt(band, rng.standard_normal(len(T)))
+    missed *= 1.5e-5 / missed.std()
+    quiet, loud, wrong = (
+        verify.noise_floor(data, data, (known, error), 1e-5)
+        for error in (0.5 * other, 2.0 * other, other + missed)
+    )
+    assert quiet == pytest.approx(0.5e-5, rel=0.1)
+    assert loud == pytest.approx(2e-5, rel=0.1)
+    assert wrong == pytest.approx(1e-5, rel=0.15)

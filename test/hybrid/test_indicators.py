@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from actuator_glue.errors import InputError
-from actuator_glue.hybrid.indicators import Target, energy_error, tracking_indicator
+from actuator_glue.hybrid.indicators import TargetMotion, energy_error, tracking_indicator
 
 PERIOD = 1e-3
 TIME = PERIOD * np.arange(4000)
@@ -14,7 +14,7 @@ TIME = PERIOD * np.arange(4000)
 def test_a_delayed_sine(delay: float) -> None:
     """Delay and amplitude, also beyond a quarter of the period, where an arctangent folds."""
     target, measured = (np.sin(2 * np.pi * 2.0 * t) for t in (TIME, TIME - delay))
-    asked = Target(target, PERIOD)
+    asked = TargetMotion(target, PERIOD)
     found = asked.frequency_evaluation(0.9 * measured)
     assert found == pytest.approx((0.9, delay, 2.0), rel=1e-9)
     assert asked.criteria(measured).j1 == pytest.approx(delay, abs=2 * PERIOD)
@@ -29,11 +29,11 @@ def test_the_index_is_the_ratio_of_spectra() -> None:
         target, measured = rng.standard_normal((2, size))
         x, y = np.fft.rfft(target)[1:], np.fft.rfft(measured)[1:]
         index = (y * x.conj()).sum() / (np.abs(x) ** 2).sum()
-        found = Target(target, PERIOD).frequency_evaluation(measured)
+        found = TargetMotion(target, PERIOD).frequency_evaluation(measured)
         assert found.amplitude == pytest.approx(abs(index), rel=1e-9)
         angle = -2.0 * np.pi * found.frequency * found.delay
         assert np.exp(1j * angle) == pytest.approx(index / abs(index), rel=1e-9)
-        assert Target(target, PERIOD).criteria(target[::-1]).j1 == PERIOD * (
+        assert TargetMotion(target, PERIOD).criteria(target[::-1]).j1 == PERIOD * (
             int(np.argmax(np.correlate(target[::-1], target, 'full'))) - (size - 1)
         )
 
@@ -50,7 +50,7 @@ def test_rows_that_cannot_be_compared() -> None:
     """Lengths, NaN, rest."""
     for wrong in (np.zeros(4000), TIME[:10], np.full(4000, np.nan)):
         with pytest.raises(InputError):
-            Target(wrong, PERIOD).criteria(TIME)
+            TargetMotion(wrong, PERIOD).criteria(TIME)
 
 
 @pytest.mark.parametrize('lag', [0.05, -0.08])

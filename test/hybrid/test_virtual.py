@@ -15,7 +15,7 @@ from actuator_glue.hybrid import sampled
 from actuator_glue.hybrid.compensator import Compensator
 from actuator_glue.hybrid.design import Loop, compensator_of
 from actuator_glue.hybrid.ground_motion import artificial
-from actuator_glue.hybrid.indicators import Target
+from actuator_glue.hybrid.indicators import TargetMotion
 from actuator_glue.hybrid.virtual import Responses, VirtualTest
 from actuator_glue.io.partition import read_partition
 from actuator_glue.model import linear
@@ -149,7 +149,7 @@ def test_criteria_are_those_of_the_indicators(benchmark_draws: Made) -> None:
     )
     found, whole = test.run(0), test.histories(0)
     for i in range(4):
-        j1, j2, j3 = Target(whole.target[i], partition.period).criteria(whole.moved[i])
+        j1, j2, j3 = TargetMotion(whole.target[i], partition.period).criteria(whole.moved[i])
         assert (found.j1[i], found.j2[i], found.j3[i]) == pytest.approx((j1, j2, j3), rel=1e-9)
     assert found.j1.min() > 1e-3
 

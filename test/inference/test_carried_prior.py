@@ -20,7 +20,7 @@ from actuator_glue.inference.mixture_density import (
 )
 from actuator_glue.inference.posterior import Problem, _Density, sample
 from actuator_glue.inference.prior_conflict import SequentialTest, conflict
-from actuator_glue.model import problem_r
+from actuator_glue.model import reference_problem
 from actuator_glue.model.parameters import NAMES
 
 MODEL = choose_model()
@@ -81,7 +81,7 @@ def test_the_density_is_normalised_in_the_physical_parameters(stiffness):
 
 @pytest.mark.parametrize('stiffness', [0.0, 250e3])
 def test_the_compiled_density_is_the_python_one(stiffness):
-    record = problem_r.records()[int(stiffness > 0)].slice(500, 2500)
+    record = reference_problem.records()[int(stiffness > 0)].slice(500, 2500)
     target = Problem((record,), MODEL, initial='measured', settle=0.2, prior=carried()).target()
     density = _Density(target.log_likelihood, target.transform, target.prior)
     form = density.compiled()
@@ -113,7 +113,7 @@ def test_drift_adds_to_the_variance_of_logarithms():
 
 def test_the_sampler_finds_prior_times_likelihood():
     """Where the record says nothing the prior is what is left; else both are narrower."""
-    record = problem_r.records()[0].slice(0, 4000)
+    record = reference_problem.records()[0].slice(0, 4000)
     known = carried()
     target = Problem((record,), MODEL, initial='rest', prior=known).target()
     chains = sample(target, (1,), 30_000)

@@ -13,12 +13,12 @@ from actuator_glue.inference.likelihood import GaussianLikelihood, GlueLikelihoo
 from actuator_glue.inference.moves import PUBLISHED
 from actuator_glue.inference.posterior import Problem, _Density
 from actuator_glue.inference.settings import SamplerSettings
-from actuator_glue.model import problem_r
+from actuator_glue.model import reference_problem
 from actuator_glue.model.fast import FastErrors
 from actuator_glue.model.parameters import bounds
 from actuator_glue.records import Array
 
-RECORDS = [record.slice(0, 4000) for record in problem_r.records()]
+RECORDS = [record.slice(0, 4000) for record in reference_problem.records()]
 LOWER, UPPER = bounds()
 
 

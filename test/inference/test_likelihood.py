@@ -15,7 +15,7 @@ from actuator_glue.inference.likelihood import (
     GaussianLikelihood,
     GlueLikelihood,
 )
-from actuator_glue.model import linear, problem_r
+from actuator_glue.model import linear, reference_problem
 from actuator_glue.model.exact import ExactErrors
 from actuator_glue.model.parameters import TABLE_2
 from actuator_glue.records import Array
@@ -54,7 +54,7 @@ def test_glue_is_equation_4_over_all_records_together(rng_seed: int) -> None:
 
 
 def test_glue_on_the_paper_s_tests() -> None:
-    records = problem_r.records()
+    records = reference_problem.records()
     density = GlueLikelihood(ExactErrors(records))
     simulated = [
         linear.simulate(TABLE_2, r.command, stiffness=r.stiffness, period=r.period)
@@ -112,7 +112,7 @@ def test_ar1_on_the_exact_model_finds_the_autocorrelation_of_the_noise(
 ) -> None:
     """False failure below 1e-6: the standard error of phi is 0.03 at the most."""
     rng = np.random.default_rng(rng_seed)
-    record = problem_r.records(duration=10.0)[1]
+    record = reference_problem.records(duration=10.0)[1]
     clean = linear.simulate(
         TABLE_2, record.command, stiffness=record.stiffness, period=record.period
     )

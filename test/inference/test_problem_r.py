@@ -14,7 +14,7 @@ import pytest
 from actuator_glue.inference.dream import sample
 from actuator_glue.inference.likelihood import GlueLikelihood
 from actuator_glue.inference.moments import moments
-from actuator_glue.model import problem_r
+from actuator_glue.model import reference_problem
 from actuator_glue.model.fast import FastErrors
 from actuator_glue.model.parameters import bounds
 
@@ -28,7 +28,7 @@ SD_LIMIT = np.array([0.10, 0.10, 0.10, 0.15])
 
 @pytest.fixture(scope='module')
 def density() -> GlueLikelihood:
-    return GlueLikelihood(FastErrors(problem_r.records()), 256.0)
+    return GlueLikelihood(FastErrors(reference_problem.records()), 256.0)
 
 
 @pytest.mark.parametrize(('evaluations', 'seeds'), [(60_000, 10), (20_000, 20)])
@@ -80,7 +80,7 @@ def test_one_free_test_leaves_a_ridge_that_the_chains_run_along(rng_seed: int) -
     alpha_1 beta_0 meets: means 2/3 of it, standard deviations sqrt(1/18); alpha_3 stays uniform.
     Five runs of some 200 effective draws: the limits are six standard errors.
     """
-    density = GlueLikelihood(FastErrors(problem_r.records()[:1]), 256.0)
+    density = GlueLikelihood(FastErrors(reference_problem.records()[:1]), 256.0)
     upper = bounds()[1]
     runs = [
         sample(rng, density, *bounds(), evaluations=60_000)

@@ -14,7 +14,7 @@ from actuator_glue.inference.likelihood import GaussianLikelihood
 from actuator_glue.model import commands, linear
 from actuator_glue.model.exact import ExactErrors
 from actuator_glue.model.parameters import NAMES, bounds
-from actuator_glue.model.problem_r import STIFFNESS
+from actuator_glue.model.reference_problem import STIFFNESS
 from actuator_glue.records import Record
 
 CASES = 300

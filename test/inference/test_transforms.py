@@ -10,9 +10,9 @@ import pytest
 
 from actuator_glue.inference.choice import ModelChoice, choose_model
 from actuator_glue.inference.transforms import Composed, Transform
+from actuator_glue.inference.transforms.inverse_response import Ridge
 from actuator_glue.inference.transforms.laplace import Laplace
 from actuator_glue.inference.transforms.log import Log
-from actuator_glue.inference.transforms.ridge import Ridge
 from actuator_glue.inference.transforms.triangular import Triangular
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.records import Array

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from actuator_glue.errors import InputError
-from actuator_glue.model import commands, problem_r
+from actuator_glue.model import commands, reference_problem
 from actuator_glue.model.parameters import TABLE_2
 from actuator_glue.records import Record
 
@@ -94,21 +94,21 @@ def test_refusals_say_what_to_change(make, message):
 
 
 def test_problem_r_is_the_specified_one():
-    first, second = problem_r.records()
+    first, second = reference_problem.records()
     assert (len(first), len(second)) == (12_001, 12_001)
     assert (first.stiffness, second.stiffness) == (0.0, 250e3)
     noise = np.random.default_rng(1).standard_normal(24_002)
     a, b, c, d, _ = signal.cont2discrete(signal.tf2ss([2208.0], [1, 133.0, 2101.0]), 1 / 200)
     _, y, _ = signal.dlsim((a, b, c, d, 1 / 200), second.command)
     np.testing.assert_allclose(second.measured, y[:, 0] + 2e-5 * noise[12_001:], atol=1e-12)
-    assert problem_r.records(2)[0].measured[5] != first.measured[5]
+    assert reference_problem.records(2)[0].measured[5] != first.measured[5]
 
 
 def test_problem_r_maximum_of_the_likelihood():
     """L = 1764.79 at the best theta (mm, G = 2^8); the mean of the posterior is close to it."""
     from actuator_glue.model.exact import ExactErrors
 
-    errors = ExactErrors(problem_r.records())
+    errors = ExactErrors(reference_problem.records())
     n = errors.sizes.sum()
     s, q = errors([133.65, 1.1005e9, 2.4927e5, 0.0])[:].sum(axis=0)
     best = -256 * np.log(1e6 * (q / n - (s / n) ** 2))

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from scipy import signal
 
 from actuator_glue.errors import InputError
-from actuator_glue.model import commands, linear, problem_r
+from actuator_glue.model import commands, linear, reference_problem
 from actuator_glue.model.fast import FastErrors
 from actuator_glue.model.parameters import TABLE_2, bounds
 from actuator_glue.records import Record
@@ -31,7 +31,7 @@ def log_likelihood(errors, sums):
 
 @functools.cache
 def problem():
-    return FastErrors(problem_r.records())
+    return FastErrors(reference_problem.records())
 
 
 def posterior_draws(m, seed=0):
@@ -138,7 +138,7 @@ def test_any_hint_gives_the_same_answer():
 
 
 def test_ten_times_the_length_is_as_accurate():
-    fast = FastErrors(problem_r.records(duration=600.0))
+    fast = FastErrors(reference_problem.records(duration=600.0))
     theta = posterior_draws(300, 1)
     difference = log_likelihood(fast, fast(theta)) - log_likelihood(fast, fast.exact(theta))
     assert np.abs(difference).max() < 1e-6
@@ -148,7 +148,10 @@ def test_ten_times_the_length_is_as_accurate():
 def test_cost_does_not_grow_with_the_length():
     """Processor time of this thread, medians side by side: flat within half, lfilter's is not."""
     theta, one = posterior_draws(512), posterior_draws(1)[0]
-    short, long = FastErrors(problem_r.records()), FastErrors(problem_r.records(duration=600.0))
+    short, long = (
+        FastErrors(reference_problem.records()),
+        FastErrors(reference_problem.records(duration=600.0)),
+    )
 
     def lfilter():
         for record in short.exact.records:
@@ -195,7 +198,7 @@ def test_refusals_are_those_of_the_exact_errors():
     with pytest.raises(InputError, match='theta has shape'):
         problem()(np.zeros(3))
     with pytest.raises(InputError, match='settle'):
-        FastErrors(problem_r.records(), 20_000)
+        FastErrors(reference_problem.records(), 20_000)
 
 
 def test_records_of_different_rate_hold_and_length_are_fitted_jointly():

@@ -18,7 +18,7 @@ from actuator_glue.model.benchmark_plant import (
     benchmark_plant,
 )
 from actuator_glue.model.commands import noise, sweep
-from actuator_glue.model.effects import rows
+from actuator_glue.model.effects import layout
 from actuator_glue.model.parameters import TABLE_2
 from actuator_glue.model.plant import MeasuredPlant, Plant
 from actuator_glue.model.sensor import SensorSpec
@@ -70,8 +70,8 @@ def test_output_does_not_depend_on_the_blocks(kind, hold, cuts, seed):
 def test_an_empty_first_block_writes_nothing():
     # Guarded memory around the output: a write past it would only sometimes crash.
     plant = paper_plant(effects=('delay', 'backlash'))
-    memory = np.full((3, rows.LANES), 7.0)
-    out, force = memory[1:1], np.empty((0, rows.LANES))
+    memory = np.full((3, layout.LANES), 7.0)
+    out, force = memory[1:1], np.empty((0, layout.LANES))
     plant._advance(np.zeros(1), out, force)
     assert (memory == 7.0).all()
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from actuator_glue.model import commands, linear, problem_r, reference
+from actuator_glue.model import commands, linear, reference, reference_problem
 from actuator_glue.model.exact import ExactErrors
 from actuator_glue.model.parameters import TABLE_2
 from actuator_glue.records import Record
@@ -47,9 +47,11 @@ def test_fit_is_about_as_good_as_the_truth(rate, hold, stiffness, quake, factors
 
 def test_fit_of_problem_r_is_what_the_paper_identified():
     """(3a) within 2 %; (3b) has a static gain above one, which Eq. (2a) cannot have."""
-    first, second = problem_r.records()
+    first, second = reference_problem.records()
     rest = np.zeros(2)
-    np.testing.assert_allclose(reference.fit(first, 0, rest), problem_r.EQUATION_3[0], rtol=0.02)
+    np.testing.assert_allclose(
+        reference.fit(first, 0, rest), reference_problem.EQUATION_3[0], rtol=0.02
+    )
     a1, a0, b0 = reference.fit(second, 0, rest)
     assert b0 == pytest.approx(a0)
     assert a1 / a0 == pytest.approx(133.0 / 2101.0, rel=0.05)

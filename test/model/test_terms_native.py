@@ -12,7 +12,7 @@ from actuator_glue.model.commands import sweep
 from actuator_glue.model.effects.terms import machine as m
 from actuator_glue.model.effects.terms.entry import term
 from actuator_glue.model.effects.terms.expression import KNOWN, SIGNAL
-from actuator_glue.model.effects.terms.native import Native, Part
+from actuator_glue.model.effects.terms.native import InstructionGroup, Native
 from actuator_glue.model.effects.terms.operations import PURE, REMEMBERING
 from actuator_glue.model.parameters import TABLE_2, Parameter
 from actuator_glue.model.structure import Structure
@@ -53,7 +53,7 @@ def executed(op: int, values: Array) -> Array:
     """Return registers after an operation on a, b, c and what is remembered, values (4, 32)."""
     g = np.zeros((RESULT + 1, 32))
     g[A : KEPT + 1] = values
-    part = Part((m.Instruction(op, RESULT, A, B, C, KEPT),), ((RESULT, RESULT),))
+    part = InstructionGroup((m.Instruction(op, RESULT, A, B, C, KEPT),), ((RESULT, RESULT),))
     native = Native((part,), {})
     m.once(native.addresses[0], g)
     return g

@@ -5,11 +5,11 @@ import pickle
 from online_streams import SETTINGS
 
 from actuator_glue.inference.choice import choose_model
-from actuator_glue.online import wire
+from actuator_glue.online import conversion
 from actuator_glue.online.estimator import Estimator, Schedule
 from actuator_glue.online.job import WindowResult, run
 from actuator_glue.online.playback import replay
-from actuator_glue.online.published import differences
+from actuator_glue.online.replay_comparison import differences
 from actuator_glue.online.stream import Preview
 from actuator_glue.setups import StreamSetup
 
@@ -25,8 +25,8 @@ def is_result(item):
 
 def fields(result):
     """Everything a result publishes."""
-    bands = [wire.prediction(p, 'a')[1] for p in (*result.scored, *result.forecast)]
-    return [wire.posterior(result, 0.0)[1], *bands, wire.response(result)[1]]
+    bands = [conversion.prediction(p, 'a')[1] for p in (*result.scored, *result.forecast)]
+    return [conversion.posterior(result, 0.0)[1], *bands, conversion.response(result)[1]]
 
 
 def same(one, other):

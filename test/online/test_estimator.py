@@ -9,10 +9,10 @@ from online_streams import RATE, SETTINGS, THETA, record
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference.choice import choose_model
-from actuator_glue.online import wire
+from actuator_glue.online import conversion
 from actuator_glue.online.estimator import Ahead
 from actuator_glue.online.playback import replay, stream
-from actuator_glue.online.published import differences
+from actuator_glue.online.replay_comparison import differences
 from actuator_glue.online.stream import Dropped, Failed, Preview
 from actuator_glue.sample_block import Block
 from actuator_glue.setups import StreamSetup
@@ -69,8 +69,8 @@ def test_scored_bands_are_the_published_ones_to_the_bit(changes, effects):
     for early in published:
         late = later[early.number, early.kind]
         assert early.coverage is None and late.coverage is not None
-        head, fields = wire.prediction(early, 'a')
-        scored_head, scored = wire.prediction(late, 'a')
+        head, fields = conversion.prediction(early, 'a')
+        scored_head, scored = conversion.prediction(late, 'a')
         names = differences(fields, Message(scored))
         assert set(names) == {'scored', 'coverage', 'widest_coverage', 'rms_error'}
         assert head == scored_head
@@ -90,7 +90,9 @@ def test_a_preview_changes_no_posterior():
     whole = record(4.0)
     told = results([Preview(0, whole.period, whole.command), *stream(whole)])
     for one, other in zip(told, results(stream(whole)), strict=True):
-        assert not differences(wire.posterior(one, 0.0)[1], Message(wire.posterior(other, 0.0)[1]))
+        assert not differences(
+            conversion.posterior(one, 0.0)[1], Message(conversion.posterior(other, 0.0)[1])
+        )
 
 
 def test_blocks_do_not_matter():

@@ -12,7 +12,7 @@ from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.inference.posterior import Problem, sample
 from actuator_glue.model.parameters import NAMES
-from actuator_glue.online import wire
+from actuator_glue.online import conversion
 from actuator_glue.online.estimator import Estimator, Schedule
 from actuator_glue.online.job import WindowResult, run
 from actuator_glue.online.playback import replay
@@ -151,12 +151,12 @@ def test_a_replay_is_identical_bit_for_bit():
     """What was live and what a bag's set-up says agree, drops included."""
     settings = replace(SEQUENTIAL, drift=0.5)
     once, _ = told(record(9.0), settings, known())
-    message = type('M', (), wire.estimator_setup(settings, choose_model(), 0, 0, known()))
+    message = type('M', (), conversion.estimator_setup(settings, choose_model(), 0, 0, known()))
     again = list(
         replay(
             stream(record(9.0), 37),
-            wire.estimator_settings(message),
-            carried=wire.carried(message),
+            conversion.estimator_settings(message),
+            carried=conversion.carried(message),
         )
     )
     twice = [r for r in again if isinstance(r, WindowResult)]

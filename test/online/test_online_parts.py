@@ -9,7 +9,7 @@ from scipy.special import ndtri
 from scipy.stats import norm
 
 from actuator_glue.inference.predictive import ResidualModel, total_band
-from actuator_glue.model import linear, ridge
+from actuator_glue.model import identifiable, linear
 from actuator_glue.normal import below
 from actuator_glue.online.alarm import CoverageAlarm, SwapWatch
 from actuator_glue.online.collect import PIECE, Collector
@@ -25,19 +25,22 @@ def test_bounds_beyond_all_reason_leave_the_density_a_number(stiffness):
     low, high = np.zeros(4), np.array([400.0, 1e125, 1e120, 100.0])
     theta = np.array([[134.0, 1e120, 1e118, 0.5]])
     phi, back, log_jacobian = np.empty((1, 4)), np.empty((1, 4)), np.empty(1)
-    ridge.coordinates_all(theta, stiffness, low, high, phi)
-    ridge.physical_all(phi, stiffness, low, high, back, log_jacobian)
+    identifiable.coordinates_all(theta, stiffness, low, high, phi)
+    identifiable.physical_all(phi, stiffness, low, high, back, log_jacobian)
     assert np.isfinite(log_jacobian).all()
     assert np.allclose(back, theta, rtol=1e-9)
 
 
 def test_what_is_uniform_between_bounds_is_a_normal_score():
     share = np.concatenate([np.logspace(-6.9, -0.4, 500), 1.0 - np.logspace(-6.9, -0.4, 500)])
-    scores = np.array([ridge.score(s) for s in share])
+    scores = np.array([identifiable.score(s) for s in share])
     assert np.allclose(scores, ndtri(share), rtol=0.0, atol=1e-12)
     assert np.allclose([below(z) for z in scores], share, rtol=1e-12)
-    assert ridge.score(0.0) == -ridge.EDGE and ridge.score(1.0) == ridge.EDGE
-    assert ridge.score(np.nan) == -ridge.EDGE
+    assert (
+        identifiable.score(0.0) == -identifiable.EDGE
+        and identifiable.score(1.0) == identifiable.EDGE
+    )
+    assert identifiable.score(np.nan) == -identifiable.EDGE
 
 
 def test_a_mixture_of_one_is_a_normal():

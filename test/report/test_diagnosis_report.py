@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 
 from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.next_experiment import Experiment
+from actuator_glue.diagnosis.posterior import Draws
 from actuator_glue.diagnosis.response import Response, Sine
 from actuator_glue.diagnosis.result import (
     Alarm,
@@ -21,6 +22,7 @@ from actuator_glue.diagnosis.result import (
     Trace,
 )
 from actuator_glue.report import diagnosis_figures as figures
+from actuator_glue.report import diagnosis_report
 from actuator_glue.report.diagnosis_report import page as page_of
 from actuator_glue.report.html import render
 
@@ -216,3 +218,10 @@ def test_first_page_says_what_came_out_and_what_to_do() -> None:
         'beta_1 = 128',
     ):
         assert shown in text
+
+
+def test_chains_that_stand_still_have_no_r_hat_and_a_report_all_the_same() -> None:
+    """What cannot be told is null in the JSON."""
+    still = Draws(np.zeros((4, 2)), 'dream', 128).told()
+    assert still['rhat'] is None
+    assert diagnosis_report._drawn(still) == 'nan effective draws by DREAM(ZS), R-hat nan'

@@ -18,7 +18,7 @@ from actuator_glue.io.bag_records import write_record
 from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.io.messages import full_name
 from actuator_glue.model.commands import noise
-from actuator_glue.nodes import diagnoser, diagnosing
+from actuator_glue.nodes import diagnoser, diagnoser_worker
 from actuator_glue.nodes.recorder import RecorderNode
 from actuator_glue.nodes.topics import SAMPLES
 from actuator_glue.records import Record
@@ -143,15 +143,15 @@ def node(probe, monkeypatch):
 
 
 def test_an_answer_that_is_lost_does_not_hold_up_the_diagnoser(node, probe, monkeypatch):
-    monkeypatch.setattr(diagnosing, 'augmented', lambda _: SetModel.Request())
+    monkeypatch.setattr(diagnoser_worker, 'augmented', lambda _: SetModel.Request())
     # Nobody spins the probe: the request arrives and is never answered.
     probe.create_service(SetModel, 'estimator/set_model', lambda _, answer: answer)
     executor = rclpy.executors.SingleThreadedExecutor()
     executor.add_node(node)
     while not node._model_client.service_is_ready():
         executor.spin_once(0.1)
-    node._request = diagnosing.Request(apply=True)
-    outcome = diagnosing.Outcome(diagnosis=SimpleNamespace())
+    node._request = diagnoser_worker.Request(apply=True)
+    outcome = diagnoser_worker.Outcome(diagnosis=SimpleNamespace())
     node._apply(outcome)
     assert node._request is not None
     while node._request is not None:

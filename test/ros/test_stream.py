@@ -12,7 +12,7 @@ from ros_nodes import QUICK, RATE, recorded
 from actuator_glue.io.bag_reader import decoded, summarise
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.playback import items, replay
-from actuator_glue.online.published import compare, published
+from actuator_glue.online.replay_comparison import compare, published
 from actuator_glue.records import Record
 
 ROOT = Path(__file__).resolve().parents[2]

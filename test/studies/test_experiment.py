@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from actuator_glue.model import problem_r
+from actuator_glue.model import reference_problem
 from studies.chen.experiment import (
     blocks,
     empirical_response,
@@ -16,7 +16,7 @@ from studies.chen.published import CLOSE_UPS
 
 @pytest.mark.parametrize('test', [0, 1])
 def test_sweeps_give_back_their_transfer_function(test: int) -> None:
-    record = problem_r.records(noise=0.0)[test]
+    record = reference_problem.records(noise=0.0)[test]
     # The sweep moves 0.17 Hz/s while the response settles in 50 ms: 0.5 % is what that leaves.
     for reading in read_off(record, test, CLOSE_UPS):
         assert reading.amplitude == pytest.approx(abs(reading.expected), rel=5e-3)
@@ -28,7 +28,7 @@ def test_sweeps_give_back_their_transfer_function(test: int) -> None:
 
 
 def test_the_spring_test_decays_and_lags_more() -> None:
-    free, spring = (read_off(r, i, CLOSE_UPS) for i, r in enumerate(problem_r.records()))
+    free, spring = (read_off(r, i, CLOSE_UPS) for i, r in enumerate(reference_problem.records()))
     for one, other in zip(free, spring, strict=True):
         assert other.delay > one.delay
     assert spring[1].decay > free[1].decay and spring[2].decay > free[2].decay
@@ -40,7 +40,7 @@ def test_hold_is_half_a_sample_of_delay() -> None:
     np.testing.assert_allclose(-np.angle(response) / (2 * np.pi * frequency), 0.0025)
     # Against the exact discrete response of a sine, long after its start.
     time = np.arange(0, 20, 0.005)
-    a1, a0, b0 = problem_r.EQUATION_3[0]
+    a1, a0, b0 = reference_problem.EQUATION_3[0]
     from actuator_glue.model import linear
 
     x = linear.respond(np.array([[a1, a0, b0]]), np.sin(2 * np.pi * 5 * time), period=0.005)[0]
@@ -52,7 +52,7 @@ def test_hold_is_half_a_sample_of_delay() -> None:
 
 
 def test_blocks_share_a_record_out_evenly_and_wholly() -> None:
-    record = problem_r.records(1)[0]
+    record = reference_problem.records(1)[0]
     fit, held_out = blocks(record)
     covered = held_out.astype(int)
     for part in fit:

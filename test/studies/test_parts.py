@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import norm
 
 from actuator_glue.inference.likelihood import GlueLikelihood
-from actuator_glue.model import problem_r
+from actuator_glue.model import reference_problem
 from actuator_glue.model.exact import ExactErrors
 from actuator_glue.model.parameters import TABLE_2
 from studies.chen import findings, misfit, shaping, spread
@@ -20,7 +20,7 @@ from studies.chen.words import listed, num, percent, power_of_two
 def test_added_residual_is_what_white_noise_does_on_average(rng_seed: int) -> None:
     # Mean of 30 noise realisations of Var[E]: relative sd sqrt(2/24002/30) = 0.0017; 6 sd allowed.
     rng = np.random.default_rng(rng_seed)
-    records = problem_r.records(1)
+    records = reference_problem.records(1)
     theta, size = TABLE_2[None], 0.3e-3
     expected = GlueLikelihood(AddedResidual(ExactErrors(records), size), 1.0)(theta)[0]
     variances = []
@@ -32,7 +32,7 @@ def test_added_residual_is_what_white_noise_does_on_average(rng_seed: int) -> No
 
 def test_spread_of_table_4_is_met_at_about_0_7_mm(rng_seed: int) -> None:
     # The COV of one run of 60 000 evaluations scatters by about 3 % here; 15 % is asked.
-    errors = ExactErrors(problem_r.records(1))
+    errors = ExactErrors(reference_problem.records(1))
     laboratory = Laboratory(rng_seed)
     posterior = laboratory.run((1,), errors, CHOSEN, 60_000, added_rms=0.69e-3)
     assert (posterior.chains.rhat < 1.05).all()
@@ -104,13 +104,13 @@ def test_trace_says_when_r_hat_stays_below() -> None:
 
 
 def test_gain_with_the_specimen_removes_the_papers_residual() -> None:
-    refits = misfit.study(problem_r.records(1))
+    refits = misfit.study(reference_problem.records(1))
     before, after = refits['both'], refits['both, spring gain']
     assert refits['spring, gain'].gain == pytest.approx(1.051, abs=0.005)
     assert before.held_out[1] > 35e-6
     assert max(after.held_out.values()) < 20.6e-6  # the noise is 20 um
     assert misfit.removed(before.held_out[1], after.held_out[1]) > 0.95
-    centres, rms = misfit.by_frequency(problem_r.records(1)[1], before.residual[1])
+    centres, rms = misfit.by_frequency(reference_problem.records(1)[1], before.residual[1])
     assert rms[centres < 1].min() > 2.5 * rms[centres > 9].max()
 
 

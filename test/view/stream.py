@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from actuator_glue.view.history import History
-from actuator_glue.view.messages import Intake
+from actuator_glue.view.intake import Intake
 
 RATE = 1000.0
 

@@ -13,7 +13,7 @@ from browser import PROGRAM, Browser
 from stream import feed, intake
 
 from actuator_glue.errors import InputError
-from actuator_glue.view.messages import Intake, read_bag
+from actuator_glue.view.intake import Intake, read_bag
 from actuator_glue.view.server import PageServer
 
 SESSION = Path(__file__).resolve().parents[2] / 'bags' / 'session'

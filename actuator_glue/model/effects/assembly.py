@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from actuator_glue.jit import njit
 from actuator_glue.model.effects import catalogue
-from actuator_glue.model.effects import rows as r
+from actuator_glue.model.effects import layout as r
 from actuator_glue.model.effects.stage import Quantity
 from actuator_glue.records import Array
 
@@ -113,8 +113,9 @@ error = reduce(_passed, [s.error for s in _BY_NAME if s.error is not None])
 limit = reduce(_passed, [s.limit for s in _BY_NAME if s.limit is not None])
 # (w, n) -> what the controller's own transducer shows beyond the position.
 beyond = reduce(_added, [s.beyond for s in _BY_NAME if s.beyond is not None])
-# (w, n, y) -> y: recorded displacement.
+# (w, n, y) -> y: recorded displacement; `shown` where what carries the actuator does not move.
 sensed = reduce(_sensed, [s.sensed for s in _BY_NAME if s.sensed is not None])
+shown = reduce(_sensed, [s.sensed for s in _BY_NAME if s.sensed is not None and s.beyond is None])
 # (w, on, time): writes IN_GAIN of all lanes, from IN_Q; an effect that is off costs nothing.
 gains: Any = _no_gain
 for _stage in _BY_NAME:

@@ -13,7 +13,7 @@ from __future__ import annotations
 from typing import Any
 
 from actuator_glue.jit import njit
-from actuator_glue.model.effects import rows as r
+from actuator_glue.model.effects import layout as r
 from actuator_glue.model.effects.catalogue import specimen_gap, specimen_yield
 from actuator_glue.model.effects.catalogue.specimen_hardening import cubic
 from actuator_glue.model.effects.dead_zone import beyond

@@ -13,7 +13,7 @@ import numpy as np
 
 from actuator_glue.jit import njit
 from actuator_glue.model.effects import assembly, catalogue
-from actuator_glue.model.effects import rows as r
+from actuator_glue.model.effects import layout as r
 from actuator_glue.model.effects.stage import Case
 from actuator_glue.model.parameters import NAMES as BASE
 from actuator_glue.records import Array

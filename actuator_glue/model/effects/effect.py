@@ -84,7 +84,8 @@ class Effect:
         source: literature.
         starts: sizes from which a fit may start, given the scale of the test; each row holds
             one value per parameter.
-        exact: states of the exact simulation it needs beside x and q (lti.py) where it is linear.
+        exact: states it needs beside x and q in the exact simulation (linear_effects.py), where
+            it is linear.
         stage: what it does in the compiled step.
         onset: what depends on where a record begins, given the record if it begins in motion.
         states: what `onset` gives its stage beside parameters.
@@ -122,5 +123,5 @@ class Effect:
 
     @property
     def linear(self) -> bool:
-        """Whether it leaves the loop linear, so that the exact simulation (lti.py) has it."""
+        """Whether it leaves the loop linear, so that linear_effects.py simulates it exactly."""
         return self.exact is not None or self.output is not None or self.variance is not None

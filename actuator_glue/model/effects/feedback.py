@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from actuator_glue.jit import njit
 from actuator_glue.model.effects import assembly
-from actuator_glue.model.effects import rows as r
+from actuator_glue.model.effects import layout as r
 from actuator_glue.model.effects.terms import machine
 from actuator_glue.records import Array
 

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from actuator_glue.jit import njit
 from actuator_glue.model.effects import assembly, balance, command, feedback, lag, stages
-from actuator_glue.model.effects import rows as r
+from actuator_glue.model.effects import layout as r
 from actuator_glue.model.effects.catalogue import specimen_gap, specimen_yield, stribeck_friction
 from actuator_glue.model.effects.terms import machine, stage
 from actuator_glue.records import Array
@@ -258,8 +258,7 @@ def advance(
     g = table[assembly.SIZE :].reshape(-1, r.LANES)
     places = np.empty(lag.PLACES, np.int32)
     lag.prepare(w, substeps)
-    inverse = 1.0 / substeps
-    rate = 2.0 * substeps / period
+    inverse, rate = 1.0 / substeps, 2.0 * substeps / period
     want_force = force.shape[0] > 0
     if begin == 0 and displacement.shape[0] > 0:  # the state as it stands
         for n in range(r.LANES):
@@ -283,10 +282,12 @@ def advance(
             if on[r.ON_BEYOND]:
                 feedback.expect(w)
             substep(w, g, parts, on, mean, rate, (at + (j + 0.5) * inverse) * period)
-            if on[r.ON_TRANSDUCER]:
+            if on[r.ON_TRANSDUCER] and on[r.ON_BEYOND]:
                 for n in range(r.LANES):
-                    corrected = stages.chains(w, n, mean, slope)
-                    displacement[i, n] = assembly.sensed(w, n, corrected)
+                    displacement[i, n] = assembly.sensed(w, n, stages.chains(w, n, mean, slope))
+            elif on[r.ON_TRANSDUCER]:
+                for n in range(r.LANES):
+                    displacement[i, n] = assembly.shown(w, n, stages.chains(w, n, mean, slope))
             else:
                 for n in range(r.LANES):
                     displacement[i, n] = stages.chains(w, n, mean, slope)

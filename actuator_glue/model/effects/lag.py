@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from actuator_glue.jit import njit
 from actuator_glue.model.effects import command
-from actuator_glue.model.effects import rows as r
+from actuator_glue.model.effects import layout as r
 from actuator_glue.records import Array
 
 # Samples fetched per lane: those at both ends of a sub-step, and where the command runs linearly

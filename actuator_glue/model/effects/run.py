@@ -8,7 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.jit import njit
-from actuator_glue.model.effects import assembly, coefficients, kernel, lti, lti_step, rows
+from actuator_glue.model.effects import (
+    assembly,
+    coefficients,
+    kernel,
+    layout,
+    linear_effects,
+    linear_step,
+)
 from actuator_glue.model.effects.terms import machine
 from actuator_glue.model.effects.terms.program import Program
 from actuator_glue.records import Array, Record
@@ -67,13 +74,13 @@ def tables(
             parameters[name] = value
     # A limit that is not a number must not pass for no limit: it makes the state not a number.
     one = np.where(np.isnan(total), np.nan, 1.0)
-    blocks = -(-len(total) // rows.LANES)
+    blocks = -(-len(total) // layout.LANES)
     x, v = start[0] * one, start[1] * one
     step = period / substeps
-    out = np.zeros((blocks, assembly.SIZE + program.rows * rows.LANES))
+    out = np.zeros((blocks, assembly.SIZE + program.rows * layout.LANES))
     coefficients.fill(parameters, stiffness, step, period, x, v, out)
     if program.acts(machine.COMMAND, machine.SENSOR):
-        which = np.minimum(np.arange(blocks * rows.LANES), len(total) - 1)
+        which = np.minimum(np.arange(blocks * layout.LANES), len(total) - 1)
         registers = program.start(values, which)
         registers[:, machine.STEP], registers[:, machine.K] = step, stiffness
         registers[:, machine.D_V_MIDDLE], registers[:, machine.D_V_END] = 1.0 / step, 1.5 / step
@@ -115,13 +122,13 @@ def blocks(
     # One sample before the record: at rest the command was zero, else it was held.
     before = record.command[:1] if start != (0.0, 0.0) else np.zeros(1)
     command = np.concatenate([before, record.command])
-    out = np.empty((min(len(record), _CHUNK), rows.LANES))
-    load = np.empty((len(out) if force else 0, rows.LANES))
+    out = np.empty((min(len(record), _CHUNK), layout.LANES))
+    load = np.empty((len(out) if force else 0, layout.LANES))
     for factor in np.unique(factors):
         which = np.flatnonzero(factors == factor)
         substeps = base * int(factor)
         some = {name: value[which] for name, value in values.items()}
-        members = (which[i : i + rows.LANES] for i in range(0, len(which), rows.LANES))
+        members = (which[i : i + layout.LANES] for i in range(0, len(which), layout.LANES))
         split = tables(some, program, stiffness, substeps, record.period, start)
         for lanes, table in zip(members, split, strict=True):
             for begin in range(0, len(record), _CHUNK):
@@ -153,20 +160,20 @@ def exact_blocks(
 ) -> Iterator[tuple[NDArray[np.intp], int, Array]]:
     """Simulate a record with linear effects only, as `blocks` does, but exactly and faster.
 
-    `third` and `delayed` as `lti_step.advance` takes them.
+    `third` and `delayed` as `linear_step.advance` takes them.
     """
     linear = record.hold == 'linear'
     before = record.command[:1] if start != (0.0, 0.0) else np.zeros(1)
     command = np.concatenate([before, record.command])
-    out = np.empty((min(len(record), _CHUNK), rows.LANES))
-    load = np.empty((len(out) if force else 0, rows.LANES))
-    split = lti.tables(values, record.known_stiffness(), record.period, linear, start)
+    out = np.empty((min(len(record), _CHUNK), layout.LANES))
+    load = np.empty((len(out) if force else 0, layout.LANES))
+    split = linear_effects.tables(values, record.known_stiffness(), record.period, linear, start)
     count = len(values['beta_1'])
     for block, table in enumerate(split):
-        lanes = np.arange(block * rows.LANES, min((block + 1) * rows.LANES, count))
+        lanes = np.arange(block * layout.LANES, min((block + 1) * layout.LANES, count))
         for begin in range(0, len(record), _CHUNK):
             part = out[: min(_CHUNK, len(record) - begin)]
-            lti_step.advance(table, third, delayed, command, -1, begin, part, load[: len(part)])
+            linear_step.advance(table, third, delayed, command, -1, begin, part, load[: len(part)])
             shown = load[: len(part)] if force else part
             yield lanes, begin, shown[:, : len(lanes)]
 

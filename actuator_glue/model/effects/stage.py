@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal, NamedTuple, TypeAlias
 
-from actuator_glue.model.effects import rows as r
+from actuator_glue.model.effects import layout as r
 
 
 class Case(NamedTuple):
@@ -50,8 +50,8 @@ class Stage:
         beyond: (w, n) -> what the controller's own transducer shows beyond the position, in the
             middle of the step to come; called once before every step.
         sensed: (w, n, y) -> recorded displacement.
-        own: switch that the effect has taken for itself (rows.SWITCHES).
-        shared: switches of the scheme that it needs (rows.ON_...), beside that of its place.
+        own: switch that the effect has taken for itself (layout.SWITCHES).
+        shared: switches of the scheme that it needs (layout.ON_...), beside that of its place.
     """
 
     fill: Callable[..., None] | None = None

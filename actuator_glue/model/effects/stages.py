@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from actuator_glue.jit import njit
 from actuator_glue.model.effects import assembly
-from actuator_glue.model.effects import rows as r
+from actuator_glue.model.effects import layout as r
 from actuator_glue.records import Array
 
 

@@ -31,7 +31,7 @@ _ENOUGH = 1e-11  # what the terms should leave of the response
 _APART = 5.0  # the sections' poles over their geometric mean, at most
 
 
-class Samples(NamedTuple):
+class JoinedSamples(NamedTuple):
     """The samples of all records one after another, for compiled loops.
 
     Attributes:
@@ -90,10 +90,10 @@ class FastErrors:
                 wide[: len(row)] = row
 
     @cached_property
-    def samples(self) -> Samples:
+    def samples(self) -> JoinedSamples:
         """What the exact kernel needs."""
         exact = self.exact
-        return Samples(
+        return JoinedSamples(
             np.concatenate([record.measured for record in exact.records]),
             np.concatenate(exact.padded),
             np.cumsum([0, *(len(record) for record in exact.records)]),

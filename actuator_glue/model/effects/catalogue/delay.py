@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from actuator_glue.jit import njit
-from actuator_glue.model.effects import rows as r
+from actuator_glue.model.effects import layout as r
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.effects.stage import Stage
 from actuator_glue.model.parameters import Parameter

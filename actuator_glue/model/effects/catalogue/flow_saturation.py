@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 from actuator_glue.jit import njit
-from actuator_glue.model.effects import rows as r
+from actuator_glue.model.effects import layout as r
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.effects.stage import Case, Stage
 from actuator_glue.model.parameters import Parameter

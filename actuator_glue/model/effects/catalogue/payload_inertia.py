@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from actuator_glue.jit import njit
-from actuator_glue.model.effects import lti_step
+from actuator_glue.model.effects import linear_step
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.effects.stage import Stage
 from actuator_glue.model.parameters import Parameter
@@ -28,7 +28,7 @@ EFFECT = Effect(
         for hz in (80.0, 40.0, 20.0)
         for ratio in (0.1, 0.4)
     ),
-    exact=lti_step.MASS,
+    exact=linear_step.MASS,
     stage=Stage(
         adds={'damping': njit(lambda p: p.mass * p.mass_damping), 'mass': njit(lambda p: p.mass)}
     ),

@@ -6,8 +6,8 @@ import math
 from typing import Any
 
 from actuator_glue.jit import njit
-from actuator_glue.model.effects import lti_step
-from actuator_glue.model.effects import rows as r
+from actuator_glue.model.effects import layout as r
+from actuator_glue.model.effects import linear_step
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.effects.stage import Case, Stage
 from actuator_glue.model.parameters import Parameter
@@ -46,6 +46,6 @@ EFFECT = Effect(
     signature='linear; as a delay with a slight roll-off',
     source='Jelali & Kroll 2003 (transducers)',
     starts=lambda s: ((0.0005,), (0.002,), (0.008,)),
-    exact=lti_step.SENSOR,
+    exact=linear_step.SENSOR,
     stage=Stage(_fill, sensed=_sensed),
 )

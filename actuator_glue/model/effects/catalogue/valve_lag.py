@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from actuator_glue.jit import njit
-from actuator_glue.model.effects import lti_step
+from actuator_glue.model.effects import linear_step
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.effects.stage import Stage
 from actuator_glue.model.parameters import Parameter
@@ -17,6 +17,6 @@ EFFECT = Effect(
     signature='linear; residual grows with the square of frequency',
     source='Merritt 1967; Jelali & Kroll 2003',
     starts=lambda s: ((0.0005,), (0.002,), (0.006,)),
-    exact=lti_step.VALVE,
+    exact=linear_step.VALVE,
     stage=Stage(adds={'valve_lag': njit(lambda p: p.valve_lag)}),
 )

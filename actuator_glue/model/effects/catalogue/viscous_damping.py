@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from actuator_glue.jit import njit
-from actuator_glue.model.effects import lti_step
+from actuator_glue.model.effects import linear_step
 from actuator_glue.model.effects.effect import Effect
 from actuator_glue.model.effects.stage import Stage
 from actuator_glue.model.parameters import Parameter
@@ -19,6 +19,6 @@ EFFECT = Effect(
     starts=lambda s: tuple(
         (share * s.oil * s.stroke / s.velocity,) for share in (0.01, 0.05, 0.3)
     ),
-    exact=lti_step.VELOCITY,
+    exact=linear_step.VELOCITY,
     stage=Stage(adds={'damping': njit(lambda p: p.damping)}),
 )

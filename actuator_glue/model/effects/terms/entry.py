@@ -9,7 +9,7 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.model.effects.effect import Effect, Place, Scale
-from actuator_glue.model.effects.rows import LANES
+from actuator_glue.model.effects.layout import LANES
 from actuator_glue.model.effects.terms import machine as m
 from actuator_glue.model.effects.terms import program
 from actuator_glue.model.effects.terms.expression import SIGNAL, Expression, read, reserved

@@ -1,4 +1,4 @@
-"""Formulas that write native code: what is computed with `Lanes` is computed when that code runs.
+"""Formulas that write native code: what is computed with `LaneNumbers` is computed when it runs.
 
 One operation of the processor for each that is written, none joined or reordered: a parameter set
 gets the same bits whatever its neighbours.
@@ -21,28 +21,34 @@ WHOLE: Final = 1.5 * 2.0**52
 _EXPONENT, _MANTISSA = 1023, 52
 
 
-def _value(number: Lanes | float) -> Any:
-    return number.value if isinstance(number, Lanes) else ir.Constant(VECTOR, [number] * WIDE)
+def _value(number: LaneNumbers | float) -> Any:
+    return (
+        number.value if isinstance(number, LaneNumbers) else ir.Constant(VECTOR, [number] * WIDE)
+    )
 
 
-def _two(name: str, turned: bool = False) -> Callable[[Lanes, Lanes | float], Lanes]:
-    def method(self: Lanes, other: Lanes | float) -> Lanes:
+def _two(
+    name: str, turned: bool = False
+) -> Callable[[LaneNumbers, LaneNumbers | float], LaneNumbers]:
+    def method(self: LaneNumbers, other: LaneNumbers | float) -> LaneNumbers:
         a, b = (other, self) if turned else (self, other)
-        return Lanes(self.code, getattr(self.code, name)(_value(a), _value(b)))
+        return LaneNumbers(self.code, getattr(self.code, name)(_value(a), _value(b)))
 
     return method
 
 
-def _compared(how: str, unordered: bool = False) -> Callable[[Lanes, Lanes | float], Lanes]:
-    def method(self: Lanes, other: Lanes | float) -> Lanes:
+def _compared(
+    how: str, unordered: bool = False
+) -> Callable[[LaneNumbers, LaneNumbers | float], LaneNumbers]:
+    def method(self: LaneNumbers, other: LaneNumbers | float) -> LaneNumbers:
         compare = self.code.fcmp_unordered if unordered else self.code.fcmp_ordered
-        return Lanes(self.code, compare(how, self.value, _value(other)))
+        return LaneNumbers(self.code, compare(how, self.value, _value(other)))
 
     return method
 
 
 @dataclass(frozen=True, slots=True)
-class Lanes:
+class LaneNumbers:
     """A number of every lane; from a comparison its truth.
 
     Attributes:
@@ -63,27 +69,27 @@ class Lanes:
     # Not __eq__: lanes are values of a dataclass, too.
     equals, differs = _compared('=='), _compared('!=', unordered=True)
 
-    def __neg__(self) -> Lanes:
-        return Lanes(self.code, self.code.fneg(self.value))
+    def __neg__(self) -> LaneNumbers:
+        return LaneNumbers(self.code, self.code.fneg(self.value))
 
-    def __abs__(self) -> Lanes:
+    def __abs__(self) -> LaneNumbers:
         return self.call('fabs')
 
-    def choose(self, yes: Lanes | float, no: Lanes | float) -> Lanes:
+    def choose(self, yes: LaneNumbers | float, no: LaneNumbers | float) -> LaneNumbers:
         """Return one number where this is true and another one where it is not."""
-        return Lanes(self.code, self.code.select(self.value, _value(yes), _value(no)))
+        return LaneNumbers(self.code, self.code.select(self.value, _value(yes), _value(no)))
 
-    def call(self, function: str, *others: Lanes | float) -> Lanes:
+    def call(self, function: str, *others: LaneNumbers | float) -> LaneNumbers:
         """Return a function of LLVM."""
         module, name = self.code.module, f'llvm.{function}.v{WIDE}f64'
         operands = [self.value, *map(_value, others)]
         kind = ir.FunctionType(VECTOR, [VECTOR] * len(operands))
         known = module.globals.get(name) or ir.Function(module, kind, name)
-        return Lanes(self.code, self.code.call(known, operands))
+        return LaneNumbers(self.code, self.code.call(known, operands))
 
-    def power_of_two(self) -> Lanes:
+    def power_of_two(self) -> LaneNumbers:
         """Return 2^k of k + WHOLE, whose lowest bits are those of the integer k."""
         code, kind = self.code, ir.VectorType(ir.IntType(64), WIDE)
         k = code.add(code.bitcast(self.value, kind), ir.Constant(kind, [_EXPONENT] * WIDE))
         k = code.shl(k, ir.Constant(kind, [_MANTISSA] * WIDE))
-        return Lanes(code, code.bitcast(k, VECTOR))
+        return LaneNumbers(code, code.bitcast(k, VECTOR))

@@ -13,15 +13,15 @@ from typing import Any, Final, NamedTuple
 import llvmlite.binding as llvm
 from llvmlite import ir
 
-from actuator_glue.model.effects.rows import LANES
+from actuator_glue.model.effects.layout import LANES
 from actuator_glue.model.effects.terms import machine as m
-from actuator_glue.model.effects.terms.lanes import VECTOR, WIDE, Lanes
+from actuator_glue.model.effects.terms.lanes import VECTOR, WIDE, LaneNumbers
 from actuator_glue.model.effects.terms.operations import PURE, REMEMBERING, remembered
 
 _INDEX: Final = ir.IntType(64)
 
 
-class Part(NamedTuple):
+class InstructionGroup(NamedTuple):
     """Instructions that are executed together.
 
     Attributes:
@@ -44,7 +44,9 @@ class Native:
         addresses: of every part's, 0 where a part has no instructions.
     """
 
-    def __init__(self, parts: tuple[Part, ...], constants: Mapping[int, float]) -> None:
+    def __init__(
+        self, parts: tuple[InstructionGroup, ...], constants: Mapping[int, float]
+    ) -> None:
         module = ir.Module()
         written = [i for i, part in enumerate(parts) if part.left]
         for i in written:
@@ -64,7 +66,9 @@ class Native:
 
 # More than there are forms of a learned term, each of which takes 0.7 MB.
 @lru_cache(maxsize=64)
-def native(parts: tuple[Part, ...], constants: tuple[tuple[int, float], ...]) -> Native:
+def native(
+    parts: tuple[InstructionGroup, ...], constants: tuple[tuple[int, float], ...]
+) -> Native:
     """Return the code of a program's parts; `constants` are registers and their values."""
     return Native(parts, dict(constants))
 
@@ -81,11 +85,11 @@ class _Writer:
         self._lane = self._code.phi(_INDEX)
         self._lane.add_incoming(_INDEX(0), entry)
         self._known = {
-            row: Lanes(self._code, ir.Constant(VECTOR, [value] * WIDE))
+            row: LaneNumbers(self._code, ir.Constant(VECTOR, [value] * WIDE))
             for row, value in constants.items()
         }
 
-    def write(self, part: Part) -> None:
+    def write(self, part: InstructionGroup) -> None:
         """Write the function, to its end."""
         for step in part.code:
             a, b, c = (self._read(row) for row in step[2:5])
@@ -108,10 +112,12 @@ class _Writer:
         place = self._code.add(self._lane, _INDEX(begin))
         return self._code.bitcast(self._code.gep(table, [place]), VECTOR.as_pointer())
 
-    def _read(self, row: int) -> Lanes:
+    def _read(self, row: int) -> LaneNumbers:
         if row not in self._known:
-            self._known[row] = Lanes(self._code, self._code.load(self._address(row), align=8))
+            self._known[row] = LaneNumbers(
+                self._code, self._code.load(self._address(row), align=8)
+            )
         return self._known[row]
 
-    def _store(self, row: int, number: Lanes) -> None:
+    def _store(self, row: int, number: LaneNumbers) -> None:
         self._code.store(number.value, self._address(row), align=8)

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from typing import Final
 
 from actuator_glue.model.effects.terms import machine as m
-from actuator_glue.model.effects.terms.lanes import WHOLE, Lanes
+from actuator_glue.model.effects.terms.lanes import WHOLE, LaneNumbers
 
 # Of the Taylor series of exp(r) - 1 and sin(a), with what the first leaves out at ln(2)/2 below
 # rounding, and the second at a quarter turn.
@@ -25,33 +25,33 @@ _TURN: Final = 1.0 / (2.0 * math.pi)
 _LN2, _LN2_REST = math.log(2.0), 2.3190468138462996e-17
 
 
-def _series(x: Lanes, coefficients: list[float]) -> Lanes:
+def _series(x: LaneNumbers, coefficients: list[float]) -> LaneNumbers:
     """c[0] + c[1] x + ..., each product added without rounding it."""
-    value: Lanes | float = coefficients[-1]
+    value: LaneNumbers | float = coefficients[-1]
     for c in reversed(coefficients[:-1]):
         value = x.call('fma', value, c)
-    assert isinstance(value, Lanes)
+    assert isinstance(value, LaneNumbers)
     return value
 
 
-def _within(x: Lanes, least: float, most: float) -> Lanes:
+def _within(x: LaneNumbers, least: float, most: float) -> LaneNumbers:
     x = (x < least).choose(least, x)
     return (x > most).choose(most, x)
 
 
-def _parted(x: Lanes, unit: float, rest: float) -> tuple[Lanes, Lanes]:
+def _parted(x: LaneNumbers, unit: float, rest: float) -> tuple[LaneNumbers, LaneNumbers]:
     """2^k and r of x = k (unit + rest) + r, r at most half of the unit in size."""
     whole = x.call('fma', 1.0 / unit, WHOLE)
     k = WHOLE - whole
     return whole.power_of_two(), k.call('fma', rest, k.call('fma', unit, x))
 
 
-def _exp(x: Lanes) -> Lanes:
+def _exp(x: LaneNumbers) -> LaneNumbers:
     power, r = _parted(_within(x, -708.0, 709.0), _LN2, _LN2_REST)
     return (r * _series(r, _EXPM1)).call('fma', power, power)
 
 
-def _tanh(x: Lanes) -> Lanes:
+def _tanh(x: LaneNumbers) -> LaneNumbers:
     """(e^2x - 1)/(e^2x + 1) with e^2z = (under + z over)/(under - z over): one division."""
     power, z = _parted(_within(x, -20.0, 20.0), 0.5 * _LN2, 0.5 * _LN2_REST)
     over, under = z * _series(z * z, _OVER), _series(z * z, _UNDER)
@@ -59,7 +59,7 @@ def _tanh(x: Lanes) -> Lanes:
     return less.call('fma', under, more * over) / more.call('fma', under, less * over)
 
 
-def _sine(turns: Lanes) -> Lanes:
+def _sine(turns: LaneNumbers) -> LaneNumbers:
     """sin(2 pi turns): Taylor series up to a quarter turn, to rounding."""
     part = turns - (turns + 0.5).call('floor')
     rest = (part > 0.0).choose(0.5, -0.5) - part
@@ -68,12 +68,12 @@ def _sine(turns: Lanes) -> Lanes:
     return a + a * z * _series(z, _SINE)
 
 
-def _sign(x: Lanes) -> Lanes:
+def _sign(x: LaneNumbers) -> LaneNumbers:
     return (x > 0.0).choose(1.0, 0.0) - (x < 0.0).choose(1.0, 0.0)
 
 
 # Result from operands a, b and c.
-PURE: Final[dict[int, Callable[[Lanes, Lanes, Lanes], Lanes]]] = {
+PURE: Final[dict[int, Callable[[LaneNumbers, LaneNumbers, LaneNumbers], LaneNumbers]]] = {
     m.COPY: lambda a, _b, _c: a,
     m.ADD: lambda a, b, _: a + b,
     m.SUB: lambda a, b, _: a - b,
@@ -100,23 +100,31 @@ PURE: Final[dict[int, Callable[[Lanes, Lanes, Lanes], Lanes]]] = {
 }
 
 
-def _lag(a: Lanes, b: Lanes, c: Lanes, kept: Lanes) -> tuple[Lanes, Lanes]:
+def _lag(
+    a: LaneNumbers, b: LaneNumbers, c: LaneNumbers, kept: LaneNumbers
+) -> tuple[LaneNumbers, LaneNumbers]:
     """Of a value held over the step: mean, and what it ends with."""
     return a + (kept - a) * c, a + (kept - a) * b
 
 
-def _integral(a: Lanes, b: Lanes, _: Lanes, kept: Lanes) -> tuple[Lanes, Lanes]:
+def _integral(
+    a: LaneNumbers, b: LaneNumbers, _: LaneNumbers, kept: LaneNumbers
+) -> tuple[LaneNumbers, LaneNumbers]:
     return kept + 0.5 * b * a, kept + b * a
 
 
-def _play(a: Lanes, b: Lanes, _: Lanes, kept: Lanes) -> tuple[Lanes, Lanes]:
+def _play(
+    a: LaneNumbers, b: LaneNumbers, _: LaneNumbers, kept: LaneNumbers
+) -> tuple[LaneNumbers, LaneNumbers]:
     low, high = a - b, a + b
     kept = (low > kept).choose(low, kept)
     kept = (high < kept).choose(high, kept)
     return kept, kept
 
 
-def _limit(a: Lanes, b: Lanes, _: Lanes, kept: Lanes) -> tuple[Lanes, Lanes]:
+def _limit(
+    a: LaneNumbers, b: LaneNumbers, _: LaneNumbers, kept: LaneNumbers
+) -> tuple[LaneNumbers, LaneNumbers]:
     change = a - kept
     kept = (abs(change) <= b).choose(a, kept + b.call('copysign', change))
     return kept, kept
@@ -126,6 +134,6 @@ def _limit(a: Lanes, b: Lanes, _: Lanes, kept: Lanes) -> tuple[Lanes, Lanes]:
 REMEMBERING: Final = {m.LAG: _lag, m.INTEGRAL: _integral, m.PLAY: _play, m.LIMIT: _limit}
 
 
-def remembered(operation: int, a: Lanes, kept: Lanes) -> Lanes:
+def remembered(operation: int, a: LaneNumbers, kept: LaneNumbers) -> LaneNumbers:
     """What an operation remembers that has not been executed yet, which is no number."""
     return kept.differs(kept).choose(0.0 if operation == m.INTEGRAL else a, kept)

@@ -14,11 +14,11 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.model.effects import rows as r
+from actuator_glue.model.effects import layout as r
 from actuator_glue.model.effects.terms import machine as m
 from actuator_glue.model.effects.terms.expression import SIGNAL, Expression
 from actuator_glue.model.effects.terms.instructions import Dual, Emitter
-from actuator_glue.model.effects.terms.native import Native, Part, native
+from actuator_glue.model.effects.terms.native import InstructionGroup, Native, native
 from actuator_glue.model.parameters import NAMES as BASE
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.records import Array
@@ -84,7 +84,7 @@ class Program:
             neutral values: an effect all of whose parameters are neutral is not there.
     """
 
-    code: tuple[Part, ...]
+    code: tuple[InstructionGroup, ...]
     constants: tuple[tuple[int, float], ...]
     times: int
     rows: int
@@ -153,7 +153,7 @@ class _Builder:
         self._emitter = Emitter({m.STEP, m.D_V_MIDDLE, m.D_V_END, *_HOLDS.values()})
         self._parameters: dict[str, int] = {}
         self._switches: list[tuple[int, tuple[str, ...], tuple[float, ...]]] = []
-        self._parts: list[Part] = []
+        self._parts: list[InstructionGroup] = []
         self._times = 1
         # Where every signal and its slope are by now.
         self._signals: dict[str, Dual] = {
@@ -175,7 +175,7 @@ class _Builder:
             left.append((slope_to, slope))
             slope = slope_to
         self._signals[signal] = to, slope
-        self._parts.append(Part(tuple(self._emitter.code), tuple(left)))
+        self._parts.append(InstructionGroup(tuple(self._emitter.code), tuple(left)))
         self._emitter.forget()
 
     def balance(self) -> None:
@@ -186,7 +186,7 @@ class _Builder:
         """
         into, force = self._emitter, self._parts[m.FORCE - 1]
         if not force.left:
-            self._parts.append(Part((), ()))
+            self._parts.append(InstructionGroup((), ()))
             return
         dx, stiffness, dry = -r.IN_DX, -r.STIFFNESS, -r.COULOMB
         into.code = code = []
@@ -204,7 +204,7 @@ class _Builder:
         trial = into.do(m.ADD, trial, into.do(m.MUL, tangent, dx))
         taken = into.do(m.MIN, into.do(m.MAX, trial, into.do(m.NEG, dry)), dry)
         moved = into.do(m.DIV, into.do(m.SUB, trial, taken), into.do(m.ADD, oil, tangent))
-        self._parts.append(Part(tuple(code), ((dx, moved),)))
+        self._parts.append(InstructionGroup(tuple(code), ((dx, moved),)))
 
     def _add(self, effect: Written) -> None:
         into, names = self._emitter, tuple(p.name for p in effect.parameters)
@@ -246,7 +246,10 @@ class _Builder:
             step.result for step in into.prepare if any(p.reads(step.result) for p in self._parts)
         ]
         return Program(
-            code=(Part(tuple(into.prepare), tuple((row, row) for row in read)), *self._parts),
+            code=(
+                InstructionGroup(tuple(into.prepare), tuple((row, row) for row in read)),
+                *self._parts,
+            ),
             constants=tuple((row, value) for value, row in into.constants.items()),
             # One Newton step where a force bends slowly, as for a hardening specimen; more for a
             # kink, and for a force that follows the velocity, which may be steep.

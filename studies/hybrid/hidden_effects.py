@@ -187,7 +187,7 @@ def figure(stories: list[Story]) -> Figure:
 def main(argv: list[str] | None = None) -> int:
     """Tell every story; return 0 where each is right after the diagnosis and was not before."""
     parser = argparse.ArgumentParser(
-        prog='python -m studies.hybrid.undeclared', description=__doc__
+        prog='python -m studies.hybrid.hidden_effects', description=__doc__
     )
     parser.add_argument('--out', default='out/study-rths', metavar='DIR', help='(%(default)s)')
     parser.add_argument(
@@ -212,7 +212,7 @@ def main(argv: list[str] | None = None) -> int:
         }
         print(f'{case}: {content[case]}', flush=True)
     library.write_json(
-        {'schema': 'studies.hybrid.undeclared/1', **content}, str(out / 'undeclared.json')
+        {'schema': 'studies.hybrid.hidden_effects/1', **content}, str(out / 'undeclared.json')
     )
     library.style.save(figure(told), out / 'undeclared.png')
     print(table(told))

@@ -26,7 +26,8 @@ from numpy.typing import NDArray
 
 from actuator_glue.jit import njit
 from actuator_glue.model.effects import catalogue, transition
-from actuator_glue.model.effects.lti_step import (
+from actuator_glue.model.effects.layout import LANES
+from actuator_glue.model.effects.linear_step import (
     FORCE,
     INTO,
     PHI,
@@ -35,7 +36,6 @@ from actuator_glue.model.effects.lti_step import (
     STATES,
     WHOLE,
 )
-from actuator_glue.model.effects.rows import LANES
 from actuator_glue.model.parameters import NAMES as BASE
 from actuator_glue.records import Array
 

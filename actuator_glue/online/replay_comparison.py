@@ -12,7 +12,7 @@ import numpy as np
 
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.choice import ModelChoice
-from actuator_glue.online import wire
+from actuator_glue.online import conversion
 from actuator_glue.online.estimator import Schedule
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.settings import EstimatorSettings
@@ -61,9 +61,9 @@ def published(messages: Iterable[tuple[str, Any]]) -> Published:
     for name, message in messages:
         kind = name.rpartition('/')[2]
         if kind == 'EstimatorSetup':
-            found.settings = wire.estimator_settings(message)
-            found.carried = wire.carried(message)
-            found.models.append((int(message.window), wire.model_choice(message)))
+            found.settings = conversion.estimator_settings(message)
+            found.carried = conversion.carried(message)
+            found.models.append((int(message.window), conversion.model_choice(message)))
         elif kind == 'PosteriorMoments':
             check_period(message.period, f'posterior of window {message.window}')
             found.posteriors[int(message.window)] = message
@@ -74,7 +74,7 @@ def published(messages: Iterable[tuple[str, Any]]) -> Published:
 
 
 @dataclass(slots=True)
-class Comparison:
+class ReplayComparison:
     """Replayed numbers held against the published ones, bit by bit.
 
     Attributes:
@@ -93,9 +93,9 @@ class Comparison:
         return self.windows > 0 and not self.differing
 
 
-def compare(results: Iterable[WindowResult], live: Published) -> Comparison:
+def compare(results: Iterable[WindowResult], live: Published) -> ReplayComparison:
     """Hold replayed results against what was published live."""
-    found = Comparison()
+    found = ReplayComparison()
     seen: set[int] = set()
     for result in results:
         number = result.window.number
@@ -105,7 +105,7 @@ def compare(results: Iterable[WindowResult], live: Published) -> Comparison:
             found.differing.append(f'window {number}: not published live')
             continue
         found.windows += 1
-        names = differences(wire.posterior(result, float('nan'))[1], message)
+        names = differences(conversion.posterior(result, float('nan'))[1], message)
         if names:
             found.differing.append(f'window {number}: posterior differs in {", ".join(names)}')
         for prediction in result.scored:
@@ -114,7 +114,7 @@ def compare(results: Iterable[WindowResult], live: Published) -> Comparison:
                 found.differing.append(f'window {number}: band {key} was not published live')
                 continue
             found.bands += 1
-            fields = wire.prediction(prediction, '')[1]
+            fields = conversion.prediction(prediction, '')[1]
             names = differences(fields, live.scored[key])
             if names:
                 found.differing.append(f'band {key} differs in {", ".join(names)}')

@@ -20,7 +20,7 @@ from actuator_glue.model.structure import Structure
 from actuator_glue.nodes import own_effects
 from actuator_glue.nodes.messages import fill
 from actuator_glue.nodes.parameters import Spec
-from actuator_glue.online.wire import Fields, Head
+from actuator_glue.online.conversion import Fields, Head
 from actuator_glue.records import Record
 from actuator_glue.workers.worker import Tell
 

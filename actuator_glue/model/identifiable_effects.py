@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.jit import njit
-from actuator_glue.model import ridge
+from actuator_glue.model import identifiable
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.parameters import Coordinate
 from actuator_glue.records import Array
@@ -153,7 +153,7 @@ def physical(
             theta[j] = viscous
             log_jacobian += more
     phi[0], phi[1], phi[2], phi[3] = math.log(lag), math.log(inertia), z[2], z[3]
-    log_jacobian += ridge.physical(phi, k, low, high, theta)
+    log_jacobian += identifiable.physical(phi, k, low, high, theta)
     if log_jacobian == -math.inf:
         return log_jacobian
     oil = theta[2] + k
@@ -210,7 +210,7 @@ def coordinates_all(
     for i in range(len(theta)):
         for j in range(theta.shape[1]):
             z[i, j] = theta[i, j]
-    ridge.coordinates_all(theta, k, low, high, z)
+    identifiable.coordinates_all(theta, k, low, high, z)
     for i in range(len(theta)):
         oil = max(k + theta[i, 2], 1e-9)
         lag, inertia, s = math.exp(z[i, 0]), math.exp(z[i, 1]), z[i, 3] if k > 0.0 else 0.0

@@ -27,7 +27,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from actuator_glue.inference.compiled import Compiled
-from actuator_glue.model import ridge, ridge_effects
+from actuator_glue.model import identifiable, identifiable_effects
 from actuator_glue.records import Array
 
 # ln d1/n0 (lag of the loop, 1 us .. 1000 s) and ln d2/n0 (natural frequency 1000 .. 0.05 Hz): no
@@ -53,9 +53,9 @@ class Ridge:
         self._low, self._high = low, high
         self._k = stiffness
         self._middle = middle
-        self._at = ridge_effects.columns(names)
-        self.lower, self.upper = ridge_effects.bounds(self._at, stiffness, low, high)
-        self.lower[:4], self.upper[:4] = -ridge.EDGE, ridge.EDGE
+        self._at = identifiable_effects.columns(names)
+        self.lower, self.upper = identifiable_effects.bounds(self._at, stiffness, low, high)
+        self.lower[:4], self.upper[:4] = -identifiable.EDGE, identifiable.EDGE
         self.lower[0], self.upper[0] = _LAG
         self.lower[1], self.upper[1] = _INERTIA
         if stiffness > 0.0:
@@ -69,7 +69,9 @@ class Ridge:
         """Return the coordinates (m, p) of parameters (m, p), moved inside the bounds."""
         x = np.ascontiguousarray(x, dtype=np.float64)
         z = np.empty_like(x)
-        ridge_effects.coordinates_all(x, self._k, self._low, self._high, self._at, self._middle, z)
+        identifiable_effects.coordinates_all(
+            x, self._k, self._low, self._high, self._at, self._middle, z
+        )
         return np.clip(z, self.lower, self.upper)
 
     def inverse(self, z: Array) -> tuple[Array, Array]:
@@ -77,9 +79,9 @@ class Ridge:
         z = np.ascontiguousarray(z, dtype=np.float64)
         x, log_jacobian = np.empty_like(z), np.empty(len(z))
         if len(self._low) == 4:
-            ridge.physical_all(z, self._k, self._low, self._high, x, log_jacobian)
+            identifiable.physical_all(z, self._k, self._low, self._high, x, log_jacobian)
         else:
-            ridge_effects.physical_all(
+            identifiable_effects.physical_all(
                 z, self._k, self._low, self._high, self._at, self._middle, x, log_jacobian
             )
         return x, log_jacobian

@@ -1,4 +1,4 @@
-"""The step of the loop as a linear system (lti.py): its table, and stepping through it."""
+"""One step of the loop as a linear system: its table, and stepping through it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from actuator_glue.jit import njit
 from actuator_glue.model.effects.command import held
-from actuator_glue.model.effects.rows import LANES
+from actuator_glue.model.effects.layout import LANES
 from actuator_glue.records import Array
 
 STATES: Final = 6

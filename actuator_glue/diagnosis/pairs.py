@@ -1,0 +1,103 @@
+"""Two effects together that may be what one was found for.
+
+A payload that brings damping of its own moves as a damper and a lag do together. No single effect
+in its place does so, and a search that goes on from the payload never comes to the two. A pair
+has two parameters at least, so that only what has as many has rivals of two that are no richer.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from actuator_glue.diagnosis.finding import BESIDE, Rival
+from actuator_glue.diagnosis.learned_term import is_learned
+from actuator_glue.diagnosis.search import Search, Trial
+
+if TYPE_CHECKING:
+    from actuator_glue.diagnosis.model_selection import ModelSelection
+
+
+def price(count: int) -> float:
+    """Nats that a pair pays for being one of many: pairs of `count` effects to each of them."""
+    return math.log(max(1.0, 0.5 * (count - 1)))
+
+
+def rivals(search: Search, name: str, trials: Sequence[Trial], most: int) -> list[Trial]:
+    """Refit the most promising pairs that have no more parameters than an effect.
+
+    Args:
+        search: what refits.
+        name: the effect.
+        trials: structures with one other effect in its place.
+        most: of these that are gone on from, and of pairs that are refitted.
+    """
+    room = len(search.entries[name].parameters)
+    if room < 2 or is_learned(search.entries[name]):
+        return []
+    out = []
+    for first, other in screened(search, name, trials[:most], room)[:most]:
+        pair = search.additions(first, [other])[0]
+        out.append(replace(pair, added=f'{first.added}{BESIDE}{other}'))
+    return out
+
+
+def ahead(
+    selection: ModelSelection, name: str, row: Sequence[Rival], two: Sequence[Trial]
+) -> list[Trial]:
+    """Return the pairs beside which the effect is no alternative any more, best first.
+
+    Both of a pair's effects are significant; it takes a place and adds no parameter, so that
+    only together they must be material.
+
+    Args:
+        selection: what judges.
+        name: the effect.
+        row: weights of all its rivals.
+        two: pairs refitted in its place.
+    """
+    known = {r.name: r.probability for r in row}
+    least = math.exp(selection.settings.tie_nats) * known[name]
+    better = (t for t in two if known[t.added] > least)
+    return [
+        t
+        for t in sorted(better, key=lambda t: -known[t.added])
+        if all(
+            selection.better(t, selection.search.without(t, n), 0.0) for n in t.added.split(BESIDE)
+        )
+    ]
+
+
+def screened(
+    search: Search, name: str, trials: Sequence[Trial], room: int
+) -> list[tuple[Trial, str]]:
+    """Sort pairs by the error that the second one's starting sizes leave beside the first one.
+
+    They are simulated where the first one was refitted: its lag is none of Eq. (2)'s.
+
+    Args:
+        search: what simulates.
+        name: an effect that is in no pair.
+        trials: structures with the first one.
+        room: parameters of a pair, at most.
+    """
+    size = {n: len(e.parameters) for n, e in search.entries.items()}
+    wanted = [
+        (trial, other)
+        for trial in trials
+        for other in search.names
+        if other not in (name, *trial.effects) and size[trial.added] + size[other] <= room
+    ]
+
+    def left(pair: tuple[Trial, str]) -> float:
+        return (1.0 - search.screen(*pair, beside=True)[0]) * pair[0].mean_square
+
+    errors = list(search.each(left, wanted))
+    best: dict[frozenset[str], tuple[Trial, str]] = {}
+    for i in np.argsort(errors, kind='stable'):
+        best.setdefault(frozenset((wanted[i][0].added, wanted[i][1])), wanted[i])
+    return list(best.values())

@@ -1,0 +1,51 @@
+"""One effect that was found may stand for two of the catalogue together."""
+
+import numpy as np
+
+from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.model_selection import ModelSelection, Selection
+from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.model import commands
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Record
+
+RATE = 128.0
+THETA = np.array([235.0, 5.0e10, 4.23e6, 3.3])
+NAMES = ('payload-inertia', 'viscous-damping', 'delay', 'gain')
+
+
+def selected(effects: tuple[str, ...], sizes: list[float], rng_seed: int) -> Selection:
+    """What is chosen of four effects for sweeps without and with a specimen, 10 um of noise."""
+    model, rng, records = Structure(effects), np.random.default_rng(rng_seed), []
+    command = commands.sweep(RATE, 24.0, 0.0, 10.0, 2e-3)
+    theta = np.array([*THETA, *sizes])
+    for k in (0.0, 250e3):
+        measured = model.simulate(theta, Record(command, command, 1 / RATE, stiffness=k))
+        measured += 1e-5 * rng.standard_normal(len(command))
+        records.append(Record(command, measured, 1 / RATE, stiffness=k))
+    search = Search(Data.whole(records), NAMES)
+    return ModelSelection(search, Thresholds(), lambda stage, share: None).run()
+
+
+def test_damping_and_a_delay_are_as_likely_as_the_payload_that_does_the_same(
+    rng_seed: int,
+) -> None:
+    """A payload has a damping of its own; without pairs among its rivals it was certain."""
+    found = selected(('viscous-damping', 'delay'), [2.5e4, 3e-3], rng_seed)
+    if found.final.effects == ('payload-inertia',):
+        row = found.rivals['payload-inertia']
+        both = [r.probability for r in row if set(r.effects) == {'viscous-damping', 'delay'}]
+        assert both[0] > 0.05
+        assert next(r.probability for r in row if r.name == 'payload-inertia') < 0.9
+    else:
+        assert set(found.final.effects) == {'viscous-damping', 'delay'}
+
+
+def test_a_payload_keeps_its_name(rng_seed: int) -> None:
+    """Two effects together leave 17 um more than what it is."""
+    found = selected(('payload-inertia',), [200.0, 100.0], rng_seed)
+    assert found.final.effects == ('payload-inertia',)
+    told = {r.name: r.probability for r in found.rivals['payload-inertia']}
+    assert told['payload-inertia'] > 0.99
+    assert any(len(r.effects) == 2 for r in found.rivals['payload-inertia'])
