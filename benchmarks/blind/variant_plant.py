@@ -2,10 +2,13 @@
 
 One implicit step for everything: over a step h the piston velocity v solves
 
-    spring(x + h v) + friction(v) + c(v) v + m (v - v_0)/h + h alpha_2 v = f + h (Q - alpha_3 f)
+    spring(x + g v) + friction(v) + c(v) v + m (v - v_0)/g = p
+    p = f + g (Q - alpha_2 v - alpha_3 p)
 
-a monotone scalar equation (Newton, bisected where it leaves its bracket). The valve is stepped by
-Heun's rule. 32 kHz: the first-order error of the step is below a micrometre and smooth.
+with g = h/2, or h where friction without an inertia would ring: a monotone scalar equation
+(Newton, bisected where it leaves its bracket). The valve is stepped by the midpoint rule, with the
+control error in the middle of the step: that of its beginning is a delay of h/2, 16 us at 32 kHz,
+which alone moves beta_1 by up to four standard deviations of what two records tell.
 """
 
 from __future__ import annotations
@@ -168,6 +171,10 @@ def respond(command, theta, k, first_e, later_e, onset):
         e = first_e if i / RATE < onset else later_e
         out[i] = x + e[FRAME_SEEN] * frame
         dry = e[COULOMB] + e[STRIBECK] + (e[SUPPORT_STICK] if k > 0.0 else 0.0)
+        heavy = e[MASS] > 0.0
+        g = h if dry > 0.0 and not heavy else 0.5 * h
+        leaky = 1.0 + g * a3
+        oil = g * a2 / leaky
         for j in range(SUBSTEPS):
             t = (i + j / SUBSTEPS) / RATE
             lag = e[DELAY] + e[AMPLITUDE_DELAY] * abs(command[i]) / 2e-3
@@ -189,13 +196,13 @@ def respond(command, theta, k, first_e, later_e, onset):
                 ulag += (u - ulag) * (1.0 - math.exp(-h / e[COMMAND_LAG]))
                 u = ulag
             uplay = _play(uplay, u, e[COMMAND_PLAY])
-            read = _play(felt, x + frame, e[LOOP_PLAY])
+            read = _play(felt, x + frame + 0.5 * h * (v + frame_v), e[LOOP_PLAY])
             if e[LOOP_LAG] > 0.0:
                 read = felt + (read - felt) * (1.0 - math.exp(-h / e[LOOP_LAG]))
             felt = read
             error = uplay - felt + e[NULL]
             total += h * error
-            error += e[INTEGRAL] * total
+            error += e[INTEGRAL] * (total - 0.5 * h * error)
             vplay = _play(vplay, error, e[VALVE_PLAY])
             error = vplay
             if e[DEADBAND] > 0.0:
@@ -205,8 +212,9 @@ def respond(command, theta, k, first_e, later_e, onset):
                 error = min(max(error, -stop), stop)
             drive = error
             if e[VALVE_LAG] > 0.0:
+                before = q2
                 q2 += (error - q2) * (1.0 - math.exp(-h / e[VALVE_LAG]))
-                drive = q2
+                drive = 0.5 * (before + q2)
             first = -b1 * q + n0 * drive
             middle = q + 0.5 * h * first
             q += h * (-b1 * middle + n0 * drive)
@@ -217,9 +225,9 @@ def respond(command, theta, k, first_e, later_e, onset):
                 else:  # emptied by flow, refilled at a fixed rate, never overfull
                     s += h * (abs(flow) / e[DROOP_FLOW] - 0.4) / e[DROOP_TIME]
                     s = min(max(s, 0.0), 1.5)
-            pull = f + h * (flow - a3 * f - a2 * frame_v)
+            pull = (f + g * (flow - a2 * frame_v)) / leaky
             if e[TURBULENT_LEAK] > 0.0:
-                pull -= h * math.copysign(e[TURBULENT_LEAK] * math.sqrt(abs(f)), f)
+                pull -= g * math.copysign(e[TURBULENT_LEAK] * math.sqrt(abs(f)), f)
             limit = e[COULOMB] + e[STRIBECK] * math.exp(-abs(v) / e[STRIBECK_SPEED])
             if k > 0.0:
                 limit += e[SUPPORT_STICK]
@@ -228,16 +236,16 @@ def respond(command, theta, k, first_e, later_e, onset):
                 size = min(abs(z) / e[YIELD_X], 1.0) ** e[YIELD_POWER]
                 sign = 1.0 if z * v > 0.0 else -1.0
                 hard = 1.0 - size * ((1.0 - e[YIELD_GAMMA]) * sign + e[YIELD_GAMMA])
-            zk = k * (1.0 - e[YIELD_RATIO]) * hard * h
+            zk = k * (1.0 - e[YIELD_RATIO]) * hard * g
             guess, low, high, after = v, -10.0, 10.0, w
             for _ in range(40):
-                spring, tangent = _specimen(x + h * guess, z, k, e)
+                spring, tangent = _specimen(x + g * guess, z, k, e)
                 damping = e[VISCOUS] + (e[RETURN_DAMPING] if guess < 0.0 else 0.0)
-                rest = spring + zk * guess + damping * guess + h * a2 * guess - pull
-                slope = tangent * h + zk + damping + h * a2
-                if e[MASS] > 0.0:
-                    rest += e[MASS] * (guess - v) / h
-                    slope += e[MASS] / h
+                rest = spring + zk * guess + damping * guess + oil * guess - pull
+                slope = tangent * g + zk + damping + oil
+                if heavy:
+                    rest += e[MASS] * (guess - v) / g
+                    slope += e[MASS] / g
                 if dry > 0.0:
                     force, rise, after = _dry(guess, w, limit, e[FRICTION_FORM], h)
                     rest += force
@@ -252,10 +260,12 @@ def respond(command, theta, k, first_e, later_e, onset):
                 guess -= step
                 if not low < guess < high:
                     guess = 0.5 * (low + high)
-            v, w = guess, after
-            x += h * v
-            z += h * v * hard
-            f = pull - h * a2 * v
+            w = after
+            x += h * guess
+            z += h * guess * hard
+            # On from the point that was solved for to the end of the step.
+            f += (pull - oil * guess - f) * h / g
+            v = 2.0 * guess - v if heavy else guess
             if e[FRAME] > 0.0:
                 # The cylinder gives way to what it pushes the piston with.
                 w2 = e[FRAME_SPEED] ** 2
