@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Mapping
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -24,6 +25,28 @@ _SCALES = np.concatenate([[0.0], 2.0 ** np.arange(-6.0, 1.0)])
 _PRIOR = np.log(np.concatenate([[0.5], np.full(len(_SCALES) - 1, 0.5 / (len(_SCALES) - 1))]))
 _FLAT = 1e-8  # of what the records tell of a parameter alone
 _SAME = 1e-10  # of the largest power: a shape that others make up
+
+
+class ScaleMixture(NamedTuple):
+    """Normal distributions of a move of parameters, one for each scale of what is beside them.
+
+    Attributes:
+        weights: of the scales (s,), sum 1.
+        means: (s, p).
+        covariances: (s, p, p).
+    """
+
+    weights: Array
+    means: Array
+    covariances: Array
+
+    def moments(self) -> tuple[Array, Array]:
+        """Mean (p,) and covariance (p, p) of all together."""
+        mean = self.weights @ self.means
+        off = self.means - mean
+        covariance = np.einsum('s,sij->ij', self.weights, self.covariances)
+        covariance += np.einsum('s,si,sj->ij', self.weights, off, off)
+        return mean, covariance
 
 
 @dataclass(frozen=True)
@@ -66,10 +89,10 @@ class Discrepancy:
             rows.append(prior - 0.5 * left / noise - 0.5 * np.log1p(power / noise).sum())
         return np.asarray(np.logaddexp.reduce(rows, axis=0))
 
-    def gaussian(
+    def gaussians(
         self, jacobian: Array, error: Array, noise: float, widest: Array
-    ) -> tuple[Array, Array]:
-        """Mean (p,) and covariance (p, p) of what parameters move by from where they stand.
+    ) -> ScaleMixture:
+        """Return what parameters move by from where they stand, were all linear.
 
         Args:
             jacobian: whitened derivatives of the simulation (p, N).
@@ -84,10 +107,11 @@ class Discrepancy:
         size = np.maximum(size, 1e-9 / widest)
         floor = np.where(flat, _FLAT, 1.0 / (widest * size) ** 2)
         jac = jacobian / size[:, None]
-        count = self.shapes.shape[1]
-        seen, along = self.shapes @ jac[:, :count].T, self.shapes @ error[:count]
+        count, length = self.shapes.shape
+        seen, along = self.shapes @ jac[:, :length].T, self.shapes @ error[:length]
         weights, means, covariances = [], [], []
-        for scale, prior in zip(_SCALES, _PRIOR, strict=True):
+        # Without any shape all scales are one.
+        for scale, prior in list(zip(_SCALES, _PRIOR, strict=True))[: None if count else 1]:
             power = scale**2 * self.powers
             share = power / (noise + power)
             normal = (jac @ jac.T - seen.T @ (share[:, None] * seen)) / noise
@@ -101,11 +125,7 @@ class Discrepancy:
             means.append(mean)
             covariances.append(covariance)
         share = np.exp(np.array(weights) - np.logaddexp.reduce(weights))
-        mean = share @ np.array(means)
-        off = np.array(means) - mean
-        covariance = np.einsum('s,sij->ij', share, np.array(covariances))
-        covariance += np.einsum('s,si,sj->ij', share, off, off)
-        return mean / size, covariance / np.outer(size, size)
+        return ScaleMixture(share, np.array(means) / size, covariances / np.outer(size, size))
 
 
 def responses(search: Search, size: float) -> dict[str, Array]:

@@ -73,6 +73,8 @@ class Straight:
 
     Attributes:
         widest: spreads (p,) beyond which nothing is known.
+        least: what the coordinate of alpha_3 is at its lower bound beside the fit [1/s]; 0 where
+            no specimen makes it act.
     """
 
     def __init__(self, space: Space, model: Model, data: Data, fit: Array) -> None:
@@ -93,6 +95,7 @@ class Straight:
         self.widest = np.where(
             np.arange(len(fit)) < _P, 1.0, self._ridge.upper - self._ridge.lower
         )
+        self.least = float(low[3] * stiffness / (stiffness + space.theta(fit)[2]))
         if stiffness > 0.0:
             self.widest[3] = self._ridge.upper[3]
         # The bounds of the parameters are all there are.

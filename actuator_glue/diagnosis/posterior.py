@@ -1,6 +1,6 @@
 """Posterior of base and effect parameters around the best fit.
 
-Where it is nearly normal importance sampling draws from it, and knows that it did; else DREAM(ZS).
+Where it is nearly linear importance sampling draws from it, and knows that it did; else DREAM(ZS).
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from actuator_glue.diagnosis import proposals
 from actuator_glue.diagnosis.data import LANES, Data, Model, chunks
-from actuator_glue.diagnosis.discrepancy import Discrepancy
+from actuator_glue.diagnosis.discrepancy import Discrepancy, ScaleMixture
 from actuator_glue.diagnosis.fit import Fit, Space
 from actuator_glue.diagnosis.fit import fit as fit_to
 from actuator_glue.diagnosis.identifiable import Straight, Working, coordinates, derivatives
@@ -133,9 +134,9 @@ def _inside(around: Working | Straight, phi: Array, move: Array) -> Array:
 def _optimum(
     around: Working | Straight,
     phi: Array,
-    linearised: Callable[[Array], tuple[float, Array, Array]],
-) -> tuple[Array, Array]:
-    """Return the optimum (p,) of a likelihood from where it is linear about, and a covariance.
+    linearised: Callable[[Array], tuple[float, ScaleMixture]],
+) -> tuple[Array, ScaleMixture]:
+    """Return the optimum (p,) of a likelihood from where it is linear about, and moves from it.
 
     The allowance may take a long record thousands of nats from the optimum without it, over which
     no response is linear.
@@ -143,18 +144,19 @@ def _optimum(
     Args:
         around: the coordinates.
         phi: where to begin, (p,).
-        linearised: of coordinates (p,) the log density, the move to the optimum were all linear,
-            and the covariance.
+        linearised: of coordinates (p,) the log density, and where the parameters were if all
+            were linear.
     """
-    centre, best, new, covariance = phi, -math.inf, phi, np.empty(0)
-    for step in range(_MOST_STEPS):
-        value, move, found = linearised(new)
+    value, moves = linearised(phi)
+    centre, best, new = phi, value, _inside(around, phi, moves.moments()[0])
+    for step in range(1, _MOST_STEPS):
+        value, found = linearised(new)
         # The first move is to a mean, from where there may be next to nothing to gain.
-        if step > 0 and not value > best + (_NATS if step > 1 else -_NATS):
+        if not value > best + (_NATS if step > 1 else -_NATS):
             break
-        centre, best, covariance = new, value, found
-        new = _inside(around, centre, move)
-    return centre, covariance
+        centre, best, moves = new, value, found
+        new = _inside(around, centre, moves.moments()[0])
+    return centre, moves
 
 
 def _loosened(
@@ -234,49 +236,50 @@ def sample(
         # Uniform in the logarithms otherwise.
         return found if data.prior is None else found + data.prior.log_density(theta)
 
-    def linearised(phi: Array) -> tuple[float, Array, Array]:
+    def linearised(phi: Array) -> tuple[float, ScaleMixture]:
         seen, jac = derivatives(around, space, phi, response)
         error = np.concatenate([whitened, np.zeros(len(seen) - len(whitened))]) - seen
         theta, log_prior = around.inverse(phi[None])
         likely = beside.log_likelihood(error[None, : len(whitened)], noise) + log_prior
         if data.prior is not None:
             likely += data.prior.log_density(theta)
-        return float(likely[0]), *beside.gaussian(jac, error, noise, around.widest)
+        return float(likely[0]), beside.gaussians(jac, error, noise, around.widest)
 
-    centre, covariance = _optimum(around, phi, linearised)
-    transform = Composed(around, Laplace(centre, covariance, around.widest))
-
-    def gaussian(count: int) -> Array:
-        w = rng.standard_normal((count, len(phi)))
-        for _ in range(_HALVINGS):
-            outside = ~np.isfinite(transform.inverse(w)[1])
-            if not outside.any():
-                break
-            w[outside] = rng.standard_normal((int(outside.sum()), len(phi)))
-        w[~np.isfinite(transform.inverse(w)[1])] = 0.0
-        return w
+    centre, moves = _optimum(around, phi, linearised)
+    laplace = Composed(around, Laplace(centre, moves.moments()[1], around.widest))
 
     def loosened(points: Array) -> Array:
         return _loosened(around, points, centre - phi, rng)
 
     if evaluations <= 0:
-        return Draws(loosened(transform.inverse(gaussian(500))[0]), 'laplace')
+        w = rng.standard_normal((500, len(phi)))
+        for _ in range(_HALVINGS):
+            outside = ~np.isfinite(laplace.inverse(w)[1])
+            if not outside.any():
+                break
+            w[outside] = rng.standard_normal((int(outside.sum()), len(phi)))
+        w[~np.isfinite(laplace.inverse(w)[1])] = 0.0
+        return Draws(loosened(laplace.inverse(w)[0]), 'laplace')
 
     bounds = space.theta(space.lower), space.theta(space.upper)
+    transform, start = proposals.proposed(around, centre, moves)
     goal = posterior.Target(log_likelihood, bounds, transform)
     seed = [int(word) for word in rng.integers(0, 2**32, 3)]
     found = importance.sample(
-        np.random.default_rng((*seed, 1)), goal.density(), len(phi), _ESS, progress
+        np.random.default_rng((*seed, 1)), goal.density(), start, _ESS, progress
     )
     if found is not None:
         points = loosened(transform.inverse(found.points)[0])
         return Draws(points, 'importance', len(points), found.effective, pareto_k=found.pareto_k)
+    # None of the archive's points may be impossible; the fit, at least, is not.
+    near = np.concatenate([start.draw(rng, 480), transform.forward(around.inverse(phi[None])[0])])
+    near = near[np.isfinite(transform.inverse(near)[1])]
     chains = posterior.sample(
         goal,
         seed,
         evaluations,
         settings=SamplerSettings(chains=32, population=128, steps=2, adaptation=20, parts=48),
-        archive=gaussian(320),
+        archive=rng.choice(near, 320),
         enough=_enough,
         progress=lambda done, all_: progress(done / all_),
     )

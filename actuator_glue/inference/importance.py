@@ -1,10 +1,10 @@
-"""Draws of a nearly normal posterior by importance sampling, which says whether it succeeded.
+"""Draws of a nearly known posterior by importance sampling, which says whether it succeeded.
 
-Batches come from Student t's, each fitted to what the weights make of the batches before it;
-a weight compares the posterior with the mixture of all (adaptive multiple importance sampling,
-Cornuet et al. 2012). The largest weights are smoothed by a Pareto distribution (Vehtari et al.
-2024), whose shape k tells whether they have a mean and a variance: from 0.5 on they have not, and
-nothing is returned.
+Batches come from mixtures of Student t's, each fitted to what the weights make of the batches
+before it (Cappe et al. 2008); a weight compares the posterior with the mixture of all (adaptive
+multiple importance sampling, Cornuet et al. 2012). The largest weights are smoothed by a Pareto
+distribution (Vehtari et al. 2024), whose shape k tells whether they have a mean and a variance:
+from 0.5 on they have not, and nothing is returned.
 """
 
 from __future__ import annotations
@@ -21,10 +21,12 @@ from actuator_glue.inference.evaluate import LogDensity
 from actuator_glue.records import Array
 
 _BATCH = 192  # evaluations between two looks
-_MOST = 6  # batches
+_MOST = 10  # batches
 # After so many batches what has not come as far as this share of the way is left to chains.
 _LOOK, _SHARE = 3, 0.5
 _PARETO = 0.5
+_LEAST = 1e-9  # spread of what has none
+_EQUAL = 0.4  # of all draws are shared by the parts of a proposal, however likely they are
 _FEWEST = 5  # weights that a Pareto distribution is fitted to
 
 
@@ -39,34 +41,85 @@ class ImportanceSample(NamedTuple):
     pareto_k: float
 
 
+class StudentMixture(NamedTuple):
+    """Mixture of Student t's: shares (k,) of sum 1, centres (k, p), Cholesky factors (k, p, p)."""
+
+    shares: Array
+    centres: Array
+    factors: Array
+
+    def draw(self, rng: np.random.Generator, count: int) -> Array:
+        """Return draws (m, p), of each part as many as its share."""
+        ends = np.round(count * np.cumsum(self.shares)).astype(int)
+        uniforms = np.split(rng.random((count, self.centres.shape[1] + 4)), ends[:-1])
+        parts = zip(uniforms, self.centres, self.factors, strict=True)
+        return np.concatenate([student.draw_all(*part) for part in parts])
+
+    def log_densities(self, points: Array) -> Array:
+        """Log density of each part (k, m) at points (m, p), all less one constant."""
+        rows = []
+        for share, centre, factor in zip(*self, strict=True):
+            size = np.log(share) - np.log(np.diag(factor)).sum()
+            rows.append(student.log_density(points, centre, factor) + size)
+        return np.array(rows)
+
+    def refitted(self, points: Array, weights: Array) -> StudentMixture:
+        """Return what weighted points (m, p) make of it; parts that few of them fall to stay."""
+        of = self.log_densities(points)
+        shares, centres, factors = [], [], []
+        parts = np.exp(of - np.logaddexp.reduce(of, axis=0)) * weights
+        for own, centre, factor in zip(parts, self.centres, self.factors, strict=True):
+            total = own.sum()
+            own = own / max(total, 1e-300)
+            count = 1.0 / max(float(own @ own), 1e-300)
+            known = count / (count + len(centre) + 1.0) if total > 0.0 else 0.0
+            new = centre + known * (own @ points - centre)
+            off = points - new
+            rows = [np.sqrt(known * own)[:, None] * off, np.sqrt(1.0 - known) * factor.T]
+            shares.append(total)
+            centres.append(new)
+            factors.append(lower_factor(np.concatenate(rows)))
+        return StudentMixture(_shared(np.array(shares)), np.array(centres), np.array(factors))
+
+
+def lower_factor(rows: Array) -> Array:
+    """Return the Cholesky factor (p, p) of rows.T @ rows (m, p), which may be singular."""
+    factor: Array = np.linalg.qr(rows)[1].T
+    size = np.diag(factor)
+    factor = np.where(size < 0.0, -1.0, 1.0) * factor
+    factor[np.diag_indices(len(factor))] = np.maximum(np.abs(size), _LEAST)
+    return factor
+
+
+def _shared(shares: Array) -> Array:
+    """Return shares (k,) of which none is so small that nothing is drawn."""
+    return np.asarray((1.0 - _EQUAL) * shares / shares.sum() + _EQUAL / len(shares))
+
+
 def sample(
     rng: np.random.Generator,
     log_density: LogDensity,
-    dimension: int,
+    start: StudentMixture,
     effective: float,
     progress: Callable[[float], None] = lambda share: None,
 ) -> ImportanceSample | None:
-    """Draw from a density that is nearly standard normal; None where it is too far from that.
+    """Draw from a density near to a mixture of normal ones; None where it is too far from that.
 
     Args:
         rng: random numbers.
         log_density: of points (m, p), (m,), up to a constant; not finite where impossible.
-        dimension: p.
+        start: what is drawn from first.
         effective: how many effective draws are wanted.
         progress: called with the share done.
     """
+    dimension = start.centres.shape[1]
     points, values = np.empty((0, dimension)), np.empty(0)
-    centre: Array = np.zeros(dimension)
-    factor: Array = np.eye(dimension)
-    proposals: list[tuple[Array, Array]] = []
+    proposals = [start._replace(shares=_shared(start.shares))]
     for number in range(1, _MOST + 1):
-        proposals.append((centre, factor))
-        new = student.draw_all(rng.random((_BATCH, dimension + 4)), centre, factor)
+        new = proposals[-1].draw(rng, _BATCH)
         points = np.concatenate([points, new])
         values = np.concatenate([values, log_density(new)])
-        densities = [
-            student.log_density(points, c, f) - np.log(np.diag(f)).sum() for c, f in proposals
-        ]
+        densities = np.concatenate([p.log_densities(points) for p in proposals])
         weights, pareto_k = smoothed(values - np.logaddexp.reduce(densities, axis=0))
         count = 1.0 / float(weights @ weights)
         progress(min(1.0, count / effective))
@@ -76,12 +129,7 @@ def sample(
             return ImportanceSample(points[rng.permutation(chosen)], count, pareto_k)
         if number >= _LOOK and count < _SHARE * effective * number / _MOST:
             break
-        centre = weights @ points
-        off = points - centre
-        # Few effective points do not know a covariance: it keeps to that of the proposal.
-        known = count / (count + dimension + 1.0)
-        covariance = known * (weights * off.T) @ off + (1.0 - known) * factor @ factor.T
-        factor = np.asarray(np.linalg.cholesky(covariance))
+        proposals.append(proposals[-1].refitted(points, weights))
     return None
 
 

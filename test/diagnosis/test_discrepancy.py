@@ -39,12 +39,12 @@ def test_a_clean_record_keeps_its_narrow_interval() -> None:
     beside = Discrepancy.of(0.8 * shape[None])
     noise = rng.standard_normal(N)
     plain = np.sqrt(np.diag(np.linalg.inv(jac @ jac.T)))
-    _, covariance = beside.gaussian(jac, noise, 1.0, WIDE)
+    _, covariance = beside.gaussians(jac, noise, 1.0, WIDE).moments()
     assert np.sqrt(np.diag(covariance)) == pytest.approx(plain, rel=0.1)
     error = noise + 0.6 * shape
     alone = np.linalg.solve(jac @ jac.T, jac @ error)
     assert alone[0] > 4.0 * plain[0]
-    move, covariance = beside.gaussian(jac, error, 1.0, WIDE)
+    move, covariance = beside.gaussians(jac, error, 1.0, WIDE).moments()
     assert abs(move[0]) < 2.5 * np.sqrt(covariance[0, 0])
 
 
@@ -53,7 +53,7 @@ def test_what_no_record_tells_keeps_the_width_of_the_bounds() -> None:
     rng = np.random.default_rng(3)
     row = rng.standard_normal(N)
     empty = Discrepancy.of(np.empty((0, N)))
-    move, covariance = empty.gaussian(np.stack([row, row]), row, 1.0, WIDE)
+    move, covariance = empty.gaussians(np.stack([row, row]), row, 1.0, WIDE).moments()
     assert np.sqrt(np.diag(covariance)) == pytest.approx(WIDE / np.sqrt(2.0), rel=0.01)
     assert move.sum() == pytest.approx(1.0, abs=0.01)
     assert np.sqrt(covariance.sum()) == pytest.approx(1.0 / np.linalg.norm(row), rel=0.01)

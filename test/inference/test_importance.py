@@ -23,6 +23,9 @@ def test_weights_are_smoothed_as_by_arviz(spread: float) -> None:
     assert weights == pytest.approx(np.exp(reference), abs=1e-12)
 
 
+START = importance.StudentMixture(np.ones(1), np.zeros((1, 3)), np.eye(3)[None])
+
+
 def normal(z: np.ndarray) -> np.ndarray:
     """Twice as likely and half a standard deviation from where it is looked for."""
     return -0.25 * ((z - 0.7) ** 2).sum(axis=1)
@@ -46,7 +49,7 @@ def test_draws_are_of_the_density_and_worth_what_they_say(
 
     The ratio is 0.95 to 1.25 over 300 runs; of 180 numbers it scatters by 0.11.
     """
-    runs = [importance.sample(np.random.default_rng(i), density, 3, WANTED) for i in range(60)]
+    runs = [importance.sample(np.random.default_rng(i), density, START, WANTED) for i in range(60)]
     found = [run for run in runs if run is not None]
     assert len(found) > 50
     assert min(run.effective for run in found) >= WANTED
@@ -57,6 +60,25 @@ def test_draws_are_of_the_density_and_worth_what_they_say(
     assert spreads.mean(axis=0) == pytest.approx(sd, rel=0.03)
     worth = np.mean([run.effective for run in found])
     assert 0.6 < np.mean((means - mean) ** 2) * worth / sd**2 < 1.8
+
+
+def test_a_spike_and_a_slab_are_drawn_from_a_mixture() -> None:
+    """Half of the mass each, one fifty times as wide: the share of the spike, four errors.
+
+    From one Student t as wide as the slab nothing would ever fall on the spike.
+    """
+    widths, roots = np.array([0.02, 1.0]), np.array([0.02, 1.0])[:, None, None] * np.eye(3)
+
+    def density(z: np.ndarray) -> np.ndarray:
+        squares = ((z - 0.3) ** 2).sum(axis=1)
+        return np.logaddexp(*(-0.5 * squares / w**2 - 3.0 * np.log(w) for w in widths))
+
+    mixture = importance.StudentMixture(np.array([0.9, 0.1]), np.full((2, 3), 0.3), roots)
+    for seed in range(5):
+        found = importance.sample(np.random.default_rng(seed), density, mixture, WANTED)
+        assert found is not None
+        near = np.linalg.norm(found.points - 0.3, axis=1) < 0.1
+        assert near.mean() == pytest.approx(0.5, abs=4 * 0.5 / np.sqrt(WANTED))
 
 
 def test_none_of_what_it_cannot_reach() -> None:
@@ -73,4 +95,4 @@ def test_none_of_what_it_cannot_reach() -> None:
 
     for density in (hills, tails, nothing):
         for seed in range(3):
-            assert importance.sample(np.random.default_rng(seed), density, 3, WANTED) is None
+            assert importance.sample(np.random.default_rng(seed), density, START, WANTED) is None

@@ -13,6 +13,7 @@ from actuator_glue.inference.transforms import Composed, Transform
 from actuator_glue.inference.transforms.inverse_response import Ridge
 from actuator_glue.inference.transforms.laplace import Laplace
 from actuator_glue.inference.transforms.log import Log
+from actuator_glue.inference.transforms.near_zero import NearZero
 from actuator_glue.inference.transforms.triangular import Triangular
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.records import Array
@@ -65,6 +66,13 @@ def _laplace() -> Case:
     return Case(Laplace(centre, covariance, np.full(4, 1e9)), points)
 
 
+def _near_zero() -> Case:
+    rng = np.random.default_rng(4)
+    points = rng.standard_normal((20, 3))
+    points[:, 1] = 10.0 ** rng.uniform(-8.0, 2.0, 20)
+    return Case(NearZero(1, 0.05, 3), points)
+
+
 def _triangular() -> Case:
     rng = np.random.default_rng(3)
     wide, thin, free, own = rng.standard_normal((4, 500))
@@ -75,6 +83,7 @@ def _triangular() -> Case:
 CASES: dict[str, Callable[[], Case]] = {
     'log': _log,
     'laplace': _laplace,
+    'near zero': _near_zero,
     'triangular': _triangular,
 }
 for _k in (0.0, 250e3):
