@@ -190,11 +190,13 @@ def respond(command, theta, k, first_e, later_e, onset):
             u *= e[GAIN]
             if e[COMMAND_RATE] > 0.0:
                 most = h / e[COMMAND_RATE]
+                before = urate
                 urate = min(max(u, urate - most), urate + most)
-                u = urate
+                u = 0.5 * (before + urate)
             if e[COMMAND_LAG] > 0.0:
+                before = ulag
                 ulag += (u - ulag) * (1.0 - math.exp(-h / e[COMMAND_LAG]))
-                u = ulag
+                u = 0.5 * (before + ulag)
             uplay = _play(uplay, u, e[COMMAND_PLAY])
             read = _play(felt, x + frame + 0.5 * h * (v + frame_v), e[LOOP_PLAY])
             if e[LOOP_LAG] > 0.0:
