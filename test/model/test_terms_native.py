@@ -144,3 +144,35 @@ def test_every_signal_known_at_a_place_acts_there(place: str) -> None:
 def test_an_expression_costs_at_most_twice_a_compiled_effect(name: str) -> None:
     """Of its kind, in turns, so that a machine which slows down slows both; the best of six."""
     assert any(written([name], 5)[name]['ratio'] < 2.0 for _ in range(6))
+
+
+@pytest.mark.parametrize(
+    'beside', [(), ('specimen-gap',), ('specimen-hardening',), ('specimen-yield',)]
+)
+@pytest.mark.parametrize('stiffness', [0.0, 250e3])
+def test_a_force_however_steep_is_found(beside: tuple[str, ...], stiffness: float) -> None:
+    """As its turn gets steeper it becomes Coulomb friction, of which the step knows the solution.
+
+    As close as some percent more friction, which tells how much depends on when the piston
+    sticks. Newton's steps alone leap to and fro there and end a millimetre beside it.
+    """
+    rng = np.random.default_rng()
+    u = rng.uniform(1e-3, 4e-3) * np.sin(
+        2.0 * np.pi * rng.uniform(2.0, 6.0) * np.arange(2000) / 1e3
+    )
+    record = Record(u, u, 1e-3, stiffness)
+    dry = Structure((*beside, 'coulomb-friction'))
+    theta = dry.neutral(np.array(TABLE_2))
+    for j, parameter in enumerate(dry.parameters[4:-1], start=4):
+        theta[j] = parameter.lower + 0.1 * (parameter.upper - parameter.lower)
+    theta[-1] = rng.uniform(100.0, 400.0)
+    expected = dry.simulate(theta, record)
+    more = [
+        float(np.abs(dry.simulate([*theta[:-1], times * theta[-1]], record) - expected).max())
+        for times in (0.97, 1.03)
+    ]
+    own = Parameter('own', 'N', 0.0, 2e4, '', 0.0), Parameter('turn', 'm/s', 1e-6, 1.0, '', 1.0)
+    steep = Structure((*beside, term('own', 'force: f = f + own*tanh(v/turn)', own)))
+    for turn in (1e-4, 1e-5):
+        found = steep.simulate([*theta, turn], record)
+        assert np.abs(found - expected).max() < 2.0 * max(more) + 2e-6

@@ -10,7 +10,9 @@ stable, no branch per lane).
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Final
+
+import numpy as np
 
 from actuator_glue.jit import njit
 from actuator_glue.model.effects import layout as r
@@ -57,3 +59,45 @@ def look(
     """Newton step: the increment against force and tangent of the specimen after `guess`."""
     trial = push - force + tangent * guess
     return beyond(trial, dry) / (stiff + w[r.DAMPING_2 + n] + tangent)
+
+
+# Newton steps end where one is this small against the increment of the last sub-step: the next
+# would be its square.
+_SMALL: Final = 3e-3
+# ... or against rounding [m].
+_LEAST: Final = 1e-13
+# Newton steps at most, of a force that follows the velocity, which may be steep, or has a kink.
+MOST: Final = 40
+
+
+@njit
+def begin(w: Array, ahead: bool) -> None:
+    """Start Newton steps at the last increment or, `ahead`, where that goes on as it did."""
+    for n in range(r.LANES):
+        more = w[r.DX + n] - w[r.DX_BEFORE + n] if ahead else 0.0
+        w[r.IN_DX + n] = w[r.IN_TRIED + n] = w[r.DX + n] + more
+        w[r.DX_BEFORE + n] = w[r.DX + n]
+        w[r.IN_LOW + n], w[r.IN_HIGH + n] = -np.inf, np.inf
+
+
+@njit
+def settled(w: Array) -> bool:
+    """Whether the Newton steps from IN_TRIED to IN_DX were the last; where not, prepare the next.
+
+    The force that is left falls with the increment, so that a step tells on which side of its
+    start the solution lies. A step beyond where the solution can be goes half way: where friction
+    turns within less than a step's motion, Newton's steps would leap to and fro. A lane that has
+    settled stays where it is, whatever its neighbours need.
+    """
+    open_lanes = 0
+    for n in range(r.LANES):
+        tried, to = w[r.IN_TRIED + n], w[r.IN_DX + n]
+        low = max(w[r.IN_LOW + n], tried) if to > tried else w[r.IN_LOW + n]
+        high = min(w[r.IN_HIGH + n], tried) if to < tried else w[r.IN_HIGH + n]
+        to = 0.5 * (low + high) if to <= low or to >= high else to
+        more = abs(to - tried) > _SMALL * abs(w[r.DX + n]) + _LEAST
+        open_lanes += more
+        w[r.IN_DX + n] = w[r.IN_TRIED + n] = to
+        w[r.IN_LOW + n] = low if more else to
+        w[r.IN_HIGH + n] = high if more else to
+    return open_lanes == 0

@@ -113,13 +113,9 @@ def _search(
     yields: bool,
     terms: bool,
 ) -> None:
-    """Sub-step against any specimen and friction: Newton steps, three unless all is smooth.
-
-    `terms`: whether a force is an expression.
-    """
-    for n in range(r.LANES):
-        w[r.IN_DX + n] = w[r.DX + n]
-    for _ in range(parts[machine.TIMES] if terms else 3 if falls else 2):
+    """Newton steps: two, three where friction falls, with expressions (`terms`) until all settle."""
+    balance.begin(w, terms)
+    for _ in range(balance.MOST if terms else 3 if falls else 2):
         if yields:
             for n in range(r.LANES):
                 moved = specimen_gap.passed(w, n, w[r.IN_DX + n], True)
@@ -138,6 +134,8 @@ def _search(
             else:
                 force, tangent = balance.specimen(w, n, guess, True, yields)
             w[r.IN_DX + n] = balance.look(w, n, push, stiff, dry, guess, force, tangent)
+        if terms and balance.settled(w):
+            break
     for n in range(r.LANES):
         dx = w[r.IN_DX + n]
         if falls:

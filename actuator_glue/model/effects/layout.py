@@ -56,7 +56,7 @@ ROWS, SWITCHES = Numbers(LANES), Numbers(1)
     # show beyond the position.
     FEEDBACK, NULL_ALONE,
     # ... its states (carried on by `advance`) ...
-    X, Q, QD, F, R, V, DX, DF, X_EXACT, V_EXACT, X_TRAP, Q_TRAP,
+    X, Q, QD, F, R, V, DX, DX_BEFORE, DF, X_EXACT, V_EXACT, X_TRAP, Q_TRAP,
     # What the recorded transducer shows beyond the position, now and a step before, and what a
     # record's noise adds from sample to sample.
     BEYOND, BEYOND_BEFORE, HELD,
@@ -64,7 +64,9 @@ ROWS, SWITCHES = Numbers(LANES), Numbers(1)
     # gain of the orifice, flow, balance of forces, the increment.
     PER_CLOCK, IN_SHARE, IN_PART, IN_PART_STOP, IN_U, IN_U_STOP, IN_U_NEXT, IN_U_STOP_NEXT,
     IN_MEAN, IN_SLOPE, IN_Q, IN_DQ, IN_GAIN, IN_FLOW, IN_DFLOW, IN_PUSH, IN_OIL, IN_STIFF, IN_DX,
-) = ROWS.take(68)  # fmt: skip
+    # Where the last Newton step began, and what the increment lies between.
+    IN_TRIED, IN_LOW, IN_HIGH,
+) = ROWS.take(72)  # fmt: skip
 
 # Of stages that can be skipped: lanes with commands of their own, any effect on the flow, a
 # specimen whose force is neither proportional nor has a gap only, the transducer, any expression

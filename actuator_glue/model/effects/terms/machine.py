@@ -27,7 +27,7 @@ NONE, T, U, E, Q, F, X, V, Y, D_E, D_Q, D_F, ORIGIN, STEP, D_V_MIDDLE, D_V_END =
 BETA_1, ALPHA_1_BETA_0, ALPHA_2, ALPHA_3, K = range(16, 21)
 FIXED: Final = 21
 # The parts of a program, and what the compiled step is told (`Parts`): where the code of each is,
-# 0 if it has none; how often the balance of forces is solved with it; which of `NEEDS` it reads.
+# 0 if it has none; Newton steps at most of the balance of forces; which of `NEEDS` it reads.
 PREPARE, COMMAND, VALVE, FLOW, FORCE, SENSOR, BALANCE, TIMES, NEEDS = range(9)
 NEEDS_T, NEEDS_U, NEEDS_E, NEEDS_Q, NEEDS_F, NEEDS_X, NEEDS_V, NEEDS_FLOW = (
     1 << i for i in range(8)

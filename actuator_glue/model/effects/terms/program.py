@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.model.effects import layout as r
+from actuator_glue.model.effects.balance import MOST
 from actuator_glue.model.effects.terms import machine as m
 from actuator_glue.model.effects.terms.expression import SIGNAL, Expression
 from actuator_glue.model.effects.terms.instructions import Dual, Emitter
@@ -76,7 +77,7 @@ class Program:
     Attributes:
         code: its parts, machine.PREPARE to machine.BALANCE.
         constants: registers that hold a number, and the number.
-        times: how often the balance of forces is solved with it.
+        times: Newton steps at most of the balance of forces.
         rows: number of registers.
         parameters: register of every parameter.
         memory: registers that remember.
@@ -237,7 +238,9 @@ class _Builder:
                 slope = into.do(m.SELECT, slope, slope_before, on)
         self._signals[signal] = after, slope
         if place in ('specimen', 'piston'):
-            self._times = max(self._times, 3 if 'v' in used else 2 if used & _KINKS else 1)
+            # One Newton step where a force bends slowly, as for a hardening specimen.
+            bends = 'v' in used or used & _KINKS
+            self._times = max(self._times, MOST if bends else 1)
 
     def program(self) -> Program:
         """Return what has been added."""
@@ -251,8 +254,6 @@ class _Builder:
                 *self._parts,
             ),
             constants=tuple((row, value) for value, row in into.constants.items()),
-            # One Newton step where a force bends slowly, as for a hardening specimen; more for a
-            # kink, and for a force that follows the velocity, which may be steep.
             times=self._times,
             rows=into.rows,
             parameters=self._parameters,

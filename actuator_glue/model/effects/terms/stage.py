@@ -140,7 +140,8 @@ def force(w: Array, g: Array, parts: m.Parts, rate: float, yields: bool) -> None
 @njit
 def proportional(w: Array, g: Array, parts: m.Parts) -> None:
     """Write the increment against a proportional specimen and the force, after Newton steps."""
-    for n in range(r.LANES):
-        w[r.IN_DX + n] = w[r.DX + n]
+    balance.begin(w, True)
     for _ in range(parts[m.TIMES]):
         m.execute(parts[m.BALANCE], g, w)
+        if parts[m.TIMES] == 1 or balance.settled(w):
+            break
