@@ -113,7 +113,7 @@ def _search(
     yields: bool,
     terms: bool,
 ) -> None:
-    """Newton steps: two, three where friction falls, with expressions (`terms`) until all settle."""
+    """Newton steps: two, three where friction falls, until all settle with `terms`."""
     balance.begin(w, terms)
     for _ in range(balance.MOST if terms else 3 if falls else 2):
         if yields:
