@@ -16,7 +16,7 @@ from actuator_glue.diagnosis.model_selection import Selection
 from actuator_glue.diagnosis.next_experiment import Experiment
 from actuator_glue.diagnosis.regression import Surrogate
 from actuator_glue.diagnosis.result import HeldOutError
-from actuator_glue.diagnosis.verdict import misses
+from actuator_glue.diagnosis.verdict import excused, misses
 from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.model.effects import CATALOGUE
 
@@ -165,11 +165,13 @@ def unconverged(rhat: float) -> tuple[str, ...]:
 
 def contradicted(error: HeldOutError, material: float) -> tuple[str, ...]:
     """Say so where the held-out part shows materially more than noise, and what it may be."""
-    if not misses(replace(error, unsure=0.0), material):
+    if not misses(replace(error, reached=None), material):
         return ()
     why = 'it may show what the fitting records do not'
-    if not misses(error, material):
-        why = f'the parameters leave up to {1e6 * error.unsure:.1f} um open there'
+    if error.reached is not None and excused(error, material):
+        why = (
+            f'other parameters, as likely by the fitting part, leave {1e6 * error.reached:.1f} um'
+        )
     return (
         f'the held-out part leaves {1e6 * error.after:.1f} um where '
         f'{1e6 * error.noise_floor:.1f} um are noise: {why}; add a record '

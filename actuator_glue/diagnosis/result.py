@@ -42,8 +42,8 @@ class HeldOutError:
         after_without_hum: `after` with the hum that was found regressed out of the held-out part
             (frequency known, phase not); None without hum.
         split: 'held-out' where data were set aside.
-        unsure: rms error that the uncertainty of the parameters alone makes, in 95 % of draws at
-            most.
+        reached: the least rms error of parameters in the 95 % region of their posterior; None
+            where it was not asked.
     """
 
     before: float
@@ -57,7 +57,7 @@ class HeldOutError:
     records: tuple[tuple[str, float, float], ...] = ()
     after_without_hum: float | None = None
     split: str = 'held-out'
-    unsure: float = 0.0
+    reached: float | None = None
 
     def to_json(self) -> Json:
         """Return the JSON object of the held-out error."""

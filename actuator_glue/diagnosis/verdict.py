@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import math
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -18,13 +18,19 @@ _NOTHING = 5e-4
 def misses(error: HeldOutError, material: float) -> bool:
     """Whether the held-out part shows more than noise: as much as an addition must remove.
 
-    That is `material` [m] and a share of what was removed; and not by one stretch of it alone,
-    nor by as much as the parameters are not known.
+    That is `material` [m] and a share of what was removed; not by one stretch of it alone, and
+    whichever of the parameters that the fitting part leaves possible are taken.
     """
+    left = error.after if error.reached is None else min(error.after, error.reached)
     floor = error.noise_floor
     removed = max(0.0, error.before**2 - error.after**2)
-    matters = error.after**2 - floor**2 > max(material**2, _LATER**2 * removed)
-    return matters and error.after_ci[0] > math.hypot(floor, error.unsure)
+    matters = left**2 - floor**2 > max(material**2, _LATER**2 * removed)
+    return matters and error.after_ci[0] * left > floor * error.after
+
+
+def excused(error: HeldOutError, material: float) -> bool:
+    """Whether the held-out part shows more than noise that other likely parameters account for."""
+    return misses(replace(error, reached=None), material) and not misses(error, material)
 
 
 def conclude(verdict: Verdict, moved: bool, error: HeldOutError, material: float) -> Verdict:

@@ -8,15 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.diagnosis import hum
-from actuator_glue.diagnosis.data import LANES, Data, Model, chunks
+from actuator_glue.diagnosis.data import Data, Model
 from actuator_glue.diagnosis.fit import rms
 from actuator_glue.diagnosis.hum import Line
 from actuator_glue.diagnosis.result import HeldOutError, Trace
 from actuator_glue.diagnosis.score import BLOCK, pooled, splits_of
+from actuator_glue.diagnosis.spread import spread
 from actuator_glue.records import Array
 
 _RESAMPLES = 1000
-_DRAWS = 100  # of parameters, for the bands
 _NORMAL_95 = 1.959964
 
 
@@ -60,28 +60,6 @@ def bootstrap(
             for values in (np.sqrt(before), np.sqrt(after), (before - after) / removable)
         )
     ]
-
-
-def _spread(data: Data, side: Side, rng: np.random.Generator) -> tuple[Array, float]:
-    """Standard deviation of the simulation over posterior draws, (N,) [m].
-
-    And the rms distance from the best fit [m] that 95 % of them keep within.
-    """
-    rows = rng.integers(0, len(side.draws), min(_DRAWS, len(side.draws)))
-    centre = data.simulate(side.model, side.theta)[0]
-    count, total, squares = 0, np.zeros_like(centre), np.zeros_like(centre)
-    distances: list[float] = []
-    for some in chunks(len(rows), data.target.size, LANES):
-        off = data.simulate(side.model, side.draws[rows[some]]) - centre
-        off = off[np.isfinite(off).all(axis=1)]
-        count += len(off)
-        total += off.sum(axis=0)
-        squares += np.einsum('mn,mn->n', off, off)
-        distances += [rms(row) for row in off]
-    if count < 2:
-        return np.zeros_like(centre), 0.0
-    variance = np.maximum(squares / count - (total / count) ** 2, 0.0)
-    return np.asarray(np.sqrt(variance)), float(np.quantile(distances, 0.95))
 
 
 def _sham(
@@ -195,10 +173,11 @@ def verify(
     floor = noise_floor(fit, held, (left, errors['after']), noise)
     curves = {}
     for key, side in (('before', before), ('after', after)):
-        spread, unsure = _spread(held, side, rng)
-        halves[key] = _NORMAL_95 * np.sqrt(spread**2 + floor**2)
+        known = side.model, side.theta, side.draws, rng
+        deviation, reached = spread(held, *known)
+        halves[key] = _NORMAL_95 * np.sqrt(deviation**2 + floor**2)
         inner = fit.simulate(side.model, side.theta)[0]
-        width = _NORMAL_95 * np.sqrt(_spread(fit, side, rng)[0] ** 2 + noise**2)
+        width = _NORMAL_95 * np.sqrt(spread(fit, *known)[0] ** 2 + noise**2)
         curves[key] = (inner, width, sims[key], halves[key])
     intervals = bootstrap((errors['before'], errors['after']), floor, held, rng)
     first, last = rms(errors['before']), rms(errors['after'])
@@ -228,7 +207,7 @@ def verify(
         sham=sham,
         after_without_hum=rms(hum.regressed(held, errors['after'], line)) if line else None,
         records=per_record,
-        unsure=unsure,
+        reached=reached,
     )
     coverage = tuple(
         float(np.mean(np.abs(errors[key]) <= halves[key])) for key in ('before', 'after')

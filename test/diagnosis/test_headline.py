@@ -11,6 +11,7 @@ from actuator_glue.api import diagnosis as module
 from actuator_glue.cli.main import main
 from actuator_glue.diagnosis.advice import contradicted
 from actuator_glue.diagnosis.finding import Finding
+from actuator_glue.diagnosis.headline import headline
 from actuator_glue.diagnosis.result import Alarm, DiagnosisData, HeldOutError, Verdict
 from actuator_glue.diagnosis.verdict import against, conclude, misses
 
@@ -168,9 +169,12 @@ def test_what_the_parameters_leave_open_contradicts_nothing() -> None:
     error = diagnosis('none', 15e-6, 15e-6).error
     assert misses(error, 5e-6)
     assert 'may show' in contradicted(error, 5e-6)[0]
-    error = replace(error, unsure=11e-6)
+    assert misses(replace(error, reached=14e-6), 5e-6)
+    error = replace(error, reached=11e-6)
     assert not misses(error, 5e-6)
-    assert 'leave up to 11.0 um open' in contradicted(error, 5e-6)[0]
+    assert 'leave 11.0 um' in contradicted(error, 5e-6)[0]
+    said = headline(replace(diagnosis('none', 15e-6, 15e-6), error=error))
+    assert said.endswith('noise 10.0 um; 11.0 um with parameters as likely')
     assert not contradicted(error, 12e-6)
 
 

@@ -1,0 +1,83 @@
+"""How far what is not known of the parameters moves a simulation, and where it cannot move it."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.stats import chi2
+
+from actuator_glue.diagnosis.data import LANES, Data, Model, chunks
+from actuator_glue.diagnosis.fit import rms
+from actuator_glue.records import Array
+
+_DRAWS = 100  # of parameters, for the bands
+# Samples of all draws' simulations that are kept side by side.
+_KEPT = 20_000_000
+
+
+def spread(
+    data: Data, model: Model, theta: Array, draws: Array, rng: np.random.Generator
+) -> tuple[Array, float]:
+    """Standard deviation of the simulation over posterior draws, and the error they can reach.
+
+    Args:
+        data: records and the samples of each that count.
+        model: simulates them.
+        theta: best parameters, (d,).
+        draws: of their posterior, (m, d).
+        rng: random numbers, for a choice of draws.
+
+    Returns:
+        The standard deviation (N,) [m], and the rms error [m], see `reached`.
+    """
+    rows = rng.integers(0, len(draws), min(_DRAWS, len(draws)))
+    centre = data.simulate(model, theta)[0]
+    every = max(1, len(rows) * centre.size // _KEPT)
+    count, total, squares = 0, np.zeros_like(centre), np.zeros_like(centre)
+    kept: list[Array] = []
+    for some in chunks(len(rows), data.target.size, LANES):
+        off = data.simulate(model, draws[rows[some]]) - centre
+        off = off[np.isfinite(off).all(axis=1)]
+        count += len(off)
+        total += off.sum(axis=0)
+        squares += np.einsum('mn,mn->n', off, off)
+        kept.append(off[:, ::every].copy())
+    error = data.target - centre
+    if count < 2:
+        return np.zeros_like(centre), rms(error)
+    variance = np.maximum(squares / count - (total / count) ** 2, 0.0)
+    share = reached(error[::every], np.vstack(kept), len(theta)) / max(rms(error[::every]), 1e-300)
+    return np.asarray(np.sqrt(variance)), rms(error) * share
+
+
+def reached(error: Array, off: Array, parameters: int) -> float:
+    """The least rms error of parameters in the 95 % region of their posterior, to first order [m].
+
+    How far they are open says nothing of an error in another direction: where no such parameters
+    take it away, it is the model's. Least squares over the distances of draws from the best
+    parameters, these weighted within the 95 % region of a normal posterior.
+
+    Args:
+        error: of the best parameters, (N,) [m].
+        off: what draws simulate less what the best parameters do, (m, N) [m].
+        parameters: how many there are.
+    """
+    values, vectors = np.linalg.eigh(off @ off.T / len(off))
+    main = np.argsort(values)[::-1][:parameters]
+    main = main[values[main] > 1e-12 * values.max()]
+    if not main.size:
+        return rms(error)
+    # Unit steps of the posterior move the simulation by rows of `moves`, at right angles.
+    sizes = values[main]
+    along = vectors[:, main].T @ (off @ error) / np.sqrt(len(off))
+    most = float(chi2.ppf(0.95, parameters))
+
+    def beyond(log: float) -> float:
+        return float(np.sum((along / (sizes + np.exp(log))) ** 2)) - most
+
+    # Steps b minimise |error - moves b|^2 with |b|^2 at most `most`.
+    low, high = np.log(sizes.min()) - 40.0, np.log(sizes.max() + np.abs(along).max()) + 40.0
+    weight = 0.0 if beyond(low) <= 0.0 else float(np.exp(brentq(beyond, low, high)))
+    steps = along / (sizes + weight)
+    left = float(error @ error) - float(2.0 * steps @ along - steps @ (sizes * steps))
+    return float(np.sqrt(max(left, 0.0) / error.size))
