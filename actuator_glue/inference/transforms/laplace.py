@@ -34,11 +34,6 @@ class Laplace:
         self.root = spread[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
         self.lower, self.upper = np.full(len(sd), -_REACH), np.full(len(sd), _REACH)
 
-    def seen(self, other: Laplace) -> tuple[Array, Array]:
-        """Return mean (p,) and a root (p, p) of the covariance of another one in coordinates z."""
-        scale = np.linalg.pinv(self.root)
-        return scale @ (other._centre - self._centre), scale @ other.root
-
     def forward(self, x: Array) -> Array:
         """Return the coordinates (m, p) of what they are made from (m, p)."""
         z = (x - self._centre) @ np.linalg.pinv(self.root).T
