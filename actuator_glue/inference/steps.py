@@ -50,8 +50,8 @@ class Kernels(NamedTuple):
 
 @lru_cache(maxsize=8)
 def kernels(moves: tuple[Move, ...]) -> Kernels:
-    """Return the compiled code for moves; that of others than `MOVES` is not kept in files."""
-    if moves == MOVES:
+    """Return the compiled code for moves; only that of the first of `MOVES` is kept in files."""
+    if moves and moves == MOVES[: len(moves)]:
         return Kernels(propose, _advance)
     proposing = _with_globals(propose, {}, _propose_by=dispatch(moves))
     return Kernels(proposing, _with_globals(_advance, _STRICT, propose=proposing))

@@ -61,17 +61,17 @@ def test_problem_r_from_csv_files(run, problem_r: Path, tmp_path: Path, rng_seed
 def test_the_published_sampler_finds_the_same_posterior_and_says_where_it_has_not(
     run, problem_r: Path, rng_seed: int
 ) -> None:
-    """Of 12 seeds none was 0.04 standard deviations off, or had an R-hat above 1.002.
+    """Of 8 seeds none was 0.06 standard deviations off, or had an R-hat above 1.005.
 
     What 3000 evaluations from the prior leave is told to be no posterior: their R-hat was 1.37 at
     its least.
     """
     records = (problem_r / 'r_1.csv', problem_r / 'r_2.csv', '--stiffness', 0, 250e3)
     how = ('--sampler', 'published', '--shaping-factor', 256, '--seed', rng_seed, '--json', '-')
-    done = run('calibrate', *records, *how, '--evaluations', 400_000)
+    done = run('calibrate', *records, *how, '--evaluations', 100_000)
     assert done.code == 0, done.err
     content = done.json
-    assert content['sampler'] == 'published' and content['evaluations'] <= 400_000
+    assert content['sampler'] == 'published' and content['evaluations'] <= 100_000
     for name, mean, stddev in zip(NAMES, MEAN, STDDEV, strict=True):
         got = content['parameters'][name]
         assert abs(got['mean'] - mean) < 0.5 * stddev and got['rhat'] < 1.1
