@@ -59,12 +59,12 @@ def certainty(fitted: float, error: HeldOutError, material: float) -> float:
 
     Args:
         fitted: by the fitting part.
-        error: held-out error; where it shows more than noise, names explain at most their share.
+        error: held-out error; where it shows more than noise, or the additions take nothing of it
+            away, names explain at most their share.
         material: smallest error that matters [m].
     """
-    if not misses(error, material):
-        return fitted
-    return min(fitted, max(0.0, min(1.0, error.removable_removed)))
+    share = max(0.0, min(1.0, error.removable_removed))
+    return min(fitted, share) if share < _NOTHING or misses(error, material) else fitted
 
 
 def against(found: DiagnosisData) -> str:

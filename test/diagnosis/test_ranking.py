@@ -106,6 +106,10 @@ def test_held_out_records_that_contradict_lower_the_certainty() -> None:
     assert verdict.certainty(0.95, replace(error, after_ci=(9e-6, 50e-6)), 5e-6) == 0.95
     good = replace(error, after=11e-6, removable_removed=0.99)
     assert verdict.certainty(0.95, good, 5e-6) == 0.95
+    # A verdict that says the held-out part does not ask for the name gives it no probability.
+    nothing = replace(error, before=10e-6, after=10e-6, removable_removed=0.0)
+    assert verdict.conclude('missing-effect', True, nothing, 5e-6) == 'undecided'
+    assert verdict.certainty(0.95, nothing, 5e-6) == 0.0
 
 
 def test_three_of_a_kind_speak_for_what_is_tied() -> None:
