@@ -208,6 +208,7 @@ def test_a_specimen_effect_is_not_taken_for_a_setting(effect: str, size: float) 
     assert [(e.name, e.records) for e in found.effects] == [(effect, ())]
 
 
+@pytest.mark.slow
 def test_a_command_that_ran_linearly_is_seen() -> None:
     """Half a sample of lead, 4 ms here, looks like a drifting gain: the hold is said instead."""
     rng = np.random.default_rng(26)
