@@ -16,22 +16,28 @@ _KEPT = 20_000_000
 
 
 def spread(
-    data: Data, model: Model, theta: Array, draws: Array, rng: np.random.Generator
-) -> tuple[Array, float]:
+    data: Data,
+    model: Model,
+    centre: Array,
+    draws: Array,
+    rng: np.random.Generator,
+    *,
+    reach: bool = False,
+) -> tuple[Array, float | None]:
     """Standard deviation of the simulation over posterior draws, and the error they can reach.
 
     Args:
         data: records and the samples of each that count.
         model: simulates them.
-        theta: best parameters, (d,).
+        centre: what the best parameters simulate, (N,) [m].
         draws: of their posterior, (m, d).
         rng: random numbers, for a choice of draws.
+        reach: whether the error is asked for.
 
     Returns:
-        The standard deviation (N,) [m], and the rms error [m], see `reached`.
+        The standard deviation (N,) [m], and the rms error [m], see `reached`; None unasked.
     """
     rows = rng.integers(0, len(draws), min(_DRAWS, len(draws)))
-    centre = data.simulate(model, theta)[0]
     every = max(1, len(rows) * centre.size // _KEPT)
     count, total, squares = 0, np.zeros_like(centre), np.zeros_like(centre)
     kept: list[Array] = []
@@ -41,13 +47,17 @@ def spread(
         count += len(off)
         total += off.sum(axis=0)
         squares += np.einsum('mn,mn->n', off, off)
-        kept.append(off[:, ::every].copy())
+        if reach:
+            kept.append(off[:, ::every].copy())
     error = data.target - centre
     if count < 2:
-        return np.zeros_like(centre), rms(error)
-    variance = np.maximum(squares / count - (total / count) ** 2, 0.0)
-    share = reached(error[::every], np.vstack(kept), len(theta)) / max(rms(error[::every]), 1e-300)
-    return np.asarray(np.sqrt(variance)), rms(error) * share
+        return np.zeros_like(centre), rms(error) if reach else None
+    deviation = np.asarray(np.sqrt(np.maximum(squares / count - (total / count) ** 2, 0.0)))
+    if not reach:
+        return deviation, None
+    thin = error[::every]
+    share = reached(thin, np.vstack(kept), draws.shape[1]) / max(rms(thin), 1e-300)
+    return deviation, rms(error) * share
 
 
 def reached(error: Array, off: Array, parameters: int) -> float:
@@ -67,7 +77,7 @@ def reached(error: Array, off: Array, parameters: int) -> float:
     main = main[values[main] > 1e-12 * values.max()]
     if not main.size:
         return rms(error)
-    # Unit steps of the posterior move the simulation by rows of `moves`, at right angles.
+    # Unit steps of the posterior move the simulation at right angles, by mean squares `sizes`.
     sizes = values[main]
     along = vectors[:, main].T @ (off @ error) / np.sqrt(len(off))
     most = float(chi2.ppf(0.95, parameters))
@@ -75,7 +85,7 @@ def reached(error: Array, off: Array, parameters: int) -> float:
     def beyond(log: float) -> float:
         return float(np.sum((along / (sizes + np.exp(log))) ** 2)) - most
 
-    # Steps b minimise |error - moves b|^2 with |b|^2 at most `most`.
+    # Steps minimise what is left of the error, their squares' sum at most `most`.
     low, high = np.log(sizes.min()) - 40.0, np.log(sizes.max() + np.abs(along).max()) + 40.0
     weight = 0.0 if beyond(low) <= 0.0 else float(np.exp(brentq(beyond, low, high)))
     steps = along / (sizes + weight)

@@ -165,20 +165,21 @@ def verify(
     """
     rng = np.random.default_rng([seed, 3])
     noise = float(np.hypot(noise, line.rms)) if line else noise
-    errors, halves, sims = {}, {}, {}
+    errors, halves, sims, inner = {}, {}, {}, {}
     for key, side in (('before', before), ('after', after)):
         sims[key] = held.simulate(side.model, side.theta)[0]
+        inner[key] = fit.simulate(side.model, side.theta)[0]
         errors[key] = held.target - sims[key]
-    left = fit.target - fit.simulate(after.model, after.theta)[0]
-    floor = noise_floor(fit, held, (left, errors['after']), noise)
+    floor = noise_floor(fit, held, (fit.target - inner['after'], errors['after']), noise)
     curves = {}
     for key, side in (('before', before), ('after', after)):
-        known = side.model, side.theta, side.draws, rng
-        deviation, reached = spread(held, *known)
+        deviation, reached = spread(
+            held, side.model, sims[key], side.draws, rng, reach=side is after
+        )
         halves[key] = _NORMAL_95 * np.sqrt(deviation**2 + floor**2)
-        inner = fit.simulate(side.model, side.theta)[0]
-        width = _NORMAL_95 * np.sqrt(spread(fit, *known)[0] ** 2 + noise**2)
-        curves[key] = (inner, width, sims[key], halves[key])
+        deviation = spread(fit, side.model, inner[key], side.draws, rng)[0]
+        width = _NORMAL_95 * np.sqrt(deviation**2 + noise**2)
+        curves[key] = (inner[key], width, sims[key], halves[key])
     intervals = bootstrap((errors['before'], errors['after']), floor, held, rng)
     first, last = rms(errors['before']), rms(errors['after'])
     removable = first**2 - floor**2
