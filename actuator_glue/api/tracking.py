@@ -11,7 +11,7 @@ import numpy as np
 from actuator_glue.api.spread import Spread, spread
 from actuator_glue.diagnosis.data import LANES, chunks
 from actuator_glue.hybrid.actuator import actuator, table_of
-from actuator_glue.hybrid.indicators import TargetMotion, energy_error, tracking_indicator
+from actuator_glue.hybrid.indicators import TargetMotion
 from actuator_glue.hybrid.stability import tracking
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
@@ -155,11 +155,10 @@ def _numbers(record: Record, target: TargetMotion, moved: Array) -> dict[str, fl
         'J1_s': j.j1,
         'J2': j.j2,
         'J3': j.j3,
-        'ti_m2': float(tracking_indicator(record.command, moved)[-1]),
+        'ti_m2': target.tracking_indicator(moved),
     }
-    k = record.known_stiffness()
-    if k > 0.0:
-        out['hsem'] = float(energy_error(record.command, moved, k * moved, k)[-1])
+    if record.known_stiffness() > 0.0:
+        out['hsem'] = target.energy_error(moved)
     return out
 
 

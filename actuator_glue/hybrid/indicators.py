@@ -65,6 +65,15 @@ class TargetMotion:
         return np.fft.ifft(x, n).conj() * (n / power.sum()), frequency
 
     @cached_property
+    def _peak(self) -> float:
+        return float(np.abs(self._target).max())
+
+    @cached_property
+    def _steps(self) -> Array:
+        """Half of what the target moves in each step, (n - 1,) [m]."""
+        return 0.5 * np.diff(self._target)
+
+    @cached_property
     def _reversed(self) -> tuple[NDArray[np.complex128], int]:
         """Transform of the reversed target for correlations, and its length."""
         size = next_fast_len(2 * len(self._target) - 1, real=True)
@@ -98,9 +107,31 @@ class TargetMotion:
         error = measured - target
         return Criteria(
             lag * self._period,
-            float(np.sqrt(np.mean(error**2) / np.mean(target**2))),
-            float(np.abs(error).max() / np.abs(target).max()),
+            float(np.sqrt((error @ error) / (target @ target))),
+            float(max(error.max(), -error.min()) / self._peak),
         )
+
+    def tracking_indicator(self, measured: Array) -> float:
+        """Return the last value of `tracking_indicator` [m^2], without those before it.
+
+        Raises:
+            InputError: as `_checked`.
+        """
+        target, measured = _checked(self._target, measured)
+        return float(0.5 * (target[:-1] @ measured[1:] - target[1:] @ measured[:-1]))
+
+    def energy_error(self, measured: Array) -> float:
+        """Return the last value of `energy_error` of an elastic specimen, whatever its stiffness.
+
+        Raises:
+            InputError: as `_checked`.
+        """
+        _, measured = _checked(self._target, measured)
+        # Energies over the stiffness.
+        work = np.cumsum((measured[1:] + measured[:-1]) * self._steps)
+        lost = work[-1] - 0.5 * (measured[-1] ** 2 - measured[0] ** 2)
+        whole = max(work.max(), -work.min()) + 0.5 * max(measured.max(), -measured.min()) ** 2
+        return float(lost / whole) if whole > 0.0 else 0.0
 
 
 def tracking_indicator(target: Array, measured: Array) -> Array:

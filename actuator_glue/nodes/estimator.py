@@ -15,7 +15,7 @@ from actuator_glue import sample_block
 from actuator_glue.errors import InputError
 from actuator_glue.inference.choice import ModelChoice, choose_model
 from actuator_glue.nodes import configuration, own_effects, spin, topics
-from actuator_glue.nodes.estimator_worker import Computed, compute, warm_up
+from actuator_glue.nodes.estimator_worker import compute, warm_up
 from actuator_glue.nodes.health import ERROR, Rate
 from actuator_glue.nodes.latched import Newest
 from actuator_glue.nodes.messages import publish
@@ -36,7 +36,7 @@ from actuator_glue.online.stream import (
     Window,
 )
 from actuator_glue.setups import from_message
-from actuator_glue.workers.worker import DIED, FAILED, Answer
+from actuator_glue.workers.worker import DIED, DONE, FAILED, PROGRESS, Answer
 
 
 class EstimatorNode(WorkingNode):
@@ -172,7 +172,7 @@ class EstimatorNode(WorkingNode):
         return now + 2.0 * takes > self._arrival[window.number] + self.settings.time_budget
 
     def answered(self, answer: Answer) -> None:
-        """Take the result of a window, or that there is none."""
+        """Take the result of a window, its tracking numbers afterwards, or that there is none."""
         if not self.active:
             return
         if answer.kind in (DIED, FAILED):
@@ -181,12 +181,14 @@ class EstimatorNode(WorkingNode):
             self.get_logger().info('the estimate goes on from its last window')
         if answer.kind == FAILED:
             self.complain('internal error', str(answer.payload), ERROR)
-        elif answer.kind != DIED and self.estimator.running is not None:
+        elif answer.kind == PROGRESS and self.estimator.running is not None:
             self._finish(answer.payload, answer.seconds)
+        elif answer.kind == DONE and answer.payload is not None:
+            for complaint in publish_tracking(self._out, answer.payload, self._frequencies):
+                self.complain('tracking', complaint)
         self._next(time.monotonic())
 
-    def _finish(self, computed: Computed, seconds: float) -> None:
-        result = computed.result
+    def _finish(self, result: WindowResult, seconds: float) -> None:
         self._tell(self.estimator.finish(result))
         if result.failure:
             return
@@ -198,8 +200,6 @@ class EstimatorNode(WorkingNode):
         for prediction in (*result.scored, *result.forecast):
             publish(self._out[topics.BAND], *conversion.prediction(prediction, actuator))
         publish(self._out[topics.RESPONSE], *conversion.response(result))
-        for complaint in publish_tracking(self._out, computed, self._frequencies):
-            self.complain('tracking', complaint)
         latency = time.monotonic() - self._started
         self.compute.append(seconds)
         self.latency.append(latency)

@@ -29,18 +29,30 @@ class _Reserve:
     tracking = 0.0
 
 
-class Computed(NamedTuple):
-    """A window, and how the actuator followed its command: None without posterior or time."""
+class Tracked(NamedTuple):
+    """Tracking numbers of a window, which went ahead.
 
-    result: WindowResult
-    tracking: RecordTracking | None
+    Attributes:
+        window: its running number.
+        stamp_ns: acquisition time of its last sample [ns since 1970].
+        actuator: name of the actuator.
+        numbers: how that followed its command.
+    """
+
+    window: int
+    stamp_ns: int
+    actuator: str
+    numbers: RecordTracking
 
 
-def compute(job: Job, deadline: float, frequencies: tuple[float, ...], tell: Tell) -> Computed:
-    """Compute a job in the worker so that it is done at a monotonic time [s].
+def compute(
+    job: Job, deadline: float, frequencies: tuple[float, ...], tell: Tell
+) -> Tracked | None:
+    """Compute a job in the worker and tell its WindowResult by a monotonic time [s].
 
-    Sampling ends early enough for what follows it, as long as that took lately. Tracking numbers
-    are computed in time that is left, delay and amplitude at the frequencies [Hz].
+    Sampling ends early enough for what follows it, as long as that took lately. Tracking numbers,
+    delay and amplitude at the frequencies [Hz], come afterwards where the deadline leaves time for
+    them; None where not, or without a posterior.
     """
     last = time.monotonic()
     kept = ON_THE_WAY + SLACK * job.settings.time_budget
@@ -53,12 +65,19 @@ def compute(job: Job, deadline: float, frequencies: tuple[float, ...], tell: Tel
     result = run(job, expired)
     now = time.monotonic()
     _Reserve.seconds = max(now - last, 0.8 * _Reserve.seconds)
+    # Bands are waited for, these numbers are not.
+    tell(result)
+    now = time.monotonic()
     if now > deadline - 1.3 * _Reserve.tracking - ON_THE_WAY:
         _Reserve.tracking *= 0.9  # one slow moment must not end them for good
-        return Computed(result, None)
-    tracking = window_tracking(result, frequencies)
+        return None
+    numbers = window_tracking(result, frequencies)
     _Reserve.tracking = max(time.monotonic() - now, 0.8 * _Reserve.tracking)
-    return Computed(result, tracking)
+    if numbers is None:
+        return None
+    record = result.window.record
+    stamp = record.stamp_ns(len(record) - 1)
+    return Tracked(result.window.number, stamp, record.actuator, numbers)
 
 
 def warm_up() -> None:
@@ -66,6 +85,11 @@ def warm_up() -> None:
     for _ in range(2):
         # The first time compiling counts: ten windows would find no time left for sampling.
         _Reserve.seconds = _Reserve.tracking = 0.0
-        warm_windows(
-            lambda job: compute(job, time.monotonic() + 60.0, FREQUENCIES, lambda _: None).result
-        )
+        warm_windows(lambda job: computed(job, time.monotonic() + 60.0)[0])
+
+
+def computed(job: Job, deadline: float) -> tuple[WindowResult, Tracked | None]:
+    """Return what `compute` tells and returns, with the numbers at the usual frequencies."""
+    told: list[WindowResult] = []
+    tracked = compute(job, deadline, FREQUENCIES, told.append)
+    return told[0], tracked

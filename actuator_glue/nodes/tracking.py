@@ -7,12 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from actuator_glue.api.tracking import RecordTracking
 from actuator_glue.nodes import topics
-from actuator_glue.nodes.estimator_worker import Computed
+from actuator_glue.nodes.estimator_worker import Tracked
 from actuator_glue.nodes.messages import publish
 from actuator_glue.online.conversion import Head
-from actuator_glue.online.job import WindowResult
 
 # Field in the message: name in `RecordTracking`.
 _NUMBERS = {
@@ -28,31 +26,28 @@ _LIMITS = ('lower', 'median', 'upper')
 
 
 def publish_tracking(
-    out: Mapping[topics.Topic, Any], computed: Computed, frequencies: tuple[float, ...]
+    out: Mapping[topics.Topic, Any], found: Tracked, frequencies: tuple[float, ...]
 ) -> Iterator[str]:
     """Publish what was computed; yield why it cannot be."""
     if topics.TRACKING not in out:
         yield 'actuator_glue_msgs is older than this node: build it again (make setup)'
-    elif computed.tracking is not None:
-        fields = message(computed.result, computed.tracking, frequencies)
-        publish(out[topics.TRACKING], *fields)
+    else:
+        publish(out[topics.TRACKING], *message(found, frequencies))
 
 
-def message(
-    result: WindowResult, found: RecordTracking, frequencies: tuple[float, ...]
-) -> tuple[Head, dict[str, Any]]:
+def message(found: Tracked, frequencies: tuple[float, ...]) -> tuple[Head, dict[str, Any]]:
     """Return header and fields of a TrackingIndicators."""
-    record = result.window.record
-    told = [f for f in frequencies if f'delay_at_{f:g}_hz_s' in found.predicted]
-    fields: dict[str, Any] = {'window': result.window.number, 'frequency': np.array(told)}
+    predicted, measured = found.numbers.predicted, found.numbers.measured
+    told = [f for f in frequencies if f'delay_at_{f:g}_hz_s' in predicted]
+    fields: dict[str, Any] = {'window': found.window, 'frequency': np.array(told)}
     for limit in _LIMITS:
         for what, unit in (('delay', '_s'), ('amplitude', '')):
-            values = [getattr(found.predicted[f'{what}_at_{f:g}_hz{unit}'], limit) for f in told]
+            values = [getattr(predicted[f'{what}_at_{f:g}_hz{unit}'], limit) for f in told]
             fields[f'{what}_{limit}'] = np.array(values)
     for name, known in {'bandwidth': 'bandwidth_hz', **_NUMBERS}.items():
-        band = found.predicted.get(known)
+        band = predicted.get(known)
         for limit in _LIMITS:
             fields[f'{name}_{limit}'] = float(getattr(band, limit, np.nan))
         if name in _NUMBERS:
-            fields[f'{name}_measured'] = float(found.measured.get(known, np.nan))
-    return Head(record.stamp_ns(len(record) - 1), record.actuator), fields
+            fields[f'{name}_measured'] = float(measured.get(known, np.nan))
+    return Head(found.stamp_ns, found.actuator), fields

@@ -24,7 +24,7 @@ Tell = Callable[[Any], None]
 
 
 class Answer(NamedTuple):
-    """What a worker says: kind, payload, and seconds it worked."""
+    """What a worker says: kind, payload, and seconds it has worked on the task."""
 
     kind: str
     payload: Any
@@ -137,8 +137,10 @@ def _serve(pipe: Connection, warm: Callable[[], None] | None, nice: int) -> None
     if nice:
         os.nice(nice)
 
+    started = time.monotonic()
+
     def tell(payload: Any) -> None:
-        pipe.send((PROGRESS, payload, 0.0))
+        pipe.send((PROGRESS, payload, time.monotonic() - started))
 
     with suppress(EOFError, BrokenPipeError, ConnectionResetError):
         if warm is not None:

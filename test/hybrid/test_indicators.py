@@ -69,6 +69,20 @@ def test_energy_error_of_an_elastic_specimen(lag: float) -> None:
     assert not energy_error(target, target, k * target, k).any()
 
 
+def test_last_values_alone_are_those_of_the_rows() -> None:
+    """Of noise, of a target that ends elsewhere, of a specimen that is never reached."""
+    rng = np.random.default_rng()
+    for scale in (1.0, 0.01, 0.0):
+        target, measured = 1e-3 * np.cumsum(rng.standard_normal((2, 500)), axis=1)
+        measured, k = scale * measured + rng.uniform(0.0, 1e-3), rng.uniform(1e4, 1e6)
+        asked = TargetMotion(target, PERIOD)
+        row = energy_error(target, measured, k * measured, k)
+        assert asked.energy_error(measured) == pytest.approx(row[-1], rel=1e-9)
+        assert asked.tracking_indicator(measured) == pytest.approx(
+            tracking_indicator(target, measured)[-1], rel=1e-9, abs=1e-18
+        )
+
+
 def test_energy_error_refuses() -> None:
     """A force of another length, no stiffness."""
     x = np.sin(np.arange(100.0))
