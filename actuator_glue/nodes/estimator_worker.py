@@ -65,8 +65,8 @@ def compute(
     result = run(job, expired)
     now = time.monotonic()
     _Reserve.seconds = max(now - last, 0.8 * _Reserve.seconds)
-    # Bands are waited for, these numbers are not. With real-time priority, and one core for node and
-    # worker, the node publishes nothing before the worker rests.
+    # Bands are waited for, these numbers are not. On one core with real-time priority the node
+    # publishes nothing before the worker rests.
     tell(result)
     time.sleep(ON_THE_WAY)
     now = time.monotonic()
