@@ -172,7 +172,8 @@ def test_a_name_means_one_thing() -> None:
         for node in ast.walk(ast.parse(path.read_text(encoding='utf-8')))
         if isinstance(node, ast.ClassDef)
     )
-    files = Counter(path.name for path in SOURCES if path.name != '__init__.py')
+    everywhere = [p for p in [*SOURCES, *OUTSIDE] if not p.name.startswith('__')]
+    files = Counter(path.name for path in everywhere)
     assert not [name for name, count in classes.items() if count > 1]
     assert not [name for name, count in files.items() if count > 2]
 

@@ -10,7 +10,16 @@ import numpy as np
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from actuator_glue.report import html
-from studies.chen import findings, identify, library, published, responses, shaping, spread, words
+from studies.chen import (
+    findings,
+    identify,
+    library,
+    published,
+    responses,
+    shaping,
+    table_spread,
+    words,
+)
 from studies.chen.experiment import stiffness_name
 from studies.chen.figures import FIGURES
 from studies.chen.study import NOISE_FREE, NOISY, Results
@@ -41,7 +50,7 @@ def prose(results: Results) -> str:
     }
     names: dict[str, Any] = {
         m.__name__.rpartition('.')[2]: m
-        for m in (findings, identify, library, published, responses, shaping, spread)
+        for m in (findings, identify, library, published, responses, shaping, table_spread)
     }
     names |= {
         'KINDS': words.KINDS,

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from studies.chen import misfit, responses, shaping, spread
+from studies.chen import misfit, responses, shaping, table_spread
 from studies.chen.calibration import EVALUATIONS, Coverage, simulated_case
 from studies.chen.experiment import Complex, Reading, read_off
 from studies.chen.identify import (
@@ -111,7 +111,7 @@ class Results:
     identified: dict[str, tuple[TransferFunction, ...]]
     physical: PhysicalFit
     sensor: Posterior
-    table_4: spread.Spread
+    table_4: table_spread.Spread
     shapes: dict[str, Posterior]
     shaped: dict[str, list[shaping.Shaped]]
     choices: dict[str, shaping.Choice]
@@ -157,11 +157,11 @@ def study(seed: int = 1, *, quick: bool = False, progress: Progress | None = Non
     laboratory.enter('posterior at G_6')
     sensor = laboratory.run((30,), errors, CHOSEN, effort.evaluations)
     laboratory.enter('spread against residual')
-    wide = spread.against_residual(
+    wide = table_spread.against_residual(
         laboratory, errors, effort.added_mm, effort.short, effort.evaluations
     )
     laboratory.enter('shapes of residual')
-    shapes = spread.shapes(laboratory, records, wide.matched.best_rms, effort.short)
+    shapes = table_spread.shapes(laboratory, records, wide.matched.best_rms, effort.short)
 
     shaped = {}
     for name, added in (('sensor', 0.0), ('matched', wide.matched.added_rms)):

@@ -16,7 +16,7 @@ import numpy as np
 from actuator_glue.errors import InputError
 from studies.hybrid import library, outcomes
 from studies.hybrid.figure import reliability_figure
-from studies.hybrid.findings import Findings, findings
+from studies.hybrid.judgement import Findings, findings
 from studies.hybrid.page import write_between
 from studies.hybrid.trial import Outcome, design
 

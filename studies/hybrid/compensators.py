@@ -8,7 +8,7 @@ import sys
 import numpy as np
 
 import actuator_glue as ag
-from studies.hybrid.posterior import spread
+from studies.hybrid.plants import spread
 
 CASES = tuple(f'benchmark_case_{i}' for i in (1, 2, 3, 4))
 

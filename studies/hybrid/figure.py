@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from studies.hybrid.findings import Findings
+from studies.hybrid.judgement import Findings
 from studies.hybrid.library import style
 from studies.hybrid.trial import Outcome
 

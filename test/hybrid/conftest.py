@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 
 import actuator_glue as ag
-from studies.hybrid.posterior import spread
+from studies.hybrid.plants import spread
 
 
 @pytest.fixture(scope='session')

@@ -11,7 +11,7 @@ from actuator_glue.errors import InputError
 from studies.hybrid import __main__ as command
 from studies.hybrid import library, outcomes, trial
 from studies.hybrid.actuators import EFFECTS, drawn
-from studies.hybrid.findings import EDGES, FALSE_ALARM, findings, limits
+from studies.hybrid.judgement import EDGES, FALSE_ALARM, findings, limits
 from studies.hybrid.trial import Outcome
 
 

@@ -10,7 +10,7 @@ from actuator_glue.inference.likelihood import GlueLikelihood
 from actuator_glue.model import reference_problem
 from actuator_glue.model.exact import ExactErrors
 from actuator_glue.model.parameters import TABLE_2
-from studies.chen import findings, misfit, shaping, spread
+from studies.chen import findings, misfit, shaping, table_spread
 from studies.chen.calibration import simulated_case
 from studies.chen.laboratory import AddedResidual, Laboratory
 from studies.chen.published import CHOSEN, TABLE_4
@@ -25,7 +25,9 @@ def test_added_residual_is_what_white_noise_does_on_average(rng_seed: int) -> No
     expected = GlueLikelihood(AddedResidual(ExactErrors(records), size), 1.0)(theta)[0]
     variances = []
     for _ in range(30):
-        noisy = spread.altered(records, lambda r: r.measured + size * rng.standard_normal(len(r)))
+        noisy = table_spread.altered(
+            records, lambda r: r.measured + size * rng.standard_normal(len(r))
+        )
         variances.append(np.exp(-GlueLikelihood(noisy, 1.0)(theta)[0]))
     assert np.mean(variances) == pytest.approx(np.exp(-expected), rel=0.01)
 
@@ -44,8 +46,10 @@ def test_spread_of_table_4_is_met_at_about_0_7_mm(rng_seed: int) -> None:
 def test_match_finds_the_residual_between_grid_points() -> None:
     added = np.array([0.2, 0.5, 0.9])
     cov = np.exp(np.array([[-1.0], [0.0], [1.0]])) * TABLE_4['cov']
-    assert spread.match(added, cov, TABLE_4['cov']) == pytest.approx(0.5, abs=1e-3)
-    assert spread.match(added, cov * np.exp(-0.5), TABLE_4['cov']) == pytest.approx(0.7, abs=1e-3)
+    assert table_spread.match(added, cov, TABLE_4['cov']) == pytest.approx(0.5, abs=1e-3)
+    assert table_spread.match(added, cov * np.exp(-0.5), TABLE_4['cov']) == pytest.approx(
+        0.7, abs=1e-3
+    )
 
 
 def test_match_is_steady_against_the_scatter_of_short_runs(rng_seed: int) -> None:
@@ -53,7 +57,7 @@ def test_match_is_steady_against_the_scatter_of_short_runs(rng_seed: int) -> Non
     rng = np.random.default_rng(rng_seed)
     added = np.linspace(0.4, 0.9, 9)
     cov = TABLE_4['cov'] * np.exp(3 * (added - 0.69) + 0.05 * rng.standard_normal(9))[:, None]
-    assert spread.match(added, cov, TABLE_4['cov']) == pytest.approx(0.69, abs=0.08)
+    assert table_spread.match(added, cov, TABLE_4['cov']) == pytest.approx(0.69, abs=0.08)
 
 
 class Entry(NamedTuple):
