@@ -239,8 +239,10 @@ def run_effects(
                 right = commands[last % past, n] if last >= 0 else 0.0
                 jump = (right - left) if share > 0.0 else 0.0
                 w[r.IN_MEAN + n] = left + jump * share
+                w[r.IN_JUMP + n], w[r.IN_SHARE + n] = jump, share
                 w[r.IN_SLOPE + n] = 6.0 * jump * share * (1.0 - share)
-            kernel.substep(w, g, parts, on, 0.0, rate, (i + (j + 0.5) * inverse) * course.period)
+            time = (i + (j + 0.5) * inverse) * course.period
+            kernel.substep(w, g, parts, on, 0.0, 0.0, rate, time)
             for n in range(LANES):
                 corrected = stages.chains(w, n, 0.0, 0.0)
                 work[0, n] = work[1, n] = corrected

@@ -34,6 +34,7 @@ SIZES = {
     'flow-asymmetry': 0.05,
     'integral-action': 0.5,
     'command-lag': 3e-3,
+    'valve-hysteresis': 20e-6,
 }
 
 
@@ -59,10 +60,12 @@ def test_generators_and_catalogue_agree(name: str, monkeypatch: pytest.MonkeyPat
     known = equivalents.values(sizes, theta, 2e-3)
     model = Structure((equivalents.catalogued(name),))
     full = np.append(theta, [known[n] for n in model.names[4:]])
+    # At the tips of stairs each is 0.05 to 0.1 um off by its own steps.
+    most = 0.25e-6 if name == 'valve-hysteresis' else 0.15e-6
     for seen in outputs:
         for k, reading in zip(stiffnesses, seen, strict=False):
             y = model.simulate(full, Record(command, reading, 1.0 / plant.RATE, k))
-            assert np.sqrt(np.mean((y - reading) ** 2)) < 0.15e-6
+            assert np.sqrt(np.mean((y - reading) ** 2)) < most
 
 
 @pytest.mark.slow

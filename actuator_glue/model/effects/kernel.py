@@ -152,13 +152,14 @@ def substep(
     parts: machine.Parts,
     on: NDArray[np.bool_],
     mean: float,
+    slope: float,
     rate: float,
     time: float,
 ) -> None:
     """Carry the nonlinear loop on by one sub-step; `time` is its middle."""
     flows, falls, gaps = on[r.ON_FLOW], on[stribeck_friction.ON], on[specimen_gap.ON]
     if on[r.ON_TERMS]:
-        flows = stage.before_the_oil(w, g, parts, on, mean, rate, time)
+        flows = stage.before_the_oil(w, g, parts, on, mean, slope, rate, time)
     elif flows:
         for n in range(r.LANES):
             w[r.IN_Q + n], w[r.IN_DQ + n] = stages.valve(w, n, mean)
@@ -279,7 +280,7 @@ def advance(
                 mean = command.held(u, at - offset)
             if on[r.ON_BEYOND]:
                 feedback.expect(w)
-            substep(w, g, parts, on, mean, rate, (at + (j + 0.5) * inverse) * period)
+            substep(w, g, parts, on, mean, slope, rate, (at + (j + 0.5) * inverse) * period)
             if on[r.ON_TRANSDUCER] and on[r.ON_BEYOND]:
                 for n in range(r.LANES):
                     displacement[i, n] = assembly.sensed(w, n, stages.chains(w, n, mean, slope))

@@ -82,7 +82,7 @@ def _fetch(w: Array, places: NDArray[np.int32], u: Array, count: int) -> None:
 def held(
     w: Array, places: NDArray[np.int32], u: Array, offset: int, at: float, step: float
 ) -> None:
-    """Write every lane's mean and slope of a held command over a sub-step.
+    """Write every lane's mean, slope and jump of a held command over a sub-step.
 
     Any fractional shift of it keeps its integral and its centre.
 
@@ -99,7 +99,7 @@ def held(
     for n in range(r.LANES):
         share, left = w[r.IN_SHARE + n], w[r.IN_U + n]
         jump = w[r.IN_U_STOP + n] - left
-        w[r.IN_MEAN + n] = left + jump * share
+        w[r.IN_JUMP + n], w[r.IN_MEAN + n] = jump, left + jump * share
         w[r.IN_SLOPE + n] = 6.0 * jump * share * (1.0 - share)
 
 

@@ -63,10 +63,11 @@ ROWS, SWITCHES = Numbers(LANES), Numbers(1)
     # ... and scratch within one step: command samples and what part of each, command, spool flow,
     # gain of the orifice, flow, balance of forces, the increment.
     PER_CLOCK, IN_SHARE, IN_PART, IN_PART_STOP, IN_U, IN_U_STOP, IN_U_NEXT, IN_U_STOP_NEXT,
-    IN_MEAN, IN_SLOPE, IN_Q, IN_DQ, IN_GAIN, IN_FLOW, IN_DFLOW, IN_PUSH, IN_OIL, IN_STIFF, IN_DX,
+    IN_MEAN, IN_SLOPE, IN_JUMP, IN_Q, IN_DQ, IN_GAIN, IN_FLOW, IN_DFLOW,
+    IN_PUSH, IN_OIL, IN_STIFF, IN_DX,
     # Where the last Newton step began, and what the increment lies between.
     IN_TRIED, IN_LOW, IN_HIGH,
-) = ROWS.take(72)  # fmt: skip
+) = ROWS.take(73)  # fmt: skip
 
 # Of stages that can be skipped: lanes with commands of their own, any effect on the flow, a
 # specimen whose force is neither proportional nor has a gap only, the transducer, any expression

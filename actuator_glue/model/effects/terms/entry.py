@@ -196,13 +196,15 @@ def _tried(
     period = 2.0 * np.pi * scale.stroke / scale.velocity
     step = 3.0 * period / _SAMPLES
     motion = _motion(scale, step * np.arange(_SAMPLES, dtype=np.float64), period)
-    g[m.STEP], g[m.K] = step, scale.stiffness
+    # What turns over within a step: the last part of it shows where that leads.
+    pieces = 8 if made.parts[m.NEEDS] & m.NEEDS_CHANGE else 1
+    g[m.STEP], g[m.K] = step / pieces, scale.stiffness
     for j, row in enumerate((m.BETA_1, m.ALPHA_1_BETA_0, m.ALPHA_2, m.ALPHA_3)):
         g[row] = scale.theta[j]
     made.prepare(g)
     code, row = made.parts[program.PART[place]], motion[SIGNAL[place]][0]
     before, after = np.empty((_SAMPLES, 1)), np.empty((_SAMPLES, LANES))
-    for i in range(_SAMPLES):
+    for i in np.repeat(range(_SAMPLES), pieces):
         for register, trace in motion.values():
             g[register] = trace[i]
         before[i] = g[row, 0]

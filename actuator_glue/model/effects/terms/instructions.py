@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Final
 
 from actuator_glue.model.effects.terms import machine as m
-from actuator_glue.model.effects.terms.expression import Tree
+from actuator_glue.model.effects.terms.expression import MEMORY, Tree
 
 _ONE: Final = {
     name: int(getattr(m, name.upper()))
@@ -14,6 +14,8 @@ _ONE: Final = {
 # Most factors of a power that is multiplied out.
 _MOST: Final = 16
 _TINY: Final = 1e-150
+# As good as no limit.
+_FASTEST: Final = 1e150
 
 # A register with the value, and one with the slope d/d(dx) where there is one.
 Dual = tuple[int, int | None]
@@ -31,6 +33,8 @@ class Emitter:
         prepare: instructions executed once.
         code: instructions of the present part.
         symbols: register and slope of what an expression may name.
+        changes, jumps: the same with what it changes by over the step in place of the slope:
+            steadily, and in the leap of a held command.
     """
 
     def __init__(self, held: set[int]) -> None:
@@ -40,13 +44,17 @@ class Emitter:
         self.prepare: list[m.Instruction] = []
         self.code: list[m.Instruction] = []
         self.symbols: dict[str, Dual] = {}
+        self.changes: dict[str, Dual] = {}
+        self.jumps: dict[str, Dual] = {}
         self._held = set(held)
         self._prepared: dict[tuple[int, ...], int] = {}
         self._known: dict[tuple[int, ...], int] = {}
+        self._kept: dict[tuple[int, ...], int] = {}
 
     def forget(self) -> None:
         """Forget what was computed from signals that have changed."""
         self._known.clear()
+        self._kept.clear()
 
     def row(self, held: bool = False) -> int:
         """Return a new register; `held` if it does not change during a test."""
@@ -61,19 +69,32 @@ class Emitter:
             self.constants[value] = self.row(held=True)
         return self.constants[value]
 
-    def do(self, op: int, a: int, b: int = 0, c: int = 0, memory: bool = False) -> int:
+    def do(self, op: int, a: int, b: int = 0, c: int = 0, memory: int = 0) -> int:
         """Return the register with the result of an operation, computed once."""
         operands = [a, *([b] if b else []), *([c] if c else [])]
         held = self._held.issuperset(operands) and not memory
         known, code = (self._prepared, self.prepare) if held else (self._known, self.code)
-        key = op, a, b, c
+        key = op, a, b, c, memory
         if key not in known:
             known[key] = self.row(held)
-            kept = self.row() if memory else 0
-            if memory:
-                self.memory.append(kept)
-            code.append(m.Instruction(op, known[key], a, b, c, kept))
+            if memory:  # of the two that it leaves beside
+                self.rows += 2
+            code.append(m.Instruction(op, known[key], a, b, c, memory))
         return known[key]
+
+    def _keep(self, *key: int) -> int:
+        """Return the register that remembers for an operation on these."""
+        if key not in self._kept:
+            self._kept[key] = self.row()
+            self.memory.append(self._kept[key])
+        return self._kept[key]
+
+    def along(self, symbols: dict[str, Dual], tree: Tree) -> int | None:
+        """Return the slope of an expression along others than `symbols`, as `jumps`."""
+        before, self.symbols = self.symbols, symbols
+        slope = self.emit(tree)[1]
+        self.symbols = before
+        return slope
 
     def _times(self, a: int, slope: int | None) -> int | None:
         if slope is None or slope == self.constants.get(1.0):
@@ -94,6 +115,8 @@ class Emitter:
             return self.symbols[tree.name]
         if name == 'pow':
             return self._power(*parts)
+        if name in MEMORY:
+            return self._remembered(name, *parts)
         found = [self.emit(part) for part in parts]
         if name in _ONE:
             return self._one(name, *found[0])
@@ -103,12 +126,10 @@ class Emitter:
             return self._chosen(name, *found)
         if name == 'clip':
             return self._chosen('min', self._chosen('max', found[0], found[1]), found[2])
-        if name == 'dead':
-            (a, da), (w, _) = found
-            least = self.do(m.NEG, w), None
-            inside, slope = self._chosen('min', self._chosen('max', found[0], least), (w, None))
-            return self.do(m.SUB, a, inside), self._plus(da, slope, m.SUB)
-        return self._remembered(name, *found)
+        (a, da), (w, _) = found  # dead
+        least = self.do(m.NEG, w), None
+        inside, slope = self._chosen('min', self._chosen('max', found[0], least), (w, None))
+        return self.do(m.SUB, a, inside), self._plus(da, slope, m.SUB)
 
     def _two(self, name: str, a: int, da: int | None, b: int, db: int | None) -> Dual:
         if name == 'mul':
@@ -189,22 +210,49 @@ class Emitter:
         slope = self._times(self.do(m.MUL, self.constant(float(n)), less), da) if da else None
         return self.do(m.MUL, less, a), slope
 
-    def _remembered(self, name: str, first: Dual, *rest: Dual) -> Dual:
-        a, da = first
-        one = self.constant(1.0)
-        if name == 'integral':
-            out = self.do(m.INTEGRAL, a, m.STEP, memory=True)
-            return out, self._times(self.do(m.MUL, self.constant(0.5), m.STEP), da)
-        other = rest[0][0]
+    def _remembered(self, name: str, operand: Tree, *sizes: Tree) -> Dual:
+        """What remembers, and its slope; along `changes` its own change, and it does not jump."""
+        a, da = self.emit(operand)
+        one, b = self.constant(1.0), m.STEP
         if name == 'lag':
-            steps = self.do(m.DIV, m.STEP, other)
-            left = self.do(m.EXP, self.do(m.NEG, steps))
-            mean = self.do(m.DIV, self.do(m.SUB, one, left), steps)
-            out = self.do(m.LAG, a, left, mean, memory=True)
-            return out, self._times(self.do(m.SUB, one, mean), da)
-        if name == 'play':
-            out = self.do(m.PLAY, a, other, memory=True)
-            return out, self._times(self.do(m.EDGE, a, out, other), da) if da else None
-        step = self.do(m.MUL, other, m.STEP)
-        out = self.do(m.LIMIT, a, step, memory=True)
-        return out, self._times(self.do(m.EQUAL, a, out), da) if da else None
+            steps = self.do(m.DIV, m.STEP, self.emit(sizes[0])[0])
+            b = self.do(m.EXP, self.do(m.NEG, steps))
+            mean = self.do(m.DIV, self.do(m.SUB, one, b), steps)
+            out = self.do(m.LAG, a, b, mean, self._keep(m.LAG, a, b))
+            moved, gain = out + 1, self.do(m.SUB, one, mean)
+        elif name == 'integral':
+            out = self.do(m.INTEGRAL, a, b, memory=self._keep(m.INTEGRAL, a))
+            moved, gain = out + 1, self.do(m.MUL, self.constant(0.5), b)
+        else:
+            b = self.emit(sizes[0])[0]
+            change, jump = self.along(self.changes, operand), self.along(self.jumps, operand)
+            out, moved, gain = self._turning(name == 'play', a, b, change, jump)
+        if self.symbols is self.jumps:
+            return out, None
+        if self.symbols is self.changes:
+            return out, moved
+        return out, self._times(gain, da)
+
+    def _turning(
+        self, plays: bool, a: int, b: int, change: int | None, jump: int | None
+    ) -> tuple[int, int, int]:
+        """Play or a rate limit, before a jump and after it: mean, change, share that follows."""
+        op = m.PLAY if plays else m.LIMIT
+        kept = self._keep(op, a, b)
+        if not plays:  # times no time it must be a number
+            b = self.do(m.MUL, self.do(m.MIN, b, self.constant(_FASTEST)), m.STEP)
+        rise = self.constant(0.0) if change is None else change
+        if jump is None:
+            out = self.do(op, a, b, rise, kept)
+            return out, out + 1, out + 2
+        after = m.SHARE
+        before = self.do(m.SUB, self.constant(1.0), after)
+        apart = self.do(m.ADD, jump, self.do(m.MUL, self.constant(0.5), rise))
+        first = self.do(m.SUB, a, self.do(m.MUL, after, apart))
+        found = []
+        for at, share in ((first, before), (self.do(m.ADD, first, apart), after)):
+            most = b if plays else self.do(m.MUL, b, share)
+            out = self.do(op, at, most, self.do(m.MUL, rise, share), kept)
+            found.append((self.do(m.MUL, share, out), out + 1, self.do(m.MUL, share, out + 2)))
+        mean, moved, gain = (self.do(m.ADD, *both) for both in zip(*found, strict=True))
+        return mean, moved, gain

@@ -20,17 +20,20 @@ from actuator_glue.jit import njit
 from actuator_glue.records import Array
 
 COPY, ADD, SUB, MUL, DIV, NEG, ABS, SIGN, SQRT, EXP, LOG, SIN, COS, TANH, ATAN, POW = range(16)
-MIN, MAX, LESS, EQUAL, EDGE, SELECT, LAG, INTEGRAL, PLAY, LIMIT = range(16, 26)
+MIN, MAX, LESS, SELECT, LAG, INTEGRAL, PLAY, LIMIT = range(16, 24)
 # Fixed registers: what moves, what of it changes with the increment dx, what holds. A part leaves
 # its signal, and d/d(dx) of it, where it has found them. NONE stands for no operand.
 NONE, T, U, E, Q, F, X, V, Y, D_E, D_Q, D_F, ORIGIN, STEP, D_V_MIDDLE, D_V_END = range(16)
 BETA_1, ALPHA_1_BETA_0, ALPHA_2, ALPHA_3, K = range(16, 21)
-FIXED: Final = 21
+# By how much signals change over the step, beside the jump of a held command, and the share of the
+# step behind that.
+CHANGE_U, CHANGE_X, CHANGE_F, CHANGE_Q, JUMP, SHARE = range(21, 27)
+FIXED: Final = 27
 # The parts of a program, and what the compiled step is told (`Parts`): where the code of each is,
 # 0 if it has none; Newton steps at most of the balance of forces; which of `NEEDS` it reads.
 PREPARE, COMMAND, VALVE, FLOW, FORCE, SENSOR, BALANCE, TIMES, NEEDS = range(9)
-NEEDS_T, NEEDS_U, NEEDS_E, NEEDS_Q, NEEDS_F, NEEDS_X, NEEDS_V, NEEDS_FLOW = (
-    1 << i for i in range(8)
+NEEDS_T, NEEDS_U, NEEDS_E, NEEDS_Q, NEEDS_F, NEEDS_X, NEEDS_V, NEEDS_FLOW, NEEDS_CHANGE = (
+    1 << i for i in range(9)
 )
 NEEDS_VALVE: Final = NEEDS_E | NEEDS_FLOW
 
@@ -38,7 +41,7 @@ Parts = NDArray[Any]
 
 
 class Instruction(NamedTuple):
-    """One operation on registers."""
+    """One operation on registers; what has a memory leaves two more behind its result."""
 
     operation: int
     result: int

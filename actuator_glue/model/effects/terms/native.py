@@ -98,8 +98,9 @@ class _Writer:
             else:
                 kept = remembered(step.operation, a, self._read(step.memory))
                 made = REMEMBERING[step.operation](a, b, c, kept)
-                self._known[step.result], after = made
-                self._store(step.memory, after)
+                rows = step.result, step.memory, step.result + 1, step.result + 2
+                self._known.update(zip(rows, made, strict=True))
+                self._store(step.memory, made[1])
         for row, value in [(row, self._read(held)) for row, held in part.left]:
             self._store(row, value)
         code, after = self._code, self._code.add(self._lane, _INDEX(WIDE))

@@ -12,6 +12,8 @@ from typing import Final
 from actuator_glue.model.effects.terms import machine as m
 from actuator_glue.model.effects.terms.lanes import WHOLE, LaneNumbers
 
+# Of what remembers, see REMEMBERING.
+Remembered = tuple[LaneNumbers, LaneNumbers, LaneNumbers, LaneNumbers]
 # Of the Taylor series of exp(r) - 1 and sin(a), with what the first leaves out at ln(2)/2 below
 # rounding, and the second at a quarter turn.
 _EXPM1: Final = [1.0 / math.factorial(n) for n in range(1, 14)]
@@ -93,45 +95,59 @@ PURE: Final[dict[int, Callable[[LaneNumbers, LaneNumbers, LaneNumbers], LaneNumb
     m.MIN: lambda a, b, _: ((a < b) | a.differs(a)).choose(a, b),
     m.MAX: lambda a, b, _: ((a > b) | a.differs(a)).choose(a, b),
     m.LESS: lambda a, b, _: (a < b).choose(1.0, 0.0),
-    m.EQUAL: lambda a, b, _: a.equals(b).choose(1.0, 0.0),
-    # Whether play drags.
-    m.EDGE: lambda a, b, c: (abs(a - b) >= c * (1.0 - 1e-9)).choose(1.0, 0.0),
     m.SELECT: lambda a, b, c: c.differs(0.0).choose(a, b),
 }
 
 
-def _lag(
-    a: LaneNumbers, b: LaneNumbers, c: LaneNumbers, kept: LaneNumbers
-) -> tuple[LaneNumbers, LaneNumbers]:
+def _lag(a: LaneNumbers, b: LaneNumbers, c: LaneNumbers, kept: LaneNumbers) -> Remembered:
     """Of a value held over the step: mean, and what it ends with."""
-    return a + (kept - a) * c, a + (kept - a) * b
+    end = a + (kept - a) * b
+    return a + (kept - a) * c, end, end - kept, b
 
 
-def _integral(
-    a: LaneNumbers, b: LaneNumbers, _: LaneNumbers, kept: LaneNumbers
-) -> tuple[LaneNumbers, LaneNumbers]:
-    return kept + 0.5 * b * a, kept + b * a
+def _integral(a: LaneNumbers, b: LaneNumbers, _: LaneNumbers, kept: LaneNumbers) -> Remembered:
+    return kept + 0.5 * b * a, kept + b * a, b * a, b
 
 
-def _play(
-    a: LaneNumbers, b: LaneNumbers, _: LaneNumbers, kept: LaneNumbers
-) -> tuple[LaneNumbers, LaneNumbers]:
-    low, high = a - b, a + b
+def _dragged(kept: LaneNumbers, at: LaneNumbers, half: LaneNumbers) -> LaneNumbers:
+    low, high = at - half, at + half
     kept = (low > kept).choose(low, kept)
-    kept = (high < kept).choose(high, kept)
-    return kept, kept
+    return (high < kept).choose(high, kept)
 
 
-def _limit(
-    a: LaneNumbers, b: LaneNumbers, _: LaneNumbers, kept: LaneNumbers
-) -> tuple[LaneNumbers, LaneNumbers]:
-    change = a - kept
-    kept = (abs(change) <= b).choose(a, kept + b.call('copysign', change))
-    return kept, kept
+def _play(a: LaneNumbers, b: LaneNumbers, c: LaneNumbers, kept: LaneNumbers) -> Remembered:
+    """Of a line of mean a that rises by c: it drags from its end backwards, if it does."""
+    last = a + 0.5 * c
+    begin = _dragged(kept, a - 0.5 * c, b)
+    end = _dragged(begin, last, b)
+    moved, way = end - begin, abs(c)
+    touches = (abs(last - end) >= b * (1.0 - 1e-9)).choose(1.0, 0.0)
+    share = (abs(moved) < way).choose(abs(moved) / way, (way > 0.0).choose(1.0, touches))
+    return begin + 0.5 * moved * share, end, moved, share
 
 
-# Result, and what is remembered, from operands and what was.
-REMEMBERING: Final = {m.LAG: _lag, m.INTEGRAL: _integral, m.PLAY: _play, m.LIMIT: _limit}
+def _limit(a: LaneNumbers, b: LaneNumbers, c: LaneNumbers, kept: LaneNumbers) -> Remembered:
+    """Of a line of mean a that rises by c, by at most b: as fast as it may until it is caught.
+
+    The mean is that of the line less the two triangles by which it is missed.
+    """
+    last, gap = a + 0.5 * c, a - 0.5 * c - kept
+    closing = b - (gap < 0.0).choose(-c, c)
+    caught, slow = abs(gap) < closing, abs(c) <= b
+    before = caught.choose(abs(gap) / closing, 1.0)
+    after = 1.0 - before
+    left = slow.choose(last, last - after * (c - b.call('copysign', c)))
+    end = caught.choose(left, kept + b.call('copysign', gap))
+    missed = before * gap + caught.choose(after, 1.0) * (last - end)
+    share = slow.choose(caught.choose(after, 0.0), 0.0)
+    return a - 0.5 * missed, end, end - kept, share
+
+
+# Result, what is remembered, by how much the result changes over the step without leaps, and (of
+# play and limit) the share of the step, its last, in which it follows; from operands and what was.
+REMEMBERING: Final[
+    dict[int, Callable[[LaneNumbers, LaneNumbers, LaneNumbers, LaneNumbers], Remembered]]
+] = {m.LAG: _lag, m.INTEGRAL: _integral, m.PLAY: _play, m.LIMIT: _limit}
 
 
 def remembered(operation: int, a: LaneNumbers, kept: LaneNumbers) -> LaneNumbers:

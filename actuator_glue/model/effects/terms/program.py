@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from actuator_glue.model.effects import layout as r
 from actuator_glue.model.effects.balance import MOST
+from actuator_glue.model.effects.terms import changes
 from actuator_glue.model.effects.terms import machine as m
 from actuator_glue.model.effects.terms.expression import SIGNAL, Expression
 from actuator_glue.model.effects.terms.instructions import Dual, Emitter
@@ -106,6 +107,8 @@ class Program:
         """What the compiled step is told, see machine.PREPARE; valid as long as the program."""
         needs = m.NEEDS_E * self.acts(m.COMMAND, m.VALVE)
         needs |= m.NEEDS_FLOW * self.acts(m.FLOW, m.FLOW)
+        moved = range(m.CHANGE_U, m.SHARE + 1)
+        needs |= m.NEEDS_CHANGE * any(part.reads(row) for part in self.code for row in moved)
         for flag, row, first, last in _NEEDS:
             needs |= flag * any(part.reads(row) for part in self.code[first : last + 1])
         return np.array([*self._native.addresses, self.times, needs])
@@ -141,7 +144,8 @@ class Program:
 
 def compiled(effects: Iterable[Written]) -> Program:
     """Return the program of some effects."""
-    builder, written = _Builder(), tuple(effects)
+    written = tuple(effects)
+    builder = _Builder(changes.asked([e.expression.tree for e in written]))
     for places in _PARTS:
         here = (e for place in places for e in written if e.expression.place == place)
         builder.part(SIGNAL[places[0]], here)
@@ -150,7 +154,7 @@ def compiled(effects: Iterable[Written]) -> Program:
 
 
 class _Builder:
-    def __init__(self) -> None:
+    def __init__(self, moves: bool) -> None:
         self._emitter = Emitter({m.STEP, m.D_V_MIDDLE, m.D_V_END, *_HOLDS.values()})
         self._parameters: dict[str, int] = {}
         self._switches: list[tuple[int, tuple[str, ...], tuple[float, ...]]] = []
@@ -161,15 +165,17 @@ class _Builder:
             **_SIGNALS,
             'e': (m.E, self._emitter.constant(_E_SLOPE)),
         }
+        self._changes = changes.Changes(self._emitter, moves)
 
     def part(self, signal: str, effects: Iterable[Written]) -> None:
         """Add a part; every effect takes the signal that the one before has made."""
         self._emitter.code = []
         before = self._signals[signal]
+        self._changes.begin(signal)
         for effect in effects:
             self._add(effect)
         (value, slope), (to, slope_to) = self._signals[signal], _SIGNALS[signal]
-        left = []
+        left = self._changes.left() if signal == 'u' else []
         if value != before[0]:
             left.append((to, value))
         if slope is not None and slope_to is not None and slope != before[1]:
@@ -223,12 +229,14 @@ class _Builder:
             **{s: (at, d if s in followed else None) for s, (at, d) in self._signals.items()},
             **{name: (self._parameters[name], None) for name in names},
         }
+        self._changes.follow(into.symbols)
         signal = SIGNAL[place]
         before, slope_before = into.symbols[signal]
         used = effect.expression.tree.words()
         after, slope = into.emit(effect.expression.tree)
         if slope_before is not None and slope is None:
             slope = into.constant(0.0)
+        on = 0
         if not effect.expression.exact:
             on = into.row(held=True)
             off = tuple(float(p.neutral or 0.0) for p in effect.parameters)
@@ -237,6 +245,7 @@ class _Builder:
             if slope is not None and slope_before is not None:
                 slope = into.do(m.SELECT, slope, slope_before, on)
         self._signals[signal] = after, slope
+        self._changes.passed(effect.expression, on)
         if place in ('specimen', 'piston'):
             # One Newton step where a force bends slowly, as for a hardening specimen.
             bends = 'v' in used or used & _KINKS

@@ -17,11 +17,14 @@ from actuator_glue.records import Array
 # The number of lanes is taken from the table: as a constant it would have short loops unrolled
 # before they can become vector code.
 @njit
-def middle(w: Array, g: Array, parts: m.Parts, mean: float, rate: float, time: float) -> None:
+def middle(
+    w: Array, g: Array, parts: m.Parts, mean: float, slope: float, rate: float, time: float
+) -> None:
     """Write what moves in the middle of the step, as far as it is read.
 
     The step is not known yet; all is taken as if the piston went on as before, and linear in
-    what it does otherwise. `mean` and `time` as in `stages.valve` and `stages.flow`.
+    what it does otherwise. `mean` and `time` as in `stages.valve` and `stages.flow`, `slope` as
+    in `stages.chains`.
     """
     lanes, needs, half, inverse = g.shape[1], parts[m.NEEDS], 0.5 * rate, 1.0 / rate
     if needs & m.NEEDS_T:
@@ -42,6 +45,15 @@ def middle(w: Array, g: Array, parts: m.Parts, mean: float, rate: float, time: f
     if needs & m.NEEDS_U:
         for n in range(lanes):
             g[m.U, n] = w[r.GAIN + n] * (mean + w[r.IN_MEAN + n])
+    if needs & m.NEEDS_CHANGE:
+        for n in range(lanes):
+            gain, share, jump = w[r.GAIN + n], w[r.IN_SHARE + n], w[r.IN_JUMP + n]
+            g[m.SHARE, n] = share
+            g[m.JUMP, n] = gain * jump if share > 0.0 else 0.0
+            # The ramp of a jump's first moment is none.
+            ramp = slope + w[r.IN_SLOPE + n] - 6.0 * jump * share * (1.0 - share)
+            g[m.CHANGE_U, n] = gain * ramp
+            g[m.CHANGE_X, n], g[m.CHANGE_F, n] = w[r.DX + n], w[r.DF + n]
 
 
 @njit
@@ -83,6 +95,9 @@ def flow(w: Array, g: Array, parts: m.Parts, rate: float, acted: bool) -> None:
     """
     lanes = g.shape[1]
     if parts[m.FLOW]:
+        if parts[m.NEEDS] & m.NEEDS_CHANGE:
+            for n in range(lanes):
+                g[m.CHANGE_Q, n] = 2.0 * (w[r.IN_Q + n] - w[r.Q + n])
         if acted:
             for n in range(lanes):
                 g[m.Q, n], g[m.D_Q, n] = w[r.IN_FLOW + n], w[r.IN_DFLOW + n]
@@ -106,12 +121,13 @@ def before_the_oil(
     parts: m.Parts,
     on: NDArray[np.bool_],
     mean: float,
+    slope: float,
     rate: float,
     time: float,
 ) -> bool:
     """Write all up to the flow into the cylinder; return whether anything acts on that."""
     flows = on[r.ON_FLOW]
-    middle(w, g, parts, mean, rate, time)
+    middle(w, g, parts, mean, slope, rate, time)
     if not (flows or parts[m.NEEDS] & m.NEEDS_VALVE):
         return False
     valve(w, g, parts, mean, rate)
