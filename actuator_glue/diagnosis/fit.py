@@ -7,7 +7,7 @@ each step scaled by its own curvature (Marquardt 1963), so units do not matter.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -33,12 +33,14 @@ class Fit:
         error: target minus simulation at the counted samples, (N,) [m].
         jacobian: derivative of the simulation to the working coordinates, (p, N).
         z: the working coordinates of `theta`, (p,).
+        room: how far their bounds let them move down and up, (2, p); empty for freely.
     """
 
     theta: Array
     error: Array
     jacobian: Array
     z: Array
+    room: Array = field(default_factory=lambda: np.empty((2, 0)))
 
     @property
     def rms(self) -> float:
@@ -249,7 +251,8 @@ def fit(
     if final is None:
         final = jacobian(data, model, space, z[best : best + 1], output[best : best + 1])[0]
     # Copies: views would keep what all starts left.
-    return Fit(space.theta(z[best]), error[best].copy(), final.copy(), z[best].copy())
+    room = np.stack([space.lower, space.upper]) - z[best]
+    return Fit(space.theta(z[best]), error[best].copy(), final.copy(), z[best].copy(), room)
 
 
 def _tried(data: Data, model: Model, space: Space, tries: Array) -> tuple[Array, Array | None]:

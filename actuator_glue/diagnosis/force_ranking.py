@@ -14,11 +14,11 @@ from dataclasses import dataclass, replace
 
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.finding import Rival
-from actuator_glue.diagnosis.fit import fit, rms
+from actuator_glue.diagnosis.fit import Fit, fit, rms
 from actuator_glue.diagnosis.force import newtons_per_metre, with_forces
 from actuator_glue.diagnosis.model_selection import Selection
 from actuator_glue.diagnosis.ranking import compare, worth
-from actuator_glue.diagnosis.score import Scorer, evidence, splits_of
+from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.search import Search, Trial
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.model.effects import Effect
@@ -74,7 +74,7 @@ def _ranked(
 
         tried = list(search.each(refitted, tried))
         best = min(tried[1:], key=lambda t: t.fit.rms)
-    scorer = Scorer.of(both, splits_of(both, best.fit.error))
+    scorer = _scorer(both, best.fit, settings)
     alone, *trials = (replace(t, scores=scorer.block_scores(t.fit)) for t in tried)
     trials.sort(key=lambda t: -float(t.scores.sum()))
     rivals = compare(alone, trials[0], trials[0].added, trials[1:], scorer, settings)
@@ -82,6 +82,13 @@ def _ranked(
     force = slice(search.data.target.size, None)
     errors = {t.added: size * rms(t.fit.error[force]) for t in trials}
     return Ranked(tuple(trials), rivals, errors)
+
+
+def _scorer(both: Data, found: Fit, settings: Thresholds) -> Scorer:
+    """Take the noise of both channels from what a structure leaves of them."""
+    splits = splits_of(both, found.error)
+    left, noise = pooled(both, splits)
+    return replace(Scorer.of(both, splits), likely=left < settings.noise_share * noise)
 
 
 def _swapped(search: Search, found: Selection, name: str, ranked: Ranked) -> Selection:
@@ -131,7 +138,7 @@ def _unseen(search: Search, found: Selection, settings: Thresholds) -> tuple[str
 
     best = min(search.each(added, names), key=lambda t: t.fit.rms)
     with_it = fit(both, best.structure, best.fit.theta)
-    scorer = Scorer.of(both, splits_of(both, with_it.error))
+    scorer = _scorer(both, with_it, settings)
     nats = evidence(scorer.block_scores(with_it), scorer.block_scores(without))
     size = newtons_per_metre(both)
     before, after = (size * rms(f.error[count:]) for f in (without, with_it))

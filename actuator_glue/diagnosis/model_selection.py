@@ -71,12 +71,13 @@ class ModelSelection:
         """Take the noise from the residual of a structure (first: of the base)."""
         fit = error_of.fit if error_of else self.search.base()
         parts = splits_of(self.search.data, fit.error)
-        self.search.scorer = Scorer.of(self.search.data, parts)
+        self.search.scorer = scorer = Scorer.of(self.search.data, parts)
         left, self.noise = self._apart(fit)
         self.first = self.first or left
         stroke = self.search.scale().stroke
         s = self.settings
         self.material = max(s.noise_share * self.noise, s.stroke_share * stroke)
+        self.search.scorer = replace(scorer, likely=left < self.material)
 
     def left(self, trial: Trial) -> float:
         """Rms structure that remains in the residual of a structure [m]."""

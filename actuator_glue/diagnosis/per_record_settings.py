@@ -113,7 +113,7 @@ def setting(
         left, noise = pooled(data, parts)
         if left > limit or removed(start, best) < found.material:
             continue
-        search.scorer = Scorer.of(data, parts)
+        search.scorer = replace(Scorer.of(data, parts), likely=left < found.material)
         tried, start = [_rescored(search, t) for t in tried], search.trial(effects)
         common = search.trial(found.final.effects)
         cost = len(best.fit.theta) - len(start.fit.theta) + float(np.log(len(tried)))

@@ -160,10 +160,14 @@ def _limit(trial: Trial, name: str, scorer: Scorer) -> tuple[str, float] | None:
     at = next(i for i, p in enumerate(trial.model.parameters) if p.name == parameter)
     bounds = trial.model.parameters[at]
     jac, error = scorer.whiten(trial.fit.jacobian), scorer.whiten(trial.fit.error)
+    move = np.zeros(len(jac))
+    if scorer.likely:
+        move = scorer.moves(trial.fit, error, jac, (slice(0),))[0]
+        error = error - move @ jac
     scale = np.sqrt(np.maximum(np.einsum('pn,pn->p', jac, jac), 1e-300))
     jac /= scale[:, None]
     inverse = np.linalg.pinv(jac @ jac.T, rcond=1e-10, hermitian=True)
     spread = _NORMAL_95 * float(np.sqrt(inflation(error) * inverse[at, at])) / float(scale[at])
-    fitted = float(trial.fit.theta[at])
+    fitted = float(trial.fit.theta[at] + move[at])
     limit = fitted + spread if fitted >= value else fitted - spread
     return parameter, float(np.clip(limit, bounds.lower, bounds.upper))

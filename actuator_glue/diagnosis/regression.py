@@ -226,7 +226,7 @@ def _regressed(
     scale = np.sqrt(np.einsum('pn,pn->p', white, white))
     scale = np.where(scale > 0.0, scale, 1.0)
     weights, *_ = np.linalg.lstsq((white / scale[:, None]).T, error, rcond=1e-10)
-    left = Fit(fit.theta, fit.error - (weights / scale) @ raw, raw, fit.z)
+    left = Fit(fit.theta, fit.error - (weights / scale) @ raw, raw, fit.z, fit.room)
     return left, chosen, len(names)
 
 

@@ -1,13 +1,15 @@
 """Out-of-sample evidence of refitted structures, in nats of independent samples.
 
 The residual is whitened by its own noise density, so that a coloured background does not count
-twice. Each block is scored with parameters fitted without it: for least squares that refit is
-the influence formula d = (J J' - J_b J_b')^-1 J_b e_b, exact where the model is linear in its
-parameters (Cook 1977).
+twice. Each block is scored with parameters fitted without it: d = (J J' - J_b J_b')^-1
+(J e - J_b e_b) away from the fit, exact where the model is linear in its parameters (Cook 1977,
+for a fit that is itself the optimum: J e = 0). Where only noise is left, e and J are whitened:
+these are the optimum and the covariance of the likelihood that is sampled (posterior.py).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -30,11 +32,14 @@ class Scorer:
         data: the counted samples.
         taps: whitening filter of each record.
         blocks: slices of the joined vectors.
+        likely: whether blocks are scored under the parameters that are most likely without them:
+            where only noise is left. Beside misfit those of least squares are nearer in the error.
     """
 
     data: Data
     taps: tuple[Array, ...]
     blocks: tuple[slice, ...]
+    likely: bool = True
 
     @classmethod
     def of(cls, data: Data, splits: list[Split], *, misfit: bool = False) -> Scorer:
@@ -47,7 +52,7 @@ class Scorer:
             count = max(2, round(size * period / BLOCK))
             edges = part.start + np.linspace(0, size, count + 1).astype(int)
             blocks += [slice(int(a), int(b)) for a, b in pairwise(edges)]
-        return cls(data, tuple(whitener([s]) for s in splits), tuple(blocks))
+        return cls(data, tuple(whitener([s]) for s in splits), tuple(blocks), not misfit)
 
     def of_part(self, part: Part) -> Scorer:
         """Return the same noise for a part of the data, which has no blocks."""
@@ -65,42 +70,79 @@ class Scorer:
     def block_scores(self, fit: Fit) -> Array:
         """Log density of each block under parameters fitted without it (B,), up to a constant."""
         error, jac = self.whiten(fit.error), self.whiten(fit.jacobian)
-        scale = np.sqrt(np.einsum('pn,pn->p', jac, jac))
-        jac = jac[scale > 0] / scale[scale > 0, None]
+        fitted = (error, jac) if self.likely else _plain(fit)
         out = np.empty(len(self.blocks))
-        for i, (block, shift) in enumerate(
-            zip(self.blocks, self._shifts(error, jac), strict=True)
-        ):
-            e = error[block]
-            predicted = e + jac[:, block].T @ shift
+        for i, move in enumerate(self.moves(fit, *fitted, self.blocks)):
+            e = error[self.blocks[i]]
+            left = e - move @ jac[:, self.blocks[i]]
             # A block that alone fixes a parameter must not explode: it is scored as fitted.
-            worst = 4.0 * float(e @ e) + 8.0
-            out[i] = -0.5 * min(float(predicted @ predicted), worst)
+            out[i] = -0.5 * min(float(left @ left), 4.0 * float(e @ e) + 8.0)
         return out
 
     def left_out_error(self, fit: Fit) -> float:
-        """Rms error of all blocks, each under parameters fitted without it [m]."""
-        error, jac = self.whiten(fit.error), self.whiten(fit.jacobian)
-        scale = np.sqrt(np.einsum('pn,pn->p', jac, jac))
-        known = scale > 0
-        jac, raw = jac[known] / scale[known, None], fit.jacobian[known] / scale[known, None]
-        total = 0.0
-        for block, shift in zip(self.blocks, self._shifts(error, jac), strict=True):
-            e = fit.error[block]
-            predicted = e + raw[:, block].T @ shift
-            total += min(float(predicted @ predicted), 4.0 * float(e @ e))
-        return float(np.sqrt(total / len(error)))
+        """Rms error of all blocks, each under least-squares parameters fitted without it [m].
 
-    def _shifts(self, error: Array, jac: Array) -> list[Array]:
-        """What each block moves the parameters by (whitened rows of unit length)."""
-        normal = jac @ jac.T
-        # Prior of the shift, 30 of these nats wide: keeps directions no block fixes at rest.
-        ridge = 1e-3 * np.eye(len(jac))
-        out: list[Array] = []
-        for block in self.blocks:
+        What is compared in metres is fitted in metres, as the structures themselves are.
+        """
+        total, moves = 0.0, self.moves(fit, *_plain(fit), self.blocks)
+        for block, move in zip(self.blocks, moves, strict=True):
+            e = fit.error[block]
+            left = e - move @ fit.jacobian[:, block]
+            total += min(float(left @ left), 4.0 * float(e @ e))
+        return float(np.sqrt(total / len(fit.error)))
+
+    def moves(self, fit: Fit, error: Array, jac: Array, blocks: Sequence[slice]) -> Array:
+        """Return how far the optimum without each block is from a fit, (B, p), within the bounds.
+
+        Args:
+            fit: a structure.
+            error: its error, of unit variance, whose squares are least at the optimum (N,).
+            jac: derivatives of what is simulated, in the same units (p, N).
+            blocks: what is left out, one at a time.
+        """
+        scale = np.sqrt(np.einsum('pn,pn->p', jac, jac))
+        room = np.multiply([[-np.inf], [np.inf]], np.ones(len(jac)))
+        room[:, : fit.room.shape[1]] = fit.room
+        known = scale > 0
+        scale = scale[known]
+        jac, room = jac[known] / scale[:, None], room[:, known] * scale
+        # Prior of the move, 30 of these nats wide: keeps directions no block fixes at rest.
+        normal, pull = jac @ jac.T + 1e-3 * np.eye(len(jac)), jac @ error
+        if self.data.prior is not None:
+            size = np.sqrt(np.mean(error**2))
+            slopes = size * self.data.prior.slopes(len(known))[known] / scale[:, None]
+            normal += slopes @ slopes.T
+            pull -= slopes @ (size * self.data.prior.pull(fit.z))
+        normals, pulls = np.tile(normal, (len(blocks), 1, 1)), np.tile(pull, (len(blocks), 1))
+        for i, block in enumerate(blocks):
             j = jac[:, block]
-            out.append(np.asarray(np.linalg.solve(normal - j @ j.T + ridge, j @ error[block])))
+            normals[i] -= j @ j.T
+            pulls[i] -= j @ error[block]
+        steps = np.linalg.solve(normals, pulls[..., None])[..., 0]
+        for i in np.flatnonzero(((steps < room[0]) | (steps > room[1])).any(axis=1)):
+            steps[i] = _step(normals[i], pulls[i], room)
+        out = np.zeros((len(blocks), len(known)))
+        out[:, known] = steps / scale
         return out
+
+
+def _plain(fit: Fit) -> tuple[Array, Array]:
+    """Error (N,) and Jacobian (p, N) of least squares, in units of the error's rms."""
+    size = max(fit.rms, 1e-300)
+    return fit.error / size, fit.jacobian / size
+
+
+def _step(normal: Array, pull: Array, room: Array) -> Array:
+    """Return the Gauss-Newton step (p,); what would leave its room (2, p) stops at its end."""
+    step, free = np.zeros(len(pull)), np.ones(len(pull), dtype=np.bool_)
+    while free.any():
+        rest = pull - normal[:, ~free] @ step[~free]
+        step[free] = np.linalg.solve(normal[np.ix_(free, free)], rest[free])
+        out = free & ((step < room[0]) | (step > room[1]))
+        if not out.any():
+            break
+        step, free = np.clip(step, *room), free & ~out
+    return step
 
 
 def evidence(scores: Array, reference: Array) -> float:
