@@ -28,12 +28,18 @@ ENTRIES = dict(CATALOGUE) | {
 }
 
 
-def stationary(effects: tuple[str, ...], sizes: list[float], seed: int) -> Data:
-    """A random command between 0.1 and 7 Hz without and with a specimen, 10 um of noise."""
+def stationary(
+    effects: tuple[str, ...], sizes: list[float], seed: int, fading: float = 0.0
+) -> Data:
+    """A random command between 0.1 and 7 Hz without and with a specimen, 10 um of noise.
+
+    It may fade (1/s).
+    """
     rng, n, records = np.random.default_rng(seed), int(40 * RATE), []
     for k in (0.0, 250e3):
         sos = signal.butter(3, [0.1, 7.0], 'bandpass', fs=RATE, output='sos')
         u = signal.sosfilt(sos, rng.standard_normal(n)) * np.minimum(1.0, np.arange(n) / 256)
+        u *= np.exp(-fading * np.arange(n) / RATE)
         u *= 2e-3 / np.abs(u).max()
         y = Structure(effects).simulate(np.append(THETA, sizes), Record(u, u, 1 / RATE, k))
         records.append(Record(u, y + 1e-5 * rng.standard_normal(n), 1 / RATE, k))
@@ -182,6 +188,17 @@ def test_a_term_takes_no_place_of_what_has_a_name(
     both = trial(('flow-asymmetry', 'learned-valve-e2'), term)
     found = Displaced(term)
     assert learning._displaces(found, both, best) is displaces  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize('seed', [1, 2])
+def test_structure_under_a_shaking_that_fades_is_no_noise(seed: int) -> None:
+    """A dead zone of 30 um: the motion is told from noise, what it leaves is not (18.8 um)."""
+    found = selection(stationary(('valve-deadband',), [3e-5], seed, fading=0.08))
+    data, error = found.search.data, found.search.base().error
+    structure, noise = pooled(data, splits_of(data, data.target))
+    assert noise**2 < 0.3 * (structure**2 + noise**2)
+    assert pooled(data, splits_of(data, error))[1] > 1.8e-5
+    assert 0.97e-5 < found.noise < 1.2e-5
 
 
 def test_misfit_is_not_weighed_as_noise() -> None:
