@@ -178,7 +178,13 @@ def _proposals(jac: Array, error: Array, z: Array, damping: float, space: Space)
 
 
 def fit(
-    data: Data, model: Model, starts: Array, *, iterations: int = 25, tolerance: float = 1e-6
+    data: Data,
+    model: Model,
+    starts: Array,
+    *,
+    iterations: int = 25,
+    tolerance: float = 1e-6,
+    space: Space | None = None,
 ) -> Fit:
     """Refit all parameters of a structure by least squares on the free-run error.
 
@@ -190,11 +196,12 @@ def fit(
         starts: physical starting values, (p,) or (s, p).
         iterations: most Marquardt steps of each start.
         tolerance: relative decrease of the sum of squares below which a start is done.
+        space: coordinates, if not the working ones.
 
     Returns:
         The best of all starts.
     """
-    space = Space(model, max(r.duration for r in data.records))
+    space = space or Space(model, max(r.duration for r in data.records))
     z = space.z(np.atleast_2d(starts))
     found, ahead = _tried(data, model, space, z[:, None])
     output = found[:, 0]

@@ -158,7 +158,8 @@ class Search:
         poles = valves and self.entries[trial.added].group in _POLES
         factors = _VALVES if poles else _VALVES[:1]
         if self._polished.get(key, 0) < len(factors):
-            starts = np.tile(self._tried[key].theta, (len(factors), 1))
+            start = global_search.along_ridge(self.data, trial.structure, self._tried[key].theta)
+            starts = np.tile(start, (len(factors), 1))
             starts[:, :2] *= np.array(factors)[:, None]
             self._tried[key] = fit(self.data, trial.structure, starts)
             self._polished[key] = len(factors)
@@ -288,9 +289,8 @@ class Search:
         key = frozenset(effects)
         if (key, current.effects) not in self._descended:
             self._descended.add((key, current.effects))
-            names = {p.name for p in self.entries[name].parameters}
-            keep = np.array([p.name not in names for p in current.structure.parameters])
-            start = np.stack([current.fit.theta[keep], current.fit.theta[keep]])
+            kept = np.delete(current.fit.theta, current.structure.columns(name))
+            start = np.tile(kept, (2, 1))
             start[1, :_P] = self._tried[frozenset()].theta
             again = fit(self.data, self.structure(*effects), start)
             known = self._tried.get(key)
