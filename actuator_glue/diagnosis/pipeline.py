@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -34,9 +35,10 @@ Progress = Callable[[str, float], None]
 _SWAYING = 0.02
 
 
-def mean_effects() -> tuple[str, ...]:
+def mean_effects(reserved: bool = False) -> tuple[str, ...]:
     """Return the effects with a mean response; measurement.py and hum.py find the others."""
-    return tuple(n for n in CATALOGUE.searched() if CATALOGUE[n].variance is None and n != 'hum')
+    names = CATALOGUE.searched(reserved)
+    return tuple(n for n in names if CATALOGUE[n].variance is None and n != 'hum')
 
 
 @dataclass(frozen=True)
@@ -91,19 +93,46 @@ def _conclude(prepared: Prepared, settings: Thresholds, each: Each, tell: Progre
     line = hum.find(prepared.fit, search.base().error)
     if line is not None:
         search = Search(hum.without(prepared.fit, line), mean_effects(), each)
-    selection = ModelSelection(search, settings, tell)
-    named = selection.run()
-    if settings.use_force:
-        named, told = force_ranking.decided(search, named, settings)
-        prepared = replace(prepared, notes=(*told, *prepared.notes))
-    result = _conclusion(prepared, selection, named, line)
+    result = _searched(prepared, search, line, settings, tell)
+    if result.decision.verdict == 'unexplained':
+        result = _with_reserved(prepared, result, settings, tell)
     if result.decision.verdict != 'unexplained':
         return result
+    prepared, selection, search = result.prepared, result.selection, result.selection.search
     tell('one record', 0.0)
     limit = result.decision.limit
     found, held = result.found, prepared.held.records
     own = per_record_settings.setting(search, found, limit, held, settings)
     return result if own is None else _conclusion(prepared, selection, own, line)
+
+
+def _searched(
+    prepared: Prepared, search: Search, line: Line | None, settings: Thresholds, tell: Progress
+) -> Conclusion:
+    selection = ModelSelection(search, settings, tell)
+    named = selection.run()
+    if settings.use_force:
+        named, told = force_ranking.decided(search, named, settings)
+        prepared = replace(prepared, notes=(*told, *prepared.notes))
+    return _conclusion(prepared, selection, named, line)
+
+
+def _with_reserved(
+    prepared: Prepared, first: Conclusion, settings: Thresholds, tell: Progress
+) -> Conclusion:
+    """Search again with the effects that are reserved for what all others leave.
+
+    Taken where one of them stays, and the answer is better beyond chance and by a material error.
+    """
+    reserved = mean_effects(reserved=True)
+    search = first.selection.search.wider(reserved)
+    second = _searched(prepared, search, first.line, settings, tell)
+    before, after = first.found.final, second.found.final
+    before = replace(before, scores=second.scorer.block_scores(before.fit))
+    found = set(after.effects) & set(reserved)
+    cost = math.log(len(reserved))
+    worth = second.selection.better(after, before, second.found.material, cost)
+    return second if found and worth else first
 
 
 def since_onset(first: Conclusion, settings: Thresholds, each: Each, tell: Progress) -> Conclusion:

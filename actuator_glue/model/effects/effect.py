@@ -96,6 +96,7 @@ class Effect:
         expression: what it does to the signal of its place, where the compiled step has no stage
             of its own for it (see terms.term).
         searched: whether the diagnosis tries it.
+        reserved: it is tried only where all others leave material structure.
         holds: the effect of which it is a richer form, and the parameter and its value at which
             it is that effect.
         record_time: its time counts from a record's first sample, wherever in the test that lies:
@@ -118,6 +119,7 @@ class Effect:
     variance: Variance | None = None
     expression: Expression | None = None
     searched: bool = True
+    reserved: bool = False
     holds: tuple[str, str, float] | None = None
     record_time: bool = False
 

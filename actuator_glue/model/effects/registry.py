@@ -104,6 +104,6 @@ class Registry(dict[str, Effect]):
         """Return the effects beyond the catalogue, which other processes must be told of."""
         return tuple(effect for name, effect in self.items() if name not in self._own)
 
-    def searched(self) -> tuple[str, ...]:
-        """Return the effects that the diagnosis tries."""
-        return tuple(name for name, effect in self.items() if effect.searched)
+    def searched(self, reserved: bool = False) -> tuple[str, ...]:
+        """Return the effects that the diagnosis always tries, or those that it reserves."""
+        return tuple(n for n, e in self.items() if e.searched and e.reserved == reserved)

@@ -18,6 +18,9 @@ WW, WV, VW, VV, COMPLIANCE, LATE, SEEN, RATE = r.ROWS.take(8)
 # Its motion and velocity; the force at the beginning of the step, and by how much it was moved.
 W, VELOCITY, BEFORE, SHIFT = r.ROWS.take(4)
 
+# Hz, a few widths of a peak apart: a fit does not move a mode further than that.
+_SEEN_AT = tuple(5.0 * 1.3**i for i in range(10))
+
 
 @njit
 def _fill(w: Array, n: int, p: Any, case: Case) -> None:
@@ -95,9 +98,9 @@ EFFECT = Effect(
     source='Dyke et al. 1995 (structures the actuator reacts against)',
     starts=lambda s: tuple(
         (min(0.05 / max(s.stiffness, 0.1 * s.oil), 1e-5), hz, 0.05, seen)
-        for hz in (8.0, 14.0, 25.0, 50.0)
+        for hz in _SEEN_AT
         for seen in (0.0, 1.0)
     ),
-    searched=False,  # seldom within reach, and its intervals are too narrow (docs/diagnosis.md)
+    reserved=True,  # seldom within reach (docs/diagnosis.md)
     stage=Stage(_fill, beyond=_beyond, sensed=_sensed, shared=(r.ON_BEYOND,)),
 )
