@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.model_selection import ModelSelection
+from actuator_glue.diagnosis.pipeline import mean_effects
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.model.structure import Structure
@@ -37,3 +39,17 @@ def test_a_mode_has_its_name(effect: str, sizes: list[float], rng_seed: int) -> 
     assert found.final.effects == (effect,)
     assert found.final.fit.rms < 1.1 * NOISE
     assert [r.name for r in found.rivals[effect] if r.tied and len(r.effects) == 1] == [effect]
+
+
+def test_a_mode_is_tried_where_all_other_effects_leave_something(rng_seed: int) -> None:
+    """And stays; what rings on in the residual of Eq. (2) is not taken for hum."""
+    assert 'frame-mode' not in mean_effects()
+    rng = np.random.default_rng(rng_seed)
+    sizes = [4e-7, rng.uniform(6.0, 9.0), 0.03, 0.0]
+    still = Record(SWEEP, SWEEP, 1.0 / RATE, 250e3)
+    moved = Structure(('frame-mode',)).simulate([*THETA, *sizes], still)
+    measured = moved + 10e-6 * rng.standard_normal(len(T))
+    found = diagnose([replace(still, measured=measured)], settings=Thresholds(evaluations=0))
+    assert [e.name for e in found.effects] == ['frame-mode']
+    assert found.verdict == 'missing-effect'
+    assert found.error.after < 12e-6 < found.error.before

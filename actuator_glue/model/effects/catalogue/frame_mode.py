@@ -81,7 +81,7 @@ EFFECT = Effect(
         "w''/omega^2 + 2 zeta w'/omega + w = c f"
     ),
     parameters=(
-        Parameter('frame_compliance', 'm/N', 0.0, 1e-5, 'static compliance of the frame', 0.0),
+        Parameter('frame_compliance', 'm/N', 0.0, 2e-6, 'static compliance of the frame', 0.0),
         Parameter('frame_frequency', 'Hz', 3.0, 100.0, 'natural frequency of the frame', 25.0),
         Parameter('frame_damping', '1', 0.002, 0.5, 'damping ratio of the frame', 0.03),
         Parameter(
@@ -97,7 +97,7 @@ EFFECT = Effect(
     signature='linear; pole and zero close together at the mode of the frame',
     source='Dyke et al. 1995 (structures the actuator reacts against)',
     starts=lambda s: tuple(
-        (min(0.05 / max(s.stiffness, 0.1 * s.oil), 1e-5), hz, 0.05, seen)
+        (min(0.05 / max(s.stiffness, 0.1 * s.oil), 2e-6), hz, 0.05, seen)
         for hz in _SEEN_AT
         for seen in (0.0, 1.0)
     ),
