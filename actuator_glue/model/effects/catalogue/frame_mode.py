@@ -18,8 +18,8 @@ WW, WV, VW, VV, COMPLIANCE, LATE, SEEN, RATE = r.ROWS.take(8)
 # Its motion and velocity; the force at the beginning of the step, and by how much it was moved.
 W, VELOCITY, BEFORE, SHIFT = r.ROWS.take(4)
 
-# Hz, a few widths of a peak apart: a fit does not move a mode further than that.
-_SEEN_AT = tuple(5.0 * 1.3**i for i in range(10))
+# Hz, to the width of a peak apart: a fit does not move a mode much further.
+_SEEN_AT = tuple(5.0 * 1.15**i for i in range(16))
 
 
 @njit
