@@ -14,14 +14,13 @@ from actuator_glue.diagnosis.homogeneity import Homogeneity
 from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.model_selection import Selection
 from actuator_glue.diagnosis.next_experiment import Experiment
+from actuator_glue.diagnosis.posterior import UNMET
 from actuator_glue.diagnosis.regression import Surrogate
 from actuator_glue.diagnosis.result import HeldOutError
 from actuator_glue.diagnosis.verdict import excused, misses
 from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.model.effects import CATALOGUE
 
-# Above this a posterior's spread may be off by a tenth and more.
-_CONVERGED = 1.2
 _TELLING = 4.0  # nats, as where names count as tied
 
 
@@ -155,11 +154,11 @@ def unidentified(data: Data, estimates: dict[str, Estimate]) -> tuple[str, ...]:
 
 def unconverged(rhat: float) -> tuple[str, ...]:
     """Say so where the chains of the posterior have not met; NaN says nothing."""
-    if not rhat > _CONVERGED:
+    if not rhat > UNMET:
         return ()
     return (
-        f'the chains of the posterior have not met (R-hat {rhat:.2f}): its spreads are rough, its '
-        'names and errors do not depend on them',
+        f'the chains of the posterior have not met (R-hat {rhat:.2f}): sizes that they differ '
+        'about are told as not identified, names and errors do not depend on them',
     )
 
 

@@ -121,7 +121,9 @@ def diagnose(
     space = Space(after.model, max(r.duration for r in data.records))
     others = alternatives.alternatives(result)
     mixed = alternatives.mixed(after.draws, final, others, lambda trial: sample(trial).points, rng)
-    estimates, held_at = _estimates(space, replace(after, draws=mixed)), _pressed(space, after)
+    unmet = draws.unmet if final.effects else ()
+    estimates = _estimates(space, replace(after, draws=mixed), unmet)
+    held_at = _pressed(space, after)
     plain = Space(before.model, max(r.duration for r in data.records))
     experiments = _experiments(result, [trial for trial, _ in others])
     sizes = result.selection.search.scale()
@@ -218,12 +220,15 @@ def _pressed(space: Space, side: Side) -> tuple[Pressed, ...]:
     return tuple(out)
 
 
-def _estimates(space: Space, side: Side) -> dict[str, Estimate]:
+def _estimates(space: Space, side: Side, unmet: Sequence[bool] = ()) -> dict[str, Estimate]:
+    """Return what is known of each parameter; of one that chains differ about, its bounds."""
     out = {}
     lower, upper = space.theta(space.lower), space.theta(space.upper)
     known = posterior.identified(space, side.draws)
     for i, (parameter, column) in enumerate(zip(side.model.parameters, side.draws.T, strict=True)):
         low, high = np.quantile(column, [0.025, 0.975])
+        if any(unmet[i : i + 1]):
+            known[i], low, high = False, lower[i], upper[i]
         out[parameter.name] = Estimate(
             float(column.mean()), float(column.std(ddof=1)), float(low), float(high),
             parameter.unit, parameter.neutral, bool(known[i]), (float(lower[i]), float(upper[i])),

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from copy import copy
+from dataclasses import dataclass, fields, replace
 
 from actuator_glue.diagnosis import (
     force_ranking,
@@ -25,7 +26,7 @@ from actuator_glue.diagnosis.onset import Onset
 from actuator_glue.diagnosis.preparation import Prepared
 from actuator_glue.diagnosis.regression import Surrogate
 from actuator_glue.diagnosis.score import Scorer, evidence
-from actuator_glue.diagnosis.search import Each, Search
+from actuator_glue.diagnosis.search import Each, Search, Trial
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.model.effects import CATALOGUE
 
@@ -122,24 +123,39 @@ def _with_reserved(
 ) -> Conclusion:
     """Search again with the effects that are reserved for what all others leave.
 
-    Taken where one of them stays, and the answer is better beyond chance and by a material error.
-    A mode that rings on passes for hum: with it, hum is asked for once more.
+    Where one of them alone, or beside what was found, is better beyond chance and by a material
+    error; and so must be the answer, with one of them in it. A mode that rings on passes for hum:
+    with it, hum is asked for once more.
     """
-    reserved = mean_effects(reserved=True)
-    usual = first.selection.search
-    ways = [(usual.wider(reserved), first.line)]
+    reserved, before = mean_effects(reserved=True), first.found.final
+    usual, cost = first.selection.search, math.log(len(reserved))
+    ways = [(_wider(usual, reserved), first.line)]
     if first.line is not None:
         ways.insert(0, (Search(prepared.fit, (*usual.names, *reserved), usual.each), None))
+
+    def better(after: Trial, scorer: Scorer) -> bool:
+        known = replace(before, scores=scorer.block_scores(before.fit))
+        return first.selection.better(after, known, first.found.material, cost)
+
     for search, line in ways:
+        search.scorer = first.scorer
+        search.base()
+        starts = [
+            search.trial(t.effects) for t in (first.found.base, before) if search.known(t.effects)
+        ]
+        if not any(better(t, first.scorer) for s in starts for t in search.additions(s, reserved)):
+            continue
         second = _searched(prepared, search, line, settings, tell)
-        before, after = first.found.final, second.found.final
-        before = replace(before, scores=second.scorer.block_scores(before.fit))
-        worth = second.selection.better(
-            after, before, second.found.material, math.log(len(reserved))
-        )
-        if worth and set(after.effects) & set(reserved):
+        found = second.found.final
+        if set(found.effects) & set(reserved) and better(found, second.scorer):
             return second
     return first
+
+
+def _wider(search: Search, names: Sequence[str]) -> Search:
+    """Return a search that tries further effects; what was refitted is known to it."""
+    own = {f.name: copy(getattr(search, f.name)) for f in fields(search) if f.name[0] == '_'}
+    return replace(search, names=(*search.names, *names), **own)
 
 
 def since_onset(first: Conclusion, settings: Thresholds, each: Each, tell: Progress) -> Conclusion:

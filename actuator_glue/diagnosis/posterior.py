@@ -37,6 +37,8 @@ _STEPS = 8  # from the least-squares fit to the optimum of the likelihood
 # Draws will do for 95 % intervals and bands from here on (Vehtari et al. 2021), with few in each
 # of many chains.
 _ESS, _RHAT = 400.0, 1.05
+# Above this in any parameter chains say nothing yet of the spread of those above _RHAT.
+UNMET = 1.1
 _HALVINGS = 40  # bring any point of it inside the bounds of the prior
 # From the optimum of the whitened error to that of the likelihood: a step that gains less than
 # this is none.
@@ -53,6 +55,7 @@ class Draws(NamedTuple):
         effective: how many draws they are worth, the least of all parameters.
         rhat: largest R-hat of chains, else not-a-number.
         pareto_k: shape of the tail of importance weights, else not-a-number.
+        unmet: of each parameter whether chains have not met in it; empty without chains.
     """
 
     points: Array
@@ -61,6 +64,7 @@ class Draws(NamedTuple):
     effective: float = math.nan
     rhat: float = math.nan
     pareto_k: float = math.nan
+    unmet: tuple[bool, ...] = ()
 
     def told(self) -> Json:
         """Return how they were drawn, as JSON."""
@@ -283,5 +287,12 @@ def sample(
         enough=_enough,
         progress=lambda done, all_: progress(done / all_),
     )
-    rhat, effective = float(chains.rhat.max()), float(chains.ess.min())
-    return Draws(loosened(chains.posterior()), 'dream', chains.evaluations, effective, rhat)
+    apart = chains.rhat > (_RHAT if chains.rhat.max() > UNMET else math.inf)
+    return Draws(
+        loosened(chains.posterior()),
+        'dream',
+        chains.evaluations,
+        effective=float(chains.ess.min()),
+        rhat=float(chains.rhat.max()),
+        unmet=tuple(map(bool, apart)),
+    )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Protocol, TypeVar
 
@@ -105,18 +105,6 @@ class Search:
     _signatures: dict[str, tuple[Array, Array]] = field(default_factory=dict)
     _polished: dict[frozenset[str], int] = field(default_factory=dict)
     _descended: set[tuple[frozenset[str], tuple[str, ...]]] = field(default_factory=set)
-
-    def wider(self, names: Sequence[str]) -> Search:
-        """Return a search that tries further effects; what was refitted is known to it."""
-        return replace(
-            self,
-            names=(*self.names, *names),
-            scorer=None,
-            _tried=dict(self._tried),
-            _signatures=dict(self._signatures),
-            _polished=dict(self._polished),
-            _descended=set(self._descended),
-        )
 
     def base(self) -> Fit:
         """Fit Eq. (2)."""
