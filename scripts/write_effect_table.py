@@ -37,8 +37,8 @@ def markdown() -> str:
         rows.append('| ' + ' | '.join(cell.replace('|', '\\|') for cell in cells) + ' |')
     kept = ', '.join(f'`{e.name}`' for e in CATALOGUE.values() if not e.searched)
     reserved = ', '.join(f'`{e.name}`' for e in CATALOGUE.values() if e.reserved)
-    rows += ['', f'Not tried by the diagnosis: {kept}.']
-    rows += ['', f'Tried only where all others leave material structure: {reserved}.']
+    last = f'tried only where all others leave material structure: {reserved}'
+    rows += ['', f'Not tried by the diagnosis: {kept}; {last}.']
     return '\n'.join(rows)
 
 
