@@ -14,7 +14,7 @@ from actuator_glue.diagnosis.homogeneity import Homogeneity
 from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.model_selection import Selection
 from actuator_glue.diagnosis.next_experiment import Experiment
-from actuator_glue.diagnosis.posterior import UNMET
+from actuator_glue.diagnosis.posterior import RHAT
 from actuator_glue.diagnosis.regression import Surrogate
 from actuator_glue.diagnosis.result import HeldOutError
 from actuator_glue.diagnosis.verdict import excused, misses
@@ -154,7 +154,7 @@ def unidentified(data: Data, estimates: dict[str, Estimate]) -> tuple[str, ...]:
 
 def unconverged(rhat: float) -> tuple[str, ...]:
     """Say so where the chains of the posterior have not met; NaN says nothing."""
-    if not rhat > UNMET:
+    if not rhat > RHAT:
         return ()
     return (
         f'the chains of the posterior have not met (R-hat {rhat:.2f}): sizes that they differ '

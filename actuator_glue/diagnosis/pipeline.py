@@ -95,7 +95,7 @@ def _conclude(prepared: Prepared, settings: Thresholds, each: Each, tell: Progre
     if line is not None:
         search = Search(hum.without(prepared.fit, line), mean_effects(), each)
     result = _searched(prepared, search, line, settings, tell)
-    if result.decision.verdict == 'unexplained':
+    if result.decision.verdict == 'unexplained' and mean_effects(reserved=True):
         result = _with_reserved(prepared, result, settings, tell)
     if result.decision.verdict != 'unexplained':
         return result

@@ -36,9 +36,7 @@ _P = len(BASE)
 _STEPS = 8  # from the least-squares fit to the optimum of the likelihood
 # Draws will do for 95 % intervals and bands from here on (Vehtari et al. 2021), with few in each
 # of many chains.
-_ESS, _RHAT = 400.0, 1.05
-# Above this in any parameter chains say nothing yet of the spread of those above _RHAT.
-UNMET = 1.1
+_ESS, RHAT = 400.0, 1.05
 _HALVINGS = 40  # bring any point of it inside the bounds of the prior
 # From the optimum of the whitened error to that of the likelihood: a step that gains less than
 # this is none.
@@ -183,7 +181,7 @@ def _loosened(
 
 def _enough(chains: Chains) -> bool:
     rhat, ess = quick_rhat_and_ess(chains.kept)
-    return bool(ess.min() >= _ESS and rhat.max() <= _RHAT)
+    return bool(ess.min() >= _ESS and rhat.max() <= RHAT)
 
 
 def sample(
@@ -287,12 +285,11 @@ def sample(
         enough=_enough,
         progress=lambda done, all_: progress(done / all_),
     )
-    apart = chains.rhat > (_RHAT if chains.rhat.max() > UNMET else math.inf)
     return Draws(
         loosened(chains.posterior()),
         'dream',
         chains.evaluations,
         effective=float(chains.ess.min()),
         rhat=float(chains.rhat.max()),
-        unmet=tuple(map(bool, apart)),
+        unmet=tuple(bool(r > RHAT) for r in chains.rhat),
     )

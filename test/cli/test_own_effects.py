@@ -81,7 +81,9 @@ def test_diagnose_and_report(own: str, tmp_path: Path, monkeypatch: pytest.Monke
     effects.load_effects(own)
     # The catalogue's entry of the same form would tie with it.
     others = tuple(n for n in CATALOGUE.searched() if n != 'sensor-curve')
-    monkeypatch.setattr(type(CATALOGUE), 'searched', lambda self: others)
+    monkeypatch.setattr(
+        type(CATALOGUE), 'searched', lambda self, reserved=False: () if reserved else others
+    )
     rate, rng = 128.0, np.random.default_rng(3)
     t = np.arange(int(24 * rate)) / rate
     sweep, theta = 2e-3 * np.sin(np.pi * (10.0 / 24.0) * t**2), [235.0, 5.0e10, 4.23e6, 3.3]
