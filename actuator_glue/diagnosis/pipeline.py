@@ -7,6 +7,8 @@ from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, fields, replace
 
+import numpy as np
+
 from actuator_glue.diagnosis import (
     force_ranking,
     hum,
@@ -19,6 +21,7 @@ from actuator_glue.diagnosis import (
 from actuator_glue.diagnosis.completeness import Decision, decide
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.decimate import decimated
+from actuator_glue.diagnosis.fit import Fit, fit
 from actuator_glue.diagnosis.hum import Line
 from actuator_glue.diagnosis.measurement import Measured
 from actuator_glue.diagnosis.model_selection import ModelSelection, Selection
@@ -229,6 +232,9 @@ def with_the_right_hold(
     found for it (a gain that drifts, say). The other hold is taken where Eq. (2) alone explains
     materially more with it, and what is found with it explains more, beyond chance. Held
     commands taken for linear ones are a delay, which is in the catalogue.
+
+    An answer that leaves nothing and explains less with the other hold is not searched for again:
+    of a large effect that Eq. (2) leaves, either hold may leave more.
     """
     prepared = first.prepared
     if first.decision.verdict == 'none' or not any(r.hold == 'zoh' for r in prepared.fit.recorded):
@@ -239,6 +245,8 @@ def with_the_right_hold(
     if before - base.rms**2 < first.found.material**2:
         return first
     tell('other hold', 0.0)
+    if first.decision.verdict == 'missing-effect' and _explains_less(first, other, base):
+        return first
     second = conclude(other, settings, each, tell)
     a, b = first.found.final.fit, second.found.final.fit
     scorer = second.scorer
@@ -250,6 +258,16 @@ def with_the_right_hold(
         f'alone then leaves {1e6 * base.rms:.1f} um instead of {1e6 * before**0.5:.1f} um'
     )
     return replace(second, prepared=replace(other, notes=(*other.notes, note)))
+
+
+def _explains_less(first: Conclusion, other: Prepared, base: Fit) -> bool:
+    """Whether what was found explains less with the other hold, whose Eq. (2) is fitted."""
+    found = first.found.final
+    data = other.fit if first.line is None else hum.without(other.fit, first.line)
+    starts = np.stack([found.fit.theta, found.fit.theta])
+    starts[1, : len(base.theta)] = base.theta
+    again, scorer = fit(data, found.model, starts), first.scorer
+    return evidence(scorer.block_scores(again), scorer.block_scores(found.fit)) < 0.0
 
 
 def _linear(data: Data) -> Data:

@@ -93,6 +93,22 @@ def test_friction_under_one_stiffness_goes_along_its_ridge(rng_seed: int) -> Non
     assert there.rms < fit(data, COULOMB, start).rms
 
 
+def test_a_hold_that_explains_less_is_not_searched_with() -> None:
+    """Of friction that holds the piston Eq. (2) leaves 150 um, 1 um less with the other hold."""
+    theta, rng = np.array([128.0, 1.01e9, 2.42e5, 0.3, 300.0]), np.random.default_rng(1)
+    command = commands.sweep(RATE, 40.0, 0.0, 10.0, 2e-3)
+    stages, silent = [], Record(command, command, 1 / RATE, stiffness=250e3)
+    measured = COULOMB.simulate(theta, silent) + 1e-5 * rng.standard_normal(len(command))
+    record = Record(command, measured, 1 / RATE, stiffness=250e3)
+    found = diagnose(
+        [record],
+        settings=Thresholds(evaluations=0),
+        progress=lambda stage, share: stages.append(stage),
+    )
+    assert [e.name for e in found.effects] == ['coulomb-friction']
+    assert stages.count('base fit') == 1
+
+
 def test_a_lag_does_not_change_places_with_the_valve() -> None:
     """Poles of 87, 127 and 143 1/s: which is the transducer's is told by a specimen alone.
 
