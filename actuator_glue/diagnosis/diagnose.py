@@ -24,7 +24,6 @@ from actuator_glue.diagnosis import (
 from actuator_glue.diagnosis.base_prior import BasePrior
 from actuator_glue.diagnosis.detect import alarm_of
 from actuator_glue.diagnosis.estimate import Estimate
-from actuator_glue.diagnosis.fit import UPPER, Space
 from actuator_glue.diagnosis.force import check_forces
 from actuator_glue.diagnosis.next_experiment import Experiment, ranked
 from actuator_glue.diagnosis.pipeline import (
@@ -38,6 +37,7 @@ from actuator_glue.diagnosis.pipeline import (
 from actuator_glue.diagnosis.preparation import prepare, rest_samples
 from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.diagnosis.search import Each, Trial
+from actuator_glue.diagnosis.space import UPPER, Space
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.verify import Side, traces, verify
 from actuator_glue.inference.at_bound import Pressed, pressed
@@ -85,7 +85,11 @@ def diagnose(
         check_forces(records)
     first = conclude(prepare(records, held, known), settings, each, tell)
     first = with_the_right_hold(first, settings, each, tell)
-    result = with_learned_terms(since_onset(first, settings, each, tell))
+    # What acts all the time comes before what appears.
+    always = with_learned_terms(first)
+    result = since_onset(always, settings, each, tell)
+    if result is not always:
+        result = with_learned_terms(result)
     prepared, data, scorer = result.prepared, result.data, result.scorer
     found, decision = result.found, result.decision
     stretches = homogeneity.agreement(decision.final, scorer)

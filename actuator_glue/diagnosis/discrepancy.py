@@ -18,6 +18,7 @@ import numpy as np
 from actuator_glue.diagnosis.fit import rms
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.space import sum_of_squares
 from actuator_glue.records import Array
 
 # Scales, of the largest: none at all is as likely as all others together.
@@ -76,18 +77,25 @@ class Discrepancy:
     def log_likelihood(self, errors: Array, noise: float) -> Array:
         """Log density of whitened errors (m, N), up to a constant, (m,).
 
+        Minus infinity where a simulation diverged.
+
         Args:
-            errors: free-run errors; not-a-number where a simulation diverged.
+            errors: free-run errors.
             noise: variance of the whitened noise.
         """
-        squares = np.einsum('mn,mn->m', errors, errors)
+        squares = sum_of_squares(errors)
+        stable = np.isfinite(squares)
+        out = np.full(len(errors), -np.inf)
+        if not stable.all():
+            errors, squares = errors[stable], squares[stable]
         along = (errors @ self.shapes.T) ** 2
         rows = []
         for scale, prior in zip(_SCALES, _PRIOR, strict=True):
             power = scale**2 * self.powers
             left = squares - along @ (power / (noise + power))
             rows.append(prior - 0.5 * left / noise - 0.5 * np.log1p(power / noise).sum())
-        return np.asarray(np.logaddexp.reduce(rows, axis=0))
+        out[stable] = np.logaddexp.reduce(rows, axis=0)
+        return out
 
     def gaussians(
         self, jacobian: Array, error: Array, noise: float, widest: Array

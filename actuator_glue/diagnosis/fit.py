@@ -12,15 +12,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from actuator_glue.diagnosis.data import LANES, Data, Model
+from actuator_glue.diagnosis.space import Space, jacobian, sum_of_squares, with_jacobian
 from actuator_glue.model.parameters import BASE
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 
 _P = len(BASE)
-# The prior of Table 3 belongs to the paper's plant; other machines lie outside it.
-_LOG_LOWER = np.log([1.0, 1e5, 1e2, 1e-4])
-UPPER = np.array([2e3, 1e14, 1e10, 1e3])
-_LOG_UPPER = np.log(UPPER)
 _DAMPINGS = np.array([1e-2, 1.0, 1e2])
 
 
@@ -51,76 +48,6 @@ class Fit:
 def rms(error: Array) -> float:
     """Root mean square."""
     return float(np.sqrt(np.mean(error**2)))
-
-
-class Space:
-    """Working coordinates: logarithms of Eq. (2)'s parameters, an effect's as they are."""
-
-    def __init__(self, model: Model, duration: float) -> None:
-        extra = model.parameters[_P:]
-        self.lower = np.concatenate([_LOG_LOWER, [p.lower for p in extra]])
-        self.upper = np.concatenate([_LOG_UPPER, [p.upper for p in extra]])
-        self._steps = np.concatenate([np.full(_P, 1e-3), 1e-4 * (self.upper - self.lower)[_P:]])
-        # A line's phase runs away with its frequency: its step is a part of the resolution.
-        self._line = np.array([False] * _P + [p.unit == 'Hz' for p in extra])
-        self._steps[self._line] = 0.02 / duration
-
-    def theta(self, z: Array) -> Array:
-        """Physical parameters of working coordinates (..., p)."""
-        out = np.array(z, dtype=np.float64)
-        out[..., :_P] = np.exp(out[..., :_P])
-        return out
-
-    def z(self, theta: Array) -> Array:
-        """Working coordinates of physical parameters (..., p), moved into the bounds."""
-        out = np.array(theta, dtype=np.float64)
-        out[..., :_P] = np.log(np.maximum(out[..., :_P], 1e-300))
-        return np.clip(out, self.lower, self.upper)
-
-    def steps(self, z: Array) -> Array:
-        """Finite-difference steps (..., p): 1 % of an effect's size, so that kinks average out."""
-        steps = np.broadcast_to(self._steps, z.shape).copy()
-        larger = np.maximum(0.01 * np.abs(z), steps)
-        steps = np.where(self._line | (np.arange(z.shape[-1]) < _P), steps, larger)
-        # Step inwards at an upper bound.
-        return np.where(z + steps > self.upper, -steps, steps)
-
-
-def sum_of_squares(error: Array) -> Array:
-    """Sum of squares of errors (..., n); infinite where a simulation diverged."""
-    with np.errstate(over='ignore', invalid='ignore'):
-        sums = np.einsum('...n,...n->...', error, error)
-    return np.where(np.isfinite(sums), sums, np.inf)
-
-
-def jacobian(data: Data, model: Model, space: Space, z: Array, output: Array) -> Array:
-    """Finite differences of the simulation at z (s, p) with output (s, N): (s, p, N)."""
-    steps = space.steps(z)
-    out = _simulated(data, model, space, _moved(z, steps))
-    return _differences(out, output, steps)
-
-
-def _with_jacobian(data: Data, model: Model, space: Space, z: Array) -> tuple[Array, Array]:
-    """Simulation at z (s, p), (s, N), and its finite differences (s, p, N), in one go."""
-    steps = space.steps(z)
-    out = _simulated(data, model, space, np.concatenate([z[:, None], _moved(z, steps)], axis=1))
-    return out[:, 0], _differences(out[:, 1:], out[:, 0], steps)
-
-
-def _moved(z: Array, steps: Array) -> Array:
-    return np.asarray(z[:, None, :] + steps[:, :, None] * np.eye(z.shape[1]))
-
-
-def _simulated(data: Data, model: Model, space: Space, z: Array) -> Array:
-    return data.simulate(model, space.theta(z.reshape(-1, z.shape[-1]))).reshape(*z.shape[:2], -1)
-
-
-@np.errstate(over='ignore', invalid='ignore')
-def _differences(out: Array, output: Array, steps: Array) -> Array:
-    out -= output[:, None, :]
-    out /= steps[:, :, None]
-    np.nan_to_num(out, copy=False, nan=0.0, posinf=0.0, neginf=0.0)
-    return out
 
 
 @np.errstate(over='ignore', invalid='ignore')
@@ -272,7 +199,7 @@ def _tried(data: Data, model: Model, space: Space, tries: Array) -> tuple[Array,
     flat = tries.reshape(-1, p)
     if len(flat) * (p + 1) > LANES:
         return data.simulate(model, space.theta(flat)).reshape(s, d, -1), None
-    out, slopes = _with_jacobian(data, model, space, flat)
+    out, slopes = with_jacobian(data, model, space, flat)
     return out.reshape(s, d, -1), slopes.reshape(s, d, p, -1)
 
 

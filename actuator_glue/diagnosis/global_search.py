@@ -19,7 +19,8 @@ import numpy as np
 from scipy.optimize import Bounds, differential_evolution
 
 from actuator_glue.diagnosis.data import Data, Model
-from actuator_glue.diagnosis.fit import Fit, Space, base_starts, fit, sum_of_squares
+from actuator_glue.diagnosis.fit import Fit, base_starts, fit
+from actuator_glue.diagnosis.space import Space, sum_of_squares
 from actuator_glue.model.effects import scale
 from actuator_glue.model.parameters import BASE
 from actuator_glue.model.structure import Structure

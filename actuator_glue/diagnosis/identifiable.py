@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 
 from actuator_glue.diagnosis.data import Data, Model
-from actuator_glue.diagnosis.fit import Space
+from actuator_glue.diagnosis.space import Space, diverged
 from actuator_glue.inference.transforms.inverse_response import Ridge
 from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array
@@ -123,9 +123,9 @@ def derivatives(
 ) -> tuple[Array, Array]:
     """Return a response (N,) and its derivatives to coordinates (p,) that lie inside, (p, N).
 
-    To either side, where both are inside. Differences to one side bend with the response, by some
-    1e-4 of it, and that is more than noise leaves to see along a ridge: it looked ten to forty
-    times shorter than it is.
+    To either side, where both are inside and stable. Differences to one side bend with the
+    response, by some 1e-4 of it, and that is more than noise leaves to see along a ridge: it
+    looked ten to forty times shorter than it is.
 
     Args:
         around: the coordinates.
@@ -143,6 +143,8 @@ def derivatives(
     outside = ~np.isfinite(log_prior)
     theta[outside] = theta[-1]
     found = response(theta)
+    outside |= diverged(found - found[-1], found[-1])
+    found[outside] = found[-1]
     count = len(phi)
     sides = 2 - outside[:count].astype(int) - outside[count:-1]
     difference = found[:count] - found[count:-1]

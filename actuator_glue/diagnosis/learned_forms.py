@@ -36,7 +36,7 @@ _PRODUCTS: Final = {
     'specimen': ('k x |x|', 'k x x', 'k v', 'k v |v|'),
     'sensor': ('y |y|', 'y y y', 'y y', '|y|'),
 }
-# Places whose signal may be rounded off towards its ends.
+# Places whose signal may be limited.
 _SATURATES: Final = ('command', 'valve', 'flow', 'sensor')
 _DIMENSIONS: Final = {
     'u': (0, 1, 0),
@@ -49,8 +49,9 @@ _DIMENSIONS: Final = {
     'k': (1, -1, 0),
 }
 LEARNED: Final = 'learned'  # source of such an effect
-_LARGEST = 0.5  # of the signal at the test's stroke and speed
-_SHARPEST = 5.0  # times a saturation may be overdriven
+_LARGEST = 2.0  # of the signal at the test's stroke and speed
+_SHARPEST = 5.0  # times a limit may be overdriven
+_BENDS = (1e-3, 3.0)  # a bend of a thousandth is a corner
 
 
 def forms(scale: Scale, known: Container[str] = ()) -> tuple[Effect, ...]:
@@ -68,7 +69,7 @@ def forms(scale: Scale, known: Container[str] = ()) -> tuple[Effect, ...]:
             if all(sizes[f.strip('|')] > 0.0 for f in factors):
                 offered.append(_product(place, factors, sizes))
         if place in _SATURATES:
-            offered.append(_saturation(place, sizes))
+            offered += [form(place, sizes) for form in (_limited, _one_sided, _fading)]
     if sizes['f'] > 0.0:
         offered.append(_turbulent(sizes))
     offered.append(_rounded_overlap(sizes))
@@ -124,12 +125,49 @@ def _word(factor: str) -> str:
     return f'abs{factor.strip("|")}' if '|' in factor else factor
 
 
-def _saturation(place: str, sizes: dict[str, float]) -> Effect:
+def _limited(place: str, sizes: dict[str, float]) -> Effect:
+    """Return a limit with any bend before it: a corner where that is 0, about tanh where it is 2.
+
+    Two hyperbolas about the corners, their slope 1 at the centre.
+    """
+    z, name = SIGNAL[place], f'{place}_limit'
+    above = f'sqrt((1 + {name}*{z})**2 + {name}_bend**2)'
+    below = f'sqrt((1 - {name}*{z})**2 + {name}_bend**2)'
+    unit = _unit([-d for d in _DIMENSIONS[z]])
+    return term(
+        f'learned-{place}-limit',
+        f'{place}: {z} = 2*{z}*sqrt(1 + {name}_bend**2)/({above} + {below})',
+        (
+            Parameter(name, unit, 0.0, _SHARPEST / sizes[z], f'one over where {z} bends', 0.0),
+            Parameter(f'{name}_bend', '1', *_BENDS, 'width of the bend over where it is', 1.0),
+        ),
+        source=LEARNED,
+    )
+
+
+def _one_sided(place: str, sizes: dict[str, float]) -> Effect:
+    """Return a limit to one side, the lower one where the parameter is negative."""
+    z, name = SIGNAL[place], f'{place}_end'
+    largest = _SHARPEST / sizes[z]
+    unit, meaning = _unit([-d for d in _DIMENSIONS[z]]), f'one over where {z} ends'
+    return term(
+        f'learned-{place}-end',
+        f'{place}: {z} = {z}*(1 + sqrt(1 + {name}_bend**2))'
+        f'/(1 + {name}*{z} + sqrt((1 - {name}*{z})**2 + {name}_bend**2))',
+        (
+            Parameter(name, unit, -largest, largest, meaning, 0.0),
+            Parameter(f'{name}_bend', '1', *_BENDS, 'width of the bend over where it is', 1.0),
+        ),
+        source=LEARNED,
+    )
+
+
+def _fading(place: str, sizes: dict[str, float]) -> Effect:
+    """Return a gain that falls from the centre on, which no limit does."""
     z = SIGNAL[place]
-    unit = [-d for d in _DIMENSIONS[z]]
-    meaning = f'one over the largest {z}'
-    bounds = (0.0, _SHARPEST / sizes[z])
-    return _effect(place, f'tanh-{z}', f'tanh({{a}}*{z})/{{a}}', unit, bounds, meaning)
+    unit, bounds = [-d for d in _DIMENSIONS[z]], (0.0, _SHARPEST / sizes[z])
+    meaning = f'one over where {z} is halved'
+    return _effect(place, f'fading-{z}', f'{z}/(1 + {{a}}*abs({z}))', unit, bounds, meaning)
 
 
 def _turbulent(sizes: dict[str, float]) -> Effect:

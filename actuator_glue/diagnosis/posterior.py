@@ -17,11 +17,12 @@ from numpy.typing import NDArray
 from actuator_glue.diagnosis import proposals
 from actuator_glue.diagnosis.data import LANES, Data, Model, chunks
 from actuator_glue.diagnosis.discrepancy import Discrepancy, ScaleMixture
-from actuator_glue.diagnosis.fit import Fit, Space
+from actuator_glue.diagnosis.fit import Fit
 from actuator_glue.diagnosis.fit import fit as fit_to
 from actuator_glue.diagnosis.identifiable import Straight, Working, coordinates, derivatives
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.search import Each
+from actuator_glue.diagnosis.space import Space
 from actuator_glue.inference import importance, posterior
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.convergence import quick_rhat_and_ess
@@ -227,8 +228,7 @@ def sample(
         error = data.simulate(model, theta)
         with np.errstate(all='ignore'):
             error = scorer.whiten(np.subtract(target, error, out=error))
-            likely = beside.log_likelihood(error, noise)
-        return np.where(np.isfinite(likely), likely, -np.inf)
+            return beside.log_likelihood(error, noise)
 
     def log_likelihood(theta: Array) -> Array:
         # As many as the kernels take at once, where there are more than chains.
@@ -239,13 +239,14 @@ def sample(
         return found if data.prior is None else found + data.prior.log_density(theta)
 
     def linearised(phi: Array) -> tuple[float, ScaleMixture]:
+        theta, log_prior = around.inverse(phi[None])
+        value = float(log_likelihood(theta)[0] + log_prior[0])
+        if not math.isfinite(value):  # it diverges there: nothing is known
+            no_move = np.zeros((1, len(phi))), np.diag(around.widest**2)[None]
+            return value, ScaleMixture(np.ones(1), *no_move)
         seen, jac = derivatives(around, space, phi, response)
         error = np.concatenate([whitened, np.zeros(len(seen) - len(whitened))]) - seen
-        theta, log_prior = around.inverse(phi[None])
-        likely = beside.log_likelihood(error[None, : len(whitened)], noise) + log_prior
-        if data.prior is not None:
-            likely += data.prior.log_density(theta)
-        return float(likely[0]), beside.gaussians(jac, error, noise, around.widest)
+        return value, beside.gaussians(jac, error, noise, around.widest)
 
     centre, moves = _optimum(around, phi, linearised)
     laplace = Composed(around, Laplace(centre, moves.moments()[1], around.widest))

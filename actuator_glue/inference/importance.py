@@ -27,6 +27,7 @@ _LOOK, _SHARE = 3, 0.5
 _PARETO = 0.5
 _LEAST = 1e-9  # spread of what has none
 _EQUAL = 0.4  # of all draws are shared by the parts of a proposal, however likely they are
+_WIDEST = 700.0  # logarithm of a ratio of weights
 _FEWEST = 5  # weights that a Pareto distribution is fitted to
 
 
@@ -154,7 +155,8 @@ def smoothed(log_weights: Array) -> tuple[Array, float]:
         share = (np.arange(len(tail)) + 0.5) / len(tail)
         stretched = -np.log1p(-share)
         if abs(shape) > 1e-12:
-            stretched = np.expm1(shape * stretched) / shape
+            # A tail hundreds of decades wide: its largest weights are limited to 1 below.
+            stretched = np.expm1(np.minimum(shape * stretched, _WIDEST)) / shape
         weights[tail] = np.minimum(cut + scale * stretched, 1.0)
     return weights / weights.sum(), shape
 

@@ -8,8 +8,8 @@ import pytest
 
 from actuator_glue.diagnosis import alternatives, posterior
 from actuator_glue.diagnosis.finding import Rival
-from actuator_glue.diagnosis.fit import Space
 from actuator_glue.diagnosis.identifiable import Working
+from actuator_glue.diagnosis.space import Space
 from actuator_glue.model import commands
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record

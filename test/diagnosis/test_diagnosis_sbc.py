@@ -13,10 +13,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-import actuator_glue.diagnosis.fit as fitting
 from actuator_glue.diagnosis import posterior
+from actuator_glue.diagnosis import space as working
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.discrepancy import _PRIOR, _SCALES, beside
+from actuator_glue.diagnosis.fit import fit
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.model import commands
@@ -87,7 +88,7 @@ def ranks(seed: tuple[int, int], case: Case) -> Array:
     """Rank of parameters drawn from the prior among their posterior draws, (p,)."""
     rng = np.random.default_rng(seed)
     model = boxed(case.effects)
-    space = fitting.Space(model, DURATION)
+    space = working.Space(model, DURATION)
     truth = space.theta(rng.uniform(space.lower, space.upper))
     still = []
     for stiffness in case.stiffnesses:
@@ -104,7 +105,7 @@ def ranks(seed: tuple[int, int], case: Case) -> Array:
     noise = case.noise * rng.standard_normal(len(clean))
     measured = silent.split(clean + there + noise)
     data = Data.whole([replace(r, measured=y) for r, y in zip(still, measured, strict=True)])
-    found = fitting.fit(data, model, truth)
+    found = fit(data, model, truth)
     scorer = Scorer.of(data, splits_of(data, found.error))
     draws = posterior.sample(
         model,
@@ -125,8 +126,8 @@ def test_ranks_of_the_truth_are_uniform(
     name: str, rng_seed: int, least_p: Callable[..., float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Two tests for each parameter, Bonferroni: one case fails by chance once in 1000 runs."""
-    monkeypatch.setattr(fitting, '_LOG_LOWER', [*LOWER[:3], np.log(POSTERIORS[name].leakage)])
-    monkeypatch.setattr(fitting, '_LOG_UPPER', UPPER)
+    monkeypatch.setattr(working, '_LOG_LOWER', [*LOWER[:3], np.log(POSTERIORS[name].leakage)])
+    monkeypatch.setattr(working, '_LOG_UPPER', UPPER)
     # What it adds to the spread is a precaution, no part of the posterior.
     monkeypatch.setattr(posterior, '_loosened', lambda around, theta, move, rng: theta)
     case = POSTERIORS[name]

@@ -28,6 +28,18 @@ def test_the_likelihood_is_that_of_the_mixture() -> None:
     assert found - expected == pytest.approx(np.full(4, (found - expected)[0]), abs=1e-9)
 
 
+def test_what_diverged_is_impossible() -> None:
+    """Whether it ran out of numbers or became none; nothing is said of the others."""
+    rng = np.random.default_rng()
+    errors = rng.standard_normal((4, N))
+    errors[1, -1], errors[2, -1] = 1e200, np.nan
+    found = Discrepancy.of(rng.standard_normal((3, N)))
+    with np.errstate(all='raise'):
+        likely = found.log_likelihood(errors, 1.0)
+    assert (likely[1:3] == -np.inf).all()
+    assert (likely[[0, 3]] == found.log_likelihood(errors[[0, 3]], 1.0)).all()
+
+
 def test_a_clean_record_keeps_its_narrow_interval() -> None:
     """Noise alone: the spread is that of least squares; beside a shape that is there, it is not.
 

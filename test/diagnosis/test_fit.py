@@ -6,9 +6,12 @@ import pytest
 from actuator_glue.diagnosis import fit as module
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.fit import fit
+from actuator_glue.diagnosis.identifiable import Working, derivatives
+from actuator_glue.diagnosis.space import Space, jacobian
 from actuator_glue.model import commands
+from actuator_glue.model.parameters import Parameter
 from actuator_glue.model.structure import Structure
-from actuator_glue.records import Record
+from actuator_glue.records import Array, Record
 
 
 @pytest.mark.parametrize(('effects', 'own'), [((), ()), (('backlash',), (1e-4,))])
@@ -29,3 +32,34 @@ def test_differences_ahead_change_no_bit(
     assert ahead.rms < 1e-5
     for name in ('theta', 'error', 'jacobian', 'z'):
         assert np.array_equal(getattr(ahead, name), getattr(after, name))
+
+
+class Edge:
+    """A response in proportion to its last parameter, unstable beyond an edge of it."""
+
+    parameters = (*Structure(()).parameters, Parameter('size', 'm', 0.0, 1.0, '', 0.0))
+
+    def __init__(self, low: float, high: float) -> None:
+        self.low, self.high = low, high
+
+    def simulate(self, theta: Array, record: Record, **_: object) -> Array:
+        """Free run (m, n)."""
+        size = theta[:, 4:]
+        grown = np.where((size > self.high) | (size < self.low), 1e225, size)
+        return np.asarray(grown * record.command)
+
+
+@pytest.mark.parametrize(('low', 'known'), [(0.0, 1.0), (0.5, 0.0)])
+def test_a_derivative_is_taken_on_the_stable_side(low: float, known: float) -> None:
+    """A step over the edge leaves no number of 200 digits; where both are unstable it is zero."""
+    model, command = Edge(low, 0.5), np.linspace(0.0, 1e-3, 100)
+    data = Data.whole([Record(command, command, 0.01, 0.0)])
+    space = Space(model, 1.0)
+    z = space.z(np.array([[134.0, 1.1e9, 2.5e5, 0.5, 0.5]]))
+    found = jacobian(data, model, space, z, data.simulate(model, space.theta(z)))
+    assert np.allclose(found[0, 4], known * command)
+    seen, to_both = derivatives(
+        Working(space), space, z[0], lambda theta: data.simulate(model, theta)
+    )
+    assert np.allclose(seen, 0.5 * command)
+    assert np.allclose(to_both[4], known * command)

@@ -7,8 +7,8 @@ import pytest
 
 import actuator_glue as ag
 from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.fit import Space, jacobian
 from actuator_glue.diagnosis.force import with_forces
+from actuator_glue.diagnosis.space import Space, jacobian
 from actuator_glue.errors import InputError
 from actuator_glue.model.force_errors import ForceErrors, shown
 from actuator_glue.model.structure import Structure

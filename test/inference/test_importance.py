@@ -23,6 +23,15 @@ def test_weights_are_smoothed_as_by_arviz(spread: float) -> None:
     assert weights == pytest.approx(np.exp(reference), abs=1e-12)
 
 
+def test_weights_over_thousands_of_decades_overflow_nothing() -> None:
+    """One point outweighs all others; a tail that wide has hardly a shape."""
+    log_weights = 4000.0 * np.random.default_rng().standard_normal(1920)
+    with np.errstate(over='raise'):
+        weights, shape = importance.smoothed(log_weights)
+    assert shape > 1.0
+    assert weights.sum() == pytest.approx(1.0)
+
+
 START = importance.StudentMixture(np.ones(1), np.zeros((1, 3)), np.eye(3)[None])
 
 

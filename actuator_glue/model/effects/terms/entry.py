@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -18,6 +19,8 @@ from actuator_glue.records import Array
 
 # Shares of its signal that an effect of a typical size changes.
 _SHARES = (0.01, 0.05, 0.25)
+# Values tried of a parameter that does nothing by itself.
+_SHAPES = 3
 # Sizes tried for it, and samples of the motion they are tried on.
 _LEAST, _SAMPLES = 1e-9, 200
 # How far from neutral an effect must be small, as a share of a parameter's range.
@@ -110,22 +113,37 @@ class _Starts:
     parameters: tuple[Parameter, ...]
 
     def __call__(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
-        found: list[tuple[float, ...]] = []
-        for j, parameter in enumerate(self.parameters):
-            neutral = float(parameter.neutral or 0.0)
-            for end in (parameter.upper, parameter.lower):
-                if end == neutral:
-                    continue
-                sizes = neutral + (end - neutral) * np.geomspace(_LEAST, 1.0, LANES)
-                table = _neutral(self.parameters)
-                table[:, j] = sizes
-                share = changed(self, table, scale)
-                for wanted in _SHARES:
-                    if (share >= wanted).any():
-                        found.append(tuple(table[int((share >= wanted).argmax())].tolist()))
+        columns = range(len(self.parameters))
+        found = {j: self._sizes(scale, j, {}) for j in columns}
+        # What does nothing by itself (a width, an exponent) shapes the others.
+        for shape in [j for j in columns if not found[j]]:
+            p = self.parameters[shape]
+            spaced = np.geomspace if p.lower > 0.0 else np.linspace
+            for value in spaced(p.lower, p.upper, _SHAPES + 2)[1:-1]:
+                for j in columns:
+                    if j != shape:
+                        found[j] += self._sizes(scale, j, {shape: float(value)})
+        rows = [row for j in columns for row in found[j]]
         # An effect that this motion does not show still needs somewhere to start.
         middle = [0.1 * p.upper + 0.9 * float(p.neutral or 0.0) for p in self.parameters]
-        return tuple(dict.fromkeys(found)) or (tuple(middle),)
+        return tuple(dict.fromkeys(rows)) or (tuple(middle),)
+
+    def _sizes(self, scale: Scale, j: int, others: Mapping[int, float]) -> list[tuple[float, ...]]:
+        """Return rows in which one parameter brings the wanted changes, all but these neutral."""
+        found: list[tuple[float, ...]] = []
+        parameter = self.parameters[j]
+        neutral = float(parameter.neutral or 0.0)
+        for end in (parameter.upper, parameter.lower):
+            if end == neutral:
+                continue
+            table = _neutral(self.parameters)
+            table[:, list(others)] = list(others.values())
+            table[:, j] = neutral + (end - neutral) * np.geomspace(_LEAST, 1.0, LANES)
+            share = changed(self, table, scale)
+            for wanted in _SHARES:
+                if (share >= wanted).any():
+                    found.append(tuple(table[int((share >= wanted).argmax())].tolist()))
+        return found
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,51 @@
+"""Forms of learned terms: what a limit can look like."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.learned_forms import forms
+from actuator_glue.diagnosis.score import Scorer, splits_of
+from actuator_glue.diagnosis.search import Search
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Array, Record
+
+NOISE, STROKE, RATE = 1e-5, 2e-3, 128.0
+LIMITS: dict[str, Callable[[Array], Array]] = {
+    'a corner': lambda r: np.clip(r, -0.8, 0.8),
+    'to one side': lambda r: np.minimum(r, 0.8),
+    'tanh': lambda r: 1.5 * np.tanh(r / 1.5),
+    'fading': lambda r: r / (1.0 + 0.1 * np.abs(r)),
+    'a short bend': lambda r: r / (1.0 + (r / 0.9) ** 8) ** 0.125,
+}
+
+
+@pytest.mark.parametrize('name', LIMITS)
+def test_a_limited_transducer_is_described(name: str) -> None:
+    """One form leaves little beside the noise, from its own starting sizes.
+
+    Of a short bend, in another form than ours, 1.054 to 1.073 of the noise were left on four
+    machines; of the others 0.976 to 1.01. The noise's own rms varies by 0.9 % (6000 samples): some
+    four standard deviations are allowed.
+    """
+    rng = np.random.default_rng()
+    t = np.arange(0.0, 24.0, 1.0 / RATE)
+    command = STROKE * np.sin(np.pi * (9.0 / 24.0) * t**2)
+    theta = np.array([235.0, 5e10, 4.2e6, 3.3]) * np.exp(0.1 * rng.standard_normal(4))
+    records = []
+    for k in (0.0, 250e3):
+        bare = Record(command, np.zeros(len(t)), 1.0 / RATE, stiffness=k)
+        reading = STROKE * LIMITS[name](Structure(()).simulate(theta, bare) / STROKE)
+        measured = reading + NOISE * rng.standard_normal(len(t))
+        records.append(Record(command, measured, 1.0 / RATE, stiffness=k))
+    search = Search(Data.whole(records), ())
+    base = search.base()
+    search.scorer = Scorer.of(search.data, splits_of(search.data, base.error))
+    offered = [e for e in forms(search.scale()) if e.place == 'sensor']
+    search.entries |= {e.name: e for e in offered}
+    assert base.rms > 1.3 * NOISE
+    best = search.additions(search.trial(()), [e.name for e in offered])
+    most = 1.11 if name == 'a short bend' else 1.05
+    assert min(trial.fit.rms for trial in best) < most * NOISE
