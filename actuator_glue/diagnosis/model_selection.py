@@ -6,9 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import numpy as np
-
-from actuator_glue.diagnosis import false_alarms, pairs, regression
+from actuator_glue.diagnosis import false_alarms, forecast, pairs
 from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.fit import Fit
 from actuator_glue.diagnosis.learned_term import is_learned
@@ -94,21 +92,23 @@ class ModelSelection:
         if self._known is not None and self._known[0] is fit:
             return self._known[1]
         data, scorer = self.search.data, self.search.scorer
-        left, noise = pooled(data, splits_of(data, fit.error))
-        if self._stationary and scorer is not None:
+        splits = splits_of(data, fit.error)
+        if any(self._stationary) and scorer is not None:
             theta = self.search.scale().theta
-            forecast = regression.forecast(data, scorer, theta, fit, self.settings.nats)
-            noise = min(noise, forecast)
-            left = max(left, float(np.sqrt(max(0.0, fit.rms**2 - noise**2))))
-        self._known = fit, (left, noise)
-        return left, noise
+            most = forecast.noise(data, scorer, theta, fit, self.settings.nats)
+            splits = [
+                replace(s, noise=min(s.noise, limit)) if asked else s
+                for s, limit, asked in zip(splits, most, self._stationary, strict=True)
+            ]
+        self._known = fit, pooled(data, splits)
+        return self._known[1]
 
     @cached_property
-    def _stationary(self) -> bool:
+    def _stationary(self) -> list[bool]:
         """Whether what follows the command may look like noise: the motion of a record does."""
         data = self.search.data
         motions = splits_of(data, data.target)
-        return any(m.noise**2 > _STATIONARY * m.mean_square for m in motions)
+        return [m.noise**2 > _STATIONARY * m.mean_square for m in motions]
 
     def rescored(self, trials: Sequence[Trial]) -> list[Trial]:
         """Score with the present noise, best first."""

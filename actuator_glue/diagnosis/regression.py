@@ -19,7 +19,7 @@ from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 
 _TELLING = 0.3  # share of the squared error a surrogate must remove to point at a place
-_FORECAST = 12  # features of a forecast
+_RADII = (0.005, 0.01, 0.02, 0.05, 0.1)  # of plays, in amplitudes
 _PIECE = 1 << 13  # samples whose products are taken at a time
 
 
@@ -77,12 +77,29 @@ class Surrogate:
         }
 
 
-def _motions(x: Array, command: Array, period: float, stiffness: float) -> dict[str, Array]:
-    """Polynomials of displacement, velocity, servo error and time, of order one each."""
+def _play(signal: Array, radius: float) -> Array:
+    """Play of a signal (n,) behind a gap of this half width."""
+    out, at = [], 0.0
+    for value in signal.tolist():
+        if value - radius > at:
+            at = value - radius
+        elif value + radius < at:
+            at = value + radius
+        out.append(at)
+    return np.array(out)
+
+
+def _motions(x: Array, record: Record, plays: bool) -> dict[str, Array]:
+    """Polynomials of displacement, velocity, servo error and time, of order one each.
+
+    And what plays of several widths take off displacement, command and servo error
+    (Prandtl-Ishlinskii), if they are wanted.
+    """
     t = np.linspace(-1.0, 1.0, len(x))
-    v = np.gradient(x, period)
-    e = command - x
-    x, v, e = (c / max(float(np.abs(c).max()), 1e-12) for c in (x, v, e))
+    v = np.gradient(x, record.period)
+    x, v, e, u = (
+        c / max(float(np.abs(c).max()), 1e-12) for c in (x, v, record.command - x, record.command)
+    )
     out = {'1': np.ones_like(x), 't': t}
     for name, c in (('x', x), ('v', v), ('e', e)):
         out |= {
@@ -94,8 +111,10 @@ def _motions(x: Array, command: Array, period: float, stiffness: float) -> dict[
             f'sign {name}': np.tanh(50.0 * c),
             f't {name}': t * c,
         }
+    for name, c in (('x', x), ('u', u), ('e', e)) if plays else ():
+        out |= {f'{name} - play {r} {name}': c - _play(c, r) for r in _RADII}
     out |= {'x v': x * v, 'x^2 v': x**2 * v, 'x v^2': x * v**2, 'x e': x * e}
-    if stiffness > 0.0:
+    if record.known_stiffness() > 0.0:
         out |= {'k x': x, 'k x^2': x**2, 'k x^3': x**3, 'k sign v': np.tanh(50.0 * v)}
     else:
         out |= {name: np.zeros_like(x) for name in ('k x', 'k x^2', 'k x^3', 'k sign v')}
@@ -103,7 +122,7 @@ def _motions(x: Array, command: Array, period: float, stiffness: float) -> dict[
 
 
 def library(
-    data: Data, theta: Array, wanted: Container[str] | None = None
+    data: Data, theta: Array, wanted: Container[str] | None = None, *, plays: bool = False
 ) -> Iterator[tuple[int, str, Array]]:
     """Yield features of the motion that Eq. (2) simulates, at the counted samples (n,).
 
@@ -114,6 +133,7 @@ def library(
         data: counted samples.
         theta: Eq. (2) (4,).
         wanted: names of the features; None for all.
+        plays: whether plays are among them.
 
     Yields:
         Which record, name, and feature.
@@ -122,7 +142,7 @@ def library(
     for i, (record, mask) in enumerate(zip(data.records, data.masks, strict=True)):
         x = np.asarray(model.simulate(theta, record)).reshape(-1)
         stroke = float(np.abs(record.command).max()) or 1.0
-        motions = _motions(x, record.command, record.period, record.known_stiffness())
+        motions = _motions(x, record, plays)
         for name, raw in motions.items():
             texts = name, f'loop({name})', f'd/dt loop({name})'
             if wanted is not None and not any(text in wanted for text in texts):
@@ -160,26 +180,6 @@ def compare(data: Data, scorer: Scorer, base: Trial, structure: Trial) -> Surrog
         nats=evidence(scorer.block_scores(fit), structure.scores),
         tried=tried,
     )
-
-
-def forecast(data: Data, scorer: Scorer, theta: Array, fit: Fit, nats: float) -> float:
-    """Return the error that a regression forecasts of a structure's residual leaves, rms [m].
-
-    Each block is forecast without having been fitted, so what is explained there is no noise;
-    infinite where it is no more than chance.
-
-    Args:
-        data: the counted samples.
-        scorer: noise and blocks.
-        theta: Eq. (2), whose motion gives the features (4,).
-        fit: the structure.
-        nats: evidence of any addition.
-    """
-    found, chosen, tried = _regressed(data, theta, scorer, fit, _FORECAST)
-    gained = evidence(scorer.block_scores(found), scorer.block_scores(fit))
-    if gained < nats + len(chosen) * math.log(tried):
-        return math.inf
-    return scorer.left_out_error(found)
 
 
 def _regressed(
