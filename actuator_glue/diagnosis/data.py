@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from actuator_glue.diagnosis.base_prior import BasePrior
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.parameters import Parameter
+from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 
 SETTLE = 1.0  # s in which an unknown initial state is forgotten
@@ -165,13 +166,37 @@ class Data:
         """
         table = np.atleast_2d(theta)
         out = np.empty((len(table), self.target.size))
-        rows = zip(self.records, self.initials, self.origins, self.runs, strict=True)
-        for record, initial, origin, runs in rows:
+        for same in self._repeats if isinstance(model, Structure) else self._singles:
+            i = same[0]
+            record, initial, origin = self.records[i], self.initials[i], self.origins[i]
             for some in chunks(len(table), len(record), LANES):
                 y = simulated(model, table[some], record, initial, origin)
-                for run, at in runs:
+                for run, at in (r for j in same for r in self.runs[j]):
                     out[some, at] = y[:, run]
         return out
+
+    @property
+    def _singles(self) -> list[list[int]]:
+        return [[i] for i in range(len(self.records))]
+
+    @cached_property
+    def _repeats(self) -> list[list[int]]:
+        """Records that a structure answers with the same motion: the same test, from rest."""
+        out: list[list[int]] = []
+        for i, record in enumerate(self.records):
+            known = next((same for same in out if self._repeated(same[0], i)), None)
+            if known is None or isinstance(record, ObservedChannel):
+                out.append([i])
+            else:
+                known.append(i)
+        return out
+
+    def _repeated(self, i: int, j: int) -> bool:
+        a, b = self.records[i], self.records[j]
+        same = (a.period, a.stiffness, a.hold, self.initials[i], self.origins[i]) == (
+            b.period, b.stiffness, b.hold, 'rest', self.origins[j]
+        )  # fmt: skip
+        return same and self.initials[j] == 'rest' and np.array_equal(a.command, b.command)
 
     def split(self, errors: Array) -> list[Array]:
         """Cut a joined vector (N,) back into records."""

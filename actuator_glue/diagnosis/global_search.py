@@ -7,8 +7,7 @@ noise. Differential evolution (Storn & Price 1997) needs no slope.
 
 One stiffness leaves a ridge besides, along which friction grows with the oil's stiffness and only
 leakage tells where on it. In N it is bent: of 300 N, 2600 N were found, and then another hold of
-the command, or a gain, to make up for it. There Coulomb friction is a share. Stribeck friction is
-not: with its sliding or its break-away force as a share its fit ended no lower.
+the command, or a gain, to make up for it. There friction is a share.
 """
 
 from __future__ import annotations
@@ -30,13 +29,15 @@ _P = len(BASE)
 _POPULATION = 32  # as many as the kernel works on at a time
 _GENERATIONS = 80
 _STRAIGHT = 25  # iterations along a ridge
+_LEAST = 1.0  # N of friction, where it is a logarithm
 _SEED = 0
 
 
 class Shares(Space):
     """Forces over what oil and specimen resist with, where `Parameter.coordinate` is a share.
 
-    So are alpha_1 beta_0 and, beside a specimen, alpha_3. Their bounds are still those in N.
+    So are alpha_1 beta_0 and, beside a specimen, alpha_3; of Stribeck friction its break-away
+    force, as a logarithm like all that is positive. Their bounds are still those in N.
 
     Args:
         model: whose parameters they are.
@@ -47,23 +48,40 @@ class Shares(Space):
     def __init__(self, model: Model, duration: float, stiffness: float) -> None:
         super().__init__(model, duration)
         self._stiffness = stiffness
-        shared = [p.coordinate == 'share' for p in model.parameters]
+        parameters = model.parameters
+        self._breaks = [i for i, p in enumerate(parameters) if p.coordinate == 'sliding-force']
+        shared = [p.coordinate in ('share', 'sliding-force') for p in parameters]
         shared[1], shared[3] = True, stiffness > 0.0
         self._shared = np.array(shared)
+        self._log = np.array([p.lower > 0.0 for p in parameters])
+        self._log[:_P], self._log[self._breaks] = False, True
         self._box = super().theta(self.lower), super().theta(self.upper)
         low, high = (np.where(self._shared, self._oil(side), 1.0) for side in self._box)
-        ends = self._box[0] / high, self._box[1] / low
+        least = self._box[0].copy()
+        least[self._breaks] = _LEAST
+        ends = [least / high, self._box[1] / low]
+        for i in self._breaks:
+            ends[1][i] *= self._box[1][i + 1]
+        ends = [np.where(self._log, np.log(np.where(self._log, e, 1.0)), e) for e in ends]
         self.lower, self.upper = (np.concatenate([np.log(e[:_P]), e[_P:]]) for e in ends)
         self._steps[_P:] = 1e-4 * (self.upper - self.lower)[_P:]
+        self._steps[self._log], self._even = 0.01, self._even | self._log
 
     def theta(self, z: Array) -> Array:
         """As `Space.theta`."""
         out = super().theta(z)
+        out[..., self._log] = np.exp(out[..., self._log])
+        for i in self._breaks:
+            out[..., i] /= out[..., i + 1]
         return np.clip(np.where(self._shared, out * self._oil(out), out), *self._box)
 
     def z(self, theta: Array) -> Array:
         """As `Space.z`."""
-        return super().z(np.where(self._shared, theta / self._oil(theta), theta))
+        out = np.where(self._shared, theta / self._oil(theta), theta)
+        for i in self._breaks:
+            out[..., i] *= theta[..., i + 1]
+        out[..., self._log] = np.log(np.maximum(out[..., self._log], 1e-300))
+        return super().z(out)
 
     def _oil(self, theta: Array) -> Array:
         return np.asarray(theta[..., 2:3] + self._stiffness)
@@ -72,13 +90,11 @@ class Shares(Space):
 def _space(data: Data, model: Model) -> Space:
     duration = max(r.duration for r in data.records)
     stiffness, *others = {r.known_stiffness() for r in data.records}
-    if others or any(p.coordinate == 'sliding-force' for p in model.parameters):
-        return Space(model, duration)
-    return Shares(model, duration, stiffness)
+    return Space(model, duration) if others else Shares(model, duration, stiffness)
 
 
 def along_ridge(data: Data, model: Structure, theta: Array) -> Array:
-    """Return parameters (p,) refitted along the ridge that one stiffness leaves Coulomb friction.
+    """Return parameters (p,) refitted along the ridge that one stiffness leaves dry friction.
 
     Args:
         data: counted samples.

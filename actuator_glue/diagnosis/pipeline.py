@@ -10,6 +10,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from actuator_glue.diagnosis import (
+    chance,
     force_ranking,
     hum,
     learning,
@@ -74,13 +75,18 @@ class Conclusion:
     onset: Onset | None = None
 
 
-def conclude(prepared: Prepared, settings: Thresholds, each: Each, tell: Progress) -> Conclusion:
+def conclude(
+    prepared: Prepared, settings: Thresholds, each: Each, tell: Progress, fixed: bool = False
+) -> Conclusion:
     """Search for what the model lacks and decide; nothing looks at the held-out part.
 
-    Where impulses that could have swayed it show beside what was found, they are taken out and
-    all is done again.
+    What friction leaves to chance does not count, unless the samples that count are fixed. Where
+    impulses that could have swayed it show beside what was found, they are taken out and all is
+    done again.
     """
-    first = _conclude(prepared, settings, each, tell)
+    tell('base fit', 0.0)
+    prepared, search, line = _begun(prepared, settings, each, fixed)
+    first = _conclude(prepared, search, line, settings, tell)
     final = first.found.final
     clean = prepared.without_impulses(final.model, final.fit.theta)
     if clean is prepared:
@@ -88,15 +94,22 @@ def conclude(prepared: Prepared, settings: Thresholds, each: Each, tell: Progres
     taken, error = prepared.fit.target - clean.fit.target, final.fit.error
     if taken @ taken < _SWAYING * (error @ error):
         return first
-    return _conclude(clean, settings, each, tell)
+    return _conclude(*_begun(clean, settings, each, fixed=True), settings, tell)
 
 
-def _conclude(prepared: Prepared, settings: Thresholds, each: Each, tell: Progress) -> Conclusion:
-    tell('base fit', 0.0)
+def _begun(
+    prepared: Prepared, settings: Thresholds, each: Each, fixed: bool
+) -> tuple[Prepared, Search, Line | None]:
     search = Search(prepared.fit, mean_effects(), each)
     line = hum.find(prepared.fit, search.base().error)
     if line is not None:
         search = Search(hum.without(prepared.fit, line), mean_effects(), each)
+    return *chance.without(prepared, search, settings, fixed), line
+
+
+def _conclude(
+    prepared: Prepared, search: Search, line: Line | None, settings: Thresholds, tell: Progress
+) -> Conclusion:
     result = _searched(prepared, search, line, settings, tell)
     if result.decision.verdict == 'unexplained' and mean_effects(reserved=True):
         result = _with_reserved(prepared, result, settings, tell)
@@ -183,7 +196,7 @@ def since_onset(first: Conclusion, settings: Thresholds, each: Each, tell: Progr
     moment = changed[0]
     before, base = quiet
     tell('onset', 0.0)
-    second = conclude(first.prepared.since(moment), settings, each, tell)
+    second = conclude(first.prepared.since(moment), settings, each, tell, fixed=True)
     always, final = final, second.found.final
     nats = settings.nats + len(base.theta)
     sides = before, moment.split(first.data)[1]
@@ -247,7 +260,7 @@ def with_the_right_hold(
     tell('other hold', 0.0)
     if first.decision.verdict == 'missing-effect' and _explains_less(first, other, base):
         return first
-    second = conclude(other, settings, each, tell)
+    second = conclude(other, settings, each, tell, fixed=True)
     a, b = first.found.final.fit, second.found.final.fit
     scorer = second.scorer
     gained = evidence(scorer.block_scores(b), scorer.block_scores(a)) - len(b.theta) + len(a.theta)

@@ -26,8 +26,9 @@ class Space:
         self.upper = np.concatenate([_LOG_UPPER, [p.upper for p in extra]])
         self._steps = np.concatenate([np.full(_P, 1e-3), 1e-4 * (self.upper - self.lower)[_P:]])
         # A line's phase runs away with its frequency: its step is a part of the resolution.
-        self._line = np.array([False] * _P + [p.unit == 'Hz' for p in extra])
-        self._steps[self._line] = 0.02 / duration
+        line = np.array([False] * _P + [p.unit == 'Hz' for p in extra])
+        self._steps[line] = 0.02 / duration
+        self._even = line | (np.arange(len(line)) < _P)  # the same step everywhere
 
     def theta(self, z: Array) -> Array:
         """Physical parameters of working coordinates (..., p)."""
@@ -45,7 +46,7 @@ class Space:
         """Finite-difference steps (..., p): 1 % of an effect's size, so that kinks average out."""
         steps = np.broadcast_to(self._steps, z.shape).copy()
         larger = np.maximum(0.01 * np.abs(z), steps)
-        steps = np.where(self._line | (np.arange(z.shape[-1]) < _P), steps, larger)
+        steps = np.where(self._even, steps, larger)
         # Step inwards at an upper bound.
         return np.where(z + steps > self.upper, -steps, steps)
 
