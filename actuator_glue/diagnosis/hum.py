@@ -38,6 +38,10 @@ class Line:
     size: int
     duration: float
 
+    def same_as(self, other: Line) -> bool:
+        """Whether both are one line, as far as the longest record tells frequencies apart."""
+        return abs(self.frequency - other.frequency) * self.duration < 2.0
+
     @property
     def rms(self) -> float:
         """Rms of the line, mean over the records [m]."""

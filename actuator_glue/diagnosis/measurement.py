@@ -1,4 +1,4 @@
-"""Effects of the measurement that leave no mean response: grid and jitter (hum: lines.py).
+"""Effects of the measurement that leave no mean response: grid and jitter (hum: hum.py).
 
 quantisation: the values lie on a grid, or the error is a sawtooth of position. timing-jitter:
 variance that follows the squared velocity at frequencies where the mean response has nothing.
@@ -19,7 +19,7 @@ from actuator_glue.records import Array, Record
 _ROUNDING = 1e-6  # of a step: values are written with so many digits
 _PIECE = 1 << 18  # samples filtered at a time: what a long record takes is its means
 _FADE = 256  # samples after which the filter has forgotten, to the last digit, where it began
-_CLEAR_STEP = 60.0  # of the median power, as for a line in time (lines.py)
+_CLEAR_STEP = 60.0  # of the median power, as for a line in time (hum.py)
 
 
 @dataclass(frozen=True)

@@ -111,6 +111,12 @@ def _conclude(
     prepared: Prepared, search: Search, line: Line | None, settings: Thresholds, tell: Progress
 ) -> Conclusion:
     result = _searched(prepared, search, line, settings, tell)
+    if line is not None and result.found.final.effects:
+        left = _line_left(prepared.fit, result.found.final)
+        if left is None or not left.same_as(line):
+            data = prepared.fit if left is None else hum.without(prepared.fit, left)
+            search = Search(data, search.names, search.each)
+            result = _searched(prepared, search, left, settings, tell)
     if result.decision.verdict == 'unexplained' and mean_effects(reserved=True):
         result = _with_reserved(prepared, result, settings, tell)
     if result.decision.verdict != 'unexplained':
@@ -120,7 +126,12 @@ def _conclude(
     limit = result.decision.limit
     found, held = result.found, prepared.held.records
     own = per_record_settings.setting(search, found, limit, held, settings)
-    return result if own is None else _conclusion(prepared, selection, own, line)
+    return result if own is None else _conclusion(prepared, selection, own, result.line)
+
+
+def _line_left(data: Data, final: Trial) -> Line | None:
+    """Return the line beside what was found: that beside Eq. (2) may be the effect's response."""
+    return hum.find(data, fit(data, final.model, final.fit.theta).error)
 
 
 def _searched(
@@ -140,8 +151,9 @@ def _with_reserved(
     """Search again with the effects that are reserved for what all others leave.
 
     Where one of them alone, or beside what was found, is better beyond chance and by a material
-    error; and so must be the answer, with one of them in it. A mode that rings on passes for hum:
-    with it, hum is asked for once more.
+    error; and so must be the answer, with one of them in it or complete without: it may lead to
+    what the first search did not reach. A mode that rings on passes for hum: with it, hum is
+    asked for once more.
     """
     reserved, before = mean_effects(reserved=True), first.found.final
     usual, cost = first.selection.search, math.log(len(reserved))
@@ -163,7 +175,8 @@ def _with_reserved(
             continue
         second = _searched(prepared, search, line, settings, tell)
         found = second.found.final
-        if set(found.effects) & set(reserved) and better(found, second.scorer):
+        told = set(found.effects) & set(reserved) or second.decision.verdict != 'unexplained'
+        if told and better(found, second.scorer):
             return second
     return first
 

@@ -34,9 +34,13 @@ def find(
         settings: thresholds.
         line: hum that was taken out of the data before.
     """
-    line = line or hum.find(data, found.final.fit.error)
+    error = found.final.fit.error
+    # Judged beside what was found: Eq. (2) alone may leave so much that hum is nothing to it.
+    line = (
+        replace(line, floor=float(error @ error) / len(error)) if line else hum.find(data, error)
+    )
     if max(data.factors) == 1:
-        return measurement.find(data, found.final.fit.error, found.material, line)
+        return measurement.find(data, error, found.material, line)
     whole = data.as_recorded
     errors = whole.simulate(_model(data, found.final), found.final.fit.theta)[0]
     np.subtract(whole.target, errors, out=errors)  # as recorded they are large

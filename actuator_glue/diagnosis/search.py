@@ -264,14 +264,14 @@ class Search:
             if progress is not None:
                 progress((i + 1) / len(wanted))
         out.sort(key=_by_score)
-        # Only what is near the best is worth the last digits.
-        near = 1.5 * out[0].mean_square if out else 0.0
-        first = list(enumerate(out[:_POLISHED]))
-        polished = self.each(
-            lambda t: self.polish(t[1], valves) if t[0] < 2 or t[1].mean_square < near else t[1],
-            first,
-        )
-        return sorted([*polished, *out[_POLISHED:]], key=_by_score)
+        # Only what is near the best is worth the last digits, or what leaves less by far: short of
+        # its optimum a fit has a bad score.
+        error = out[0].mean_square if out else 0.0
+        tried = [t for i, t in enumerate(out[:_POLISHED]) if i < 2 or t.mean_square < 1.5 * error]
+        least = sorted(out[_POLISHED:], key=lambda t: t.mean_square)[:2]
+        tried += [t for t in least if 1.5 * t.mean_square < error]
+        rest = [t for t in out if all(t is not other for other in tried)]
+        return sorted([*self.each(lambda t: self.polish(t, valves), tried), *rest], key=_by_score)
 
     def screened(self, current: Trial, names: Iterable[str]) -> list[str]:
         """Sort effects by what their signatures could remove from the present residual."""

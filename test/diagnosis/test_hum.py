@@ -1,11 +1,17 @@
 """Hum is a line in true time, whichever samples count."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from actuator_glue.api.simulation import Command, Sensors, simulate
 from actuator_glue.diagnosis import hum
 from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.preparation import prepare
+from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.records import Record
 
 RATE = 256.0
@@ -36,3 +42,40 @@ def test_a_line_between_held_out_blocks_is_found(frequency: float) -> None:
 def test_noise_has_no_line(seed: int) -> None:
     """Nor do gaps make one; the threshold is exceeded in one of 10^6 records."""
     assert hum.find(*residual(50.0, 0.0, seed)) is None
+
+
+@pytest.mark.parametrize('amplitude', [0.0, 12e-6])
+@pytest.mark.parametrize('command', [0, 1, 2])
+def test_a_line_of_the_missing_effect_is_no_hum(
+    command: int, amplitude: float, rng_seed: int
+) -> None:
+    """Integral action under a random command leaves one in the residual of Eq. (2).
+
+    Hum beside it is told all the same: its evidence is against what integral action leaves.
+    """
+    rng = np.random.default_rng(rng_seed)
+    t = np.arange(int(30 * RATE)) / RATE
+    steps = np.resize(np.repeat(np.linspace(0.3, 5.0, 8), len(t) // 8), len(t))
+    stepped = 5e-3 * np.sin(2 * np.pi * np.cumsum(steps) / RATE)
+    records = []
+    for u in (
+        Command('noise', RATE, 30.0, 5e-3, high=5.0, seed=command),
+        Record(stepped, stepped, 1 / RATE),
+        Command('sweep', RATE, 30.0, 5e-3, high=4.5),
+    ):
+        moved = simulate(
+            u,
+            stiffness=7.5e3,
+            theta=[85.0, 6.3e7, 7.5e4, 1.8],
+            effects={'integral-action': {'integral_rate': 1.4}},
+            sensors=Sensors(noise=8e-6),
+            seed=(rng_seed, len(records)),
+        )
+        line = amplitude * np.sin(2 * np.pi * 50.0 * moved.time + rng.uniform(0.0, 6.28))
+        records.append(replace(moved, measured=moved.measured + line))
+    if not amplitude:
+        data = prepare(records[:2], records[2:]).fit
+        assert hum.find(data, Search(data, ()).base().error) is not None
+    found = diagnose(records[:2], records[2], settings=Thresholds(evaluations=0))
+    names = {e.name for e in found.effects}
+    assert names == ({'integral-action', 'hum'} if amplitude else {'integral-action'})

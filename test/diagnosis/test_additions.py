@@ -1,0 +1,48 @@
+"""Which refits of further effects are finished."""
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from actuator_glue.diagnosis.search import Search, Trial
+from actuator_glue.model.structure import Structure
+
+# Score [nats] and error [um] of each refit before it is finished.
+ROUGH = {
+    'drift': (-100.0, 67.0),
+    'backlash': (-101.0, 67.0),
+    'delay': (-102.0, 67.0),
+    'gain': (-103.0, 67.0),
+    'bias': (-104.0, 67.0),
+    'flow-saturation': (-900.0, 24.0),
+    'command-rate': (-950.0, 60.0),
+}
+
+
+def trial(name: str, score: float, error: float) -> Trial:
+    """Return a refit with this score and error."""
+    fit: Any = SimpleNamespace(error=np.full(4, 1e-6 * error))
+    return Trial(Structure((name,)), name, fit, np.array([score]))
+
+
+@pytest.mark.parametrize('seed', range(3))
+def test_a_refit_that_leaves_far_less_is_finished_whatever_its_score(seed: int) -> None:
+    """Short of its optimum its score was the worst: a saturated valve went without its name."""
+    finished = []
+
+    class Rough(Search):
+        def add(self, current: Trial, name: str) -> Trial:
+            return trial(name, *ROUGH[name])
+
+        def polish(self, found: Trial, valves: bool = True) -> Trial:
+            finished.append(found.added)
+            return trial(found.added, -10.0, 8.0) if found.added == 'flow-saturation' else found
+
+    names = tuple(np.random.default_rng(seed).permutation(list(ROUGH)))
+    data: Any = None
+    found = Rough(data, names).additions(trial('hum', -100.0, 67.0))
+    assert found[0].added == 'flow-saturation'
+    assert 'command-rate' not in finished
+    assert sorted(t.added for t in found) == sorted(ROUGH)
