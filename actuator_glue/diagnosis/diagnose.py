@@ -25,6 +25,7 @@ from actuator_glue.diagnosis.base_prior import BasePrior
 from actuator_glue.diagnosis.detect import alarm_of
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.force import check_forces
+from actuator_glue.diagnosis.hold import with_the_right_hold
 from actuator_glue.diagnosis.next_experiment import Experiment, ranked
 from actuator_glue.diagnosis.pipeline import (
     Conclusion,
@@ -32,7 +33,6 @@ from actuator_glue.diagnosis.pipeline import (
     conclude,
     since_onset,
     with_learned_terms,
-    with_the_right_hold,
 )
 from actuator_glue.diagnosis.preparation import prepare, rest_samples
 from actuator_glue.diagnosis.result import DiagnosisData

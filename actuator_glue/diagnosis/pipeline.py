@@ -7,8 +7,6 @@ from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, fields, replace
 
-import numpy as np
-
 from actuator_glue.diagnosis import (
     chance,
     force_ranking,
@@ -21,15 +19,14 @@ from actuator_glue.diagnosis import (
 )
 from actuator_glue.diagnosis.completeness import Decision, decide
 from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.decimate import decimated
-from actuator_glue.diagnosis.fit import Fit, fit
+from actuator_glue.diagnosis.fit import fit
 from actuator_glue.diagnosis.hum import Line
 from actuator_glue.diagnosis.measurement import Measured
 from actuator_glue.diagnosis.model_selection import ModelSelection, Selection
 from actuator_glue.diagnosis.onset import Onset
 from actuator_glue.diagnosis.preparation import Prepared
 from actuator_glue.diagnosis.regression import Surrogate
-from actuator_glue.diagnosis.score import Scorer, evidence
+from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.search import Each, Search, Trial
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.model.effects import CATALOGUE
@@ -246,61 +243,4 @@ def _conclusion(
     decision = decide(found, seen, data, settings, generic)
     return Conclusion(
         prepared, data, search.scorer, line, found, seen, generic, decision, selection
-    )
-
-
-def with_the_right_hold(
-    first: Conclusion, settings: Thresholds, each: Each, tell: Progress
-) -> Conclusion:
-    """Ask whether the command ran linearly between its samples instead of being held.
-
-    The wrong hold is a lead of half a sample: no effect of the catalogue, but something will be
-    found for it (a gain that drifts, say). The other hold is taken where Eq. (2) alone explains
-    materially more with it, and what is found with it explains more, beyond chance. Held
-    commands taken for linear ones are a delay, which is in the catalogue.
-
-    An answer that leaves nothing and explains less with the other hold is not searched for again:
-    of a large effect that Eq. (2) leaves, either hold may leave more.
-    """
-    prepared = first.prepared
-    if first.decision.verdict == 'none' or not any(r.hold == 'zoh' for r in prepared.fit.recorded):
-        return first
-    other = replace(prepared, fit=_linear(prepared.fit), held=_linear(prepared.held))
-    base = Search(other.fit, ()).base()
-    before = first.found.base.mean_square + (first.line.rms**2 if first.line else 0.0)
-    if before - base.rms**2 < first.found.material**2:
-        return first
-    tell('other hold', 0.0)
-    if first.decision.verdict == 'missing-effect' and _explains_less(first, other, base):
-        return first
-    second = conclude(other, settings, each, tell, fixed=True)
-    a, b = first.found.final.fit, second.found.final.fit
-    scorer = second.scorer
-    gained = evidence(scorer.block_scores(b), scorer.block_scores(a)) - len(b.theta) + len(a.theta)
-    if gained < settings.nats:
-        return first
-    note = (
-        'the command is taken to run linearly between its samples (as --hold linear): Eq. (2) '
-        f'alone then leaves {1e6 * base.rms:.1f} um instead of {1e6 * before**0.5:.1f} um'
-    )
-    return replace(second, prepared=replace(other, notes=(*other.notes, note)))
-
-
-def _explains_less(first: Conclusion, other: Prepared, base: Fit) -> bool:
-    """Whether what was found explains less with the other hold, whose Eq. (2) is fitted."""
-    found = first.found.final
-    data = other.fit if first.line is None else hum.without(other.fit, first.line)
-    starts = np.stack([found.fit.theta, found.fit.theta])
-    starts[1, : len(base.theta)] = base.theta
-    again, scorer = fit(data, found.model, starts), first.scorer
-    return evidence(scorer.block_scores(again), scorer.block_scores(found.fit)) < 0.0
-
-
-def _linear(data: Data) -> Data:
-    whole = tuple(replace(r, hold='linear') for r in data.recorded)
-    pairs = zip(whole, data.factors, strict=True)
-    records = (decimated(r, n) for r, n in pairs)
-    same = zip(records, data.records, strict=True)
-    return replace(
-        data, records=tuple(replace(r, measured=d.measured) for r, d in same), recorded=whole
     )
