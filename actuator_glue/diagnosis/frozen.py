@@ -2,7 +2,8 @@
 
 A converter that hangs, or a packet that is sent again, repeats one value exactly. A piston that
 play or friction holds still does not: what a model then misses is part of its whole residual, and
-a channel's grid holds it for one step at most.
+a channel's grid holds it for one step at most. A reading that is never exceeded is an end of the
+channel's range: that is the transducer's, and stays.
 """
 
 from __future__ import annotations
@@ -55,6 +56,7 @@ def while_moving(repeated: Frozen, record: Record, output: Array) -> Frozen:
     edges = edges[edges < len(y)]
     motion = np.maximum.reduceat(output, edges) - np.minimum.reduceat(output, edges)
     far = motion[::2] > max(_BEYOND * noise, _STEPS * grid)
+    far &= (y[last] > y.min()) & (y[last] < y.max())  # else it is at an end of its range
     return Frozen(repeated.first[far], last[far])
 
 

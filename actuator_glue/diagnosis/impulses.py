@@ -8,7 +8,7 @@ the model lacks does not: it stands out of the residual by little.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -111,14 +111,14 @@ def _explained(error: Array, noise: Array, taps: Array) -> tuple[list[int], Arra
     return [chosen[i] for i in order], sizes[order]
 
 
-def find(residual: Array, speed: Array, period: float) -> Impulses:
+def find(residual: Array, motion: Sequence[Array], period: float) -> Impulses:
     """Return the impulses of a residual.
 
     None where they are too many to be accidents, or come with the motion.
 
     Args:
         residual: of a model that was fitted, (n,) [m].
-        speed: of the motion, (n,) [m/s].
+        motion: sizes of what accidents do not know of, (n,) each: how fast the piston is, say.
         period: time between samples [s].
     """
     if len(residual) < 40 * _REACH:
@@ -140,12 +140,12 @@ def find(residual: Array, speed: Array, period: float) -> Impulses:
         sizes += list(found[1])
         runs = np.flatnonzero(np.diff(found[0], prepend=-2) > 1)
         starts += [part.start + found[0][i] for i in runs]
-    if not samples or len(samples) > _MOST * len(residual) or _with_motion(starts, speed):
+    if not samples or len(samples) > _MOST * len(residual) or _with_motion(starts, motion):
         return _NONE
     return Impulses(np.array(samples, dtype=np.intp), np.array(sizes), len(starts))
 
 
-def _with_motion(starts: list[int], speed: Array) -> bool:
-    """Whether impulses come when the piston is fast: accidents do not know how fast it is."""
-    rank = stats.rankdata(speed)[starts] / len(speed)
-    return bool((rank.mean() - 0.5) * np.sqrt(12.0 * len(starts)) > _SURE)
+def _with_motion(starts: list[int], motion: Sequence[Array]) -> bool:
+    """Whether impulses come when the piston is fast or far out: accidents do not know of that."""
+    ranks = [stats.rankdata(size)[starts].mean() / len(size) for size in motion]
+    return bool((max(ranks) - 0.5) * np.sqrt(12.0 * len(starts)) > _SURE)

@@ -90,8 +90,36 @@ def test_what_the_model_lacks_is_no_impulse(
     assert changed.mean() < 1e-3
 
 
+@pytest.mark.parametrize('late', [False, True])
+@pytest.mark.parametrize('share', [0.75, 0.85, 0.95])
+def test_the_end_of_a_transducer_is_no_impulse(share: float, late: bool) -> None:
+    """What is cut off, before the noise or behind it, comes where the piston is far out."""
+    record, x = healthy(7)
+    limit = share * float(np.abs(x).max())
+    first, then = (record.measured, 0.0) if late else (x, record.measured - x)
+    cut = replace(record, measured=np.clip(first, -limit, limit) + then)
+    clean, notes, _ = despiked([cut], ['rest'])
+    assert notes == []
+    assert clean[0] is cut
+
+
+@pytest.mark.parametrize('size', [5e-5, 2e-2])
+@pytest.mark.parametrize('count', [20, 100])
+def test_accidents_far_out_are_accidents(size: float, count: int) -> None:
+    """Spikes that exceed every motion, and readings that drop to zero where it is large."""
+    record, x = healthy(8)
+    rng = np.random.default_rng(9)
+    at = rng.choice(np.arange(20, len(T) - 20, 13), count, replace=False)
+    dropped, spiked = record.measured.copy(), record.measured.copy()
+    dropped[at], spiked[at] = 0.0, spiked[at] + size
+    for y in (dropped, spiked):
+        clean, notes, _ = despiked([replace(record, measured=y)], ['rest'])
+        assert len(notes) == 1
+        assert np.abs(clean[0].measured - x).max() < 60e-6
+
+
 def test_too_many_are_no_accidents() -> None:
     """What is off in a tenth of the samples is left as it is."""
     noise = NOISE * np.random.default_rng(6).standard_normal(4000)
     noise[::10] += 1e-4
-    assert impulses.find(noise, np.ones(4000), 1e-3).count == 0
+    assert impulses.find(noise, [np.ones(4000)], 1e-3).count == 0
