@@ -270,16 +270,19 @@ class ModelSelection:
     def _pressed_form(self, trial: Trial, name: str, simpler: str) -> bool:
         """Whether an effect is a richer form of another only by a parameter at its bound.
 
-        No equation is the machine's: such a form mends that of the other, it is not found.
+        No equation is the machine's: such a form mends that of the other, it is not found. Near
+        its neutral value a size is small (20 N of 20 kN), not held.
         """
         entry = self.search.entries.get(name)
         if entry is None or entry.holds is None or entry.holds[0] != simpler:
             return False
         columns = trial.structure.columns(name)
-        for p, value in zip(entry.parameters, trial.fit.theta[columns], strict=True):
-            if min(value - p.lower, p.upper - value) < _AT_BOUND * (p.upper - p.lower):
-                return True
-        return False
+        return any(
+            abs(value - end) < _AT_BOUND * (p.upper - p.lower)
+            for p, value in zip(entry.parameters, trial.fit.theta[columns], strict=True)
+            for end in (p.lower, p.upper)
+            if end != p.neutral
+        )
 
     def simpler(
         self, current: Trial, rivals: dict[str, tuple[Rival, ...]], complete: bool
@@ -292,8 +295,7 @@ class ModelSelection:
                 fewer = len(entries[rival.name].parameters) < len(entries[name].parameters)
                 alike = complete and rival.nats < self.settings.tie_nats
                 alike = alike or self._pressed_form(current, name, rival.name)
-                named = is_learned(entries[name]) and rival.name != name
-                named = named and rival.excess < self.material
-                if rival.tied and (named or (fewer and alike)):
+                named = is_learned(entries[name]) and rival.excess < self.material
+                if rival.tied and ((named and rival.name != name) or (fewer and alike)):
                     return self.search.trial(effects, rival.name)
         return current

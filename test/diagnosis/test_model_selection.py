@@ -98,17 +98,23 @@ class Tried:
 
 
 @pytest.mark.parametrize(
-    ('ratio', 'speed', 'name'),
+    ('force', 'ratio', 'speed', 'name'),
     [
-        (4.0, 0.016, 'coulomb-friction'),
-        (1.5, 0.1, 'coulomb-friction'),
-        (1.8, 0.005, 'stribeck-friction'),
+        (80.0, 4.0, 0.016, 'coulomb-friction'),
+        (80.0, 1.5, 0.1, 'coulomb-friction'),
+        (80.0, 1.8, 0.005, 'stribeck-friction'),
+        (8.0, 1.8, 0.005, 'stribeck-friction'),
     ],
 )
-def test_a_richer_form_at_its_bound_mends_the_other(ratio: float, speed: float, name: str) -> None:
-    """Friction that falls by as much as may be, or nowhere, is Coulomb's, 300 nats or not."""
+def test_a_richer_form_at_its_bound_mends_the_other(
+    force: float, ratio: float, speed: float, name: str
+) -> None:
+    """Friction that falls by as much as may be, or nowhere, is Coulomb's, 300 nats or not.
+
+    A small force is no bound: below 20 N Stribeck friction was never told.
+    """
     coulomb, stribeck = ('coulomb-friction',), ('stribeck-friction',)
-    sizes = {coulomb: [100.0], stribeck: [80.0, ratio, speed]}
+    sizes = {coulomb: [100.0], stribeck: [force, ratio, speed]}
     trials = {
         n: Trial(
             Structure(n),
