@@ -270,8 +270,7 @@ class ModelSelection:
     def _pressed_form(self, trial: Trial, name: str, simpler: str) -> bool:
         """Whether an effect is a richer form of another only by a parameter at its bound.
 
-        No equation is the machine's: such a form mends that of the other, it is not found. Near
-        its neutral value a size is small (20 N of 20 kN), not held.
+        Such a form mends the other's equation. Near its neutral value a size is small, not held.
         """
         entry = self.search.entries.get(name)
         if entry is None or entry.holds is None or entry.holds[0] != simpler:
