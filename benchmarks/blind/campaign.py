@@ -80,10 +80,10 @@ def main() -> int:
     parser.add_argument('--jobs', type=int, default=1)
     parser.add_argument(
         '--generator',
-        choices=('cases', 'variant', 'mixed'),
+        choices=('cases', 'variant', 'mixed', 'far'),
         default='cases',
         help='cases: one effect on one test; variant: other forms, other tests; mixed: several '
-        'effects, spikes, onsets',
+        'effects, spikes, onsets; far: machines and tests of any scale',
     )
     parser.add_argument(
         '--effects',

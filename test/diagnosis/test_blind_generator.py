@@ -133,3 +133,19 @@ def test_frames_agree(form: int, payload: bool, monkeypatch: pytest.MonkeyPatch)
     for stiffness, seen in zip(stiffnesses, outputs, strict=True):
         y = model.simulate(full, Record(command, seen, 1.0 / plant.RATE, stiffness))
         assert np.sqrt(np.mean((y - seen) ** 2)) < 0.1e-6
+
+
+def test_far_machines_are_those_of_their_seed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of every scale, each moving by about its command, every third one healthy."""
+    monkeypatch.syspath_prepend(str(BLIND))
+    cases = [import_module('far').build(seed) for seed in range(12)]
+    assert [not c.effects for c in cases] == [i % 3 == 0 for i in range(12)]
+    assert len({c.rate for c in cases}) > 2
+    strokes = [np.abs(c.commands[0]).max() for c in cases]
+    assert max(strokes) > 10 * min(strokes)
+    for case in cases:
+        assert (case.ratio > 0.0) == bool(case.effects)
+        for u, y in zip(case.commands, case.measured, strict=True):
+            assert 0.3 * np.abs(u).max() < np.abs(y).max() < 3.0 * np.abs(u).max()
+    again = import_module('far').build(5)
+    assert np.array_equal(again.measured[0], cases[5].measured[0])
