@@ -35,6 +35,7 @@ from actuator_glue.diagnosis.pipeline import (
     with_learned_terms,
 )
 from actuator_glue.diagnosis.preparation import prepare, rest_samples
+from actuator_glue.diagnosis.rate_correction import corrected
 from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.diagnosis.search import Each, Trial
 from actuator_glue.diagnosis.space import UPPER, Space
@@ -100,10 +101,14 @@ def diagnose(
     small = {} if own else discrepancy.responses(result.selection.search, size)
 
     def sample(trial: Trial, evaluations: int = 0, stage: str = 'posterior') -> posterior.Draws:
+        # A linear model answers alike at any rate, and one record's own setting is linear.
+        moved = bool(trial.effects) and trial.own is None
+        theta = trial.fit.theta
+        known = corrected(scorer.data, trial.structure, theta) if moved else scorer.data
         return posterior.sample(
             trial.model,
             trial.fit,
-            scorer,
+            replace(scorer, data=known),
             beside=discrepancy.beside(small, trial.effects, scorer),
             rng=rng,
             evaluations=evaluations,
