@@ -8,6 +8,7 @@ import numpy as np
 
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.estimate import Json
+from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.measurement import Measured
 from actuator_glue.diagnosis.model_selection import Selection
 from actuator_glue.diagnosis.regression import Surrogate
@@ -83,18 +84,19 @@ def decide(
         noise=found.noise,
         left=left,
         certainty=(1.0 - settings.outside)
-        * (_certainty(found, left, surrogate) if verdict == 'unexplained' else 1.0),
+        * (_certainty(found, left, surrogate, settings) if verdict == 'unexplained' else 1.0),
         limit=limit,
         remaining={'left': left, 'limit': limit, **remaining(data, final.fit.error)},
     )
 
 
-def _certainty(found: Selection, left: float, surrogate: Surrogate) -> float:
+def _certainty(found: Selection, left: float, surrogate: Surrogate, settings: Thresholds) -> float:
     """Return the share of the structure that is the names' own doing, in [0, 1].
 
     What they explain of the structure, times what a regression of as many parameters leaves of
     what they leave: a smooth function of the motion that does much better says that the names
-    stand for it.
+    stand for it. So does a learned term beside which structure remains: the catalogue does not
+    hold the machine.
     """
     # Not of the structure found at first: under a stationary command most of it passes for noise
     # until something explains it.
@@ -102,7 +104,9 @@ def _certainty(found: Selection, left: float, surrogate: Surrogate) -> float:
     explained = gained / (gained + left**2) if gained > 0.0 else 0.0
     theirs = surrogate.structure_error**2 - found.noise**2
     generic = max(0.0, surrogate.error**2 - found.noise**2)
-    return explained * (min(1.0, generic / theirs) if theirs > 0.0 else 1.0)
+    described = any(is_learned(e) for e in found.final.structure.entries)
+    own = explained * (settings.described if described else 1.0)
+    return own * (min(1.0, generic / theirs) if theirs > 0.0 else 1.0)
 
 
 def _band(frequency: Array, excess: Array) -> list[float]:
