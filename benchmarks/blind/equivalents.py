@@ -36,6 +36,7 @@ def values(
     sign: float = 1.0,
     form: int = 0,
     frame: tuple[float, float] = (0.0, 0.0),
+    dry: bool = True,
 ) -> dict[str, float]:
     """Return the true parameters of effects whose equation is the catalogue's, by name [SI].
 
@@ -46,6 +47,7 @@ def values(
         sign: of effects that have two.
         form: which way an effect with several is written.
         frame: natural frequency [Hz] and damping ratio of the reaction frame.
+        dry: whether friction is Coulomb's; where it rises over a velocity its size is another.
     """
     out: dict[str, float] = {}
     for name, size in sizes.items():
@@ -56,7 +58,7 @@ def values(
                 out['deadband'] = size
             case 'sensor-lag' if form != 2:
                 out['sensor_lag'] = size
-            case 'coulomb-friction':
+            case 'coulomb-friction' if dry:
                 out['coulomb_force'] = size * float(theta[2])
             case 'viscous-damping':
                 out['damping'] = size * float(theta[2]) / 50.0

@@ -137,5 +137,5 @@ def build(seed: int) -> Case:
         float(colour),
         sizes | ({'onset': onset[1]} if onset[0] else {}),
         shares,
-        values(sizes, theta, float(np.abs(inputs[0]).max()), forms.sign, forms.form),
+        values(sizes, theta, float(np.abs(inputs[0]).max()), forms.sign, forms.form, dry=False),
     )

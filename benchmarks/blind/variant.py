@@ -159,5 +159,13 @@ def build(
         float(colour),
         sizes,
         shares,
-        values(sizes, theta, float(np.abs(inputs[0]).max()), forms.sign, forms.form, forms.frame),
+        values(
+            sizes,
+            theta,
+            float(np.abs(inputs[0]).max()),
+            forms.sign,
+            forms.form,
+            forms.frame,
+            dry=False,
+        ),
     )
