@@ -102,11 +102,12 @@ def _literal(text: str, path: Path) -> Any:
     for node in body:
         if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant):
             continue  # a docstring
-        named = isinstance(node, ast.Assign) and [ast.unparse(t) for t in node.targets]
         try:
-            if named != ['EFFECTS']:
-                raise ValueError
-            found = ast.literal_eval(node.value)  # type: ignore[attr-defined]
+            match node:
+                case ast.Assign(targets=[ast.Name(id='EFFECTS')]):
+                    found = ast.literal_eval(node.value)
+                case _:
+                    raise ValueError
         except (ValueError, TypeError, RecursionError):
             raise InputError(
                 f'{path}, line {node.lineno}: the file is read, not executed; it may hold '

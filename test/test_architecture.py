@@ -14,6 +14,9 @@ import actuator_glue
 
 ROOT = Path(actuator_glue.__file__).resolve().parent
 SOURCES = sorted(p for p in ROOT.rglob('*.py'))
+OUTSIDE = sorted(p for f in ('studies', 'examples') for p in (ROOT.parent / f).rglob('*.py'))
+OURS = ('test', 'benchmarks', 'launch', 'scripts')
+EVERY = [*SOURCES, *OUTSIDE, *(p for f in OURS for p in (ROOT.parent / f).rglob('*.py'))]
 
 BOTTOM = {'errors', 'records', 'setups', 'sample_block', 'jit', 'normal', 'json_value'}
 CORE = BOTTOM | {'model', 'inference'}
@@ -180,21 +183,22 @@ def test_a_name_means_one_thing() -> None:
 
 def test_layout_is_left_to_the_formatter() -> None:
     """Where lines are laid out by hand, a table is read as one."""
-    root = ROOT.parent
-    ours = [
-        p for f in ('test', 'benchmarks', 'launch', 'scripts') for p in (root / f).rglob('*.py')
-    ]
     mark = '# fmt: ' + 'skip'
-    assert (
-        sum(p.read_text(encoding='utf-8').count(mark) for p in [*SOURCES, *OUTSIDE, *ours]) <= 20
-    )
+    assert sum(p.read_text(encoding='utf-8').count(mark) for p in EVERY) <= 20
     # Tests too have one subject a file.
     assert all(
-        len(p.read_text(encoding='utf-8').splitlines()) <= 300 for p in ours if 'test' in p.parts
+        len(p.read_text(encoding='utf-8').splitlines()) <= 300 for p in EVERY if 'test' in p.parts
     )
 
 
-OUTSIDE = sorted(p for f in ('studies', 'examples') for p in (ROOT.parent / f).rglob('*.py'))
+def test_a_silenced_check_has_its_reason() -> None:
+    """What is said to mypy or ruff is followed by why."""
+    mark = re.compile(
+        r'# (?:type: ' + r'ignore|no' + r'qa)\b(?!(?:\[[\w-]+\]|: [A-Z0-9]+) +(?:#|-) \w)'
+    )
+    for path in EVERY:
+        found = mark.search(path.read_text(encoding='utf-8'))
+        assert found is None, f'{path}: {found}'
 
 
 @pytest.mark.parametrize('path', OUTSIDE, ids=lambda p: str(p.relative_to(ROOT.parent)))

@@ -50,7 +50,8 @@ def test_effects_can_be_tried_where_nothing_is_compiled(tmp_path):
 @pytest.mark.slow
 @pytest.mark.timeout(7200)
 @pytest.mark.skipif(
-    importlib.util.find_spec('atheris') is None, reason="pip install 'actuator_glue[safety]'"
+    importlib.util.find_spec('atheris') is None,
+    reason="no atheris: pip install 'actuator_glue[safety]'",
 )
 def test_a_hundred_thousand_inputs_of_every_kind_do_no_harm(tmp_path, rng_seed):
     """No exception but InputError, none slower than its limit, within a limit of memory."""

@@ -189,7 +189,7 @@ def _python(*args: str, patience: float = PATIENCE) -> subprocess.CompletedProce
         out, err = process.communicate(timeout=patience)
     except subprocess.TimeoutExpired:
         process.kill()
-        with suppress(subprocess.TimeoutExpired):
+        with suppress(subprocess.TimeoutExpired):  # its own children may keep the pipe open
             process.communicate(timeout=5.0)
         raise
     return subprocess.CompletedProcess(args, process.returncode, out, err)

@@ -21,5 +21,5 @@ def give_back(records: Sequence[Record]) -> None:
     of ten minutes at 10 kHz.
     """
     if sum(map(len, records)) >= _LONG:
-        with suppress(OSError, AttributeError, TypeError):
+        with suppress(OSError, AttributeError, TypeError):  # other C libraries have no mallopt
             ctypes.CDLL(None).mallopt(_M_MMAP_THRESHOLD, _LARGE)

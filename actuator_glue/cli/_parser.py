@@ -22,7 +22,7 @@ class Parser(argparse.ArgumentParser):
         super().__init__(epilog=EPILOG, **options)
         self._within = False
 
-    def parse_known_args(  # type: ignore[override]
+    def parse_known_args(  # type: ignore[override]  # an overload for any namespace is left out
         self, args: Sequence[str] | None = None, namespace: argparse.Namespace | None = None
     ) -> tuple[argparse.Namespace, list[str]]:
         """Parse; a command takes its positional arguments from between its options, too."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -120,12 +121,12 @@ def _of_topic(topic: TopicSeries) -> list[ColumnLook]:
 
 def _file(path: Path) -> FileLook:
     chosen = format_of(path)
-    layout: dict[str, object] = {}
+    layout: dict[str, Any] = {}
     channels, places = None, None
     if chosen is formats()['.csv']:
         layout, places = text_layout(path)
         unknown = ChannelMap(Channel(1, 'm'), Channel(2, 'm'), rate=1.0)
-        channels = replace(unknown, **layout)  # type: ignore[arg-type]
+        channels = replace(unknown, **layout)
     table = chosen.read(path, channels)
     columns = table.columns
     if places is None:

@@ -140,8 +140,8 @@ def _influence(value: object) -> Array | None:
     return np.array([_number(v, 'influence') for v in value])
 
 
-def _mass(value: object, count: int, where: str) -> Array:
-    matrix = square(value, where)  # type: ignore[arg-type]
+def _mass(value: Any, count: int, where: str) -> Array:
+    matrix = square(value, where)
     return float(matrix[0, 0]) * np.eye(count) if matrix.size == 1 else matrix
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.formats.delimited import DELIMITERS, delimiter_of, fields_of
@@ -14,7 +15,7 @@ _LOOK = 300  # lines in which the samples must begin
 _ROWS = 5  # rows of one shape that are samples
 
 
-def text_layout(path: Path) -> tuple[dict[str, object], list[int]]:
+def text_layout(path: Path) -> tuple[dict[str, Any], list[int]]:
     """Return entries of a channel map for a text, and the positions of its columns of numbers.
 
     Raises:
@@ -36,7 +37,7 @@ def text_layout(path: Path) -> tuple[dict[str, object], list[int]]:
     if best is None:
         raise InputError(f'{path}: no rows of at least two numbers in the first {_LOOK} lines')
     first, _, delimiter, numbers = best
-    entries: dict[str, object] = {'header_lines': first}
+    entries: dict[str, Any] = {'header_lines': first}
     above = [fields_of(line, delimiter) for line in lines[max(first - 2, 0) : first]]
     if len(above) == 2 and len(above[0]) >= 2 and units_line(above[1]):
         entries['header_lines'] = first - 1  # a line of units is found by itself

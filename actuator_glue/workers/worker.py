@@ -107,7 +107,7 @@ class Worker:
             process.join(2.0)
 
     def _hand_over(self, pipe: Connection, tasks: queue.SimpleQueue[Any]) -> None:
-        with suppress(OSError):
+        with suppress(OSError):  # a process that died is told where its answers are read
             while (task := tasks.get()) is not None:
                 pipe.send(task)
             pipe.send(None)
@@ -142,6 +142,7 @@ def _serve(pipe: Connection, warm: Callable[[], None] | None, nice: int) -> None
     def tell(payload: Any) -> None:
         pipe.send((PROGRESS, payload, time.monotonic() - started))
 
+    # Whoever asked has gone: nothing is left to answer.
     with suppress(EOFError, BrokenPipeError, ConnectionResetError):
         if warm is not None:
             warm()

@@ -45,7 +45,7 @@ def child(name: str, out: Path, inputs: int, seed: int) -> None:
     with atheris.instrument_imports(include=['actuator_glue', 'rosbags', 'mcap', 'nptdms']):
         from actuator_glue.errors import InputError
         from benchmarks.fuzz.targets import TARGETS
-    warnings.simplefilter('ignore')
+    warnings.simplefilter('ignore')  # a damaged file may be warned of; exceptions are looked for
     target = TARGETS[name]
     scratch = Path(tempfile.mkdtemp(dir='/dev/shm' if Path('/dev/shm').is_dir() else None))
     corpus = out / 'corpus'

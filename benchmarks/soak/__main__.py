@@ -130,7 +130,7 @@ class Soak:
                 )
 
     def _fault(self, kind: str, wire: Wire) -> Callable[[], float]:
-        return getattr(self if kind in NODES else wire, kind)  # type: ignore[no-any-return]
+        return getattr(self if kind in NODES else wire, kind)
 
     def estimator_killed(self) -> float:
         """Kill the estimator; another is started, and has to get ready first."""

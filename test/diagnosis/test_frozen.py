@@ -10,13 +10,15 @@ from actuator_glue.diagnosis.despike import despiked
 from actuator_glue.diagnosis.fit import base_fit
 from actuator_glue.diagnosis.preparation import prepare
 from actuator_glue.model.structure import Structure
-from actuator_glue.records import Record
+from actuator_glue.records import Array, Record
 
 THETA = np.array([235.0, 5.0e10, 4.23e6, 3.3])
 NOISE = 3e-6
 
 
-def machine(rate: float, seed: int, effects: tuple[str, ...] = (), *own: float):  # type: ignore[no-untyped-def]
+def machine(
+    rate: float, seed: int, effects: tuple[str, ...] = (), *own: float
+) -> tuple[Record, Array]:
     """Return a record of 24 s of sweep to 10 Hz and its noise-free response."""
     t = np.arange(int(24 * rate)) / rate
     command = 2e-3 * np.sin(np.pi * (10.0 / 24.0) * t**2)

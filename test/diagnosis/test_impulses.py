@@ -19,7 +19,9 @@ SWEEP = 2e-3 * np.sin(np.pi * (10.0 / 24.0) * T**2)
 NOISE = 3e-6
 
 
-def healthy(seed: int, command: Array = SWEEP, effects: tuple[str, ...] = (), *own: float):  # type: ignore[no-untyped-def]
+def healthy(
+    seed: int, command: Array = SWEEP, effects: tuple[str, ...] = (), *own: float
+) -> tuple[Record, Array]:
     """Return a record of a machine and its noise-free response."""
     bare = Record(command, np.zeros(len(T)), 1 / RATE, stiffness=250e3)
     x = Structure(effects).simulate(np.array([*THETA, *own]), bare)

@@ -124,7 +124,7 @@ def test_a_richer_form_at_its_bound_mends_the_other(
         )
         for n, s in sizes.items()
     }
-    found = ModelSelection(Tried(trials), Thresholds(), lambda stage, share: None)  # type: ignore[arg-type]
+    found = ModelSelection(Tried(trials), Thresholds(), lambda stage, share: None)
     rivals = {stribeck[0]: (Rival(coulomb[0], 300.0, 20.0, 1e-6, True, 0.4),)}
     assert found.simpler(trials[stribeck], rivals, True).effects == (name,)
 
@@ -144,8 +144,8 @@ def fit_of(error: Array, names: tuple[str, ...]) -> Fit:
 def test_a_name_takes_the_place_of_a_description_that_it_is_tied_with() -> None:
     """Though neither is simpler; not one that leaves materially more, or is not tied."""
     names = ('learned-valve-e2',), ('flow-asymmetry',)
-    tried = Tried({n: trial(n, 1e-5) for n in names}, ENTRIES)  # type: ignore[arg-type]
-    found = ModelSelection(tried, Thresholds(), lambda stage, share: None)  # type: ignore[arg-type]
+    tried = Tried({n: trial(n, 1e-5) for n in names}, ENTRIES)
+    found = ModelSelection(tried, Thresholds(), lambda stage, share: None)
     found.material = 3e-6
     own = Rival('learned-valve-e2', 0.0, 0.0, 0.0, True, 0.7)
     cases = (True, 1e-6, names[1]), (True, 4e-6, names[0]), (False, 1e-6, names[0])
@@ -193,7 +193,7 @@ def test_a_term_takes_no_place_of_what_has_a_name(
     best = trial(('flow-asymmetry',), named)
     both = trial(('flow-asymmetry', 'learned-valve-e2'), term)
     found = Displaced(term)
-    assert learning._displaces(found, both, best) is displaces  # type: ignore[arg-type]
+    assert learning._displaces(found, both, best) is displaces
 
 
 @pytest.mark.parametrize('seed', [1, 2])

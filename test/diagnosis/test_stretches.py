@@ -57,7 +57,7 @@ def test_a_candidate_costs_little_more_than_its_last_refit(
 
     def counted(self: Structure, theta: np.ndarray, record: Record, **how: object) -> np.ndarray:
         simulated.append(len(np.atleast_2d(theta)) * len(record))
-        return simulate(self, theta, record, **how)  # type: ignore[arg-type]
+        return simulate(self, theta, record, **how)
 
     monkeypatch.setattr(Structure, 'simulate', counted)
     found = search.add(base, 'backlash')

@@ -60,7 +60,7 @@ def test_a_diagnosis_tells_of_the_records_it_was_fitted_to() -> None:
         posterior=np.tile(theta, (8, 1)),
         sampling=({'source': 'after.csv', 'fitted_rate_hz': records[1].rate / 2},),
     )
-    (told,) = _tracking(found, records)  # type: ignore[arg-type]
+    (told,) = _tracking(found, records)
     assert told.source == 'after.csv'
 
 

@@ -10,6 +10,7 @@ from examples.demonstration.domain import free_domain
 os.environ['ROS_AUTOMATIC_DISCOVERY_RANGE'] = 'LOCALHOST'
 os.environ['ROS_DOMAIN_ID'] = str(free_domain())
 
+# Everything but ROS is tested on a machine without it, too.
 rclpy = pytest.importorskip('rclpy', reason='ROS 2 is not installed: run `make setup`')
 pytest.importorskip(
     'actuator_glue_msgs', reason='interfaces are not built: `. install/setup.bash` first'

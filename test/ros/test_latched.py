@@ -13,7 +13,10 @@ def listening():
     node.subscribe = lambda topic, callback, info: setattr(node, 'send', callback)
     node.every = lambda period, callback: setattr(node, 'tick', callback)
     newest = Newest(node, TEST_SETUP, taken.append)
-    sent = lambda text, ago: node.send(text, {'source_timestamp': (time.time() - ago) * 1e9})  # noqa: E731
+
+    def sent(text: str, ago: float) -> None:
+        node.send(text, {'source_timestamp': (time.time() - ago) * 1e9})
+
     return newest, node, sent, taken
 
 

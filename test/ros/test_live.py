@@ -98,7 +98,7 @@ def whole(probe, record, bag):
 @pytest.mark.parametrize('scheme', ['udp', 'tcp', 'lsl'])
 def test_a_record_that_is_sent_is_recorded_to_the_bit(scheme, start, probe, tmp_path):
     if scheme == 'lsl':
-        pytest.importorskip('pylsl', reason='pip install "actuator_glue[lab]"')
+        pytest.importorskip('pylsl', reason='no pylsl: pip install "actuator_glue[lab]"')
     record, bag = carried(start, probe, tmp_path, scheme, 1000.0, 3.0)
     whole(probe, record, bag)
     for found, sent in zip(

@@ -105,8 +105,7 @@ def test_the_first_run_on_a_machine_is_whole(start, probe, tmp_path, monkeypatch
         ),
     ]
     probe.until(lambda: probe.number('estimator', 'windows') >= 5, 1200, 'windows')
-    diagnosed = lambda: probe.value('diagnoser', 'last diagnosis')  # noqa: E731
-    probe.until(diagnosed, 200, 'a diagnosis')
+    probe.until(lambda: probe.value('diagnoser', 'last diagnosis'), 200, 'a diagnosis')
     assert probe.number('estimator', 'windows dropped') <= 3
     for node in reversed(nodes):
         assert end_as_launch_does(node) == 0, node.text

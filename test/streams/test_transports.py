@@ -22,7 +22,7 @@ SEAL = Seal(b'a key of twenty byte')
 
 def address(scheme):
     if scheme == 'lsl':
-        pytest.importorskip('pylsl', reason='pip install "actuator_glue[lab]"')
+        pytest.importorskip('pylsl', reason='no pylsl: pip install "actuator_glue[lab]"')
         return f'lsl:test-{free_port()}'
     kind = socket.SOCK_DGRAM if scheme == 'udp' else socket.SOCK_STREAM
     return f'{scheme}://127.0.0.1:{free_port(kind)}'

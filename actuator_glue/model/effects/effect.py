@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 
 from actuator_glue.model.effects.stage import Stage
-from actuator_glue.model.effects.terms.expression import Expression
+from actuator_glue.model.effects.terms.expression import Expression, Place
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.records import Array, Record
-
-Place: TypeAlias = Literal['command', 'valve', 'flow', 'piston', 'specimen', 'sensor']
 
 
 @dataclass(frozen=True, slots=True)

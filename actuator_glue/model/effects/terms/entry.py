@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from actuator_glue.errors import InputError
-from actuator_glue.model.effects.effect import Effect, Place, Scale
+from actuator_glue.model.effects.effect import Effect, Scale
 from actuator_glue.model.effects.layout import LANES
 from actuator_glue.model.effects.terms import machine as m
 from actuator_glue.model.effects.terms import program
@@ -61,11 +61,10 @@ def term(
         found = read(equation, tuple(p.name for p in parameters))
         if check:
             found = _expression(equation, parameters)
-        place: Place = found.place  # type: ignore[assignment]
         text = equation.partition(':')[2].strip()
         effect = Effect(
             name=name,
-            place=place,
+            place=found.place,
             equation=text,
             parameters=parameters,
             group=group or name,
@@ -73,7 +72,7 @@ def term(
             source=source or 'an expression of the user',
             starts=_Starts(name, equation, parameters),
             expression=found,
-            output=_Sensor(name, equation, parameters) if place == 'sensor' else None,
+            output=_Sensor(name, equation, parameters) if found.place == 'sensor' else None,
             searched=searched,
         )
         if check:

@@ -5,10 +5,12 @@ from __future__ import annotations
 import ast
 import math
 from dataclasses import dataclass
-from typing import Final, NoReturn
+from typing import Final, Literal, NoReturn, TypeAlias, get_args
 
 from actuator_glue.errors import InputError
 from actuator_glue.model.parameters import NAMES as BASE
+
+Place: TypeAlias = Literal['command', 'valve', 'flow', 'piston', 'specimen', 'sensor']
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +45,7 @@ KNOWN: Final = {
     'piston': 'fxvqeut',
     'sensor': 'yxt',
 }
-PLACES: Final = {**{place: place for place in SIGNAL}, 'force': 'piston'}
+PLACES: Final[dict[str, Place]] = {**{p: p for p in get_args(Place)}, 'force': 'piston'}
 # Constant during a test; not at the sensor, where a record is all there is.
 CONSTANTS: Final = (*BASE, 'k')
 # Functions and how many arguments they take.
@@ -79,7 +81,7 @@ class Expression:
             the program sees to it.
     """
 
-    place: str
+    place: Place
     tree: Tree
     exact: bool = False
 
@@ -95,12 +97,12 @@ def read(text: str, parameters: tuple[str, ...]) -> Expression:
     Raises:
         InputError: something that is no expression of what is known there; says the column.
     """
-    place, colon, equation = (part.strip() for part in text.partition(':'))
-    if not colon or place not in PLACES:
+    named, colon, equation = (part.strip() for part in text.partition(':'))
+    if not colon or named not in PLACES:
         raise InputError(
             f'{text!r} does not begin with a place and a colon; places: {", ".join(PLACES)}'
         )
-    place = PLACES[place]
+    place = PLACES[named]
     symbol, sign, right = equation.partition('=')
     signal = SIGNAL[place]
     if not sign or symbol.strip() != signal:
