@@ -24,6 +24,8 @@ _SEEN = 150.0
 _TAIL = 1e-4  # share of a channel's power that may lie above its bandwidth: 1 % of its amplitude
 _NOISE = 1e-2  # share of a channel's power that may be white noise
 _COARSE = 1e-3  # s: what moves is slower
+# Of more samples some at a time become one first (see Data.finer).
+_WHOLE = 8
 _STEPS = 24  # natural frequencies tried, a decade to either side of the motion's bandwidth
 _DAMPINGS = (0.5, 0.9, 1.5)
 
@@ -86,10 +88,11 @@ def needed_rate(record: Record) -> float:
 
 
 def factor(record: Record) -> int:
-    """Return how many samples of a record may become one."""
+    """Return how many samples of a record may become one: of many, a multiple of four."""
     if record.rate < 4.0 * _SEEN:  # whatever moves
         return 1
-    return max(1, int(record.rate / needed_rate(record) + 1e-9))
+    count = max(1, int(record.rate / needed_rate(record) + 1e-9))
+    return count if count <= _WHOLE else count - count % 4
 
 
 def window(count: int) -> Array:

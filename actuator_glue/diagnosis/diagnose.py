@@ -35,7 +35,6 @@ from actuator_glue.diagnosis.pipeline import (
     with_learned_terms,
 )
 from actuator_glue.diagnosis.preparation import prepare, rest_samples
-from actuator_glue.diagnosis.rate_correction import corrected
 from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.diagnosis.search import Each, Trial
 from actuator_glue.diagnosis.space import UPPER, Space
@@ -101,15 +100,11 @@ def diagnose(
     small = {} if own else discrepancy.responses(result.selection.search, size)
 
     def sample(trial: Trial, evaluations: int = 0, stage: str = 'posterior') -> posterior.Draws:
-        # Only what slips by leaps: beside Coulomb friction of 300 N chains did not meet then.
-        leaps = any(e.group == 'friction' and e.holds for e in trial.structure.entries)
-        moved = leaps and trial.own is None
-        theta = trial.fit.theta
-        known = corrected(scorer.data, trial.structure, theta) if moved else scorer.data
+        finer = trial.own is None and not trial.structure.linear
         return posterior.sample(
             trial.model,
             trial.fit,
-            replace(scorer, data=known),
+            replace(scorer, data=replace(scorer.data, finer=finer)),
             beside=discrepancy.beside(small, trial.effects, scorer),
             rng=rng,
             evaluations=evaluations,

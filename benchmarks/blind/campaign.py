@@ -33,7 +33,6 @@ def one(seed: int, cache: Path, generator: str, options: dict[str, Any]) -> dict
     import truth
 
     from actuator_glue.diagnosis.diagnose import diagnose
-    from actuator_glue.diagnosis.thresholds import Thresholds
     from actuator_glue.model.parameters import NAMES
     from actuator_glue.records import Record
 
@@ -42,13 +41,7 @@ def one(seed: int, cache: Path, generator: str, options: dict[str, Any]) -> dict
     rows = zip(case.commands, case.measured, case.stiffness, names, strict=True)
     records = [Record(u, y, 1.0 / case.rate, stiffness=k, source=s) for u, y, k, s in rows]
     start = time.perf_counter()
-    found = diagnose(
-        records[:2],
-        records[2],
-        seed=seed,
-        settings=Thresholds(evaluations=0),
-        clock=time.perf_counter,
-    )
+    found = diagnose(records[:2], records[2], seed=seed, clock=time.perf_counter)
     result = {
         'seed': seed,
         'kind': case.kind,

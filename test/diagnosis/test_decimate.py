@@ -89,8 +89,8 @@ def test_prepared_records_say_what_was_done() -> None:
     """The note names both rates; the recorded samples stay at hand for what lives in them."""
     prepared = prepare([fast(3000.0)], [])
     (count,) = prepared.fit.factors
-    assert count == 10
-    assert any('3000 Hz' in note and 'at 300 Hz' in note for note in prepared.notes)
+    assert count == 8
+    assert any('3000 Hz' in note and 'at 375 Hz' in note for note in prepared.notes)
     whole = prepared.fit.as_recorded
     assert len(whole.masks[0]) == len(whole.records[0]) == 60_000
     assert abs(whole.masks[0].mean() - prepared.fit.masks[0].mean()) < 1e-3
