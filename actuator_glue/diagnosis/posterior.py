@@ -7,19 +7,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields
-from functools import cached_property
 from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.diagnosis import proposals
-from actuator_glue.diagnosis.data import LANES, Data, Model, chunks
-from actuator_glue.diagnosis.discrepancy import Discrepancy, ScaleMixture
+from actuator_glue.diagnosis.data import Model
+from actuator_glue.diagnosis.discrepancy import Discrepancy
 from actuator_glue.diagnosis.fit import Fit
-from actuator_glue.diagnosis.fit import fit as fit_to
-from actuator_glue.diagnosis.identifiable import Straight, Working, coordinates, derivatives
+from actuator_glue.diagnosis.identifiable import Straight, Working, coordinates
+from actuator_glue.diagnosis.likelihood import Likelihood, inflation, most_likely
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.search import Each
 from actuator_glue.diagnosis.space import Space
@@ -34,14 +32,11 @@ from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array
 
 _P = len(BASE)
-_STEPS = 8  # from the least-squares fit to the optimum of the likelihood
+_DRAWS = 500  # of the normal approximation
 # Draws will do for 95 % intervals and bands from here on (Vehtari et al. 2021), with few in each
 # of many chains.
 _ESS, RHAT = 400.0, 1.05
 _HALVINGS = 40  # bring any point of it inside the bounds of the prior
-# From the optimum of the whitened error to that of the likelihood: a step that gains less than
-# this is none.
-_NATS, _MOST_STEPS = 0.5, 10
 
 
 class Draws(NamedTuple):
@@ -76,42 +71,6 @@ class Draws(NamedTuple):
         }
 
 
-@dataclass(frozen=True)
-class Whitened(Data):
-    """The same samples, whitened: least squares on them is most likely."""
-
-    scorer: Scorer = field(kw_only=True)
-
-    @cached_property
-    def target(self) -> Array:
-        """As `Data.target`, whitened."""
-        pairs = zip(self.records, self.masks, strict=True)
-        return self.scorer.whiten(np.concatenate([r.measured[mask] for r, mask in pairs]))
-
-    def simulate(self, model: Model, theta: Array) -> Array:
-        """As `Data.simulate`, whitened."""
-        return self.scorer.whiten(super().simulate(model, theta))
-
-
-def most_likely(data: Data, model: Model, found: Fit, scorer: Scorer) -> Fit:
-    """Go on from the least-squares fit to the optimum of the likelihood that is sampled.
-
-    Under slow noise they are up to 12 nats apart; a covariance of the likelihood belongs to its
-    own optimum. What is simulated and compared stays the least-squares fit: where structure
-    remains, it is nearer in the error itself. Error and Jacobian of what is returned are whitened.
-    """
-    white = Whitened(**{f.name: getattr(data, f.name) for f in fields(Data)}, scorer=scorer)
-    return fit_to(white, model, found.theta, iterations=_STEPS)
-
-
-def inflation(error: Array) -> float:
-    """Variance of whitened noise that a whitened error (N,) asks for, at least 1.
-
-    Where structure remains, every parameter is known less well than the noise alone says.
-    """
-    return max(1.0, float(np.mean(error**2)))
-
-
 def identified(space: Space, draws: Array) -> NDArray[np.bool_]:
     """Which parameters the records fix (p,): draws (m, p) fill less than half of the bounds.
 
@@ -122,44 +81,6 @@ def identified(space: Space, draws: Array) -> NDArray[np.bool_]:
     widest = 0.5 * (space.upper - space.lower)
     widest[:_P] = 2.0
     return np.asarray(high - low < widest)
-
-
-def _inside(around: Working | Straight, phi: Array, move: Array) -> Array:
-    """Return coordinates (p,) moved as far as they mean something."""
-    move = np.clip(move, -around.widest, around.widest)
-    for _ in range(_HALVINGS):
-        if np.isfinite(around.inverse((phi + move)[None])[1][0]):
-            return phi + move
-        move *= 0.5
-    return phi
-
-
-def _optimum(
-    around: Working | Straight,
-    phi: Array,
-    linearised: Callable[[Array], tuple[float, ScaleMixture]],
-) -> tuple[Array, ScaleMixture]:
-    """Return the optimum (p,) of a likelihood from where it is linear about, and moves from it.
-
-    The allowance may take a long record thousands of nats from the optimum without it, over which
-    no response is linear.
-
-    Args:
-        around: the coordinates.
-        phi: where to begin, (p,).
-        linearised: of coordinates (p,) the log density, and where the parameters were if all
-            were linear.
-    """
-    value, moves = linearised(phi)
-    centre, best, new = phi, value, _inside(around, phi, moves.moments()[0])
-    for step in range(1, _MOST_STEPS):
-        value, found = linearised(new)
-        # The first move is to a mean, from where there may be next to nothing to gain.
-        if not value > best + (_NATS if step > 1 else -_NATS):
-            break
-        centre, best, moves = new, value, found
-        new = _inside(around, centre, moves.moments()[0])
-    return centre, moves
 
 
 def _loosened(
@@ -178,6 +99,18 @@ def _loosened(
             return out
         step[outside] *= shorter  # to the other side first
     return np.where(outside[:, None], theta, out)
+
+
+def _normal(laplace: Composed, count: int, rng: np.random.Generator) -> Array:
+    """Draw parameters (m, `count`) of a normal approximation inside the bounds."""
+    w = rng.standard_normal((_DRAWS, count))
+    for _ in range(_HALVINGS):
+        outside = ~np.isfinite(laplace.inverse(w)[1])
+        if not outside.any():
+            break
+        w[outside] = rng.standard_normal((int(outside.sum()), count))
+    w[~np.isfinite(laplace.inverse(w)[1])] = 0.0
+    return laplace.inverse(w)[0]
 
 
 def _enough(chains: Chains) -> bool:
@@ -209,64 +142,24 @@ def sample(
         progress: called with the share done.
         each: evaluates some draws at a time: `map`, or that of a pool of threads.
     """
-    data = scorer.data
-    fit = most_likely(data, model, fit, scorer)
-    space = Space(model, max(r.duration for r in data.records))
-    around = coordinates(space, model, data, fit.z)
+    fit = most_likely(scorer.data, model, fit, scorer)
+    space = Space(model, max(r.duration for r in scorer.data.records))
+    around = coordinates(space, model, scorer.data, fit.z)
     phi = around.forward(fit.theta[None])[0]
     noise = inflation(beside.without(fit.error))
-    size, target = math.sqrt(noise), data.target
-    whitened = scorer.whiten(target)
-
-    def response(theta: Array) -> Array:
-        found = scorer.whiten(data.simulate(model, theta))
-        if data.prior is None:
-            return found
-        return np.hstack([found, size * data.prior.pull(space.z(theta))])
-
-    def of_some(theta: Array) -> Array:
-        error = data.simulate(model, theta)
-        with np.errstate(all='ignore'):
-            error = scorer.whiten(np.subtract(target, error, out=error))
-            return beside.log_likelihood(error, noise)
-
-    def log_likelihood(theta: Array) -> Array:
-        # As many as the kernels take at once, where there are more than chains.
-        least = LANES if len(theta) > 2 * LANES else LANES // 2
-        parts = chunks(len(theta), target.size, least)
-        found = np.concatenate(list(each(of_some, [theta[some] for some in parts])))
-        # Uniform in the logarithms otherwise.
-        return found if data.prior is None else found + data.prior.log_density(theta)
-
-    def linearised(phi: Array) -> tuple[float, ScaleMixture]:
-        theta, log_prior = around.inverse(phi[None])
-        value = float(log_likelihood(theta)[0] + log_prior[0])
-        if not math.isfinite(value):  # it diverges there: nothing is known
-            no_move = np.zeros((1, len(phi))), np.diag(around.widest**2)[None]
-            return value, ScaleMixture(np.ones(1), *no_move)
-        seen, jac = derivatives(around, space, phi, response)
-        error = np.concatenate([whitened, np.zeros(len(seen) - len(whitened))]) - seen
-        return value, beside.gaussians(jac, error, noise, around.widest)
-
-    centre, moves = _optimum(around, phi, linearised)
-    laplace = Composed(around, Laplace(centre, moves.moments()[1], around.widest))
+    likelihood = Likelihood(model, scorer, beside, noise, space, around, each)
+    centre, moves = likelihood.optimum(phi)
 
     def loosened(points: Array) -> Array:
         return _loosened(around, points, centre - phi, rng)
 
     if evaluations <= 0:
-        w = rng.standard_normal((500, len(phi)))
-        for _ in range(_HALVINGS):
-            outside = ~np.isfinite(laplace.inverse(w)[1])
-            if not outside.any():
-                break
-            w[outside] = rng.standard_normal((int(outside.sum()), len(phi)))
-        w[~np.isfinite(laplace.inverse(w)[1])] = 0.0
-        return Draws(loosened(laplace.inverse(w)[0]), 'laplace')
+        normal = Laplace(centre, moves.moments()[1], around.widest)
+        return Draws(loosened(_normal(Composed(around, normal), len(phi), rng)), 'laplace')
 
     bounds = space.theta(space.lower), space.theta(space.upper)
     transform, start = proposals.proposed(around, centre, moves)
-    goal = posterior.Target(log_likelihood, bounds, transform)
+    goal = posterior.Target(likelihood, bounds, transform)
     seed = [int(word) for word in rng.integers(0, 2**32, 3)]
     found = importance.sample(
         np.random.default_rng((*seed, 1)), goal.density(), start, _ESS, progress

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from actuator_glue.diagnosis.finding import BESIDE, Rival
-from actuator_glue.diagnosis.posterior import inflation
+from actuator_glue.diagnosis.likelihood import inflation
 from actuator_glue.diagnosis.score import Scorer, evidence
 from actuator_glue.diagnosis.search import Search, Trial
 from actuator_glue.diagnosis.thresholds import Thresholds

@@ -9,7 +9,7 @@ from scipy import stats
 
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.fit import fit
-from actuator_glue.diagnosis.posterior import inflation, most_likely
+from actuator_glue.diagnosis.likelihood import inflation, most_likely
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.model import commands
 from actuator_glue.model.structure import Structure

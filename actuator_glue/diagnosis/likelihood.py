@@ -1,0 +1,159 @@
+"""The likelihood of a structure's parameters, whitened, and its optimum.
+
+Least squares of the whitened error, beside what may be there below what matters.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+
+import numpy as np
+
+from actuator_glue.diagnosis.data import LANES, Data, Model, chunks
+from actuator_glue.diagnosis.discrepancy import Discrepancy, ScaleMixture
+from actuator_glue.diagnosis.fit import Fit
+from actuator_glue.diagnosis.fit import fit as fit_to
+from actuator_glue.diagnosis.identifiable import Straight, Working, derivatives
+from actuator_glue.diagnosis.score import Scorer
+from actuator_glue.diagnosis.search import Each
+from actuator_glue.diagnosis.space import Space
+from actuator_glue.records import Array
+
+_STEPS = 8  # from the least-squares fit to the optimum of the likelihood
+_HALVINGS = 40  # bring any point of it inside the bounds of the prior
+# From the optimum of the whitened error to that of the likelihood: a step that gains less than
+# this is none.
+_NATS, _MOST_STEPS = 0.5, 10
+
+
+@dataclass(frozen=True)
+class Whitened(Data):
+    """The same samples, whitened: least squares on them is most likely."""
+
+    scorer: Scorer = field(kw_only=True)
+
+    @cached_property
+    def target(self) -> Array:
+        """As `Data.target`, whitened."""
+        pairs = zip(self.records, self.masks, strict=True)
+        return self.scorer.whiten(np.concatenate([r.measured[mask] for r, mask in pairs]))
+
+    def simulate(self, model: Model, theta: Array) -> Array:
+        """As `Data.simulate`, whitened."""
+        return self.scorer.whiten(super().simulate(model, theta))
+
+
+def most_likely(data: Data, model: Model, found: Fit, scorer: Scorer) -> Fit:
+    """Go on from the least-squares fit to the optimum of the likelihood that is sampled.
+
+    Under slow noise they are up to 12 nats apart; a covariance of the likelihood belongs to its
+    own optimum. What is simulated and compared stays the least-squares fit: where structure
+    remains, it is nearer in the error itself. Error and Jacobian of what is returned are whitened.
+    """
+    white = Whitened(**{f.name: getattr(data, f.name) for f in fields(Data)}, scorer=scorer)
+    return fit_to(white, model, found.theta, iterations=_STEPS)
+
+
+def inflation(error: Array) -> float:
+    """Variance of whitened noise that a whitened error (N,) asks for, at least 1.
+
+    Where structure remains, every parameter is known less well than the noise alone says.
+    """
+    return max(1.0, float(np.mean(error**2)))
+
+
+@dataclass(frozen=True)
+class Likelihood:
+    """Likelihood of parameters, and where it would be were all linear.
+
+    Attributes:
+        model: the structure.
+        scorer: the samples, and whitening filters of their noise.
+        beside: what may be there beside the structure.
+        noise: variance of the whitened noise.
+        space: working coordinates.
+        around: the coordinates in which it is nearly normal.
+        each: evaluates some parameters at a time: `map`, or that of a pool of threads.
+    """
+
+    model: Model
+    scorer: Scorer
+    beside: Discrepancy
+    noise: float
+    space: Space
+    around: Working | Straight
+    each: Each = map
+
+    @cached_property
+    def _whitened(self) -> Array:
+        return self.scorer.whiten(self.scorer.data.target)
+
+    def __call__(self, theta: Array) -> Array:
+        """Log density of parameters (m, p), (m,); the prior's too, where one was given.
+
+        It is uniform in the logarithms otherwise.
+        """
+        data = self.scorer.data
+        # As many as the kernels take at once, where there are more than chains.
+        least = LANES if len(theta) > 2 * LANES else LANES // 2
+        parts = chunks(len(theta), data.target.size, least)
+        found = np.concatenate(list(self.each(self._of_some, [theta[some] for some in parts])))
+        return found if data.prior is None else found + data.prior.log_density(theta)
+
+    def _of_some(self, theta: Array) -> Array:
+        error = self.scorer.data.simulate(self.model, theta)
+        with np.errstate(all='ignore'):
+            error = self.scorer.whiten(np.subtract(self.scorer.data.target, error, out=error))
+            return self.beside.log_likelihood(error, self.noise)
+
+    def _response(self, theta: Array) -> Array:
+        data = self.scorer.data
+        found = self.scorer.whiten(data.simulate(self.model, theta))
+        if data.prior is None:
+            return found
+        pull = math.sqrt(self.noise) * data.prior.pull(self.space.z(theta))
+        return np.hstack([found, pull])
+
+    def linearised(self, phi: Array) -> tuple[float, ScaleMixture]:
+        """Log density at coordinates (p,), and how far the parameters were if all were linear."""
+        theta, log_prior = self.around.inverse(phi[None])
+        value = float(self(theta)[0] + log_prior[0])
+        if not math.isfinite(value):  # it diverges there: nothing is known
+            no_move = np.zeros((1, len(phi))), np.diag(self.around.widest**2)[None]
+            return value, ScaleMixture(np.ones(1), *no_move)
+        seen, jac = derivatives(self.around, self.space, phi, self._response)
+        white = self._whitened
+        error = np.concatenate([white, np.zeros(len(seen) - len(white))]) - seen
+        return value, self.beside.gaussians(jac, error, self.noise, self.around.widest)
+
+    def optimum(self, phi: Array) -> tuple[Array, ScaleMixture]:
+        """Return the optimum (p,) from where it is linear about, and moves from it.
+
+        The allowance may take a long record thousands of nats from the optimum without it, over
+        which no response is linear.
+
+        Args:
+            phi: coordinates to begin at, (p,).
+        """
+        value, moves = self.linearised(phi)
+        centre, best, new = phi, value, _inside(self.around, phi, moves.moments()[0])
+        for step in range(1, _MOST_STEPS):
+            value, found = self.linearised(new)
+            # The first move is to a mean, from where there may be next to nothing to gain.
+            if not value > best + (_NATS if step > 1 else -_NATS):
+                break
+            centre, best, moves = new, value, found
+            new = _inside(self.around, centre, moves.moments()[0])
+        return centre, moves
+
+
+def _inside(around: Working | Straight, phi: Array, move: Array) -> Array:
+    """Return coordinates (p,) moved as far as they mean something."""
+    move = np.clip(move, -around.widest, around.widest)
+    for _ in range(_HALVINGS):
+        if np.isfinite(around.inverse((phi + move)[None])[1][0]):
+            return phi + move
+        move *= 0.5
+    return phi
