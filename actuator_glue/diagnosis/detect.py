@@ -23,8 +23,8 @@ _LAGS = 20
 def surrogate(part: Split, size: int, period: float, rng: np.random.Generator) -> Array:
     """Gaussian noise (size,) with the noise density of a split: the null of the alarm [m]."""
     whole = next_fast_len(size, real=True)
-    frequency = np.fft.rfftfreq(whole, period)
-    density = np.interp(frequency, part.frequency, part.psd)
+    frequency = np.asarray(np.fft.rfftfreq(whole, period), dtype=np.float64)
+    density = part.density(frequency)
     # One-sided density S: E|X|^2 = S n / (2 T) of the unnormalised transform.
     spectrum = np.sqrt(0.25 * density * whole / period) * (
         rng.standard_normal(len(frequency)) + 1j * rng.standard_normal(len(frequency))

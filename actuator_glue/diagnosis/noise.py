@@ -3,12 +3,13 @@
 Sensor and background noise, white or coloured, has the same spectrum at all times. What a wrong
 model leaves follows the command through time and frequency. So at each frequency the median
 over time of the residual's spectrogram is noise (for Gaussian noise the power is exponential,
-its mean is its median / ln 2), and what exceeds it is structure.
+its mean is its median / ln 2), and what exceeds it is structure. What acts slowly, an offset or a
+drift, is known as well as the noise is small at next to 0 Hz, which takes longer windows to see.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -17,6 +18,10 @@ from scipy import fft, signal
 from actuator_glue.records import Array
 
 _WINDOW = 2.0  # s: a sweep stays near one frequency that long, and 1 Hz still has two periods
+_SLOW = 16.0  # s: windows for the density below a few of the others' bins, a quarter of n at most
+_FINER = 4  # bins of the whitening filter in one of the spectrogram's
+# Of the spectrogram's bins: below the first the slow density counts, beyond the second the other.
+_BLEND = 1.5, 2.5
 # Whitening: samples of a block, in lengths of the filter, and numbers that are worked on at once,
 # which the processor's cache holds.
 _FILTERS, _AT_ONCE = 8, 1 << 16
@@ -33,6 +38,7 @@ class Split:
         frequency: (nf,) [Hz].
         psd: noise density (nf,) [m^2/Hz].
         excess: structure density, signed, (nf,) [m^2/Hz].
+        slow: densities at low frequencies, from longer windows, as `frequency`, `psd`, `excess`.
     """
 
     noise: float
@@ -41,6 +47,48 @@ class Split:
     frequency: Array
     psd: Array
     excess: Array
+    slow: tuple[Array, Array, Array]
+
+    def density(self, frequency: Array) -> Array:
+        """Noise density at frequencies (k,), smoothed, (k,) [m^2/Hz]."""
+        # The median over some 50 windows scatters by 20 %; that over a few more, and unevenly.
+        psd, slow = np.exp(_smooth(np.log(self.psd), 5)), _smooth(self.slow[1], 7)
+        below, beyond = _BLEND
+        share = np.clip((beyond - frequency / self.frequency[1]) / (beyond - below), 0.0, 1.0)
+        log_density = share * np.log(np.interp(frequency, self.slow[0], slow)) + (
+            1.0 - share
+        ) * np.log(np.interp(frequency, self.frequency, psd))
+        return np.asarray(np.exp(log_density))
+
+    def all_of_it(self) -> Split:
+        """Return the same with all structure counted as noise."""
+        frequency, psd, excess = self.slow
+        return replace(
+            self,
+            psd=self.psd + np.maximum(self.excess, 0.0),
+            slow=(frequency, psd + np.maximum(excess, 0.0), excess),
+        )
+
+
+def _smooth(values: Array, size: int) -> Array:
+    """Smooth along frequency; beyond both ends a spectrum is its own mirror image."""
+    kernel = np.hanning(size + 2)[1:-1]
+    padded = np.pad(values, size // 2, mode='reflect')
+    return np.convolve(padded, kernel / kernel.sum(), mode='valid')
+
+
+def _densities(error: Array, period: float, width: int) -> tuple[Array, Array, Array]:
+    """Frequencies [Hz] and densities of noise and of all that is in a residual (n,), (nf,)."""
+    frequency, _, z = signal.stft(
+        error, 1 / period, 'hann', width, width // 2, boundary=None, scaling='psd'
+    )
+    power = np.abs(z) ** 2
+    # One-sided at 0 and Nyquist, too: half of it there would leak into what is smoothed.
+    power *= 2.0
+    level = np.median(power, axis=1) / np.log(2.0)
+    # Real bins (0 and Nyquist) are chi-square of one degree, whose mean is median / 0.455.
+    level[[0, -1]] *= np.log(2.0) / 0.4549
+    return frequency, level, power.mean(axis=1)
 
 
 def split(error: Array, period: float) -> Split:
@@ -51,45 +99,35 @@ def split(error: Array, period: float) -> Split:
     n = len(error)
     width = 2 * max(8, min(round(_WINDOW / period), n // 8) // 2)
     centred = signal.detrend(error)
-    frequency, _, z = signal.stft(
-        centred, 1 / period, 'hann', width, width // 2, boundary=None, scaling='psd'
-    )
-    power = np.abs(z) ** 2
-    # One-sided at 0 and Nyquist, too: half of it there would leak into what is smoothed.
-    power *= 2.0
-    level = np.median(power, axis=1) / np.log(2.0)
-    # Real bins (0 and Nyquist) are chi-square of one degree, whose mean is median / 0.455.
-    level[[0, -1]] *= np.log(2.0) / 0.4549
-    total = power.mean(axis=1)
+    frequency, level, total = _densities(centred, period, width)
     mean_square = float(np.mean(error**2))
     # Both ends of the axis have half a bin.
     whole = float(np.trapezoid(total))
     share = float(np.trapezoid(level)) / whole if whole > 0 else 0.0
+    longer = 2 * max(8, min(round(_SLOW / period), n // 4) // 2)
+    low, below, all_below = _densities(centred, period, longer)
+    near = low <= (_BLEND[1] + 2.0) * frequency[1]
+    floor = 1e-12 * whole / len(level) + 1e-300
     noise2 = min(share * float(np.mean(centred**2)), mean_square)
     return Split(
         noise=float(np.sqrt(noise2)),
         structure=float(np.sqrt(mean_square - noise2)),
         mean_square=mean_square,
         frequency=frequency,
-        psd=np.maximum(level, 1e-12 * whole / len(level) + 1e-300),
+        psd=np.maximum(level, floor),
         excess=total - level,
+        slow=(low[near], np.maximum(below[near], floor), (all_below - below)[near]),
     )
 
 
-def whitener(parts: list[Split]) -> Array:
-    """Return the zero-phase whitening filter of noise with the mean density of `parts`.
+def whitener(part: Split) -> Array:
+    """Return the zero-phase whitening filter of a record's noise.
 
-    Convolved with noise of that density it gives unit variance per sample; all parts must come
-    from records of one period and length class (equal frequency axes).
+    Convolved with that noise it gives unit variance per sample.
     """
-    psd = np.mean([p.psd for p in parts], axis=0)
-    # Smooth in frequency: the median over some 50 windows scatters by 20 %. Beyond both ends the
-    # spectrum is its own mirror image.
-    kernel = np.hanning(7)[1:-1]
-    kernel /= kernel.sum()
-    smooth = np.exp(np.convolve(np.pad(np.log(psd), 2, mode='reflect'), kernel, mode='valid'))
-    rate = 2.0 * parts[0].frequency[-1]
-    taps = np.fft.fftshift(np.fft.irfft(1.0 / np.sqrt(0.5 * rate * smooth)))
+    last = part.frequency[-1]
+    density = part.density(np.linspace(0.0, last, _FINER * (len(part.frequency) - 1) + 1))
+    taps = np.fft.fftshift(np.fft.irfft(1.0 / np.sqrt(last * density)))
     return np.asarray(taps * np.hanning(len(taps) + 1)[:-1])
 
 

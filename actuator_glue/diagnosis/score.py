@@ -10,7 +10,7 @@ these are the optimum and the covariance of the likelihood that is sampled (post
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -45,14 +45,14 @@ class Scorer:
     def of(cls, data: Data, splits: list[Split], *, misfit: bool = False) -> Scorer:
         """Take the noise of each record from the split of its residual, or all that is in it."""
         if misfit:
-            splits = [replace(s, psd=s.psd + np.maximum(s.excess, 0.0)) for s in splits]
+            splits = [s.all_of_it() for s in splits]
         blocks = []
         for period, part in zip(data.periods, data.parts, strict=True):
             size = part.stop - part.start
             count = max(2, round(size * period / BLOCK))
             edges = part.start + np.linspace(0, size, count + 1).astype(int)
             blocks += [slice(int(a), int(b)) for a, b in pairwise(edges)]
-        return cls(data, tuple(whitener([s]) for s in splits), tuple(blocks), not misfit)
+        return cls(data, tuple(whitener(s) for s in splits), tuple(blocks), not misfit)
 
     def of_part(self, part: Part) -> Scorer:
         """Return the same noise for a part of the data, which has no blocks."""
