@@ -19,11 +19,13 @@ from actuator_glue.records import Array
 
 _P = len(BASE)
 _DAMPINGS = np.array([1e-2, 1.0, 1e2])
+_STRAIGHT = 0.01  # of the squared motion between two starts may be beyond the linear
+_MORE = 5  # steps as large as the last one that a start may be behind
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Fit:
-    """A refitted structure.
+    """A refitted structure, equal to no other one.
 
     Attributes:
         theta: best parameters, physical units, (p,).
@@ -74,19 +76,19 @@ def _informed(
 
 
 @np.errstate(all='ignore')  # a start that diverges proposes nothing worth taking
-def _proposals(jac: Array, error: Array, z: Array, damping: float, space: Space) -> Array:
-    """Marquardt steps of one start for several dampings, kept inside the bounds: (d, p)."""
+def _proposals(jac: Array, error: Array, z: Array, dampings: Array, space: Space) -> Array:
+    """Marquardt steps of one start for several dampings (d,), kept inside the bounds: (d, p)."""
     normal, pull = jac @ jac.T, jac @ error
     scale = np.sqrt(np.maximum(np.diag(normal), 1e-300))
     normal, pull = normal / np.outer(scale, scale), pull / scale
-    out = np.empty((len(_DAMPINGS), len(z)))
-    for i, factor in enumerate(_DAMPINGS):
+    out = np.empty((len(dampings), len(z)))
+    for i, damping in enumerate(dampings):
         free = np.ones(len(z), dtype=np.bool_)
         step = np.zeros(len(z))
         # Parameters that would leave their bound from it are held (active set).
         for _ in range(len(z)):
             step[:] = 0.0
-            a = normal[np.ix_(free, free)] + damping * factor * np.eye(int(free.sum()))
+            a = normal[np.ix_(free, free)] + damping * np.eye(int(free.sum()))
             try:
                 step[free] = np.linalg.solve(a, pull[free])
             except np.linalg.LinAlgError:
@@ -143,20 +145,40 @@ def fit(
         # Every start diverged: a metre of error, which nothing prefers.
         size = data.target.size
         return Fit(space.theta(first), np.ones(size), np.zeros((p, size)), first)
-    damping = np.full(len(z), 1e-2)
+    damping, pace = np.full(len(z), 1e-2), cost.copy()
     active = np.ones(len(z), dtype=np.bool_)
     slopes = [None if ahead is None else ahead[i, 0] for i in np.flatnonzero(alive)]
     for iteration in range(iterations):
         rows = np.flatnonzero(active)
         if not rows.size:
             break
-        new = [r for r in rows if slopes[r] is None]
-        if new:
-            for r, jac in zip(new, jacobian(data, model, space, z[new], output[new]), strict=True):
-                slopes[r] = jac
+        lead = int(rows[np.argmin(cost[rows])])
+        others = rows[rows != lead]
+        # Slopes of all starts at once where that takes no longer, else those of the best first.
+        for wanted in ([lead] if rows.size * z.shape[1] > LANES else rows, rows):
+            new = [r for r in wanted if active[r] and slopes[r] is None]
+            if new:
+                some = jacobian(data, model, space, z[new], output[new])
+                for r, jac in zip(new, some, strict=True):
+                    slopes[r] = jac
+            if others.size and (best_jac := slopes[lead]) is not None:
+                steps, moves = z[others] - z[lead], output[others] - output[lead]
+                # The motion is linear between them: both lead to the same minimum.
+                beyond = sum_of_squares(moves - steps @ best_jac)
+                most = np.maximum(_STRAIGHT * sum_of_squares(moves), tolerance * sse[lead])
+                active[others[beyond < most]] = False
+        rows = np.flatnonzero(active)
+        # Two steps of each start with their slopes take no longer than three without.
+        lanes = rows.size * (z.shape[1] + 1)
+        factors = _DAMPINGS[: 2 if 2 * lanes <= LANES < 3 * lanes else 3]
         tries = np.stack(
             [
-                _proposals(*_informed(data, z[r], jac, error[r], sse[r]), z[r], damping[r], space)
+                _proposals(
+                    *_informed(data, z[r], jac, error[r], sse[r]),
+                    z[r],
+                    damping[r] * factors,
+                    space,
+                )
                 for r in rows
                 if (jac := slopes[r]) is not None
             ]
@@ -168,17 +190,19 @@ def fit(
             costs = _objective(data, tries[i], sums)
             best = int(np.argmin(costs))
             if costs[best] < cost[r]:
-                gain = (cost[r] - costs[best]) / cost[r]
+                pace[r], before = cost[r] - costs[best], cost[r]
                 z[r], output[r] = tries[i, best], tried[i, best]
                 error[r], sse[r], cost[r] = errors[best], sums[best], costs[best]
                 slopes[r] = None if ahead is None else ahead[i, best].copy()
                 damping[r] = min(max(damping[r] * _DAMPINGS[best] * 0.3, 1e-9), 1e6)
-                active[r] = gain > tolerance
+                active[r] = pace[r] > tolerance * before
             else:
                 damping[r] *= 1e3
                 active[r] = damping[r] < 1e7
+        # A start is given up that would not catch up with the best in some more such steps.
+        if iteration >= 2:
+            active &= cost - _MORE * pace <= cost.min()
         if iteration >= 4:
-            # A start that is far behind the best and no longer moves fast is given up.
             active &= cost < 1.5 * cost.min()
     best = int(np.argmin(cost))
     final = slopes[best]

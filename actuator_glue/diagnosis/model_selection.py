@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from actuator_glue.diagnosis import false_alarms, forecast, pairs
+from actuator_glue.diagnosis import false_alarms, forecast, pairs, ranking
 from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.fit import Fit
 from actuator_glue.diagnosis.learned_term import is_learned
@@ -133,9 +133,8 @@ class ModelSelection:
         found: dict[tuple[str, ...], Trial] = {}
         for i, current in enumerate(beam):
             names = [n for n in self.search.names if n not in current.effects]
-            screened = self.search.screened(current, names)
             self.progress(f'effect {stage}', i / len(beam))
-            tried = screened[: self.settings.tried]
+            tried = self.search.screened(current, names)[: self.settings.tried]
             for trial in self.search.additions(current, tried, valves=False):
                 found.setdefault(trial.effects, trial)
         return sorted(found.values(), key=lambda t: -float(t.scores.sum()))
@@ -149,9 +148,7 @@ class ModelSelection:
         self.renoise(singles[0])
         base, singles = self.search.trial(()), self.rescored(singles)
         self.nats = false_alarms.threshold(*self.search.signatures(), s.false_alarms)
-        current = base
-        ranked: list[Trial] = list(singles)
-        threshold = self.material
+        current, ranked, threshold = base, list(singles), self.material
         for stage in range(1, s.most + 1):
             # Nats weigh the whitened error, materiality the plain one: the best by nats may be
             # immaterial where another effect is neither.
@@ -201,8 +198,9 @@ class ModelSelection:
                 names = [n for n in self.search.names if n not in current.effects]
                 if len(current.effects) > 1:
                     names = self.search.screened(rest, names)[: self.settings.tried]
-                trials = self.search.additions(rest, names)
-                two = pairs.rivals(self.search, name, trials, self.settings.tried)
+                below = ranking.left_by_rivals(rest, current)
+                trials = self.search.additions(rest, names, below=below)
+                two = pairs.rivals(self.search, name, trials, self.settings.tried, below)
                 rivals[name] = self._rivals(rest, current, name, [*trials, *two])
                 for trial in (*trials, *pairs.ahead(self, name, rivals[name], two)):
                     pressed = self._pressed_form(trial, trial.added, name)

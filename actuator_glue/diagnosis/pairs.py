@@ -27,7 +27,9 @@ def price(count: int) -> float:
     return math.log(max(1.0, 0.5 * (count - 1)))
 
 
-def rivals(search: Search, name: str, trials: Sequence[Trial], most: int) -> list[Trial]:
+def rivals(
+    search: Search, name: str, trials: Sequence[Trial], most: int, below: float
+) -> list[Trial]:
     """Refit the most promising pairs that have no more parameters than an effect.
 
     Args:
@@ -35,13 +37,14 @@ def rivals(search: Search, name: str, trials: Sequence[Trial], most: int) -> lis
         name: the effect.
         trials: structures with one other effect in its place.
         most: of these that are gone on from, and of pairs that are refitted.
+        below: mean squared error that a rival leaves at most [m^2].
     """
     room = len(search.entries[name].parameters)
     if room < 2 or is_learned(search.entries[name]):
         return []
     out = []
-    for first, other in screened(search, name, trials[:most], room)[:most]:
-        pair = search.additions(first, [other])[0]
+    for first, other in screened(search, name, trials[:most], room, below)[:most]:
+        pair = search.additions(first, [other], below=below)[0]
         out.append(replace(pair, added=f'{first.added}{BESIDE}{other}'))
     return out
 
@@ -73,7 +76,7 @@ def ahead(
 
 
 def screened(
-    search: Search, name: str, trials: Sequence[Trial], room: int
+    search: Search, name: str, trials: Sequence[Trial], room: int, below: float
 ) -> list[tuple[Trial, str]]:
     """Sort pairs by the error that the second one's starting sizes leave beside the first one.
 
@@ -84,6 +87,7 @@ def screened(
         name: an effect that is in no pair.
         trials: structures with the first one.
         room: parameters of a pair, at most.
+        below: mean squared error of those returned, at most [m^2].
     """
     size = {n: len(e.parameters) for n, e in search.entries.items()}
     wanted = [
@@ -99,5 +103,6 @@ def screened(
     errors = list(search.each(left, wanted))
     best: dict[frozenset[str], tuple[Trial, str]] = {}
     for i in np.argsort(errors, kind='stable'):
-        best.setdefault(frozenset((wanted[i][0].added, wanted[i][1])), wanted[i])
+        if errors[i] < below:
+            best.setdefault(frozenset((wanted[i][0].added, wanted[i][1])), wanted[i])
     return list(best.values())

@@ -32,6 +32,11 @@ def removed(before: Trial, after: Trial) -> float:
     return float(np.sqrt(max(0.0, before.mean_square - after.mean_square)))
 
 
+def left_by_rivals(rest: Trial, best: Trial) -> float:
+    """Mean squared error that a rival of what `best` has beyond `rest` leaves at most [m^2]."""
+    return rest.mean_square - _SAME**2 * (rest.mean_square - best.mean_square)
+
+
 def worth(search: Search, final: Trial) -> tuple[dict[str, float], dict[str, float]]:
     """Return rms error [m] and nats that each effect takes away beside the others."""
     gains, nats = {}, {}

@@ -10,8 +10,9 @@ these are the optimum and the covariance of the likelihood that is sampled (post
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -40,6 +41,9 @@ class Scorer:
     taps: tuple[Array, ...]
     blocks: tuple[slice, ...]
     likely: bool = True
+    _known: WeakKeyDictionary[Fit, Array] = field(
+        default_factory=WeakKeyDictionary, init=False, compare=False, repr=False
+    )
 
     @classmethod
     def of(cls, data: Data, splits: list[Split], *, misfit: bool = False) -> Scorer:
@@ -69,6 +73,11 @@ class Scorer:
 
     def block_scores(self, fit: Fit) -> Array:
         """Log density of each block under parameters fitted without it (B,), up to a constant."""
+        if fit not in self._known:
+            self._known[fit] = self._block_scores(fit)
+        return self._known[fit]
+
+    def _block_scores(self, fit: Fit) -> Array:
         error, jac = self.whiten(fit.error), self.whiten(fit.jacobian)
         fitted = (error, jac) if self.likely else _plain(fit)
         out = np.empty(len(self.blocks))

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Protocol, TypeVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -31,7 +32,6 @@ class Each(Protocol):
         """Yield results in the order of the arguments."""
 
 
-_P = len(BASE)
 _COARSE = 8  # iterations of every refit; those in the running go on
 _TOLERANCE = 1e-4
 _FINISHED = 2  # iterations on all samples after those on stretches of them
@@ -103,6 +103,7 @@ class Search:
     entries: dict[str, Effect] = field(default_factory=lambda: dict(CATALOGUE))
     _tried: dict[frozenset[str], Fit] = field(default_factory=dict)
     _signatures: dict[str, tuple[Array, Array]] = field(default_factory=dict)
+    _misfit: WeakKeyDictionary[Fit, Scorer] = field(default_factory=WeakKeyDictionary)
     _polished: dict[frozenset[str], int] = field(default_factory=dict)
     _descended: set[tuple[frozenset[str], tuple[str, ...]]] = field(default_factory=set)
 
@@ -128,7 +129,10 @@ class Search:
 
     def with_misfit(self, trial: Trial) -> Scorer:
         """Return a scorer that counts all that a structure leaves as noise."""
-        return Scorer.of(self.data, splits_of(self.data, trial.fit.error), misfit=True)
+        if trial.fit not in self._misfit:
+            parts = splits_of(self.data, trial.fit.error)
+            self._misfit[trial.fit] = Scorer.of(self.data, parts, misfit=True)
+        return self._misfit[trial.fit]
 
     def known(self, effects: Iterable[str]) -> Trial | None:
         """Return a structure that was refitted, or None."""
@@ -155,8 +159,7 @@ class Search:
     def polish(self, trial: Trial, valves: bool = True) -> Trial:
         """Finish the refit of a trial that is in the running, from other valves if need be."""
         key = frozenset(trial.effects)
-        poles = valves and self.entries[trial.added].group in _POLES
-        factors = _VALVES if poles else _VALVES[:1]
+        factors = _VALVES if valves and self.entries[trial.added].group in _POLES else _VALVES[:1]
         if self._polished.get(key, 0) < len(factors):
             start = global_search.along_ridge(self.data, trial.structure, self._tried[key].theta)
             starts = np.tile(start, (len(factors), 1))
@@ -168,9 +171,7 @@ class Search:
     def finished(self, trial: Trial) -> Trial:
         """Go on with a refit until it gains nothing: a pole beside a zero creeps."""
         key = frozenset(trial.effects)
-        self._tried[key] = fit(
-            self.data, trial.structure, self._tried[key].theta, iterations=_LAST
-        )
+        self._tried[key] = fit(self.data, trial.structure, trial.fit.theta, iterations=_LAST)
         return self.trial(trial.effects, trial.added)
 
     def _stand_in(self, model: Structure) -> Part:
@@ -245,24 +246,22 @@ class Search:
         self,
         current: Trial,
         names: Iterable[str] | None = None,
-        progress: Callable[[float], None] | None = None,
+        progress: Callable[[float], None] = lambda share: None,
         *,
         valves: bool = True,
+        below: float = np.inf,
     ) -> list[Trial]:
         """Refit `current` with every further effect, best out-of-sample score first.
 
-        Those near the best are finished, from a slower and a quicker valve too if need be.
+        Those near the best are finished, from a slower and a quicker valve too if need be, where
+        they leave a mean squared error `below` what matters [m^2].
         """
         wanted = [n for n in (names or self.names) if n not in current.effects]
 
-        def one(name: str) -> Trial:
-            return self.add(current, name)
-
         out: list[Trial] = []
-        for i, trial in enumerate(self.each(one, wanted)):
+        for trial in self.each(lambda n: self.add(current, n), wanted):
             out.append(trial)
-            if progress is not None:
-                progress((i + 1) / len(wanted))
+            progress(len(out) / len(wanted))
         out.sort(key=_by_score)
         # Only what is near the best is worth the last digits, or what leaves less by far: short of
         # its optimum a fit has a bad score.
@@ -270,6 +269,7 @@ class Search:
         tried = [t for i, t in enumerate(out[:_POLISHED]) if i < 2 or t.mean_square < 1.5 * error]
         least = sorted(out[_POLISHED:], key=lambda t: t.mean_square)[:2]
         tried += [t for t in least if 1.5 * t.mean_square < error]
+        tried = [t for t in tried if t.mean_square < below]
         rest = [t for t in out if all(t is not other for other in tried)]
         return sorted([*self.each(lambda t: self.polish(t, valves), tried), *rest], key=_by_score)
 
@@ -291,10 +291,9 @@ class Search:
             self._descended.add((key, current.effects))
             kept = np.delete(current.fit.theta, current.structure.columns(name))
             start = np.tile(kept, (2, 1))
-            start[1, :_P] = self._tried[frozenset()].theta
+            start[1, : len(BASE)] = self._tried[frozenset()].theta
             again = fit(self.data, self.structure(*effects), start)
-            known = self._tried.get(key)
-            if known is None or again.rms < known.rms:
+            if key not in self._tried or again.rms < self._tried[key].rms:
                 self._tried[key] = again
             self._polished.setdefault(key, 1)
         return self.trial(effects)
