@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -17,9 +16,10 @@ from actuator_glue.diagnosis.next_experiment import Experiment
 from actuator_glue.diagnosis.posterior import RHAT
 from actuator_glue.diagnosis.regression import Surrogate
 from actuator_glue.diagnosis.result import HeldOutError
-from actuator_glue.diagnosis.verdict import excused, misses
+from actuator_glue.diagnosis.verdict import excuse, misses
 from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.model.effects import CATALOGUE
+from actuator_glue.records import source_name
 
 _TELLING = 4.0  # nats, as where names count as tied
 
@@ -164,17 +164,23 @@ def unconverged(rhat: float) -> tuple[str, ...]:
 
 def contradicted(error: HeldOutError, material: float) -> tuple[str, ...]:
     """Say so where the held-out part shows materially more than noise, and what it may be."""
-    if not misses(replace(error, reached=None), material):
+    if not misses(error, material, error.after):
         return ()
-    why = 'it may show what the fitting records do not'
-    if error.reached is not None and excused(error, material):
-        why = (
-            f'other parameters, as likely by the fitting part, leave {1e6 * error.reached:.1f} um'
-        )
+    why = excuse(error, material) or 'it may show what the fitting records do not'
     return (
         f'the held-out part leaves {1e6 * error.after:.1f} um where '
         f'{1e6 * error.noise_floor:.1f} um are noise: {why}; add a record '
         'like it to them',
+    )
+
+
+def zeros(error: HeldOutError, material: float) -> tuple[str, ...]:
+    """Say which held-out records have a zero of their own that matters."""
+    return tuple(
+        f'{source_name(source)}: {1e6 * after:.1f} um are left, {1e6 * left:.1f} um without the '
+        'offset and the drift of its own zero, which no other record tells'
+        for (source, _, after), left in zip(error.records, error.zeros, strict=True)
+        if after**2 - left**2 > material**2
     )
 
 

@@ -158,6 +158,7 @@ def diagnose(
             *(term.sentence() for term in learned),
             *advice.of(decision, found, result.generic, stretches, experiments),
             *advice.contradicted(error, found.material),
+            *advice.zeros(error, found.material),
             *advice.unidentified(data, estimates),
             *advice.unconverged(draws.rhat),
             *rest.compared(data.records, still, decision.noise),

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from actuator_glue.diagnosis.verdict import excused, misses
+from actuator_glue.diagnosis.verdict import excuse, misses
 from actuator_glue.records import source_name
 
 if TYPE_CHECKING:
@@ -46,8 +46,8 @@ def headline(found: DiagnosisData) -> str:
         f'held-out error {after:.1f} um'
     )  # fmt: skip
     change = f'{change}, {_noise(found)}'
-    if found.error.reached is not None and excused(found.error, found.alarm.threshold):
-        change += f'; {1e6 * found.error.reached:.1f} um with parameters as likely'
+    if other := excuse(found.error, found.alarm.threshold):
+        change += f'; {other}'
     if found.verdict == 'undecided':
         asked = f'for {names}, the held-out part does not' if names else 'for nothing'
         return f'undecided: the fitting records ask {asked}; {change}'

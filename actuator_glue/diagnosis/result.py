@@ -39,6 +39,9 @@ class HeldOutError:
         removed_ci: 95 % block-bootstrap interval of `removable_removed`.
         sham: rms error with a sham effect of equal parameter count, as control.
         records: rms error before and after of each held-out record.
+        after_without_zero: `after` without each held-out record's own zero: an offset and a drift
+            in time, which no other record tells; None where it was not asked.
+        zeros: rms error of each of `records` without it.
         after_without_hum: `after` with the hum that was found regressed out of the held-out part
             (frequency known, phase not); None without hum.
         split: 'held-out' where data were set aside.
@@ -55,14 +58,26 @@ class HeldOutError:
     removed_ci: tuple[float, float]
     sham: float
     records: tuple[tuple[str, float, float], ...] = ()
+    after_without_zero: float | None = None
+    zeros: tuple[float, ...] = ()
     after_without_hum: float | None = None
     split: str = 'held-out'
     reached: float | None = None
 
+    @property
+    def least(self) -> float:
+        """The least rms error, whichever likely parameters or zeros of records are taken [m]."""
+        ways = (self.after, self.reached, self.after_without_zero)
+        return min(way for way in ways if way is not None)
+
     def to_json(self) -> Json:
         """Return the JSON object of the held-out error."""
         records = [{'source': s, 'before': b, 'after': a} for s, b, a in self.records]
-        return {'unit': 'm', **json_fields(self), 'records': json_value(records)}
+        for row, left in zip(records, self.zeros, strict=False):
+            row['after_without_zero'] = left
+        out = {'unit': 'm', **json_fields(self), 'records': json_value(records)}
+        del out['zeros']
+        return out
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -15,22 +14,31 @@ _LATER = Thresholds().later_share  # of what was removed: less is small change
 _NOTHING = 5e-4
 
 
-def misses(error: HeldOutError, material: float) -> bool:
+def misses(error: HeldOutError, material: float, left: float | None = None) -> bool:
     """Whether the held-out part shows more than noise: as much as an addition must remove.
 
     That is `material` [m] and a share of what was removed; not by one stretch of it alone, and
-    whichever of the parameters that the fitting part leaves possible are taken.
+    whichever of the parameters that the fitting part leaves possible are taken, or zeros of its
+    records: `left` is what is left of the error then [m].
     """
-    left = error.after if error.reached is None else min(error.after, error.reached)
-    floor = error.noise_floor
+    left, floor = error.least if left is None else left, error.noise_floor
     removed = max(0.0, error.before**2 - error.after**2)
     matters = left**2 - floor**2 > max(material**2, _LATER**2 * removed)
     return matters and error.after_ci[0] * left > floor * error.after
 
 
 def excused(error: HeldOutError, material: float) -> bool:
-    """Whether the held-out part shows more than noise that other likely parameters account for."""
-    return misses(replace(error, reached=None), material) and not misses(error, material)
+    """Whether other likely parameters, or records' own zeros, account for all beyond noise."""
+    return misses(error, material, error.after) and not misses(error, material)
+
+
+def excuse(error: HeldOutError, material: float) -> str:
+    """Say what accounts for all beyond noise, and what is left then; empty where nothing does."""
+    if not excused(error, material):
+        return ''
+    if error.reached is not None and error.reached <= error.least:
+        return f'{1e6 * error.reached:.1f} um with parameters as likely'
+    return f"{1e6 * error.least:.1f} um without each record's own offset and drift"
 
 
 def conclude(verdict: Verdict, moved: bool, error: HeldOutError, material: float) -> Verdict:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.diagnosis import hum
+from actuator_glue.diagnosis import hum, zero
 from actuator_glue.diagnosis.data import Data, Model
 from actuator_glue.diagnosis.fit import rms
 from actuator_glue.diagnosis.hum import Line
@@ -156,8 +156,9 @@ def verify(
 
     A line found in the fitting part belongs to the noise here: its phase in the held-out part
     cannot be predicted. What it does there is told apart (`after_without_hum`): its frequency is
-    known, two amplitudes per record are regressed, and nothing is decided by it. `tried` is how
-    many candidates there were, and so how many shams.
+    known, two amplitudes per record are regressed, and nothing is decided by it. What is left
+    without each record's own zero is told, too. `tried` is how many candidates there were, and so
+    how many shams.
 
     Returns:
         The error, the coverage of the 95 % bands before and after, and per side the joined
@@ -186,6 +187,7 @@ def verify(
     count = len(after.theta) - len(before.theta)
     pair = fit.target - curves['before'][0], errors['before']
     sham = _sham(fit, held, before, pair, (count, tried), seed)
+    without_zero = zero.without(held, errors['after'])
     per_record = tuple(
         (record.source or f'record {i + 1}', rms(b), rms(a))
         for i, (record, b, a) in enumerate(
@@ -208,6 +210,8 @@ def verify(
         sham=sham,
         after_without_hum=rms(hum.regressed(held, errors['after'], line)) if line else None,
         records=per_record,
+        after_without_zero=rms(without_zero),
+        zeros=tuple(map(rms, held.split(without_zero))),
         reached=reached,
     )
     coverage = tuple(

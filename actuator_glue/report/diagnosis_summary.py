@@ -19,6 +19,10 @@ _WORDS = (
     ('free-run error', 'measured displacement less the simulation, which never sees it'),
     ('held out', 'records or stretches that decided nothing and were looked at once'),
     ('removable error', 'what exceeds the noise: squared error less squared noise'),
+    (
+        'own zero',
+        "offset and drift of a held-out record's channel, which no other one tells",
+    ),
     ('noise', 'what no function of the command can explain'),
     ('nats', 'gain in log-likelihood out of sample; 4.6 nats are odds of 100 to 1'),
     ('or', 'names that these records cannot tell apart'),
@@ -64,6 +68,11 @@ def _error(found: DiagnosisData) -> Table:
     rows = [
         ['before: Eq. (2), refitted', _um(e.before), _range(e.before_ci, 1e6), ''],
         ['after: with the additions', _um(e.after), _range(e.after_ci, 1e6), removed],
+        *(
+            [["after, without each record's own zero", _um(e.after_without_zero), '', '']]
+            if e.after_without_zero is not None
+            else []
+        ),
         ['noise', _um(e.noise_floor), '', ''],
     ]
     header = ['held-out data', 'rms [um]', '95 % interval [um]', 'removable error removed']

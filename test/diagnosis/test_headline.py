@@ -9,7 +9,7 @@ import pytest
 
 from actuator_glue.api import diagnosis as module
 from actuator_glue.cli.main import main
-from actuator_glue.diagnosis.advice import contradicted
+from actuator_glue.diagnosis.advice import contradicted, zeros
 from actuator_glue.diagnosis.finding import Finding
 from actuator_glue.diagnosis.headline import headline
 from actuator_glue.diagnosis.result import Alarm, DiagnosisData, HeldOutError, Verdict
@@ -172,10 +172,26 @@ def test_what_the_parameters_leave_open_contradicts_nothing() -> None:
     assert misses(replace(error, reached=14e-6), 5e-6)
     error = replace(error, reached=11e-6)
     assert not misses(error, 5e-6)
-    assert 'leave 11.0 um' in contradicted(error, 5e-6)[0]
+    assert '11.0 um with parameters as likely' in contradicted(error, 5e-6)[0]
     said = headline(replace(diagnosis('none', 15e-6, 15e-6), error=error))
     assert said.endswith('noise 10.0 um; 11.0 um with parameters as likely')
     assert not contradicted(error, 12e-6)
+
+
+def test_a_record_with_a_zero_of_its_own_contradicts_nothing() -> None:
+    """An offset or a drift of one record is no effect of the machine; it is told with its size."""
+    error = diagnosis('none', 15e-6, 15e-6).error
+    records = (('a.csv', 20e-6, 15e-6), ('b.csv', 20e-6, 15e-6))
+    error = replace(error, records=records, after_without_zero=14e-6, zeros=(10e-6, 15e-6))
+    assert misses(error, 5e-6)
+    (said,) = zeros(error, 5e-6)
+    assert said.startswith('a.csv: 15.0 um are left, 10.0 um without')
+    error = replace(error, after_without_zero=10.5e-6)
+    assert not misses(error, 5e-6)
+    said = headline(replace(diagnosis('none', 15e-6, 15e-6), error=error))
+    assert said.endswith("noise 10.0 um; 10.5 um without each record's own offset and drift")
+    rows = error.to_json()['records']
+    assert [row['after_without_zero'] for row in rows] == [10e-6, 15e-6]
 
 
 def test_only_what_the_held_out_part_bears_out_is_applied() -> None:

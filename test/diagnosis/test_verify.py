@@ -1,10 +1,12 @@
 """A held-out look: its noise, and its control, the best of as many shams as candidates."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy import signal
 
-from actuator_glue.diagnosis import verify
+from actuator_glue.diagnosis import verify, zero
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.fit import rms
 from actuator_glue.model.parameters import TABLE_2
@@ -51,3 +53,19 @@ def test_the_noise_of_other_records_is_theirs_and_what_is_missed_is_not() -> Non
     assert quiet == pytest.approx(0.5e-5, rel=0.1)
     assert loud == pytest.approx(2e-5, rel=0.1)
     assert wrong == pytest.approx(1e-5, rel=0.15)
+
+
+def test_a_zero_is_a_straight_line_of_each_record() -> None:
+    """Offset and drift go, whatever the record's samples that count; what moves stays."""
+    rng = np.random.default_rng()
+    records = [Record(0.0 * T, 0.0 * T, 1 / RATE, stiffness=0.0) for _ in range(2)]
+    data = Data.whole(records)
+    mask = rng.random(len(T)) < 0.7
+    data = replace(data, masks=(mask, data.masks[1]))
+    rest = 1e-5 * rng.standard_normal(data.target.size)
+    off = np.concatenate([3e-5 + 1e-6 * t for t in data.times])
+    off[data.parts[1]] *= -0.5
+    left = zero.without(data, rest + off)
+    assert left == pytest.approx(zero.without(data, rest), abs=1e-15)
+    # Four numbers of some 3300 samples.
+    assert rms(rest) * 0.99 < rms(left) < rms(rest) < 0.5 * rms(rest + off)
