@@ -16,6 +16,7 @@ from actuator_glue.diagnosis import (
     findings,
     homogeneity,
     learned_term,
+    model_form,
     posterior,
     response,
     rest,
@@ -127,6 +128,10 @@ def diagnose(
     others = alternatives.alternatives(result)
     mixed = alternatives.mixed(after.draws, final, others, lambda trial: sample(trial).points, rng)
     unmet = draws.unmet if final.effects else ()
+    judged = verdict.conclude(decision.verdict, bool(decision.names), error, found.material)
+    if judged in ('unexplained', 'undecided') and final.own is None:
+        open_form = model_form.spread(result.selection.search, final, decision.left, space)
+        mixed = model_form.widened(mixed, open_form, space, rng)
     estimates = _estimates(space, replace(after, draws=mixed), unmet)
     held_at = _pressed(space, after)
     plain = Space(before.model, max(r.duration for r in data.records))
@@ -137,8 +142,6 @@ def diagnose(
     )
     effects = findings.of(decision, found, estimates, stretches)
     learned = learned_term.described(decision.final, data, estimates)
-    moved = any(e.noise is None for e in effects)
-    judged = verdict.conclude(decision.verdict, moved, error, found.material)
     used = None
     if prior is not None and known is not None:
         p_value = known.conflict(after.draws).p_value

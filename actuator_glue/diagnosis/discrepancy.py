@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from actuator_glue.diagnosis import zero
 from actuator_glue.diagnosis.fit import rms
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.search import Search
@@ -162,7 +163,14 @@ def responses(search: Search, size: float) -> dict[str, Array]:
 
     found = dict(zip(search.names, search.each(one, search.names), strict=True))
     sizes = {name: rms(response) for name, response in found.items()}
-    return {n: r * (size / sizes[n]) for n, r in found.items() if 0.0 < sizes[n] < 1.0}
+    out = {n: r * (size / sizes[n]) for n, r in found.items() if 0.0 < sizes[n] < 1.0}
+    # Each record has a zero of its own, with a drift.
+    for i, (part, line) in enumerate(zero.lines(data)):
+        for which, row in zip(('offset', 'drift'), line, strict=True):
+            own = np.zeros(data.target.size)
+            own[part] = size * row
+            out[f'{which} of record {i + 1}'] = own
+    return out
 
 
 def beside(small: Mapping[str, Array], effects: Container[str], scorer: Scorer) -> Discrepancy:

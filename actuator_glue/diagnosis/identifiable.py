@@ -48,8 +48,9 @@ class Working:
 
     def __init__(self, space: Space) -> None:
         self._space = space
-        self.lower, self.upper = space.lower, space.upper
         self.widest = space.upper - space.lower
+        margin = _ROUNDING * self.widest
+        self.lower, self.upper = space.lower - margin, space.upper + margin
         self.widest[:_P] = 1.0
 
     def forward(self, theta: Array) -> Array:

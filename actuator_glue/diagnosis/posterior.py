@@ -25,7 +25,7 @@ from actuator_glue.inference import importance, posterior
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.convergence import quick_rhat_and_ess
 from actuator_glue.inference.settings import SamplerSettings
-from actuator_glue.inference.transforms import Composed
+from actuator_glue.inference.transforms import Composed, Transform
 from actuator_glue.inference.transforms.laplace import Laplace
 from actuator_glue.json_value import Json, json_value
 from actuator_glue.model.parameters import BASE
@@ -113,6 +113,19 @@ def _normal(laplace: Composed, count: int, rng: np.random.Generator) -> Array:
     return laplace.inverse(w)[0]
 
 
+def _inside(transform: Transform, points: Array, fit: Array) -> Array:
+    """Pull points (m, p) towards the fit (p,) until none is impossible.
+
+    Beside a bound the linear approximation may have all of its draws beyond it.
+    """
+    for _ in range(_HALVINGS):
+        outside = ~np.isfinite(transform.inverse(points)[1])
+        if not outside.any():
+            return points
+        points[outside] = fit + 0.5 * (points[outside] - fit)
+    return points[~outside]
+
+
 def _enough(chains: Chains) -> bool:
     rhat, ess = quick_rhat_and_ess(chains.kept)
     return bool(ess.min() >= _ESS and rhat.max() <= RHAT)
@@ -167,15 +180,13 @@ def sample(
     if found is not None:
         points = loosened(transform.inverse(found.points)[0])
         return Draws(points, 'importance', len(points), found.effective, pareto_k=found.pareto_k)
-    # None of the archive's points may be impossible; the fit, at least, is not.
-    near = np.concatenate([start.draw(rng, 480), transform.forward(around.inverse(phi[None])[0])])
-    near = near[np.isfinite(transform.inverse(near)[1])]
+    near = _inside(transform, start.draw(rng, 320), transform.forward(fit.theta[None])[0])
     chains = posterior.sample(
         goal,
         seed,
         evaluations,
         settings=SamplerSettings(chains=32, population=128, steps=2, adaptation=20, parts=48),
-        archive=rng.choice(near, 320),
+        archive=near,
         enough=_enough,
         progress=lambda done, all_: progress(done / all_),
     )

@@ -4,7 +4,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from actuator_glue.diagnosis.discrepancy import _SCALES, Discrepancy
+from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.discrepancy import _SCALES, Discrepancy, beside, responses
+from actuator_glue.diagnosis.score import Scorer, splits_of
+from actuator_glue.diagnosis.search import Search
+from actuator_glue.model.parameters import TABLE_2
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Record
 
 N = 400
 WIDE = np.full(2, 10.0)
@@ -69,3 +75,23 @@ def test_what_no_record_tells_keeps_the_width_of_the_bounds() -> None:
     assert np.sqrt(np.diag(covariance)) == pytest.approx(WIDE / np.sqrt(2.0), rel=0.01)
     assert move.sum() == pytest.approx(1.0, abs=0.01)
     assert np.sqrt(covariance.sum()) == pytest.approx(1.0 / np.linalg.norm(row), rel=0.01)
+
+
+def test_each_record_may_have_a_zero_of_its_own() -> None:
+    """Whatever offset and drift each one has, the shapes take it up, and no more than that."""
+    rng = np.random.default_rng()
+    t = np.arange(0.0, 20.0, 1.0 / 64.0)
+    records = []
+    for k in (0.0, 250e3):
+        bare = Record(2e-3 * np.sin(t**2), 0.0 * t, 1.0 / 64.0, stiffness=k)
+        measured = Structure(()).simulate(TABLE_2, bare) + 1e-5 * rng.standard_normal(len(t))
+        records.append(Record(bare.command, measured, bare.period, stiffness=k))
+    search = Search(Data.whole(records), ('gain',))
+    scorer = Scorer.of(search.data, splits_of(search.data, search.base().error))
+    small = responses(search, 5e-6)
+    own = np.concatenate([a + b * t for a, b in rng.standard_normal((2, 2))])
+    shapes = beside(small, ('gain',), scorer)
+    assert len(shapes.shapes) == 4
+    assert np.linalg.norm(shapes.without(scorer.whiten(own))) < 1e-6 * np.linalg.norm(own / 1e-5)
+    moves = scorer.whiten(np.concatenate([r.command for r in records]))
+    assert np.linalg.norm(shapes.without(moves)) > 0.9 * np.linalg.norm(moves)

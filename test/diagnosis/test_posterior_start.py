@@ -4,9 +4,12 @@ import numpy as np
 import pytest
 from test_diagnose import QUICK, make
 
-from actuator_glue.diagnosis import advice
+from actuator_glue.diagnosis import advice, posterior
 from actuator_glue.diagnosis.diagnose import diagnose
+from actuator_glue.diagnosis.identifiable import Working
+from actuator_glue.diagnosis.space import Space
 from actuator_glue.inference.convergence import rhat_and_ess
+from actuator_glue.model.structure import Structure
 
 
 @pytest.mark.parametrize('which', [(1,), (0, 1)])
@@ -51,3 +54,19 @@ def test_a_posterior_that_has_not_converged_is_told() -> None:
     assert advice.unconverged(1.05) == advice.unconverged(np.nan) == ()
     (told,) = advice.unconverged(1.5)
     assert 'R-hat 1.50' in told
+
+
+def test_chains_start_inside_of_the_bounds_whatever_is_linear_there() -> None:
+    """A fit on two bounds, beyond which all draws are: they had nowhere to start from."""
+    space = Space(Structure(('backlash', 'delay')), 60.0)
+    around, rng = Working(space), np.random.default_rng()
+    z = 0.5 * (space.lower + space.upper)
+    z[[0, 4]], z[5] = space.lower[[0, 4]], space.upper[5]
+    fit = around.forward(space.theta(z)[None])[0]
+    assert np.isfinite(around.inverse(fit[None])[1]).all()
+    beyond = fit + np.abs(rng.standard_normal((200, 6))) * [-9.0, 1.0, 1.0, 1.0, -1e-4, 1.0]
+    assert not np.isfinite(around.inverse(beyond)[1]).any()
+    points = posterior._inside(around, beyond, fit)
+    assert len(points) == 200
+    assert np.isfinite(around.inverse(points)[1]).all()
+    assert (points.std(axis=0)[1:4] > 0.0).all()

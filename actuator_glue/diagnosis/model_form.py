@@ -1,0 +1,53 @@
+"""How far a parameter depends on what stands beside it, where no structure tried is the machine.
+
+A posterior says what is known under one structure. Where that leaves material structure it is not
+the machine's, and the same parameter stands elsewhere beside companions that leave little more:
+how far is what the choice of the equations leaves open (Draper 1995, Assessment and propagation of
+model uncertainty).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from actuator_glue.diagnosis.search import Search, Trial
+from actuator_glue.diagnosis.space import Space
+from actuator_glue.records import Array
+
+_NORMAL = 1.4826  # standard deviation of a normal over its median absolute deviation
+
+
+def spread(search: Search, final: Trial, left: float, space: Space) -> Array:
+    """Return by how much structures as good differ in each parameter (p,).
+
+    In working coordinates, and robustly: a companion that makes the same motion takes a parameter
+    anywhere, and is one of many.
+
+    Args:
+        search: all structures that were tried.
+        final: the one that is told.
+        left: rms structure that it leaves [m]; the others leave twice its square at most.
+        space: working coordinates of `final`.
+    """
+    names = [p.name for p in final.structure.parameters]
+    told = space.z(final.fit.theta)
+    off: list[list[float]] = [[] for _ in names]
+    for trial in search.left_at_most(final.mean_square + left**2):
+        theirs = {p.name: i for i, p in enumerate(trial.structure.parameters)}
+        shared = [i for i, name in enumerate(names) if name in theirs]
+        theta = np.array(final.fit.theta)
+        theta[shared] = trial.fit.theta[[theirs[names[i]] for i in shared]]
+        moved = np.abs(space.z(theta) - told)
+        if trial.effects != final.effects:
+            for i in shared:
+                off[i].append(float(moved[i]))
+    return np.array([_NORMAL * float(np.median(rows)) if rows else 0.0 for rows in off])
+
+
+def widened(draws: Array, size: Array, space: Space, rng: np.random.Generator) -> Array:
+    """Return draws (m, p) moved at random by standard deviations (p,), working coordinates.
+
+    For intervals of one parameter at a time: together they leave the ridges of the posterior.
+    """
+    moved = space.z(draws) + size * rng.standard_normal(draws.shape)
+    return space.theta(np.clip(moved, space.lower, space.upper))
