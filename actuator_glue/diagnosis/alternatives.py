@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from actuator_glue.diagnosis.pipeline import Conclusion
-from actuator_glue.diagnosis.search import Trial
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.records import Array
 
 _ROUND = 1e-3  # odds below it move no interval

@@ -20,8 +20,9 @@ from actuator_glue.diagnosis.data import Data, Mask, Model, simulated
 from actuator_glue.diagnosis.fit import Fit, fit, rms
 from actuator_glue.diagnosis.preparation import Prepared
 from actuator_glue.diagnosis.score import Scorer, pooled, splits_of
-from actuator_glue.diagnosis.search import Search, Trial
+from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.records import Array
 

@@ -14,8 +14,8 @@ from actuator_glue.diagnosis.model_selection import Selection
 from actuator_glue.diagnosis.regression import Surrogate
 from actuator_glue.diagnosis.result import Verdict
 from actuator_glue.diagnosis.score import splits_of
-from actuator_glue.diagnosis.search import Trial
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.records import Array
 
 

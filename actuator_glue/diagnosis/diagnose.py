@@ -37,9 +37,10 @@ from actuator_glue.diagnosis.pipeline import (
 )
 from actuator_glue.diagnosis.preparation import prepare, rest_samples
 from actuator_glue.diagnosis.result import DiagnosisData
-from actuator_glue.diagnosis.search import Each, Trial
+from actuator_glue.diagnosis.search import Each
 from actuator_glue.diagnosis.space import UPPER, Space
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.diagnosis.verify import Side, traces, verify
 from actuator_glue.inference.at_bound import Pressed, pressed
 from actuator_glue.inference.prior_use import GivenPrior

@@ -19,8 +19,9 @@ from actuator_glue.diagnosis.force import newtons_per_metre, with_forces
 from actuator_glue.diagnosis.model_selection import Selection
 from actuator_glue.diagnosis.ranking import compare, worth
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
-from actuator_glue.diagnosis.search import Search, Trial
+from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.effects import Effect
 
 _COARSE = 8  # iterations of rough refits

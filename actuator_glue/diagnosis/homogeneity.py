@@ -8,7 +8,7 @@ import numpy as np
 from scipy import stats
 
 from actuator_glue.diagnosis.score import Scorer
-from actuator_glue.diagnosis.search import Trial
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.records import Array
 
 _STRETCHES = 2  # of every record
@@ -78,6 +78,8 @@ def _compare(
     known = scale > 0.0
     rows, scale = rows[known] / scale[known, None], scale[known]
     count = int(known[:count].sum())
+    if not count:  # its size moves nothing where the fit stands
+        return Homogeneity((), (), float('nan'), None)
     inverse = np.linalg.pinv(rows @ rows.T, rcond=1e-10, hermitian=True)
     shift = inverse @ (rows @ error)
     left = error - shift @ rows

@@ -11,7 +11,7 @@ import numpy as np
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.estimate import Estimate, Json
 from actuator_glue.diagnosis.learned_forms import LEARNED
-from actuator_glue.diagnosis.search import Trial
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.effects import Effect
 from actuator_glue.model.effects.terms.definition import entries, mapping
 from actuator_glue.records import Array

@@ -16,7 +16,7 @@ from actuator_glue.diagnosis.learned_forms import forms
 from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.model_selection import ModelSelection, Selection
 from actuator_glue.diagnosis.ranking import removed
-from actuator_glue.diagnosis.search import Trial
+from actuator_glue.diagnosis.trial import Trial
 
 _MOST = 2  # learned terms
 _REFITS = 4  # per structure and turn

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from actuator_glue.diagnosis.search import Search, Trial
+from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.space import Space
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.records import Array
 
 _NORMAL = 1.4826  # standard deviation of a normal over its median absolute deviation

@@ -12,8 +12,9 @@ from actuator_glue.diagnosis.fit import Fit
 from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.ranking import compare, removed, spokesman, standard_error, worth
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
-from actuator_glue.diagnosis.search import Search, Trial
+from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.trial import Trial
 
 Progress = Callable[[str, float], None]
 # Rounds in which members may be swapped for better or simpler ones.

@@ -16,8 +16,8 @@ import numpy as np
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.estimate import Json
 from actuator_glue.diagnosis.score import Scorer
-from actuator_glue.diagnosis.search import Trial
 from actuator_glue.diagnosis.space import Space, jacobian
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model import commands
 from actuator_glue.model.effects import Scale
 from actuator_glue.records import Array, Record

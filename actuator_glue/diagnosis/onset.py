@@ -14,7 +14,7 @@ from actuator_glue.diagnosis.data import SETTLE, Data, Mask, Model
 from actuator_glue.diagnosis.estimate import Json
 from actuator_glue.diagnosis.fit import Fit, base_fit
 from actuator_glue.diagnosis.score import pooled, splits_of
-from actuator_glue.diagnosis.search import Trial
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 

@@ -16,7 +16,8 @@ import numpy as np
 
 from actuator_glue.diagnosis.finding import BESIDE, Rival
 from actuator_glue.diagnosis.learned_term import is_learned
-from actuator_glue.diagnosis.search import Search, Trial
+from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.trial import Trial
 
 if TYPE_CHECKING:
     from actuator_glue.diagnosis.model_selection import ModelSelection

@@ -18,8 +18,9 @@ from actuator_glue.diagnosis.fit import fit
 from actuator_glue.diagnosis.model_selection import Selection
 from actuator_glue.diagnosis.ranking import removed, standard_error, weights
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
-from actuator_glue.diagnosis.search import Search, Trial
+from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.parameters import Parameter

@@ -27,8 +27,9 @@ from actuator_glue.diagnosis.onset import Onset
 from actuator_glue.diagnosis.preparation import Prepared
 from actuator_glue.diagnosis.regression import Surrogate
 from actuator_glue.diagnosis.score import Scorer
-from actuator_glue.diagnosis.search import Each, Search, Trial
+from actuator_glue.diagnosis.search import Each, Search
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.effects import CATALOGUE
 
 Progress = Callable[[str, float], None]

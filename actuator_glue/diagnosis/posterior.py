@@ -123,7 +123,7 @@ def _inside(transform: Transform, points: Array, fit: Array) -> Array:
         if not outside.any():
             return points
         points[outside] = fit + 0.5 * (points[outside] - fit)
-    return points[~outside]
+    return np.asarray(points[~outside])
 
 
 def _enough(chains: Chains) -> bool:

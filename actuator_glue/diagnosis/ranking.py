@@ -15,8 +15,9 @@ import numpy as np
 from actuator_glue.diagnosis.finding import BESIDE, Rival
 from actuator_glue.diagnosis.likelihood import inflation
 from actuator_glue.diagnosis.score import Scorer, evidence
-from actuator_glue.diagnosis.search import Search, Trial
+from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.records import Array
 

@@ -13,7 +13,7 @@ from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.fit import Fit
 from actuator_glue.diagnosis.noise import whiten
 from actuator_glue.diagnosis.score import Scorer, evidence
-from actuator_glue.diagnosis.search import Trial
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.json_value import Json, json_value
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record

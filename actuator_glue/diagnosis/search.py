@@ -11,11 +11,12 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from actuator_glue.diagnosis import global_search
-from actuator_glue.diagnosis.data import Data, Model
+from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.fit import Fit, base_fit, fit, rms
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.screening import screen, signatures
 from actuator_glue.diagnosis.stretches import Part, stretches
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.effects import CATALOGUE, Effect, Scale, scale
 from actuator_glue.model.parameters import BASE
 from actuator_glue.model.structure import Structure
@@ -42,40 +43,6 @@ _LAST = 60  # iterations at most of a structure that is told
 # slower or quicker by these factors, of the same bandwidth, leads to.
 _POLES = ('lag', 'gain', 'inertia')
 _VALVES = (1.0, 0.6, 1.6)
-
-
-@dataclass(frozen=True)
-class Trial:
-    """One refitted structure.
-
-    Attributes:
-        structure: its effects stand in the catalogue's order, learned terms last.
-        added: the effect that was added last.
-        fit: base and effects refitted together.
-        scores: out-of-sample log density of every block (B,) [nats].
-        own: the model where it is not `structure` (see diagnosis/per_record_settings.py).
-    """
-
-    structure: Structure
-    added: str
-    fit: Fit
-    scores: Array
-    own: Model | None = None
-
-    @property
-    def effects(self) -> tuple[str, ...]:
-        """Names of its effects."""
-        return self.structure.effects
-
-    @property
-    def model(self) -> Model:
-        """What simulates it."""
-        return self.own or self.structure
-
-    @property
-    def mean_square(self) -> float:
-        """Mean squared free-run error [m^2]."""
-        return float(np.mean(self.fit.error**2))
 
 
 def _by_score(trial: Trial) -> float:

@@ -6,7 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis.search import Search, Trial
+from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.structure import Structure
 
 # Score [nats] and error [um] of each refit before it is finished.

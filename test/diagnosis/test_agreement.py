@@ -1,5 +1,7 @@
 """Agreement of an effect across the halves of the records, and the generic surrogate."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,8 @@ from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.homogeneity import agreement
 from actuator_glue.diagnosis.regression import Surrogate, compare
 from actuator_glue.diagnosis.score import Scorer, splits_of
-from actuator_glue.diagnosis.search import Search, Trial
+from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 
@@ -90,3 +93,14 @@ def test_the_surrogate_beats_a_wrong_name() -> None:
     assert found.beats(4e-6, 10.0)
     assert found.place == 'sensor'
     assert found.features == ('x^2',)
+
+
+@pytest.mark.filterwarnings('error')
+def test_a_size_that_moves_nothing_is_fixed_by_no_stretch() -> None:
+    """Where the fit stands on a bound, a derivative may vanish everywhere."""
+    search, trial = searched('delay', (2e-3, 2e-3), 3)
+    jacobian = trial.fit.jacobian.copy()
+    jacobian[4] = 0.0
+    still = replace(trial, fit=replace(trial.fit, jacobian=jacobian))
+    (found,) = agreement(still, scorer_of(search, trial)).values()
+    assert found.values == () and found.agree is None and np.isnan(found.p_value)

@@ -15,8 +15,9 @@ from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.pipeline import mean_effects
 from actuator_glue.diagnosis.ranking import standard_error
 from actuator_glue.diagnosis.score import Scorer, pooled, splits_of
-from actuator_glue.diagnosis.search import Search, Trial
+from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.effects import CATALOGUE, Effect, Scale
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record

@@ -14,8 +14,8 @@ from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.ranking import standard_error, weights
 from actuator_glue.diagnosis.result import HeldOutError
 from actuator_glue.diagnosis.score import Scorer, splits_of
-from actuator_glue.diagnosis.search import Trial
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.records import Array, Record
 
 
