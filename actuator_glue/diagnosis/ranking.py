@@ -65,6 +65,17 @@ def weights(scores: Array) -> Array:
     return np.asarray((likely / likely.sum(axis=0)).mean(axis=1))
 
 
+def _without_best_blocks(scores: Array) -> Array:
+    """Return scores (K, B) in which the first is not ahead of another by its best block alone.
+
+    As in `evidence`: what one stretch of a record alone supports is not evidence.
+    """
+    out, lead = scores.copy(), scores[0] - scores
+    rows, best = np.arange(len(scores)), lead.argmax(axis=1)
+    out[rows, best] += np.maximum(lead[rows, best], 0.0)
+    return out
+
+
 def compare(
     rest: Trial,
     best: Trial,
@@ -87,7 +98,7 @@ def compare(
     """
     whole = removed(rest, best)
     odds = np.array([math.exp(-cost) if BESIDE in t.added else 1.0 for t in trials])
-    scores = np.stack([t.scores for t in (best, *trials, rest)])
+    scores = _without_best_blocks(np.stack([t.scores for t in (best, *trials, rest)]))
     scores[1:-1] += np.log(odds)[:, None] / scores.shape[1]
     known = weights(scores)
     excess = [removed(t, best) for t in trials]

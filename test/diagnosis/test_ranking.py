@@ -98,6 +98,20 @@ def test_an_alternative_has_a_probability() -> None:
     assert told['coulomb-friction'].probability > 0.2
 
 
+def test_one_stretch_alone_excludes_no_rival() -> None:
+    """A hundred nats of one block and next to nothing of the others: both names are possible."""
+    level, even = cast('Scorer', None), np.zeros(15)
+    rest, best = trial('', 40e-6, np.full(15, -500.0)), trial('delay', 10e-6, even)
+    against = np.full(15, 0.1)
+    for blocks, least, most in ((1, 0.1, 0.3), (2, 0.0, 0.01)):
+        against[:blocks] = 100.0
+        lag = trial('sensor-lag', 14e-6, -against)
+        found = ranking.compare(rest, best, 'delay', [lag], level, Thresholds())
+        told = {r.name: r for r in found}['sensor-lag']
+        assert told.nats == pytest.approx(against.sum() - 100.0)
+        assert told.tied is (blocks == 1) and least <= told.probability <= most
+
+
 def test_held_out_records_that_contradict_lower_the_certainty() -> None:
     """Names that leave three times the noise where nothing was fitted are not certain."""
     error = HeldOutError(95e-6, (0, 1), 31e-6, (25e-6, 37e-6), 10e-6, 0.9, (0.8, 1.0), 95e-6)
