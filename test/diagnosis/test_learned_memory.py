@@ -31,7 +31,7 @@ KINDS = {
 }
 
 
-def tested(kind: int, size: float, theta: Array, rng: np.random.Generator) -> list[Record]:
+def sweeps(kind: int, size: float, theta: Array, rng: np.random.Generator) -> list[Record]:
     """Two sweeps of 2 mm to 9 Hz, without and with a specimen."""
     t = np.arange(0.0, SECONDS, 1.0 / RATE)
     command = STROKE * np.sin(np.pi * (9.0 / SECONDS) * t**2)
@@ -67,7 +67,7 @@ def test_a_machine_is_described_at_its_place(name: str) -> None:
     rng = np.random.default_rng()
     kind, size, sizes = KINDS[name]
     theta = PLANTS[rng.integers(len(PLANTS))] * np.exp(0.1 * rng.standard_normal(4))
-    search, names = searched(tested(kind, size * (theta[2] if kind > 10 else 1.0), theta, rng))
+    search, names = searched(sweeps(kind, size * (theta[2] if kind > 10 else 1.0), theta, rng))
     base = search.trial(())
     best = search.additions(base, search.screened(base, names)[:4])[0]
     assert base.fit.rms > 1.1 * NOISE
@@ -85,7 +85,7 @@ def test_a_reading_that_settles_is_described() -> None:
     """Gain of the transducer, 10 % with a time constant of 8 s."""
     rng = np.random.default_rng()
     records = []
-    for record in tested(0, 0.0, PLANTS[1], rng):
+    for record in sweeps(0, 0.0, PLANTS[1], rng):
         measured = record.measured * (1.0 + 0.1 * (1.0 - np.exp(-record.time / 8.0)))
         records.append(Record(record.command, measured, 1.0 / RATE, stiffness=record.stiffness))
     search, names = searched(records)
