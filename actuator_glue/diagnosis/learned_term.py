@@ -49,7 +49,8 @@ class LearnedTerm:
     def sentence(self) -> str:
         """Return equation, intervals and range in one sentence."""
         sizes = ', '.join(
-            f'{n} = {p.mean:.4g} {p.unit} (95 % {p.lower:.4g} to {p.upper:.4g})'
+            f'{n} = {p.mean:.4g}{"" if p.unit == "1" else f" {p.unit}"}'
+            f' (95 % {p.lower:.4g} to {p.upper:.4g})'
             for n, p in self.parameters.items()
         )
         ranges = ', '.join(

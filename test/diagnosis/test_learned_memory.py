@@ -21,9 +21,9 @@ PLANTS = np.array(
 )
 # Departure of smooth_machines.py, its size (friction: over alpha_2), and sizes of the term.
 KINDS = {
-    'learned-command-play': (6, 60e-6, (1.0, 60e-6)),
-    'learned-feedback-play': (7, 60e-6, (1.0, 60e-6)),
-    'learned-valve-play': (8, 100e-6, (0.5, 100e-6)),
+    'learned-command-play': (6, 60e-6, (60e-6,)),
+    'learned-feedback-play': (7, 60e-6, (60e-6,)),
+    'learned-valve-hysteresis': (8, 100e-6, (0.5, 100e-6)),
     'learned-flow-settling': (9, 0.2, (0.2, 8.0)),
     'learned-specimen-settling': (10, 0.5, (0.5, 8.0)),
     'learned-force-friction': (11, 60e-6, (None, 1e-3)),
@@ -76,7 +76,7 @@ def test_a_machine_is_described_at_its_place(name: str) -> None:
     for value, true in zip(best.fit.theta[4:], sizes, strict=True):
         assert true is None or 0.7 * true < value < 1.4 * true
     numbers, excited = told(search, best)
-    assert f'{best.fit.theta[5]:.4g}' in numbers
+    assert f'{best.fit.theta[4]:.4g}' in numbers
     if name.endswith('settling'):
         assert excited['t'] == (0.0, SECONDS - 1.0 / RATE)
 
