@@ -1,16 +1,17 @@
 """Forms of learned terms that remember, or change with time.
 
-Hysteresis is the play operator in a share of what moves (of which any, after Prandtl and Ishlinskii,
-is a sum), or in all of it, which is lost motion: a share near one lets the piston rest elsewhere
-within the play, for which small motions are wrong. Memory acts only where the signal goes on through
-the loop; what a sensor or a specimen remembers has names in the catalogue: backlash, yielding,
-friction. A gain that changes begins at the start of the test and settles; before it has, it
-drifts. Of command and sensor only the sensor is offered: a slow change of either leaves the same.
+Hysteresis is the play operator in a share of what moves (of which any, after Prandtl and
+Ishlinskii, is a sum), or in all of it, which is lost motion: a share near one lets the piston rest
+elsewhere within the play, and small motions are wrong then. Memory acts only where the signal goes
+on through the loop; what a sensor or a specimen remembers has names in the catalogue: backlash,
+yielding, friction. A gain that changes begins at the start of the test and settles; before it has,
+it drifts. Of command and sensor only the latter is offered: a slow change of both leaves the same.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Final
 
 from actuator_glue.diagnosis.learned_sizes import LEARNED
@@ -65,7 +66,7 @@ def _hysteresis(word: str, sizes: Mapping[str, float]) -> Effect:
     signal, name = SIGNAL[place], f'{word}_hysteresis'
     low, high = (share * sizes[of] for share in _WIDTHS)
     unit = 'N/s' if of == 'q' else 'm'
-    return term(
+    effect = term(
         f'learned-{word}-hysteresis',
         f'{place}: {signal} = {signal} {sign} {name}*({of} - play({of}, {name}_width))',
         (
@@ -74,6 +75,7 @@ def _hysteresis(word: str, sizes: Mapping[str, float]) -> Effect:
         ),
         source=LEARNED,
     )
+    return replace(effect, holds=(f'learned-{word}-play', name, 1.0)) if word in _LOST else effect
 
 
 def _settling(place: str, of: str, duration: float) -> Effect:
