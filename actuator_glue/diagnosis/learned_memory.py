@@ -1,11 +1,11 @@
 """Forms of learned terms that remember, or change with time.
 
 Hysteresis is the play operator in a share of what moves (of which any, after Prandtl and
-Ishlinskii, is a sum), or in all of it, which is lost motion: a share near one lets the piston rest
-elsewhere within the play, and small motions are wrong then. Memory acts only where the signal goes
-on through the loop; what a sensor or a specimen remembers has names in the catalogue: backlash,
-yielding, friction. A gain that changes begins at the start of the test and settles; before it has,
-it drifts. Of command and sensor only the latter is offered: a slow change of both leaves the same.
+Ishlinskii, is a sum), or in all of it, which is lost motion and needs one size only. Memory acts
+only where the signal goes on through the loop; what a sensor or a specimen remembers has names in
+the catalogue: backlash, yielding, friction. A gain that changes begins at the start of the test
+and settles; before it has, it drifts. Of command and sensor only the latter is offered: a slow
+change of both leaves the same.
 """
 
 from __future__ import annotations
