@@ -68,8 +68,8 @@ def told(search: Search, trial: Trial) -> tuple[str, dict[str, tuple[float, floa
 def test_a_machine_is_described_at_its_place(name: str) -> None:
     """Of all forms, screened and refitted as a diagnosis does, the right one leaves the noise.
 
-    The noise's own rms varies by 0.9 % (6100 samples), five standard deviations are allowed; sizes
-    are found within 5 %, of what settles 10 %. Of 54 machines none failed.
+    The noise's own rms varies by 0.9 % (6100 samples), five standard deviations are allowed, and
+    of sizes more. Of 47 machines none failed.
     """
     rng = np.random.default_rng()
     kind, size, sizes = KINDS[name]
@@ -104,7 +104,7 @@ def test_lost_motion_has_one_size() -> None:
 
 
 def test_a_reading_that_settles_is_described() -> None:
-    """Gain of the transducer, 10 % with a time constant of 8 s; ten standard deviations allowed."""
+    """Gain of the transducer, 10 % with a time constant of 8 s; ten deviations are allowed."""
     rng = np.random.default_rng()
     records = []
     for record in sweeps(0, 0.0, PLANTS[1], rng):
