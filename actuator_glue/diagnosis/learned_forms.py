@@ -1,5 +1,7 @@
-"""Forms that a learned term may take: smooth functions of what is known at a place of the loop.
+"""Forms that a learned term may take: functions of what is known at a place of the loop.
 
+What is smooth and holds at any time is written here, what remembers or changes with time in
+learned_memory.py.
 Each is an effect written as an expression (docs/effects.md), its sizes scaled to the test, so that
 it is screened, refitted and compared as the effects of the catalogue are.
 """
@@ -10,6 +12,15 @@ from collections.abc import Container
 from itertools import groupby
 from typing import Final
 
+from actuator_glue.diagnosis import learned_memory
+from actuator_glue.diagnosis.learned_sizes import (
+    DIMENSIONS,
+    LARGEST,
+    LEARNED,
+    signal_size,
+    sizes_of,
+    unit_text,
+)
 from actuator_glue.model.effects import Effect, Scale
 from actuator_glue.model.effects.terms.entry import term
 from actuator_glue.model.effects.terms.expression import PLACES, SIGNAL
@@ -38,18 +49,6 @@ _PRODUCTS: Final = {
 }
 # Places whose signal may be limited.
 _SATURATES: Final = ('command', 'valve', 'flow', 'sensor')
-_DIMENSIONS: Final = {
-    'u': (0, 1, 0),
-    'e': (0, 1, 0),
-    'x': (0, 1, 0),
-    'y': (0, 1, 0),
-    'v': (0, 1, -1),
-    'q': (1, 0, -1),
-    'f': (1, 0, 0),
-    'k': (1, -1, 0),
-}
-LEARNED: Final = 'learned'  # source of such an effect
-_LARGEST = 2.0  # of the signal at the test's stroke and speed
 _SHARPEST = 5.0  # times a limit may be overdriven
 _BENDS = (1e-3, 3.0)  # a bend of a thousandth is a corner
 
@@ -61,7 +60,7 @@ def forms(scale: Scale, known: Container[str] = ()) -> tuple[Effect, ...]:
         scale: sizes of the test at the fitted base.
         known: names of effects there are already, which are not offered again.
     """
-    sizes = _sizes(scale)
+    sizes = sizes_of(scale)
     offered = []
     for place, products in _PRODUCTS.items():
         for product in products:
@@ -72,46 +71,25 @@ def forms(scale: Scale, known: Container[str] = ()) -> tuple[Effect, ...]:
             offered += [form(place, sizes) for form in (_limited, _one_sided, _fading)]
     if sizes['f'] > 0.0:
         offered.append(_turbulent(sizes))
-    offered.append(_rounded_overlap(sizes))
+    offered += [_rounded_overlap(sizes), _friction('force', sizes)]
+    if sizes['k'] > 0.0:
+        offered.append(_friction('specimen', sizes))
+    offered += learned_memory.forms(sizes)
     return tuple(effect for effect in offered if effect.name not in known)
-
-
-def _sizes(scale: Scale) -> dict[str, float]:
-    """Return the size of everything that moves in a test."""
-    stroke, speed = scale.stroke, scale.velocity
-    error = float(scale.theta[0] / max(scale.theta[1], 1e-9)) * scale.oil * speed
-    return {
-        'u': stroke,
-        'x': stroke,
-        'y': stroke,
-        'v': speed,
-        'e': error,
-        'q': scale.oil * speed,
-        'f': scale.stiffness * stroke,
-        'k': scale.stiffness,
-    }
-
-
-def _signal(place: str, sizes: dict[str, float]) -> float:
-    """Return the size that a change of a place's signal is compared with."""
-    if place in ('force', 'specimen'):
-        # What holds the piston is the oil, with or without a specimen.
-        return sizes['q'] / sizes['v'] * sizes['x']
-    return sizes[SIGNAL[place]]
 
 
 def _product(place: str, factors: list[str], sizes: dict[str, float]) -> Effect:
     signal = SIGNAL[PLACES[place]]
     full = 1.0
-    unit = list(_DIMENSIONS[signal])
+    unit = list(DIMENSIONS[signal])
     for factor in factors:
         symbol = factor.strip('|')
         full *= sizes[symbol]
-        unit = [a - b for a, b in zip(unit, _DIMENSIONS[symbol], strict=True)]
+        unit = [a - b for a, b in zip(unit, DIMENSIONS[symbol], strict=True)]
     powers = [(f, len(list(same))) for f, same in groupby(factors)]
     text = '*'.join(_modulus(f) + (f'**{n}' if n > 1 else '') for f, n in powers)
     name = '-'.join(_word(f) + (str(n) if n > 1 else '') for f, n in powers)
-    largest = _LARGEST * _signal(place, sizes) / full
+    largest = LARGEST * signal_size(place, sizes) / full
     return _effect(
         place, name, f'{signal} + {{a}}*{text}', unit, (-largest, largest), f'size of {text}'
     )
@@ -133,7 +111,7 @@ def _limited(place: str, sizes: dict[str, float]) -> Effect:
     z, name = SIGNAL[place], f'{place}_limit'
     above = f'sqrt((1 + {name}*{z})**2 + {name}_bend**2)'
     below = f'sqrt((1 - {name}*{z})**2 + {name}_bend**2)'
-    unit = _unit([-d for d in _DIMENSIONS[z]])
+    unit = unit_text([-d for d in DIMENSIONS[z]])
     return term(
         f'learned-{place}-limit',
         f'{place}: {z} = 2*{z}*sqrt(1 + {name}_bend**2)/({above} + {below})',
@@ -149,7 +127,7 @@ def _one_sided(place: str, sizes: dict[str, float]) -> Effect:
     """Return a limit to one side, the lower one where the parameter is negative."""
     z, name = SIGNAL[place], f'{place}_end'
     largest = _SHARPEST / sizes[z]
-    unit, meaning = _unit([-d for d in _DIMENSIONS[z]]), f'one over where {z} ends'
+    unit, meaning = unit_text([-d for d in DIMENSIONS[z]]), f'one over where {z} ends'
     return term(
         f'learned-{place}-end',
         f'{place}: {z} = {z}*(1 + sqrt(1 + {name}_bend**2))'
@@ -165,14 +143,14 @@ def _one_sided(place: str, sizes: dict[str, float]) -> Effect:
 def _fading(place: str, sizes: dict[str, float]) -> Effect:
     """Return a gain that falls from the centre on, which no limit does."""
     z = SIGNAL[place]
-    unit, bounds = [-d for d in _DIMENSIONS[z]], (0.0, _SHARPEST / sizes[z])
+    unit, bounds = [-d for d in DIMENSIONS[z]], (0.0, _SHARPEST / sizes[z])
     meaning = f'one over where {z} is halved'
     return _effect(place, f'fading-{z}', f'{z}/(1 + {{a}}*abs({z}))', unit, bounds, meaning)
 
 
 def _turbulent(sizes: dict[str, float]) -> Effect:
     """Return a leak as through an orifice, smooth about zero force."""
-    largest = _LARGEST * sizes['q'] / sizes['f'] ** 0.5
+    largest = LARGEST * sizes['q'] / sizes['f'] ** 0.5
     name = 'flow_sqrt_f'
     return term(
         'learned-flow-sqrt-f',
@@ -196,6 +174,26 @@ def _rounded_overlap(sizes: dict[str, float]) -> Effect:
     )
 
 
+def _friction(place: str, sizes: dict[str, float]) -> Effect:
+    """Return friction that rises over some velocity; at the specimen, what its supports add."""
+    name, speed = f'{place}_friction', sizes['v']
+    force, unit, largest = name, 'N', LARGEST * signal_size(place, sizes)
+    if place == 'specimen':
+        force, unit, largest = f'k*{name}', 'm', sizes['x']
+    return term(
+        f'learned-{place}-friction',
+        f'{place}: f = f + {force}*tanh(v/{name}_speed)',
+        (
+            # Negative it would weaken faster than the oil column is stiff.
+            Parameter(name, unit, 0.0, largest, f'friction as {unit}', 0.0),
+            Parameter(
+                f'{name}_speed', 'm/s', 1e-3 * speed, speed, 'where it is reached', 1e-2 * speed
+            ),
+        ),
+        source=LEARNED,
+    )
+
+
 def _effect(
     place: str,
     name: str,
@@ -209,18 +207,6 @@ def _effect(
     return term(
         f'learned-{place}-{name}',
         f'{place}: {left} = {equation.format(a=parameter)}',
-        (Parameter(parameter, _unit(unit), *bounds, meaning, 0.0),),
+        (Parameter(parameter, unit_text(unit), *bounds, meaning, 0.0),),
         source=LEARNED,
     )
-
-
-def _unit(exponents: list[int]) -> str:
-    """Return a unit's text, for example 'N s^2/m^2' or '1/m'."""
-    above: list[str] = []
-    below: list[str] = []
-    for symbol, power in zip(('N', 'm', 's'), exponents, strict=True):
-        if power:
-            text = symbol + (f'^{abs(power)}' if abs(power) > 1 else '')
-            (above if power > 0 else below).append(text)
-    bottom = f'({" ".join(below)})' if len(below) > 1 else ''.join(below)
-    return (' '.join(above) or '1') + (f'/{bottom}' if bottom else '')

@@ -10,13 +10,13 @@ import numpy as np
 
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.estimate import Estimate, Json
-from actuator_glue.diagnosis.learned_forms import LEARNED
+from actuator_glue.diagnosis.learned_sizes import LEARNED
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.effects import Effect
 from actuator_glue.model.effects.terms.definition import entries, mapping
 from actuator_glue.records import Array
 
-_UNITS = {'u': 'm', 'e': 'm', 'x': 'm', 'y': 'm', 'v': 'm/s', 'q': 'N/s', 'f': 'N'}
+_UNITS = {'u': 'm', 'e': 'm', 'x': 'm', 'y': 'm', 'v': 'm/s', 'q': 'N/s', 'f': 'N', 't': 's'}
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,8 @@ class LearnedTerm:
     def sentence(self) -> str:
         """Return equation, intervals and range in one sentence."""
         sizes = ', '.join(
-            f'{n} = {p.mean:.4g} {p.unit} (95 % {p.lower:.4g} to {p.upper:.4g})'
+            f'{n} = {p.mean:.4g}{"" if p.unit == "1" else f" {p.unit}"}'
+            f' (95 % {p.lower:.4g} to {p.upper:.4g})'
             for n, p in self.parameters.items()
         )
         ranges = ', '.join(
@@ -115,11 +116,11 @@ def _motion(trial: Trial, data: Data) -> dict[str, Array]:
     parts = []
     beta_1, into = trial.fit.theta[0], trial.fit.theta[1]
     outputs = data.split(data.target - trial.fit.error)
-    for record, mask, x, period in zip(
-        data.records, data.masks, outputs, data.periods, strict=True
+    for record, mask, x, period, time, origin in zip(
+        data.records, data.masks, outputs, data.periods, data.times, data.origins, strict=True
     ):
         u = record.command[mask]
         v, e = np.gradient(x, period), u - x
         row = {'u': u, 'e': e, 'x': x, 'y': x, 'v': v, 'q': into / beta_1 * e}
-        parts.append({**row, 'f': record.known_stiffness() * x})
+        parts.append({**row, 'f': record.known_stiffness() * x, 't': origin + time})
     return {s: np.concatenate([p[s] for p in parts]) for s in _UNITS}

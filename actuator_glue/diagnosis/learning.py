@@ -44,7 +44,7 @@ def learned(selection: ModelSelection, found: Selection) -> Selection | None:
         better = _additions(selection, starts, best, names)
         if better is None:
             break
-        best = better
+        best = _plainer(selection, better)
         selection.renoise(best)
         best = search.trial(best.effects, best.added)
         if selection.left(best) < selection.material:
@@ -75,6 +75,15 @@ def _additions(
                 worth.append(trial)
     worth.sort(key=_merit, reverse=True)
     return next((t for t in worth if not _displaces(selection, t, best)), None)
+
+
+def _plainer(selection: ModelSelection, trial: Trial) -> Trial:
+    """Put the form that the term holds in its place, where it is not worth more than that."""
+    search, holds = selection.search, selection.search.entries[trial.added].holds
+    if holds is None or holds[0] in trial.effects:
+        return trial
+    plain = search.additions(search.without(trial, trial.added), [holds[0]])[0]
+    return trial if selection.better(trial, plain, selection.material) else plain
 
 
 def _displaces(selection: ModelSelection, trial: Trial, best: Trial) -> bool:

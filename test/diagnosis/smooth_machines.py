@@ -1,4 +1,4 @@
-"""Machines with one smooth departure from Eq. (2), with nothing of the package in them.
+"""Machines with one departure from Eq. (2), with nothing of the package in them.
 
 Implicit in the velocity (a quadratic equation), the valve by Heun's rule, 16 kHz.
 """
@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 _STEPS = 128
+_WARM = 8.0  # s, time constant of what settles
+_SLIP = 1e-3  # m/s, where friction is nearly all there
 
 
 @njit
@@ -23,36 +25,85 @@ def _valve(error: float, kind: int, size: float) -> float:
 
 
 @njit
+def _late(before: float, now: float, half: float) -> float:
+    """Where something with play stands that was at `before`."""
+    if now > before + half:
+        return now - half
+    if now < before - half:
+        return now + half
+    return before
+
+
+@njit
+def _sliding(rest: float, slope: float, friction: float) -> float:
+    """The velocity at which slope v + friction tanh(v/1 mm/s) is what is left to push."""
+    low, high = min(0.0, rest / slope), max(0.0, rest / slope)
+    v = 0.5 * (low + high)
+    for _ in range(60):
+        r = np.tanh(v / _SLIP)
+        over = slope * v + friction * r - rest
+        if over > 0.0:
+            high = v
+        else:
+            low = v
+        step = over / (slope + friction * (1.0 - r * r) / _SLIP)
+        v -= step
+        if not low <= v <= high:
+            v = 0.5 * (low + high)
+        if abs(step) < 1e-12:
+            break
+    return v
+
+
+@njit
 def piston(
     command: Array, period: float, theta: Array, k: float, departure: tuple[int, float]
 ) -> Array:
     """Displacement at the samples of a held command, from rest (n,) [m].
 
     Departures: 1 valve that saturates [m], 2 rounded valve [m], 3 damping v|v| [N s^2/m^2],
-    4 leakage f|f| [1/(N s)], 5 leakage as through an orifice [N^0.5/s].
+    4 leakage f|f| [1/(N s)], 5 leakage as through an orifice [N^0.5/s], 6 play of the command,
+    7 of the controller's own transducer, 8 of half of the valve, the other half without, half
+    widths [m], 9 flow that grows by a share as it warms, 10 specimen that stiffens by a share,
+    11 friction as tanh(v/1 mm/s), 12 that of the specimen's support [N].
     """
     kind, size = departure
     b1, n0, a2, a3 = theta
     h = period / _STEPS
     c = size if kind == 3 else 0.0
-    q = f = x = 0.0
+    q = f = x = late = 0.0
     out = np.empty(len(command))
     for i in range(len(command)):
         out[i] = x
-        for _ in range(_STEPS):
-            drive = n0 * _valve(command[i] - x, kind, size)
+        for j in range(_STEPS):
+            warm = 1.0 - np.exp(-(i + j / _STEPS) * period / _WARM)
+            error = command[i] - x
+            if kind == 6:
+                late = _late(late, command[i], size)
+                error = late - x
+            if kind == 7:
+                late = _late(late, x, size)
+                error = command[i] - late
+            if kind == 8:
+                late = _late(late, error, size)
+                error = 0.5 * (error + late)
+            drive = n0 * _valve(error, kind, size)
             middle = q + 0.5 * h * (drive - b1 * q)
             q += h * (drive - b1 * middle)
+            flow = middle * (1.0 + size * warm) if kind == 9 else middle
+            stiff = k * (1.0 + size * warm) if kind == 10 else k
             leak = a3 * f
             if kind == 4:
                 leak += size * f * abs(f)
             if kind == 5:
                 leak += size * f / np.sqrt(abs(f) + 1e-3)
-            push = f + h * (middle - leak)
-            rest, slope = push - k * x, h * (k + a2)
+            push = f + h * (flow - leak)
+            rest, slope = push - stiff * x, h * (stiff + a2)
             v = rest / slope
             if c > 0.0:
                 v = np.sign(rest) * (np.sqrt(slope**2 + 4.0 * c * abs(rest)) - slope) / (2.0 * c)
+            if kind == 11 or (kind == 12 and k > 0.0):
+                v = _sliding(rest, slope, size)
             x += h * v
             f = push - h * a2 * v
     return out

@@ -238,7 +238,8 @@ def _motion(scale: Scale, time: Array, period: float) -> dict[str, tuple[int, Ar
     v = scale.stroke * turn * np.cos(turn * time)
     error = beta_1 * oil * v / into
     return {
-        't': (m.T, time),
+        # A term of time may take the whole test to act, in which such a sine turns many times.
+        't': (m.T, scale.duration / time[-1] * time),
         'x': (m.X, x),
         'y': (m.Y, x),
         'v': (m.V, v),

@@ -1,0 +1,93 @@
+"""Forms of learned terms that remember, or change with time.
+
+Hysteresis is the play operator in a share of what moves (of which any, after Prandtl and
+Ishlinskii, is a sum), or in all of it, which is lost motion and needs one size only. Memory acts
+only where the signal goes on through the loop; what a sensor or a specimen remembers has names in
+the catalogue: backlash, yielding, friction. A gain that changes begins at the start of the test
+and settles; before it has, it drifts. Of command and sensor only the latter is offered: a slow
+change of both leaves the same.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Final
+
+from actuator_glue.diagnosis.learned_sizes import LEARNED
+from actuator_glue.model.effects import Effect
+from actuator_glue.model.effects.terms.entry import term
+from actuator_glue.model.effects.terms.expression import SIGNAL
+from actuator_glue.model.parameters import Parameter
+
+# Place, what turns over late there, and the sign of that in the signal.
+_LATE: Final = {
+    'command': ('command', 'u', '-'),
+    'feedback': ('valve', 'x', '+'),
+    'valve': ('valve', 'e', '-'),
+    'flow': ('flow', 'q', '-'),
+}
+_LOST: Final = ('command', 'feedback')  # of the valve it is in the catalogue
+# Places whose gain may change, and the signal that is changed by a share of something.
+_SETTLING: Final = (('flow', 'q'), ('specimen', 'k*x'), ('sensor', 'y'))
+_SHARE = (-1.0, 2.0)  # at -1 nothing is left
+_WIDTHS = (1e-3, 0.5)  # of the signal's size
+_TIMES = (0.02, 5.0)  # of the test's duration: in the longest all but 9 % of a drift are linear
+
+
+def forms(sizes: Mapping[str, float]) -> list[Effect]:
+    """Return the forms for a test of these sizes (learned_sizes.sizes_of)."""
+    return [
+        *(_play(word, sizes) for word in _LOST),
+        *(_hysteresis(word, sizes) for word in _LATE),
+        *(
+            _settling(place, of, sizes['t'])
+            for place, of in _SETTLING
+            if place != 'specimen' or sizes['k'] > 0.0
+        ),
+    ]
+
+
+def _play(word: str, sizes: Mapping[str, float]) -> Effect:
+    """Return lost motion: half the width between reversals."""
+    place, of, sign = _LATE[word]
+    signal, name = SIGNAL[place], f'{word}_play'
+    return term(
+        f'learned-{word}-play',
+        f'{place}: {signal} = {signal} {sign} ({of} - play({of}, {name}))',
+        (Parameter(name, 'm', 0.0, _WIDTHS[1] * sizes[of], 'half width of the play', 0.0),),
+        source=LEARNED,
+    )
+
+
+def _hysteresis(word: str, sizes: Mapping[str, float]) -> Effect:
+    """Return play in a share of what moves."""
+    place, of, sign = _LATE[word]
+    signal, name = SIGNAL[place], f'{word}_hysteresis'
+    low, high = (share * sizes[of] for share in _WIDTHS)
+    unit = 'N/s' if of == 'q' else 'm'
+    effect = term(
+        f'learned-{word}-hysteresis',
+        f'{place}: {signal} = {signal} {sign} {name}*({of} - play({of}, {name}_width))',
+        (
+            Parameter(name, '1', *_SHARE, f'share of {of} that turns over late', 0.0),
+            Parameter(f'{name}_width', unit, low, high, 'half width of the play', 10.0 * low),
+        ),
+        source=LEARNED,
+    )
+    return replace(effect, holds=(f'learned-{word}-play', name, 1.0)) if word in _LOST else effect
+
+
+def _settling(place: str, of: str, duration: float) -> Effect:
+    """Return a gain that changes by a share in the end, and how soon."""
+    signal, name = SIGNAL[place], f'{place}_settling'
+    shortest, longest = (share * duration for share in _TIMES)
+    return term(
+        f'learned-{place}-settling',
+        f'{place}: {signal} = {signal} + {name}*{of}*(1 - exp(-t/{name}_time))',
+        (
+            Parameter(name, '1', *_SHARE, f'share that {of} changes by in the end', 0.0),
+            Parameter(f'{name}_time', 's', shortest, longest, 'time constant', duration),
+        ),
+        source=LEARNED,
+    )
