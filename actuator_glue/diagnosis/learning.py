@@ -16,6 +16,7 @@ from actuator_glue.diagnosis.learned_forms import forms
 from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.model_selection import ModelSelection, Selection
 from actuator_glue.diagnosis.ranking import removed
+from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.trial import Trial
 
 _MOST = 2  # learned terms
@@ -73,7 +74,7 @@ def _additions(
                 least = selection.settings.tie_share * removed(start, trial)
             if selection.better(trial, best, least, cost):
                 worth.append(trial)
-    worth.sort(key=_merit, reverse=True)
+    worth.sort(key=lambda trial: _merit(search, trial), reverse=True)
     return next((t for t in worth if not _displaces(selection, t, best)), None)
 
 
@@ -106,6 +107,13 @@ def _displaces(selection: ModelSelection, trial: Trial, best: Trial) -> bool:
     return alike and removed(rest, best) ** 2 > nearly * removed(rest, after) ** 2
 
 
-def _merit(trial: Trial) -> float:
-    """Out-of-sample score less a nat per parameter."""
+def _merit(search: Search, trial: Trial) -> float:
+    """Out-of-sample score less a nat per parameter; beside misfit less of the error left out [m].
+
+    Nats are those of the frequencies with the least noise: where structure remains they prefer
+    what leaves more of it elsewhere.
+    """
+    assert search.scorer is not None
+    if not search.scorer.likely:
+        return -search.scorer.left_out_error(trial.fit)
     return float(trial.scores.sum()) - len(trial.fit.theta)

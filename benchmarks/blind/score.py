@@ -45,7 +45,7 @@ def _described(result: Json) -> bool:
 
 
 def _groups(names: list[str]) -> set[str]:
-    return {CATALOGUE[n].group for n in names}
+    return {CATALOGUE[n].group for n in names if n in CATALOGUE}
 
 
 def _wrong(result: Json) -> bool:

@@ -11,9 +11,10 @@ from actuator_glue.diagnosis.learned_term import described
 from actuator_glue.diagnosis.learning import _plainer
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.score import Scorer, splits_of
-from actuator_glue.diagnosis.search import Search, Trial
+from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.stretches import stretches
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.effects import Effect, Scale
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
