@@ -11,6 +11,7 @@ from actuator_glue.records import source_name
 from actuator_glue.report import diagnosis_figures as figures
 from actuator_glue.report.diagnosis_summary import closing, summary
 from actuator_glue.report.html import Block, Note, Page, Picture, Section, Table, Text
+from actuator_glue.report.learned_figure import learned_terms
 
 _SAMPLERS = {
     'importance': '{effective_draws:.0f} effective draws by importance sampling, k {pareto_k:.2f}',
@@ -119,6 +120,15 @@ def _effects(found: DiagnosisData) -> Section:
             blocks.append(
                 Picture.of(figures.posteriors(found), f'Posterior of the effects ({drawn}).')
             )
+    if found.learned:
+        blocks.append(
+            Picture.of(
+                learned_terms(found),
+                'What each learned term adds to its signal, with its 95 % band, along a sine over '
+                'the range that was excited (or over the time of the test): beyond it, no '
+                'statement is made.',
+            )
+        )
     blocks.append(
         Picture.of(figures.ranking(found), 'Every candidate added alone, everything refitted.')
     )

@@ -12,7 +12,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.model.effects.effect import Effect, Scale
 from actuator_glue.model.effects.layout import LANES
 from actuator_glue.model.effects.terms import machine as m
-from actuator_glue.model.effects.terms import program
+from actuator_glue.model.effects.terms import program, trace
 from actuator_glue.model.effects.terms.expression import SIGNAL, Expression, read, reserved
 from actuator_glue.model.parameters import TABLE_2, Parameter
 from actuator_glue.records import Array
@@ -208,46 +208,42 @@ def _tried(
     scale: Scale,
 ) -> tuple[Array, Array]:
     """Return the signal in a sinusoidal motion, before (n, 1) and after (n, LANES) the effect."""
-    values = {p.name: table[:, j] for j, p in enumerate(parameters)}
-    g = made.start(values, np.arange(LANES))[0]
     period = 2.0 * np.pi * scale.stroke / scale.velocity
     step = 3.0 * period / _SAMPLES
-    motion = _motion(scale, step * np.arange(_SAMPLES, dtype=np.float64), period)
-    # What turns over within a step: the last part of it shows where that leads.
-    pieces = 8 if made.parts[m.NEEDS] & m.NEEDS_CHANGE else 1
-    g[m.STEP], g[m.K] = step / pieces, scale.stiffness
-    for j, row in enumerate((m.BETA_1, m.ALPHA_1_BETA_0, m.ALPHA_2, m.ALPHA_3)):
-        g[row] = scale.theta[j]
-    made.prepare(g)
-    code, row = made.parts[program.PART[place]], motion[SIGNAL[place]][0]
-    before, after = np.empty((_SAMPLES, 1)), np.empty((_SAMPLES, LANES))
-    for i in np.repeat(range(_SAMPLES), pieces):
-        for register, trace in motion.values():
-            g[register] = trace[i]
-        before[i] = g[row, 0]
-        m.once(code, g)
-        after[i] = g[row]
-    return before, after
+    motion = trace.sine(scale, step * np.arange(_SAMPLES, dtype=np.float64), period)
+    values = {p.name: table[:, j] for j, p in enumerate(parameters)}
+    after = trace.run(made, place, values, motion, step, scale.stiffness, scale.theta)
+    return motion[SIGNAL[place]][:, None], after
 
 
-def _motion(scale: Scale, time: Array, period: float) -> dict[str, tuple[int, Array]]:
-    """Return register and trace of everything that moves, for a sine of the test's size."""
-    beta_1, into, oil = scale.theta[0], max(float(scale.theta[1]), 1e-9), scale.oil
-    turn = 2.0 * np.pi / period
-    x = scale.stroke * np.sin(turn * time)
-    v = scale.stroke * turn * np.cos(turn * time)
-    error = beta_1 * oil * v / into
-    return {
-        # A term of time may take the whole test to act, in which such a sine turns many times.
-        't': (m.T, scale.duration / time[-1] * time),
-        'x': (m.X, x),
-        'y': (m.Y, x),
-        'v': (m.V, v),
-        'u': (m.U, x + error),
-        'e': (m.E, error),
-        'q': (m.Q, oil * v),
-        'f': (m.F, scale.stiffness * x),
-    }
+def along(
+    effect: Effect,
+    table: Array,
+    motion: Mapping[str, Array],
+    step: float,
+    stiffness: float,
+    theta: Array,
+) -> Array:
+    """Return what a term makes of its signal along a motion, (m, n) [unit of the signal].
+
+    Args:
+        effect: the term's entry.
+        table: its parameters (m, p).
+        motion: trace of everything in its equation, its signal among it, (n,) each.
+        step: time between two points of the traces [s].
+        stiffness: of the specimen [N/m].
+        theta: Eq. (2)'s parameters (4,).
+    """
+    starts = effect.starts
+    assert isinstance(starts, _Starts)
+    made = _program(starts.equation, starts.parameters)
+    place = _expression(starts.equation, starts.parameters).place
+    blocks = []
+    for begin in range(0, len(table), LANES):
+        rows = table[np.minimum(np.arange(begin, begin + LANES), len(table) - 1)]
+        values = {p.name: rows[:, j] for j, p in enumerate(effect.parameters)}
+        blocks.append(trace.run(made, place, values, motion, step, stiffness, theta).T)
+    return np.concatenate(blocks)[: len(table)]
 
 
 def _check_neutral(effect: Effect) -> None:
