@@ -212,7 +212,8 @@ class ModelSelection:
             # The last members stay, so that the rivals told are theirs.
             if best is current or attempt == _SWAPS - 1:
                 break
-            current = best
+            # Beside what came others may be worth nothing any more.
+            current = self.pruned(best)
         return current, rivals
 
     def _ahead(self, trial: Trial, best: Trial, complete: bool) -> bool:

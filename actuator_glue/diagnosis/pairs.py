@@ -17,6 +17,7 @@ import numpy as np
 from actuator_glue.diagnosis.finding import BESIDE, Rival
 from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.transducer import FAULTS, FEEDBACK
 from actuator_glue.diagnosis.trial import Trial
 
 if TYPE_CHECKING:
@@ -43,8 +44,11 @@ def rivals(
     room = len(search.entries[name].parameters)
     if room < 2 or is_learned(search.entries[name]):
         return []
+    wanted = screened(search, name, trials[:most], room, below)[:most]
+    # A fault has another size inside of the loop, so that one outside does not promise it.
+    wanted += [(t, FEEDBACK) for t in trials if t.added in FAULTS and FEEDBACK not in t.effects]
     out = []
-    for first, other in screened(search, name, trials[:most], room, below)[:most]:
+    for first, other in wanted:
         pair = search.additions(first, [other], below=below)[0]
         out.append(replace(pair, added=f'{first.added}{BESIDE}{other}'))
     return out

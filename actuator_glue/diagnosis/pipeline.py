@@ -16,6 +16,7 @@ from actuator_glue.diagnosis import (
     per_record_settings,
     recorded,
     regression,
+    transducer,
 )
 from actuator_glue.diagnosis.completeness import Decision, decide
 from actuator_glue.diagnosis.data import Data
@@ -115,6 +116,9 @@ def _conclude(
             data = prepared.fit if left is None else hum.without(prepared.fit, left)
             search = Search(data, search.names, search.each)
             result = _searched(prepared, search, left, settings, tell)
+    fed_back = transducer.in_the_loop(result.selection, result.found)
+    if fed_back is not None:
+        result = _conclusion(prepared, result.selection, fed_back, result.line)
     if result.decision.verdict == 'unexplained' and mean_effects(reserved=True):
         result = _with_reserved(prepared, result, settings, tell)
     if result.decision.verdict != 'unexplained':

@@ -1,0 +1,64 @@
+"""Whether the controller closes its loop on the recorded transducer.
+
+What such a transducer does wrong the piston does, too: its play, curve or lag leave another trace
+than those of one that only looks on. Without a fault of the transducer nothing tells the two
+apart, so the loop is asked for together with one, and only where structure remains.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+from actuator_glue.diagnosis.trial import Trial
+
+if TYPE_CHECKING:
+    from actuator_glue.diagnosis.model_selection import ModelSelection, Selection
+
+FEEDBACK = 'sensor-feedback'
+# A bias or a drift inside of the loop leaves nothing in the record but the way there.
+FAULTS = ('backlash', 'sensor-curve', 'sensor-lag')
+
+
+def in_the_loop(selection: ModelSelection, found: Selection) -> Selection | None:
+    """Go on from a selection with a faulty transducer in the loop.
+
+    It is asked for where structure remains, and where as many parameters or more stand for it.
+
+    Args:
+        selection: the model selection that ended with `found`.
+        found: what explains the records with a transducer beside the loop.
+
+    Returns:
+        The selection with the loop closed on the transducer, or None where that is not better.
+    """
+    search, before = selection.search, found.final
+    stands = len(before.fit.theta) - len(found.base.fit.theta)
+    if found.left < found.material and stands <= 2:
+        return None
+    tried: list[Trial] = []
+    for name in FAULTS:
+        starts = [search.known((name,)), before if name in before.effects else None]
+        tried += [search.polish(search.add(s, FEEDBACK), valves=False) for s in starts if s]
+    cost = math.log(max(1, len(tried)))
+
+    def better(trial: Trial) -> bool:
+        least = 0.0 if len(trial.fit.theta) <= len(before.fit.theta) else selection.material
+        return FEEDBACK not in before.effects and selection.better(trial, before, least, cost)
+
+    worth = [t for t in tried if better(t)]
+    if not worth:
+        return None
+    best = max(worth, key=lambda t: float(t.scores.sum()) - len(t.fit.theta))
+    while len(best.effects) < selection.settings.most:
+        selection.renoise(best)
+        best = search.trial(best.effects, best.added)
+        if selection.left(best) < selection.material:
+            break
+        further = selection.extend([best], len(best.effects))
+        worth = [t for t in further if selection.better(t, best, selection.material)]
+        if not worth:
+            break
+        best = worth[0]
+    singles = selection.rescored(found.singles)
+    return selection.concluded(best, search.trial(()), singles)

@@ -1,0 +1,59 @@
+"""A faulty transducer inside of the controller's loop is told from one that only looks on."""
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+from smooth_machines import piston
+
+from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.model_selection import ModelSelection, Selection
+from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.transducer import in_the_loop
+from actuator_glue.records import Array, Record
+
+NOISE, STROKE, RATE, SECONDS = 1e-5, 2e-3, 256.0, 24.0
+PLANTS = np.array([[128.0, 1.01e9, 2.42e5, 0.3], [225.0, 5.3e9, 6e5, 0.3]])
+NAMES = ('backlash', 'stribeck-friction', 'specimen-yield', 'delay', 'gain')
+_FEEDBACK_PLAY = 7  # departure of smooth_machines.py
+_FINER = 16
+
+
+def play(x: Array, half: float) -> Array:
+    """What a transducer with play shows of a motion (n,), which turns between its samples [m]."""
+    steps = np.arange(_FINER * len(x)) / _FINER
+    out, at = np.empty(len(steps)), 0.0
+    for i, value in enumerate(CubicSpline(np.arange(len(x)), x)(steps).tolist()):
+        at = min(max(at, value - half), value + half)
+        out[i] = at
+    return out[::_FINER]
+
+
+def selected(half: float, inside: bool, rng: np.random.Generator) -> Selection:
+    """What is chosen for two sweeps, without and with a specimen."""
+    theta = rng.choice(PLANTS) * np.exp(0.1 * rng.standard_normal(4))
+    t = np.arange(0.0, SECONDS, 1.0 / RATE)
+    command = STROKE * np.sin(np.pi * (9.0 / SECONDS) * t**2)
+    records = []
+    for k in (0.0, 250e3):
+        departure = (_FEEDBACK_PLAY, half) if inside else (0, 0.0)
+        measured = play(piston(command, 1.0 / RATE, theta, k, departure), half)
+        measured += NOISE * rng.standard_normal(len(t))
+        records.append(Record(command, measured, 1.0 / RATE, stiffness=k))
+    search = Search(Data.whole(records), NAMES)
+    selection = ModelSelection(search, Thresholds(), lambda *_: None)
+    found = selection.run()
+    return in_the_loop(selection, found) or found
+
+
+@pytest.mark.parametrize('inside', [True, False])
+def test_play_inside_of_the_loop_is_told_from_play_beside_it(inside: bool) -> None:
+    """Its size, and that the loop is closed on it; beside the loop it is play alone."""
+    rng = np.random.default_rng()
+    half = float(rng.uniform(50e-6, 150e-6))
+    final = selected(half, inside, rng).final
+    assert set(final.effects) == ({'backlash', 'sensor-feedback'} if inside else {'backlash'})
+    assert final.fit.rms < 1.05 * NOISE
+    sizes = dict(zip((p.name for p in final.structure.parameters), final.fit.theta, strict=True))
+    assert sizes['backlash'] == pytest.approx(half, abs=1.5e-6)
+    assert sizes.get('feedback_share', 1.0) == pytest.approx(1.0, abs=0.05)
