@@ -176,7 +176,7 @@ def _expression(equation: str, parameters: tuple[Parameter, ...]) -> Expression:
     return replace(found, exact=bool((after == before).all()))
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=256)
 def _program(equation: str, parameters: tuple[Parameter, ...]) -> program.Program:
     return program.compiled([program.Written(_expression(equation, parameters), parameters)])
 
