@@ -33,13 +33,13 @@ def spread(search: Search, final: Trial, left: float, space: Space) -> Array:
     names = [p.name for p in final.structure.parameters]
     told = space.z(final.fit.theta)
     off: list[list[float]] = [[] for _ in names]
-    for trial in search.left_at_most(final.mean_square + left**2):
-        theirs = {p.name: i for i, p in enumerate(trial.structure.parameters)}
+    for structure, fit in search.left_at_most(final.mean_square + left**2):
+        theirs = {p.name: i for i, p in enumerate(structure.parameters)}
         shared = [i for i, name in enumerate(names) if name in theirs]
         theta = np.array(final.fit.theta)
-        theta[shared] = trial.fit.theta[[theirs[names[i]] for i in shared]]
+        theta[shared] = fit.theta[[theirs[names[i]] for i in shared]]
         moved = np.abs(space.z(theta) - told)
-        if trial.effects != final.effects:
+        if structure.effects != final.effects:
             for i in shared:
                 off[i].append(float(moved[i]))
     return np.array([_NORMAL * float(np.median(rows)) if rows else 0.0 for rows in off])

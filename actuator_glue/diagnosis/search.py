@@ -106,10 +106,10 @@ class Search:
         names = tuple(effects)
         return self.trial(names) if frozenset(names) in self._tried else None
 
-    def left_at_most(self, mean_square: float) -> list[Trial]:
+    def left_at_most(self, mean_square: float) -> list[tuple[Structure, Fit]]:
         """Return all refitted structures that leave no more than a mean squared error [m^2]."""
-        found = [effects for effects, fit in self._tried.items() if fit.rms**2 <= mean_square]
-        return [self.trial(tuple(effects)) for effects in found]
+        found = [(key, fit) for key, fit in self._tried.items() if fit.rms**2 <= mean_square]
+        return [(self.structure(*effects), fit) for effects, fit in found]
 
     def add(self, current: Trial, name: str) -> Trial:
         """Refit `current` with one more effect."""

@@ -19,11 +19,13 @@ FEEDBACK = 'sensor-feedback'
 # A bias or a drift inside of the loop leaves nothing in the record but the way there.
 FAULTS = ('backlash', 'sensor-curve', 'sensor-lag')
 
+_OWN = 2  # parameters: of the least fault and of the share that is fed back
+
 
 def in_the_loop(selection: ModelSelection, found: Selection) -> Selection | None:
     """Go on from a selection with a faulty transducer in the loop.
 
-    It is asked for where structure remains, and where as many parameters or more stand for it.
+    It is asked for where structure remains, and where more parameters than its own may stand for it.
 
     Args:
         selection: the model selection that ended with `found`.
@@ -34,7 +36,7 @@ def in_the_loop(selection: ModelSelection, found: Selection) -> Selection | None
     """
     search, before = selection.search, found.final
     stands = len(before.fit.theta) - len(found.base.fit.theta)
-    if found.left < found.material and stands <= 2:
+    if FEEDBACK in before.effects or (found.left < found.material and stands <= _OWN):
         return None
     tried: list[Trial] = []
     for name in FAULTS:
@@ -44,7 +46,7 @@ def in_the_loop(selection: ModelSelection, found: Selection) -> Selection | None
 
     def better(trial: Trial) -> bool:
         least = 0.0 if len(trial.fit.theta) <= len(before.fit.theta) else selection.material
-        return FEEDBACK not in before.effects and selection.better(trial, before, least, cost)
+        return selection.better(trial, before, least, cost)
 
     worth = [t for t in tried if better(t)]
     if not worth:

@@ -46,7 +46,7 @@ def test_a_size_is_as_open_as_its_companions_leave_it() -> None:
 
     def left_at_most(mean_square: float) -> list[Any]:
         asked.append(mean_square)
-        return others
+        return [(other.structure, other.fit) for other in others]
 
     search: Any = SimpleNamespace(left_at_most=left_at_most)
     space = Space(final.structure, 60.0)
