@@ -25,7 +25,7 @@ _OWN = 2  # parameters: of the least fault and of the share that is fed back
 def in_the_loop(selection: ModelSelection, found: Selection) -> Selection | None:
     """Go on from a selection with a faulty transducer in the loop.
 
-    It is asked for where structure remains, and where more parameters than its own may stand for it.
+    Asked for where structure remains, and where more parameters than its own may stand for it.
 
     Args:
         selection: the model selection that ended with `found`.
