@@ -130,7 +130,7 @@ def diagnose(
     mixed = alternatives.mixed(after.draws, final, others, lambda trial: sample(trial).points, rng)
     unmet = draws.unmet if final.effects else ()
     judged = verdict.conclude(decision.verdict, bool(decision.names), error, found.material)
-    if judged in ('unexplained', 'undecided') and final.own is None:
+    if judged not in verdict.COMPLETE and final.own is None:
         open_form = model_form.spread(result.selection.search, final, decision.left, space)
         mixed = model_form.widened(mixed, open_form, space, rng)
     estimates = _estimates(space, replace(after, draws=mixed), unmet)

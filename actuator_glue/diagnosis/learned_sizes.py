@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Final
 
 from actuator_glue.model.effects import Scale
@@ -18,6 +19,7 @@ DIMENSIONS: Final = {
     'q': (1, 0, -1),
     'f': (1, 0, 0),
     'k': (1, -1, 0),
+    't': (0, 0, 1),
 }
 
 
@@ -46,7 +48,7 @@ def signal_size(place: str, sizes: dict[str, float]) -> float:
     return sizes[SIGNAL[place]]
 
 
-def unit_text(exponents: list[int]) -> str:
+def unit_text(exponents: Sequence[int]) -> str:
     """Return a unit's text, for example 'N s^2/m^2' or '1/m'."""
     above: list[str] = []
     below: list[str] = []

@@ -10,13 +10,13 @@ import numpy as np
 
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.estimate import Estimate, Json
-from actuator_glue.diagnosis.learned_sizes import LEARNED
+from actuator_glue.diagnosis.learned_sizes import DIMENSIONS, LEARNED, unit_text
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.effects import Effect
 from actuator_glue.model.effects.terms.definition import entries, mapping
 from actuator_glue.records import Array
 
-_UNITS = {'u': 'm', 'e': 'm', 'x': 'm', 'y': 'm', 'v': 'm/s', 'q': 'N/s', 'f': 'N', 't': 's'}
+_UNITS = {symbol: unit_text(powers) for symbol, powers in DIMENSIONS.items()}
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,4 +123,4 @@ def _motion(trial: Trial, data: Data) -> dict[str, Array]:
         v, e = np.gradient(x, period), u - x
         row = {'u': u, 'e': e, 'x': x, 'y': x, 'v': v, 'q': into / beta_1 * e}
         parts.append({**row, 'f': record.known_stiffness() * x, 't': origin + time})
-    return {s: np.concatenate([p[s] for p in parts]) for s in _UNITS}
+    return {s: np.concatenate([p[s] for p in parts]) for s in parts[0]}

@@ -13,6 +13,7 @@ from actuator_glue.diagnosis.learned_term import LearnedTerm
 from actuator_glue.diagnosis.next_experiment import Experiment
 from actuator_glue.diagnosis.onset import Onset
 from actuator_glue.diagnosis.response import Response
+from actuator_glue.diagnosis.verdict import COMPLETE
 from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.inference.prior_use import PriorUse
 from actuator_glue.json_value import JsonObject, json_fields, json_value
@@ -239,7 +240,7 @@ class DiagnosisData:
     @property
     def complete(self) -> bool:
         """Whether nothing material remains, on the fitting and on the held-out part."""
-        return self.verdict in ('none', 'missing-effect')
+        return self.verdict in COMPLETE
 
     def summary(self) -> str:
         """Return the verdict in one line."""

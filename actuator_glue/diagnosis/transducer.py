@@ -2,7 +2,7 @@
 
 What such a transducer does wrong the piston does, too: its play, curve or lag leave another trace
 than those of one that only looks on. Without a fault of the transducer nothing tells the two
-apart, so the loop is asked for together with one, and only where structure remains.
+apart, so the loop is asked for together with one.
 """
 
 from __future__ import annotations
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 FEEDBACK = 'sensor-feedback'
 # A bias or a drift inside of the loop leaves nothing in the record but the way there.
 FAULTS = ('backlash', 'sensor-curve', 'sensor-lag')
-
 _OWN = 2  # parameters: of the least fault and of the share that is fed back
 
 

@@ -9,6 +9,7 @@ from actuator_glue.diagnosis.thresholds import Thresholds
 if TYPE_CHECKING:
     from actuator_glue.diagnosis.result import DiagnosisData, HeldOutError, Verdict
 
+COMPLETE = ('none', 'missing-effect')  # verdicts that leave nothing material
 _LATER = Thresholds().later_share  # of what was removed: less is small change
 # Share of the removable error that is printed as 0.0 %.
 _NOTHING = 5e-4

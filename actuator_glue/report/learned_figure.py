@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 from matplotlib.figure import Figure
 
+from actuator_glue.diagnosis.learned_sizes import DIMENSIONS, unit_text
 from actuator_glue.diagnosis.learned_term import LearnedTerm
 from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.model.effects.terms.entry import along
@@ -22,7 +23,6 @@ _UNITS = {
     'N': (1e-3, 'kN', 1.0, 'N'),
     'N/s': (1e-3, 'kN/s', 1.0, 'N/s'),
 }
-_SIGNAL_UNITS = {'u': 'm', 'e': 'm', 'y': 'm', 'q': 'N/s', 'f': 'N'}
 
 
 def curve(found: DiagnosisData, term: LearnedTerm) -> tuple[str, Array, Array]:
@@ -69,7 +69,7 @@ def learned_terms(found: DiagnosisData) -> Figure:
     for axes, term in zip(panels, found.learned, strict=False):
         over, at, (middle, low, high) = curve(found, term)
         signal = SIGNAL[PLACES[term.place]]
-        scale, unit, fine, fine_unit = _UNITS[_SIGNAL_UNITS[signal]]
+        scale, unit, fine, fine_unit = _UNITS[unit_text(DIMENSIONS[signal])]
         x = at if over == 't' else scale * at
         for part in _ways(at):
             axes.fill_between(x[part], fine * low[part], fine * high[part], color=style.LIGHT_BAND)
