@@ -12,6 +12,7 @@ import numpy as np
 from actuator_glue.diagnosis import (
     advice,
     alternatives,
+    companions,
     discrepancy,
     findings,
     homogeneity,
@@ -127,13 +128,19 @@ def diagnose(
     )
     space = Space(after.model, max(r.duration for r in data.records))
     others = alternatives.alternatives(result)
-    mixed = alternatives.mixed(after.draws, final, others, lambda trial: sample(trial).points, rng)
-    unmet = draws.unmet if final.effects else ()
+    larger = final
+    if decision.verdict in verdict.COMPLETE:
+        larger = companions.with_companions(result.selection, final)
+    told = draws
+    if larger is not final:
+        told = companions.reduced(sample(larger, settings.evaluations), larger, final)
+    mixed = alternatives.mixed(told.points, final, others, lambda t: sample(t).points, rng)
     judged = verdict.conclude(decision.verdict, bool(decision.names), error, found.material)
-    if judged not in verdict.COMPLETE and final.own is None:
-        open_form = model_form.spread(result.selection.search, final, decision.left, space)
-        mixed = model_form.widened(mixed, open_form, space, rng)
-    estimates = _estimates(space, replace(after, draws=mixed), unmet)
+    if judged not in verdict.COMPLETE:
+        search, left = result.selection.search, decision.left
+        form = model_form.open_form(search, final, left, space, scorer)
+        mixed = model_form.widened(mixed, form, space, rng)
+    estimates = _estimates(space, replace(after, draws=mixed), told.unmet)
     held_at = _pressed(space, after)
     plain = Space(before.model, max(r.duration for r in data.records))
     experiments = _experiments(result, [trial for trial, _ in others])
@@ -163,8 +170,9 @@ def diagnose(
             *advice.of(decision, found, result.generic, stretches, experiments),
             *advice.contradicted(error, found.material),
             *advice.zeros(error, found.material),
+            *companions.sentences(final, larger),
             *advice.unidentified(data, estimates),
-            *advice.unconverged(draws.rhat),
+            *advice.unconverged(told.rhat),
             *rest.compared(data.records, still, decision.noise),
             *([used.remark()] if used else []),
             *prepared.notes,

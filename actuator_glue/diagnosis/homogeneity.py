@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from scipy import stats
 
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array
 
 _STRETCHES = 2  # of every record
@@ -44,25 +46,65 @@ def agreement(trial: Trial, scorer: Scorer) -> dict[str, Homogeneity]:
     by the block-clustered (sandwich) variance (Liang and Zeger 1986), never deflated.
     """
     error, jac = scorer.whiten(trial.fit.error), scorer.whiten(trial.fit.jacobian)
-    edges = [(int(a), int(b)) for part in scorer.data.parts for a, b in _halves(part)]
+    edges = _halves(scorer)
     model = trial.structure
     out = {}
     for effect in model.entries:
         name = effect.name
         row = int(np.arange(len(trial.fit.theta))[model.columns(name)][0])
-        split = np.zeros((len(edges), len(error)))
-        for i, (a, b) in enumerate(edges):
-            split[i, a:b] = jac[row, a:b]
         value = float(trial.fit.theta[row])
         size = abs(value - (effect.parameters[0].neutral or 0.0))
-        rows = np.concatenate([split, np.delete(jac, row, axis=0)])
+        rows = _free_in_each(jac, row, edges)
         out[name] = _compare(rows, error, scorer.blocks, len(edges), value, size)
     return out
 
 
-def _halves(part: slice) -> list[tuple[int, int]]:
-    edges = np.linspace(part.start, part.stop, _STRETCHES + 1).astype(int)
-    return list(zip(edges[:-1].tolist(), edges[1:].tolist(), strict=True))
+def between(trial: Trial, scorer: Scorer) -> Array:
+    """Standard deviation of each parameter between stretches, beyond what noise makes of it (p,).
+
+    In working coordinates; 0 where fewer than two stretches tell it. Equations that are not the
+    machine's are pulled elsewhere by each frequency and amplitude (a random effect: DerSimonian
+    and Laird 1986).
+    """
+    error, jac = scorer.whiten(trial.fit.error), scorer.whiten(trial.fit.jacobian)
+    edges, out = _halves(scorer), np.zeros(len(trial.fit.theta))
+    for row, reach in enumerate(_reaches(trial)):
+        rows = _free_in_each(jac, row, edges)
+        scale = np.sqrt(np.einsum('pn,pn->p', rows, rows))
+        known = scale > 0.0
+        rows, count = rows[known] / scale[known, None], int(known[: len(edges)].sum())
+        inverse = np.linalg.pinv(rows @ rows.T, rcond=1e-10, hermitian=True)
+        shifts = (inverse @ (rows @ error))[:count] / scale[known][:count]
+        variance = np.diag(inverse)[:count] / scale[known][:count] ** 2
+        told = variance < (_KNOWN * reach) ** 2
+        if told.sum() > 1:
+            beyond = shifts[told].var(ddof=1) - variance[told].mean()
+            out[row] = np.sqrt(max(0.0, float(beyond)))
+    return out
+
+
+def _reaches(trial: Trial) -> Array:
+    """Sizes of the parameters (p,): a factor of e of Eq. (2)'s, else off what does nothing."""
+    neutral = np.array([p.neutral or 0.0 for p in trial.model.parameters])
+    reach = np.abs(trial.fit.theta - neutral)
+    reach[: len(BASE)] = 1.0
+    return reach
+
+
+def _halves(scorer: Scorer) -> list[tuple[int, int]]:
+    out = []
+    for part in scorer.data.parts:
+        edges = np.linspace(part.start, part.stop, _STRETCHES + 1).astype(int)
+        out += list(pairwise(edges.tolist()))
+    return out
+
+
+def _free_in_each(jac: Array, row: int, edges: list[tuple[int, int]]) -> Array:
+    """Derivatives to one parameter in each stretch by itself, then to the others (s + p - 1, N)."""
+    split = np.zeros((len(edges), jac.shape[1]))
+    for i, (a, b) in enumerate(edges):
+        split[i, a:b] = jac[row, a:b]
+    return np.concatenate([split, np.delete(jac, row, axis=0)])
 
 
 def _compare(

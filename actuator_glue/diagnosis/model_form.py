@@ -3,19 +3,35 @@
 A posterior says what is known under one structure. Where that leaves material structure it is not
 the machine's, and the same parameter stands elsewhere beside companions that leave little more:
 how far is what the choice of the equations leaves open (Draper 1995, Assessment and propagation of
-model uncertainty).
+model uncertainty). So is how far stretches of the records, of other frequencies and amplitudes,
+differ about it.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from actuator_glue.diagnosis import homogeneity
+from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.space import Space
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.records import Array
 
 _NORMAL = 1.4826  # standard deviation of a normal over its median absolute deviation
+
+
+def open_form(
+    search: Search, final: Trial, left: float, space: Space, scorer: Scorer
+) -> Array:
+    """Return by how much each parameter is open for want of the right equations (p,).
+
+    Standard deviations in working coordinates: that over structures (see `spread`) and that
+    between stretches, together. Structures are not compared with one that has an effect in one
+    record only.
+    """
+    stretches = homogeneity.between(final, scorer)
+    return stretches if final.own else np.hypot(stretches, spread(search, final, left, space))
 
 
 def spread(search: Search, final: Trial, left: float, space: Space) -> Array:

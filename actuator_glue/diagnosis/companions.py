@@ -1,0 +1,56 @@
+"""Effects that are there beyond chance but remove too little to matter.
+
+They are not told as missing. But their size is free in the posterior of what is told: a gap that
+leaves 2 um doubles the damping that is found beside it. What is not beyond chance stays what it
+is, one of many that may be there (discrepancy.py).
+"""
+
+from __future__ import annotations
+
+from actuator_glue.diagnosis.model_selection import ModelSelection
+from actuator_glue.diagnosis.posterior import Draws
+from actuator_glue.diagnosis.ranking import removed
+from actuator_glue.diagnosis.trial import Trial
+
+_MOST = 2
+
+
+def with_companions(selection: ModelSelection, final: Trial) -> Trial:
+    """Return a structure with what else is there beyond chance, at the user's level.
+
+    Args:
+        selection: what chose the structure.
+        final: a structure that leaves nothing material.
+    """
+    search, settings = selection.search, selection.settings
+    if final.own is not None:
+        return final
+    current = final
+    for _ in range(_MOST):
+        names = [n for n in search.names if n not in current.effects]
+        ranked = search.screened(current, names)[: settings.tried]
+        trials = search.additions(current, ranked, valves=False)
+        better = [t for t in trials if selection.better(t, current, 0.0)]
+        if not better:
+            break
+        current = better[0]
+    return current
+
+
+def reduced(draws: Draws, larger: Trial, final: Trial) -> Draws:
+    """Return what draws of the larger structure say of the parameters of the other."""
+    theirs = [p.name for p in larger.model.parameters]
+    columns = [theirs.index(p.name) for p in final.model.parameters]
+    unmet = tuple(draws.unmet[i] for i in columns) if draws.unmet else ()
+    return draws._replace(points=draws.points[:, columns], unmet=unmet)
+
+
+def sentences(final: Trial, larger: Trial) -> tuple[str, ...]:
+    """Say which effects are held beside, and how little they remove."""
+    names = [n for n in larger.effects if n not in final.effects]
+    if not names:
+        return ()
+    return (
+        f'{", ".join(names)} may be there, too: beyond chance, but it removes '
+        f'{1e6 * removed(final, larger):.1f} um and does not matter; intervals allow for it',
+    )
