@@ -87,9 +87,8 @@ def diagnose(
     if settings.use_force:
         check_forces(records)
     first = conclude(prepare(records, held, known), settings, each, tell)
-    first = with_the_right_hold(first, settings, each, tell)
     # What acts all the time comes before what appears.
-    always = with_learned_terms(first)
+    always = with_the_right_hold(first, settings, each, tell)
     result = since_onset(always, settings, each, tell)
     if result is not always:
         result = with_learned_terms(result)

@@ -13,8 +13,8 @@ from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.finding import Candidate, Finding
 from actuator_glue.diagnosis.homogeneity import Homogeneity
 from actuator_glue.diagnosis.measurement import Measured
-from actuator_glue.diagnosis.model_selection import Selection
 from actuator_glue.diagnosis.ranking import standard_error, weights
+from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.effects import CATALOGUE
 

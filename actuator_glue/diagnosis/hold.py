@@ -10,7 +10,12 @@ from actuator_glue.diagnosis import hum
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.decimate import decimated
 from actuator_glue.diagnosis.fit import Fit, fit
-from actuator_glue.diagnosis.pipeline import Conclusion, Progress, conclude
+from actuator_glue.diagnosis.pipeline import (
+    Conclusion,
+    Progress,
+    conclude,
+    with_learned_terms,
+)
 from actuator_glue.diagnosis.preparation import Prepared
 from actuator_glue.diagnosis.score import evidence
 from actuator_glue.diagnosis.search import Each, Search
@@ -20,38 +25,58 @@ from actuator_glue.diagnosis.thresholds import Thresholds
 def with_the_right_hold(
     first: Conclusion, settings: Thresholds, each: Each, tell: Progress
 ) -> Conclusion:
-    """Ask whether the command ran linearly between its samples instead of being held.
+    """Ask whether the command ran linearly between its samples; terms are learned with the answer.
 
     The wrong hold is a lead of half a sample: no effect of the catalogue, but something will be
     found for it (a gain that drifts, say). The other hold is taken where Eq. (2) alone explains
     materially more with it, and what is found with it explains more, beyond chance. Held
-    commands taken for linear ones are a delay, which is in the catalogue.
+    commands taken for linear ones are a delay, which is in the catalogue. Where the catalogue
+    explains neither, terms are learned with both: what it lacks may look like the other hold.
+    """
+    other = _linearly(first, settings, each, tell)
+    if other is None:
+        return with_learned_terms(first)
+    described = with_learned_terms(other)
+    if first.decision.verdict != 'unexplained':
+        return described
+    held = with_learned_terms(first)
+    return described if _gained(held, described) >= settings.nats else held
+
+
+def _linearly(
+    first: Conclusion, settings: Thresholds, each: Each, tell: Progress
+) -> Conclusion | None:
+    """Return what is found with the other hold, where that explains more.
 
     An answer that leaves nothing and explains less with the other hold is not searched for again:
     of a large effect that Eq. (2) leaves, either hold may leave more.
     """
     prepared = first.prepared
     if first.decision.verdict == 'none' or not any(r.hold == 'zoh' for r in prepared.fit.recorded):
-        return first
+        return None
     other = replace(prepared, fit=_linear(prepared.fit), held=_linear(prepared.held))
     base = Search(other.fit, ()).base()
     before = first.found.base.mean_square + (first.line.rms**2 if first.line else 0.0)
     if before - base.rms**2 < first.found.material**2:
-        return first
+        return None
     tell('other hold', 0.0)
     if first.decision.verdict == 'missing-effect' and _explains_less(first, other, base):
-        return first
+        return None
     second = conclude(other, settings, each, tell, fixed=True)
-    a, b = first.found.final.fit, second.found.final.fit
-    scorer = second.scorer
-    gained = evidence(scorer.block_scores(b), scorer.block_scores(a)) - len(b.theta) + len(a.theta)
-    if gained < settings.nats:
-        return first
+    if _gained(first, second) < settings.nats:
+        return None
     note = (
         'the command is taken to run linearly between its samples (as --hold linear): Eq. (2) '
         f'alone then leaves {1e6 * base.rms:.1f} um instead of {1e6 * before**0.5:.1f} um'
     )
     return replace(second, prepared=replace(other, notes=(*other.notes, note)))
+
+
+def _gained(first: Conclusion, second: Conclusion) -> float:
+    """Nats that the second explains more, under its noise, less its further parameters."""
+    a, b, scorer = first.found.final.fit, second.found.final.fit, second.scorer
+    gained = evidence(scorer.block_scores(b), scorer.block_scores(a))
+    return gained - len(b.theta) + len(a.theta)
 
 
 def _explains_less(first: Conclusion, other: Prepared, base: Fit) -> bool:

@@ -88,7 +88,7 @@ def _reaches(trial: Trial) -> Array:
     neutral = np.array([p.neutral or 0.0 for p in trial.model.parameters])
     reach = np.abs(trial.fit.theta - neutral)
     reach[: len(BASE)] = 1.0
-    return reach
+    return np.asarray(reach)
 
 
 def _halves(scorer: Scorer) -> list[tuple[int, int]]:
@@ -100,7 +100,7 @@ def _halves(scorer: Scorer) -> list[tuple[int, int]]:
 
 
 def _free_in_each(jac: Array, row: int, edges: list[tuple[int, int]]) -> Array:
-    """Derivatives to one parameter in each stretch by itself, then to the others (s + p - 1, N)."""
+    """Derivatives to one parameter in each of s stretches, then to the others (s + p - 1, N)."""
     split = np.zeros((len(edges), jac.shape[1]))
     for i, (a, b) in enumerate(edges):
         split[i, a:b] = jac[row, a:b]

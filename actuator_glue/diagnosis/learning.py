@@ -14,9 +14,10 @@ from collections.abc import Sequence
 
 from actuator_glue.diagnosis.learned_forms import forms
 from actuator_glue.diagnosis.learned_term import is_learned
-from actuator_glue.diagnosis.model_selection import ModelSelection, Selection
+from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.ranking import removed
 from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
 
 _MOST = 2  # learned terms

@@ -21,9 +21,7 @@ from actuator_glue.records import Array
 _NORMAL = 1.4826  # standard deviation of a normal over its median absolute deviation
 
 
-def open_form(
-    search: Search, final: Trial, left: float, space: Space, scorer: Scorer
-) -> Array:
+def open_form(search: Search, final: Trial, left: float, space: Space, scorer: Scorer) -> Array:
     """Return by how much each parameter is open for want of the right equations (p,).
 
     Standard deviations in working coordinates: that over structures (see `spread`) and that

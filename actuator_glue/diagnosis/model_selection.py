@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 from actuator_glue.diagnosis import false_alarms, forecast, pairs, ranking
@@ -13,6 +13,7 @@ from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.ranking import compare, removed, spokesman, standard_error, worth
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
 
@@ -26,37 +27,6 @@ _SURE = 2.0  # standard errors over the blocks: what is less is not told apart
 # random commands, 0.22 to 0.47 of shaking that swells and fades, below 0.12 of sines, and of
 # sweeps nearly always below this (100 of each).
 _STATIONARY = 0.2
-
-
-@dataclass(frozen=True)
-class Selection:
-    """What the fitting part says.
-
-    Attributes:
-        base: Eq. (2) refitted.
-        singles: every single effect refitted, best first.
-        final: the structure chosen.
-        rivals: per effect of `final`, the effects tried in its place, best first.
-        removed: per effect of `final`, rms error it removes given the others [m].
-        evidence: per effect of `final`, nats it gains given the others.
-        structure: rms structure of the base residual [m].
-        left: rms structure of the final residual [m].
-        noise: rms of what no structure explains [m].
-        material: materiality threshold [m].
-        nats: evidence that any addition must have.
-    """
-
-    base: Trial
-    singles: tuple[Trial, ...]
-    final: Trial
-    rivals: dict[str, tuple[Rival, ...]]
-    removed: dict[str, float]
-    evidence: dict[str, float]
-    structure: float
-    left: float
-    noise: float
-    material: float
-    nats: float
 
 
 class ModelSelection:
@@ -140,17 +110,23 @@ class ModelSelection:
                 found.setdefault(trial.effects, trial)
         return sorted(found.values(), key=lambda t: -float(t.scores.sum()))
 
+    def overlooked(self, current: Trial) -> list[Trial]:
+        """Refit a structure with effects whose motion beside its members is another than alone.
+
+        Beside a clock's skew a payload looks like one; with Eq. (2) alone it looked like the skew.
+        """
+        names = [n for n in self.search.names if n not in current.effects]
+        new = [n for n in names if self.search.known((*current.effects, n)) is None]
+        tried = self.search.screened(current, new, beside=True)[: self.settings.tried]
+        return self.search.additions(current, tried, valves=False)
+
     def run(self) -> Selection:
         """Add effects while each is worth it, then check each against its rivals."""
         s = self.settings
         self.renoise()
         base = self.search.trial(())
         singles = self.search.additions(base, None, lambda d: self.progress('effect 1', d))
-        # By nats what explains nearly all may come last: beside much misfit the noise of Eq. (2) is
-        # that of the few frequencies where it leaves little.
-        scorer = self.search.scorer
-        assert scorer is not None
-        self.renoise(min(singles, key=lambda t: scorer.left_out_error(t.fit)))
+        self.renoise(self._nearest(singles))
         base, singles = self.search.trial(()), self.rescored(singles)
         self.nats = false_alarms.threshold(*self.search.signatures(), s.false_alarms)
         current, ranked, threshold = base, list(singles), self.material
@@ -158,6 +134,9 @@ class ModelSelection:
             # Nats weigh the whitened error, materiality the plain one: the best by nats may be
             # immaterial where another effect is neither.
             worth = [t for t in ranked if self.better(t, current, threshold)]
+            if not worth and self.left(current) >= threshold:
+                ranked = self.overlooked(current)
+                worth = [t for t in ranked if self.better(t, current, threshold)]
             if not worth:
                 break
             current = worth[0]
@@ -170,8 +149,21 @@ class ModelSelection:
             if self.left(current) < threshold or stage == s.most:
                 break
             ranked = self.extend(self.rescored(ranked[: s.beam]), stage + 1)
+            if ranked and self.left(current) >= self.material:
+                self.renoise(self._nearest(ranked))
+                ranked = self.rescored(ranked)
             current = self.search.trial(current.effects, current.added)
         return self.concluded(current, base, singles)
+
+    def _nearest(self, trials: Sequence[Trial]) -> Trial:
+        """Return what leaves the least error out of sample: its residual is nearest to noise.
+
+        By nats what explains nearly all may come last: beside much misfit the noise is that of
+        the few frequencies where little is left.
+        """
+        scorer = self.search.scorer
+        assert scorer is not None
+        return min(trials, key=lambda t: scorer.left_out_error(t.fit))
 
     def concluded(self, current: Trial, base: Trial, singles: Sequence[Trial]) -> Selection:
         """Check each member against none and against its rivals, and say what it is worth."""

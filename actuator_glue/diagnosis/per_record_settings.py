@@ -15,10 +15,10 @@ import numpy as np
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.fit import fit
-from actuator_glue.diagnosis.model_selection import Selection
 from actuator_glue.diagnosis.ranking import removed, standard_error, weights
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.effects import CATALOGUE

@@ -23,12 +23,13 @@ from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.fit import fit
 from actuator_glue.diagnosis.hum import Line
 from actuator_glue.diagnosis.measurement import Measured
-from actuator_glue.diagnosis.model_selection import ModelSelection, Selection
+from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.onset import Onset
 from actuator_glue.diagnosis.preparation import Prepared
 from actuator_glue.diagnosis.regression import Surrogate
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.search import Each, Search
+from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.effects import CATALOGUE

@@ -13,8 +13,8 @@ from actuator_glue.diagnosis import decimate, hum, measurement
 from actuator_glue.diagnosis.data import Data, Model
 from actuator_glue.diagnosis.hum import Line
 from actuator_glue.diagnosis.measurement import Measured
-from actuator_glue.diagnosis.model_selection import Selection
 from actuator_glue.diagnosis.per_record_settings import OneRecord
+from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.records import Array

@@ -42,7 +42,7 @@ _LAST = 60  # iterations at most of a structure that is told
 # What adds a pole may change places with the valve's: a second minimum, which a valve that is
 # slower or quicker by these factors, of the same bandwidth, leads to.
 _POLES = ('lag', 'gain', 'inertia')
-_VALVES = (1.0, 0.6, 1.6)
+_VALVES = (1.0, 0.6, 1.6, 0.4, 2.5)
 
 
 def _by_score(trial: Trial) -> float:
@@ -245,10 +245,13 @@ class Search:
         rest = [t for t in out if all(t is not other for other in tried)]
         return sorted([*self.each(lambda t: self.polish(t, valves), tried), *rest], key=_by_score)
 
-    def screened(self, current: Trial, names: Iterable[str]) -> list[str]:
-        """Sort effects by what their signatures could remove from the present residual."""
+    def screened(self, current: Trial, names: Iterable[str], *, beside: bool = False) -> list[str]:
+        """Sort effects by what their signatures could remove from the present residual.
+
+        Those with Eq. (2) alone, or `beside` the present effects, which takes as long as refits.
+        """
         wanted = list(names)
-        shares = list(self.each(lambda n: self.screen(current, n)[0], wanted))
+        shares = list(self.each(lambda n: self.screen(current, n, beside=beside)[0], wanted))
         return [wanted[i] for i in np.argsort(-np.array(shares), kind='stable')]
 
     def without(self, current: Trial, name: str) -> Trial:

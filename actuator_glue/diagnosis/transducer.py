@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 from actuator_glue.diagnosis.trial import Trial
 
 if TYPE_CHECKING:
-    from actuator_glue.diagnosis.model_selection import ModelSelection, Selection
+    from actuator_glue.diagnosis.model_selection import ModelSelection
+    from actuator_glue.diagnosis.selection import Selection
 
 FEEDBACK = 'sensor-feedback'
 # A bias or a drift inside of the loop leaves nothing in the record but the way there.

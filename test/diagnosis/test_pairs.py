@@ -3,8 +3,9 @@
 import numpy as np
 
 from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.model_selection import ModelSelection, Selection
+from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.model import commands
 from actuator_glue.model.structure import Structure

@@ -6,8 +6,9 @@ from scipy.interpolate import CubicSpline
 from smooth_machines import piston
 
 from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.model_selection import ModelSelection, Selection
+from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.transducer import in_the_loop
 from actuator_glue.records import Array, Record

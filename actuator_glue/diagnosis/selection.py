@@ -1,0 +1,39 @@
+"""What a search for the missing effects ends with, on the fitting part of the records."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from actuator_glue.diagnosis.finding import Rival
+from actuator_glue.diagnosis.trial import Trial
+
+
+@dataclass(frozen=True)
+class Selection:
+    """What the fitting part says.
+
+    Attributes:
+        base: Eq. (2) refitted.
+        singles: every single effect refitted, best first.
+        final: the structure chosen.
+        rivals: per effect of `final`, the effects tried in its place, best first.
+        removed: per effect of `final`, rms error it removes given the others [m].
+        evidence: per effect of `final`, nats it gains given the others.
+        structure: rms structure of the base residual [m].
+        left: rms structure of the final residual [m].
+        noise: rms of what no structure explains [m].
+        material: materiality threshold [m].
+        nats: evidence that any addition must have.
+    """
+
+    base: Trial
+    singles: tuple[Trial, ...]
+    final: Trial
+    rivals: dict[str, tuple[Rival, ...]]
+    removed: dict[str, float]
+    evidence: dict[str, float]
+    structure: float
+    left: float
+    noise: float
+    material: float
+    nats: float
