@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from actuator_glue.diagnosis import global_search
 from actuator_glue.diagnosis.checks import where
@@ -59,7 +59,7 @@ def undetermined(data: Data, model: Model, theta: Array, size: float) -> tuple[M
         y -= linear @ (linear.T @ y)
         square = np.einsum('mn,mn->n', y, y) / free
         width = max(1, round(_AROUND / record.period))
-        out.append(ndimage.uniform_filter1d(square, width, mode='nearest') > size**2)
+        out.append(scipy.ndimage.uniform_filter1d(square, width, mode='nearest') > size**2)
     return tuple(out)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy import signal
+import scipy
 
 from actuator_glue.errors import InputError
 from actuator_glue.records import Array, Record
@@ -84,14 +84,14 @@ def _follows(record: Record) -> None:
     size = max(1, int(1e-3 / record.period))  # lags are looked at in milliseconds
     period = size * record.period
     u, y = (c - c.mean() for c in (_means(record.command, size), _means(record.measured, size)))
-    cross = signal.correlate(y, u, method='fft') / np.sqrt(float(u @ u) * float(y @ y))
+    cross = scipy.signal.correlate(y, u, method='fft') / np.sqrt(float(u @ u) * float(y @ y))
     reach = min(len(u) // 4, round(_REACH / period))
     near = cross[len(u) - 1 - reach : len(u) + reach]
     lags = np.arange(-reach, reach + 1) * period
     at = int(np.argmax(np.abs(near)))
     lead = -lags[at]
     # A periodic command has other peaks as high: then nothing can be said.
-    peaks = signal.find_peaks(np.abs(near), height=0.9 * abs(near[at]))[0]
+    peaks = scipy.signal.find_peaks(np.abs(near), height=0.9 * abs(near[at]))[0]
     if abs(near[at]) < 0.5 or len(peaks) > 1:
         return
     if near[at] < 0.0:

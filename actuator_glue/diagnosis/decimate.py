@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy import signal
+import scipy
 
 from actuator_glue.model import linear
 from actuator_glue.records import Array, Record
@@ -50,7 +50,7 @@ def motion_bandwidth(record: Record) -> float:
     coarse = _coarse(record)
     window, lowest = np.hanning(len(coarse)), len(coarse)
     for channel in (coarse.command, coarse.measured):
-        power = np.abs(np.fft.rfft(signal.detrend(channel) * window)) ** 2
+        power = np.abs(np.fft.rfft(scipy.signal.detrend(channel) * window)) ** 2
         noise = float(np.median(power)) / np.log(2.0)
         if noise * len(power) < _NOISE * power.sum():  # else the motion fills the band
             power -= noise
@@ -108,7 +108,7 @@ def _filtered(values: Array, taps: Array, count: int) -> Array:
     at = -(-2 * half // count) * count
     # Zeros in front shift the first output to a multiple of the step.
     lead = np.concatenate([np.zeros(at - 2 * half), taps])
-    out = signal.upfirdn(lead, padded, up=1, down=count)
+    out = scipy.signal.upfirdn(lead, padded, up=1, down=count)
     first = at // count
     return np.asarray(out[first : first + -(-len(values) // count)])
 

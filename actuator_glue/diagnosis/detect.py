@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy import signal, stats
-from scipy.fft import next_fast_len
+import scipy
 
 from actuator_glue.diagnosis.completeness import Decision
 from actuator_glue.diagnosis.data import Data
@@ -22,7 +21,7 @@ _LAGS = 20
 
 def surrogate(part: Split, size: int, period: float, rng: np.random.Generator) -> Array:
     """Gaussian noise (size,) with the noise density of a split: the null of the alarm [m]."""
-    whole = next_fast_len(size, real=True)
+    whole = scipy.fft.next_fast_len(size, real=True)
     frequency = np.asarray(np.fft.rfftfreq(whole, period), dtype=np.float64)
     density = part.density(frequency)
     # One-sided density S: E|X|^2 = S n / (2 T) of the unnormalised transform.
@@ -56,7 +55,7 @@ def ljung_box(error: Array) -> float:
     e, n = error - error.mean(), len(error)
     lags = np.arange(1, _LAGS + 1)
     r = np.array([e[k:] @ e[:-k] for k in lags]) / (float(e @ e) or 1.0)
-    return float(stats.chi2.sf(n * (n + 2) * np.sum(r**2 / (n - lags)), _LAGS))
+    return float(scipy.stats.chi2.sf(n * (n + 2) * np.sum(r**2 / (n - lags)), _LAGS))
 
 
 def _even_odd(error: Array, output: Array) -> tuple[float, float]:
@@ -100,7 +99,7 @@ def statistics(data: Data, error: Array) -> dict[str, float]:
         out['ljung_box_p'] = min(out['ljung_box_p'], ljung_box(e))
         u = record.command[mask] - record.command[mask].mean()
         lags = round(0.5 / period)
-        cross = signal.correlate(e - e.mean(), u, mode='same', method='fft')
+        cross = scipy.signal.correlate(e - e.mean(), u, mode='same', method='fft')
         near = cross[len(e) // 2 - lags : len(e) // 2 + lags + 1]
         norm = float(np.sqrt(((e - e.mean()) ** 2).sum() * (u**2).sum())) or 1.0
         out['input_correlation'] = max(out['input_correlation'], float(np.abs(near).max()) / norm)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.records import Array
@@ -50,6 +50,6 @@ def threshold(signatures: Array, jacobian: Array, scorer: Scorer, level: float) 
     most = np.abs(normal @ root.T).max(axis=1)
     # As many independent candidates would exceed that quantile as often.
     known = float(np.quantile(most, 1.0 - _KNOWN))
-    independent = math.log1p(-_KNOWN) / math.log1p(-2.0 * float(stats.norm.sf(known)))
+    independent = math.log1p(-_KNOWN) / math.log1p(-2.0 * float(scipy.stats.norm.sf(known)))
     single = -math.expm1(math.log1p(-level) / max(1.0, independent))
-    return 0.5 * float(stats.norm.isf(0.5 * single)) ** 2
+    return 0.5 * float(scipy.stats.norm.isf(0.5 * single)) ** 2

@@ -16,8 +16,8 @@ from functools import cached_property
 from itertools import product
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg
 
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.decimate import motion_bandwidth
@@ -199,8 +199,8 @@ def _weights(products: Array, count: float, own: int, lags: Array) -> Array:
         lags: of the last rows; those between are features of the present motion, (l,) [s].
     """
     firm = products[:own, :own] + 1e-9 * np.trace(products[:own, :own]) / own * np.eye(own)
-    given = linalg.cho_factor(firm)
-    free = products[own:, own:] - products[own:, :own] @ linalg.cho_solve(
+    given = scipy.linalg.cho_factor(firm)
+    free = products[own:, own:] - products[own:, :own] @ scipy.linalg.cho_solve(
         given, products[:own, own:]
     )
     features = len(free) - 1 - len(lags)
@@ -216,7 +216,7 @@ def _weights(products: Array, count: float, own: int, lags: Array) -> Array:
     best = max(((s, *best[1:]) for s in _SIZES), key=lambda o: tried(*o)[0])
     others = tried(*best)[1]
     pull = products[:own, -1] - products[:own, own:-1] @ others
-    return np.append(linalg.cho_solve(given, pull), others)
+    return np.append(scipy.linalg.cho_solve(given, pull), others)
 
 
 def _ridge(products: Array, count: float, sizes: Array) -> tuple[float, Array]:
@@ -227,9 +227,9 @@ def _ridge(products: Array, count: float, sizes: Array) -> tuple[float, Array]:
     use, out = sizes > _NONE * sizes.max(initial=0.0), np.zeros(len(sizes))
     size = sizes[use]
     firm = products[:-1, :-1][np.ix_(use, use)] * np.outer(size, size)
-    factor = linalg.cho_factor(firm + np.eye(len(size)), lower=True)
+    factor = scipy.linalg.cho_factor(firm + np.eye(len(size)), lower=True)
     pull = size * products[:-1, -1][use]
-    means = linalg.cho_solve(factor, pull)
+    means = scipy.linalg.cho_solve(factor, pull)
     out[use] = size * means
     spread = np.log(np.diag(factor[0])).sum()
     return float(-0.5 * count * np.log(products[-1, -1] - pull @ means) - spread), out

@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.interpolate import CubicSpline
 
 from actuator_glue.records import Array, Record
 
@@ -104,4 +104,4 @@ def filled(values: Array, every: int) -> Array:
     first = int(np.bincount(at % every, minlength=every).argmax())
     known = np.arange(first, len(values), every)
     places = np.clip(np.arange(len(values)), known[0], known[-1])
-    return np.asarray(CubicSpline(known, values[known])(places))
+    return np.asarray(scipy.interpolate.CubicSpline(known, values[known])(places))

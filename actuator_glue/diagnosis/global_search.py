@@ -15,7 +15,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import Bounds, differential_evolution
+import scipy
 
 from actuator_glue.diagnosis.data import Data, Model
 from actuator_glue.diagnosis.fit import Fit, base_starts, fit
@@ -130,9 +130,9 @@ def refit(data: Data, model: Structure, found: Fit, iterations: int, tolerance: 
         return sum_of_squares(data.target - data.simulate(model, space.theta(z.T)))
 
     first = members[np.argsort(cost(members.T), kind='stable')[:_POPULATION]]
-    best = differential_evolution(
+    best = scipy.optimize.differential_evolution(
         cost,  # type: ignore[arg-type]  # its stubs do not know vectorized=True
-        Bounds(space.lower, space.upper),
+        scipy.optimize.Bounds(space.lower, space.upper),
         init=first,
         strategy='best2bin',  # with best1bin one search in 200 ended in a valley beside the lowest
         maxiter=_GENERATIONS,

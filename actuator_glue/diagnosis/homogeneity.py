@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.trial import Trial
@@ -142,7 +142,7 @@ def _compare(
     difference = contrast @ values
     inner = contrast @ covariance[np.ix_(use, use)] @ contrast.T
     q = float(difference @ np.linalg.pinv(inner, hermitian=True) @ difference)
-    p = float(stats.f.sf(q / freedom, freedom, max(1, len(blocks) - len(rows))))
+    p = float(scipy.stats.f.sf(q / freedom, freedom, max(1, len(blocks) - len(rows))))
     weights = 1.0 / deviation**2
     mean = float(np.average(values, weights=weights))
     spread = float(np.sqrt(np.average((values - mean) ** 2, weights=weights)))

@@ -9,8 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import ndimage, signal
 
 from actuator_glue.diagnosis.data import Data, Mask
 from actuator_glue.records import Array
@@ -84,9 +84,9 @@ def _peaks(error: Array, mask: Mask, period: float) -> tuple[Array, Array]:
     together, a line would change its phase at every seam.
     """
     values = np.zeros(len(mask))
-    values[mask] = signal.detrend(error)
+    values[mask] = scipy.signal.detrend(error)
     spectrum = np.abs(np.fft.rfft(values * np.hanning(len(values)))) ** 2
-    level = ndimage.median_filter(spectrum, 201, mode='reflect') + 1e-300
+    level = scipy.ndimage.median_filter(spectrum, 201, mode='reflect') + 1e-300
     f = np.fft.rfftfreq(len(values), period)
     inside = (f > _LOWEST) & (f < 0.48 / period)
     return np.asarray(f), np.asarray(np.where(inside, spectrum / level, 0.0))
@@ -94,7 +94,7 @@ def _peaks(error: Array, mask: Mask, period: float) -> tuple[Array, Array]:
 
 def _of_command(frequency: Array, command: Array, period: float) -> NDArray[np.bool_]:
     """Which frequencies are harmonics of lines of the command."""
-    spectrum = np.abs(np.fft.rfft(signal.detrend(command) * np.hanning(len(command)))) ** 2
+    spectrum = np.abs(np.fft.rfft(scipy.signal.detrend(command) * np.hanning(len(command)))) ** 2
     f = np.fft.rfftfreq(len(command), period)
     # A sinusoid holds its power in three bins, a sweep or an earthquake in hundreds.
     tones = f[spectrum > 0.03 * spectrum.sum()]

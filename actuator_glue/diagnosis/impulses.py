@@ -12,8 +12,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import linalg, ndimage, stats
 
 from actuator_glue.records import Array
 
@@ -52,7 +52,7 @@ def _filter(error: Array) -> Array:
     keep = np.ones(len(at), dtype=np.bool_)
     weights = np.zeros(2 * _REACH)
     for _ in range(3):  # impulses must not bend the prediction
-        weights = linalg.lstsq(rows[keep], error[at[keep]], cond=1e-12)[0]
+        weights = scipy.linalg.lstsq(rows[keep], error[at[keep]], cond=1e-12)[0]
         off = np.abs(error[at] - rows @ weights)
         largest = np.maximum(off, np.abs(rows).max(axis=1))
         keep = largest <= _BEYOND * 1.4826 * float(np.median(np.abs(error)))
@@ -68,7 +68,7 @@ def _noise(error: Array, period: float) -> Array:
     edges = np.linspace(0, len(error), count + 1).astype(int)
     levels = np.array([np.median(np.abs(e)) for e in np.split(np.abs(error), edges[1:-1])])
     # Motion that begins is no impulse; a channel at rest on its grid has no noise to be beyond.
-    levels = np.maximum(ndimage.maximum_filter1d(levels, 3), np.median(np.abs(error)))
+    levels = np.maximum(scipy.ndimage.maximum_filter1d(levels, 3), np.median(np.abs(error)))
     return np.repeat(1.4826 * levels, np.diff(edges))
 
 
@@ -147,5 +147,5 @@ def find(residual: Array, motion: Sequence[Array], period: float) -> Impulses:
 
 def _with_motion(starts: list[int], motion: Sequence[Array]) -> bool:
     """Whether impulses come when the piston is fast or far out: accidents do not know of that."""
-    ranks = [stats.rankdata(size)[starts].mean() / len(size) for size in motion]
+    ranks = [scipy.stats.rankdata(size)[starts].mean() / len(size) for size in motion]
     return bool((max(ranks) - 0.5) * np.sqrt(12.0 * len(starts)) > _SURE)

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import ndimage, signal
+import scipy
 
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.hum import Line
@@ -98,7 +98,7 @@ def staircase(data: Data, errors: Array, simulated: Array) -> Measured | None:
             total += np.bincount(at, e[piece] - mean, bins)
         power += np.abs(np.fft.rfft(total)) ** 2
     density = np.fft.rfftfreq(bins, cell)
-    level = ndimage.median_filter(power, 201, mode='reflect') + 1e-300
+    level = scipy.ndimage.median_filter(power, 201, mode='reflect') + 1e-300
     inside = (density > 20.0 / reach) & (density < 0.15 / cell)
     ratio = np.where(inside, power / level, 0.0)
     at = int(np.argmax(ratio))
@@ -140,13 +140,13 @@ def jitter(data: Data, errors: Array, simulated: Array) -> Measured | None:
     independent errors of the sample times do.
     """
     tops, speeds = [], []
-    sos = signal.butter(6, 0.6, 'highpass', output='sos')
+    sos = scipy.signal.butter(6, 0.6, 'highpass', output='sos')
     rows = zip(data.split(errors), data.split(simulated), data.periods, strict=True)
     for error, y, period in rows:
         # Means over 0.25 s: the variance needs averaging, the speed stays.
         size = max(8, round(0.25 / period))
         for wide, kept in _pieces(len(error), size):
-            top = signal.sosfiltfilt(sos, error[wide])[kept] ** 2 / 0.4
+            top = scipy.signal.sosfiltfilt(sos, error[wide])[kept] ** 2 / 0.4
             speed = np.gradient(y[wide], period)[kept] ** 2
             tops.append(top.reshape(-1, size).mean(axis=1))
             speeds.append(speed.reshape(-1, size).mean(axis=1))

@@ -12,8 +12,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy
 from numpy.lib.stride_tricks import sliding_window_view
-from scipy import fft, signal
 
 from actuator_glue.records import Array
 
@@ -79,7 +79,7 @@ def _smooth(values: Array, size: int) -> Array:
 
 def _densities(error: Array, period: float, width: int) -> tuple[Array, Array, Array]:
     """Frequencies [Hz] and densities of noise and of all that is in a residual (n,), (nf,)."""
-    frequency, _, z = signal.stft(
+    frequency, _, z = scipy.signal.stft(
         error, 1 / period, 'hann', width, width // 2, boundary=None, scaling='psd'
     )
     power = np.abs(z) ** 2
@@ -98,7 +98,7 @@ def split(error: Array, period: float) -> Split:
     """
     n = len(error)
     width = 2 * max(8, min(round(_WINDOW / period), n // 8) // 2)
-    centred = signal.detrend(error)
+    centred = scipy.signal.detrend(error)
     frequency, level, total = _densities(centred, period, width)
     mean_square = float(np.mean(error**2))
     # Both ends of the axis have half a bin.
@@ -142,10 +142,10 @@ def whiten(rows: Array, taps: Array) -> Array:
     table = rows.reshape(-1, count)
     blocks = -(-count // (_FILTERS * len(taps)))
     step = -(-count // blocks)
-    size = fft.next_fast_len(step + 2 * half, real=True)
+    size = scipy.fft.next_fast_len(step + 2 * half, real=True)
     spread = np.zeros(size)
     spread[:half], spread[-half:] = taps[half:], taps[:half]
-    gain = fft.rfft(spread).real
+    gain = scipy.fft.rfft(spread).real
     out = np.empty((len(table), blocks * step))
     at_once = max(1, _AT_ONCE // (blocks * size))
     for some in (slice(i, i + at_once) for i in range(0, len(table), at_once)):
@@ -153,8 +153,8 @@ def whiten(rows: Array, taps: Array) -> Array:
         longer = np.empty((len(part), (blocks - 1) * step + size))
         longer[:, :half], longer[:, half + count :] = part[:, :1], part[:, -1:]
         longer[:, half : half + count] = part
-        spectra = fft.rfft(sliding_window_view(longer, size, axis=1)[:, ::step])
+        spectra = scipy.fft.rfft(sliding_window_view(longer, size, axis=1)[:, ::step])
         spectra *= gain
-        filtered = fft.irfft(spectra, size)[:, :, half : half + step]
+        filtered = scipy.fft.irfft(spectra, size)[:, :, half : half + step]
         out[some].reshape(len(part), blocks, step)[:] = filtered
     return out[:, :count].reshape(rows.shape)

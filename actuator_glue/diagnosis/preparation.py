@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import ndimage
+import scipy
 
 from actuator_glue.diagnosis import decimate, despike, frozen
 from actuator_glue.diagnosis.base_prior import BasePrior
@@ -80,7 +80,7 @@ def rest_samples(record: Record) -> int:
     width = max(1, round(_SMOOTH / record.period))
     centre = float(np.median(head))
     noise = 1.4826 * float(np.median(np.abs(head - centre))) / np.sqrt(width)
-    off = np.abs(ndimage.uniform_filter1d(record.command, width, mode='nearest') - centre)
+    off = np.abs(scipy.ndimage.uniform_filter1d(record.command, width, mode='nearest') - centre)
     moving = off > max(_MOVED * float(off.max()), 6.0 * noise)
     return int(np.argmax(moving)) if noise < _MOVED * float(off.max()) else 0
 

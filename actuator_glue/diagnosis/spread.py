@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.stats import chi2
+import scipy
 
 from actuator_glue.diagnosis.data import LANES, Data, Model, chunks
 from actuator_glue.diagnosis.fit import rms
@@ -80,14 +79,14 @@ def reached(error: Array, off: Array, parameters: int) -> float:
     # Unit steps of the posterior move the simulation at right angles, by mean squares `sizes`.
     sizes = values[main]
     along = vectors[:, main].T @ (off @ error) / np.sqrt(len(off))
-    most = float(chi2.ppf(0.95, parameters))
+    most = float(scipy.stats.chi2.ppf(0.95, parameters))
 
     def beyond(log: float) -> float:
         return float(np.sum((along / (sizes + np.exp(log))) ** 2)) - most
 
     # Steps minimise what is left of the error, their squares' sum at most `most`.
     low, high = np.log(sizes.min()) - 40.0, np.log(sizes.max() + np.abs(along).max()) + 40.0
-    weight = 0.0 if beyond(low) <= 0.0 else float(np.exp(brentq(beyond, low, high)))
+    weight = 0.0 if beyond(low) <= 0.0 else float(np.exp(scipy.optimize.brentq(beyond, low, high)))
     steps = along / (sizes + weight)
     left = float(error @ error) - float(2.0 * steps @ along - steps @ (sizes * steps))
     return float(np.sqrt(max(left, 0.0) / error.size))

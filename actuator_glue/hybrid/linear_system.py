@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from actuator_glue.records import Array
 
@@ -109,7 +109,7 @@ def _transition(system: System, times: Array) -> tuple[Array, Array]:
     m, n = system.B.shape
     block = np.zeros((m, n + 1, n + 1))
     block[:, :n, :n], block[:, :n, n] = system.A, system.B
-    out = np.asarray(expm(block * times[:, None, None]))
+    out = np.asarray(scipy.linalg.expm(block * times[:, None, None]))
     return out[:, :n, :n], out[:, :n, n]
 
 

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.linalg import eigh
 
 from actuator_glue.errors import InputError
 from actuator_glue.records import Array, check_stiffness
@@ -156,7 +156,7 @@ class Partition:
     def natural_frequencies(self) -> Array:
         """Natural frequencies of the structure with the specimen, ascending, (n,) [Hz]."""
         M, _, K = self.whole
-        squares = eigh(K, M, eigvals_only=True)
+        squares = scipy.linalg.eigh(K, M, eigvals_only=True)
         return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi))
 
     def without_specimen(self) -> Partition:
@@ -209,7 +209,7 @@ def modal_damping(mass: Array, stiffness: Array, ratio: float) -> Array:
     if not 0.0 <= ratio < 1.0:
         raise InputError(f'damping ratio {ratio:g} is outside [0, 1); 5 % is 0.05')
     try:
-        squares, modes = eigh(stiffness, mass)
+        squares, modes = scipy.linalg.eigh(stiffness, mass)
     except np.linalg.LinAlgError as error:
         raise InputError(
             f'no modes to damp: the mass is not positive definite ({error})'

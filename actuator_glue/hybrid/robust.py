@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import minimize
+import scipy
 
 from actuator_glue.hybrid.linear_system import Complex
 from actuator_glue.records import Array
@@ -52,7 +52,7 @@ def robust(first: Array, gain: Complex, loop: Complex, s: Complex, power: Array)
         error = tracking_error(gain, loop, first + _STEP * x, s, power)
         return float(np.percentile(error, PERCENTILE))
 
-    best = minimize(
+    best = scipy.optimize.minimize(
         worst,
         np.zeros(3),
         method='Nelder-Mead',

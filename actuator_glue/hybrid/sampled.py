@@ -11,7 +11,7 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
-from scipy.linalg import expm
+import scipy
 
 from actuator_glue.hybrid.actuator import Actuator
 from actuator_glue.hybrid.linear_system import held
@@ -163,5 +163,5 @@ def _over(A: Array, inputs: Array, period: float) -> tuple[Array, Array]:
     s, r = inputs.shape
     block = np.zeros((s + r, s + r))
     block[:s, :s], block[:s, s:] = A, inputs
-    out = np.asarray(expm(block * period))
+    out = np.asarray(scipy.linalg.expm(block * period))
     return np.ascontiguousarray(out[:s, :s]), out[:s, s:]

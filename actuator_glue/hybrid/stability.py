@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.stats import beta, spearmanr
 
 from actuator_glue.hybrid.actuator import Actuator
 from actuator_glue.hybrid.compensator import Compensator
@@ -80,8 +80,8 @@ def share(hits: Flags, effective: float, level: float = 0.95) -> Share:
     n = float(np.clip(effective, 1.0, len(hits)))
     value = float(np.mean(hits))
     x, tail = value * n, 0.5 * (1.0 - level)
-    lower = 0.0 if x <= 0.0 else float(beta.ppf(tail, x, n - x + 1.0))
-    upper = 1.0 if x >= n else float(beta.ppf(1.0 - tail, x + 1.0, n - x))
+    lower = 0.0 if x <= 0.0 else float(scipy.stats.beta.ppf(tail, x, n - x + 1.0))
+    upper = 1.0 if x >= n else float(scipy.stats.beta.ppf(1.0 - tail, x + 1.0, n - x))
     return Share(value, lower, upper, level, n)
 
 
@@ -101,7 +101,7 @@ def sensitivity(values: Array, inputs: Mapping[str, Array]) -> dict[str, float]:
     if len(values) < 3 or np.ptp(np.nan_to_num(values, posinf=0.0, neginf=0.0)) == 0.0:
         return {}
     return {
-        name: float(spearmanr(values, column).statistic)
+        name: float(scipy.stats.spearmanr(values, column).statistic)
         for name, column in inputs.items()
         if np.ptp(column) > 0.0
     }

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
+import scipy
 
 from actuator_glue.errors import InputError
 from actuator_glue.records import Array
@@ -48,7 +48,7 @@ def effective_size(errors: Sequence[Array], slopes: Sequence[Array]) -> float:
         part = basis[:, begin : begin + len(e)]
         begin += len(e)
         density = np.abs(np.fft.fft(e - mean)) ** 2 / len(e)
-        density = uniform_filter1d(density, min(_BAND, len(e)), mode='wrap')
+        density = scipy.ndimage.uniform_filter1d(density, min(_BAND, len(e)), mode='wrap')
         loud += float((np.abs(np.fft.fft(part)) ** 2 @ density).sum()) / len(e)
     worth = count / max(loud / (len(basis) * power), 1.0)
     return float(max(worth, min(count, len(slopes[0]) + _FREEDOM)))

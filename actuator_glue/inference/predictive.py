@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
+import scipy
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference.bands import Band, band, check_draws, check_levels
@@ -119,7 +119,7 @@ def predictive_draws(rng: np.random.Generator, draws: Array, residual: ResidualM
     mean, sd = residual.levels(rng, len(rows))
     innovation = rng.standard_normal((len(rows), draws.shape[1]))
     innovation[:, 1:] *= np.sqrt(1.0 - residual.phi**2)
-    path = lfilter([1.0], [1.0, -residual.phi], innovation, axis=1)
+    path = scipy.signal.lfilter([1.0], [1.0, -residual.phi], innovation, axis=1)
     return np.asarray(draws[rows] + mean[:, None] + sd[:, None] * path)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
+import scipy
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference.informative_prior import InformativePrior
@@ -55,7 +55,7 @@ def conflict(prior: InformativePrior, posterior: Array) -> Conflict:
     if not told.any():
         return Conflict(0.0, 0, 1.0)
     square = float(((vectors.T @ moved)[told] ** 2 / (1.0 - values[told])).sum())
-    return Conflict(square, int(told.sum()), float(chi2.sf(square, told.sum())))
+    return Conflict(square, int(told.sum()), float(scipy.stats.chi2.sf(square, told.sum())))
 
 
 class SequentialTest:

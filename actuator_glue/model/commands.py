@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy import signal
+import scipy
 
 from actuator_glue.errors import InputError
 from actuator_glue.records import MAX_DISPLACEMENT, Array, Record
@@ -106,7 +106,7 @@ def noise(
         raise InputError(f'no frequency in {f0:g}..{f1:g} Hz fits {duration:g} s; widen the band')
     rng = np.random.default_rng(seed)
     spectrum = inside * (rng.standard_normal(inside.size) + 1j * rng.standard_normal(inside.size))
-    u = np.fft.irfft(spectrum, n) * signal.windows.tukey(n, 2.0 * min(0.1, 5.0 / duration))
+    u = np.fft.irfft(spectrum, n) * scipy.signal.windows.tukey(n, 2.0 * min(0.1, 5.0 / duration))
     return _scaled(u, amplitude)
 
 
@@ -183,8 +183,8 @@ def _kanai_tajimi(
     (wg, zg), (wf, zf) = ((2.0 * np.pi * hz, damping) for hz, damping in (ground, corner))
     numerator = np.polymul([2.0 * zg * wg, wg**2], highpass)
     denominator = np.polymul([1.0, 2.0 * zg * wg, wg**2], [1.0, 2.0 * zf * wf, wf**2])
-    z = signal.bilinear(numerator, denominator, rate)
-    return np.asarray(signal.sosfilt(signal.tf2sos(*z), drive))
+    z = scipy.signal.bilinear(numerator, denominator, rate)
+    return np.asarray(scipy.signal.sosfilt(scipy.signal.tf2sos(*z), drive))
 
 
 def recorded(record: Record, rate: float | None = None, amplitude: float | None = None) -> Array:

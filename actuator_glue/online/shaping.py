@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import least_squares
-from scipy.stats import qmc
+import scipy
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference.choice import ModelChoice
@@ -58,11 +57,11 @@ def automatic(record: Record, model: ModelChoice, settle: int, near: Array | Non
         return -slopes(shares).T
 
     if near is None:
-        trials = qmc.Sobol(len(width), scramble=False).random(_TRIALS)
+        trials = scipy.stats.qmc.Sobol(len(width), scramble=False).random(_TRIALS)
         start = trials[np.argmin(((measured - respond(trials)) ** 2).sum(axis=1))]
     else:
         start = (near - lower) / width
-    best = least_squares(
+    best = scipy.optimize.least_squares(
         error,
         np.clip(start, 1e-6, 1.0 - 1e-6),
         jac=descent,

@@ -5,9 +5,9 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
+import scipy
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from scipy import signal
 
 from actuator_glue.diagnosis.result import DiagnosisData, Trace
 from actuator_glue.records import Array, source_name
@@ -93,7 +93,7 @@ def _density(trace: Trace, residual: Array) -> tuple[Array, Array]:
     parts = stretches(trace)
     size = min(max(p.stop - p.start for p in parts), round(_SECONDS * rate))
     used = [p for p in parts if p.stop - p.start >= size]
-    found = [signal.welch(residual[p], rate, nperseg=size) for p in used]
+    found = [scipy.signal.welch(residual[p], rate, nperseg=size) for p in used]
     power = np.average([f[1] for f in found], axis=0, weights=[p.stop - p.start for p in used])
     return found[0][0][1:], np.sqrt(power[1:])
 
