@@ -1,4 +1,4 @@
-"""Compile what the first calibration, diagnosis and simulation need, by doing small ones.
+"""Compile what the first calibration, diagnosis and hybrid test need, by doing small ones.
 
 Two at a time: `make setup` runs this beside the build of the messages.
 """
@@ -13,14 +13,18 @@ from pathlib import Path
 import numpy as np
 from scipy.signal import lsim
 
-# The first two share next to no compiled code; the others need most of theirs, and some more for
-# records that tell more.
+# The first two share next to no compiled code; the next need most of theirs, and some more for
+# records that tell more; the last take what those before have saved.
 COMMANDS = [
     'simulate {0}/made.csv --duration 6 --rate 200 --stiffness 250e3 --effect backlash',
     'calibrate {0}/free.csv --stiffness 0 --evaluations 24000',
-    'calibrate {0}/free.csv {0}/clamped.csv --stiffness 0 250e3 --evaluations 24000',
+    'calibrate {0}/free.csv {0}/clamped.csv --stiffness 0 250e3 --evaluations 24000 '
+    '--save {0}/posterior.npz',
     'diagnose {0}/free.csv {0}/clamped.csv --stiffness 0 250e3',
-    'calibrate {0}/clamped.csv --stiffness 250e3 --effect backlash --evaluations 24000',
+    'calibrate {0}/clamped.csv --stiffness 250e3 --effect backlash --evaluations 24000 '
+    '--save {0}/play.npz',
+    'rths sdof --posterior {0}/posterior.npz --draws 32 --ground-motion {0}/ground.txt',
+    'rths sdof --posterior {0}/play.npz --draws 32 --ground-motion {0}/ground.txt',
 ]
 
 
@@ -56,7 +60,9 @@ def main() -> None:
             ('clamped', record(2208.0, (133.0, 2101.0))),
         ):
             Path(folder, f'{name}.csv').write_text(response, encoding='utf-8')
-        for together in (COMMANDS[:2], COMMANDS[2:]):
+        time = np.arange(200) / 100.0
+        np.savetxt(Path(folder, 'ground.txt'), np.column_stack([time, np.sin(9.0 * time)]))
+        for together in (COMMANDS[:2], COMMANDS[2:5], COMMANDS[5:]):
             list(pool.map(run, (command.format(folder) for command in together)))
 
 

@@ -19,6 +19,7 @@ from actuator_glue.diagnosis import (
     learned_term,
     model_form,
     posterior,
+    reconciled,
     response,
     rest,
     verdict,
@@ -134,6 +135,7 @@ def diagnose(
     if larger is not final:
         told = companions.reduced(sample(larger, settings.evaluations), larger, final)
     mixed = alternatives.mixed(told.points, final, others, lambda t: sample(t).points, rng)
+    error = reconciled.reached_by_both(error, found.material, scorer, prepared.held, before, after)
     judged = verdict.conclude(decision.verdict, bool(decision.names), error, found.material)
     if judged not in verdict.COMPLETE:
         search, left = result.selection.search, decision.left

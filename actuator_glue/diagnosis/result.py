@@ -48,6 +48,7 @@ class HeldOutError:
         split: 'held-out' where data were set aside.
         reached: the least rms error of parameters in the 95 % region of their posterior; None
             where it was not asked.
+        reached_before: that of Eq. (2) alone; asked where the best additions take nothing away.
     """
 
     before: float
@@ -64,6 +65,7 @@ class HeldOutError:
     after_without_hum: float | None = None
     split: str = 'held-out'
     reached: float | None = None
+    reached_before: float | None = None
 
     @property
     def least(self) -> float:

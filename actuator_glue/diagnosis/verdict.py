@@ -33,12 +33,33 @@ def excused(error: HeldOutError, material: float) -> bool:
     return misses(error, material, error.after) and not misses(error, material)
 
 
+def takes_nothing(error: HeldOutError) -> bool:
+    """Whether the additions, their best sizes taken, remove nothing of the held-out error."""
+    return error.removable_removed < _NOTHING
+
+
+def borne_out(error: HeldOutError, material: float) -> bool:
+    """Whether the held-out part asks for the additions.
+
+    What one stiffness leaves open may be far off under the next, with the best parameters and
+    more so with additions. Then those count that both parts allow: whether they leave nothing
+    with the additions, and something without.
+    """
+    if not takes_nothing(error):
+        return True
+    without = error.reached_before
+    return without is not None and excused(error, material) and misses(error, material, without)
+
+
 def excuse(error: HeldOutError, material: float) -> str:
     """Say what accounts for all beyond noise, and what is left then; empty where nothing does."""
     if not excused(error, material):
         return ''
     if error.reached is not None and error.reached <= error.least:
-        return f'{1e6 * error.reached:.1f} um with parameters as likely'
+        found = f'{1e6 * error.reached:.1f} um with parameters as likely'
+        if error.reached_before is None:
+            return found
+        return f'{found}, {1e6 * error.reached_before:.1f} um with such of Eq. (2) alone'
     return f"{1e6 * error.least:.1f} um without each record's own offset and drift"
 
 
@@ -56,7 +77,7 @@ def conclude(verdict: Verdict, moved: bool, error: HeldOutError, material: float
         error: held-out error before and after.
         material: smallest error that matters [m].
     """
-    if moved and error.removable_removed < _NOTHING:
+    if moved and not borne_out(error, material):
         return 'undecided'
     if verdict == 'unexplained' or not misses(error, material):
         return verdict
@@ -73,7 +94,8 @@ def certainty(fitted: float, error: HeldOutError, material: float) -> float:
         material: smallest error that matters [m].
     """
     share = max(0.0, min(1.0, error.removable_removed))
-    return min(fitted, share) if share < _NOTHING or misses(error, material) else fitted
+    doubted = misses(error, material) or not borne_out(error, material)
+    return min(fitted, share) if doubted else fitted
 
 
 def against(found: DiagnosisData) -> str:

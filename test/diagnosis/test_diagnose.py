@@ -180,7 +180,7 @@ def test_a_name_that_a_regression_beats_is_doubted() -> None:
     assert found.surrogate['nats'] > 40.0
 
 
-@pytest.mark.parametrize('size', [1.03, 1.05])
+@pytest.mark.parametrize('size', [1.03, pytest.param(1.05, marks=pytest.mark.slow)])
 def test_a_gain_of_one_test_is_named_with_its_record(size: float) -> None:
     """The spring test alone has a command gain: no common size explains it, its own does."""
     free, spring, _ = make(['gain'], [1.0], 23)

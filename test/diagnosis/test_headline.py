@@ -13,7 +13,7 @@ from actuator_glue.diagnosis.advice import contradicted, zeros
 from actuator_glue.diagnosis.finding import Finding
 from actuator_glue.diagnosis.headline import headline
 from actuator_glue.diagnosis.result import Alarm, DiagnosisData, HeldOutError, Verdict
-from actuator_glue.diagnosis.verdict import against, conclude, misses
+from actuator_glue.diagnosis.verdict import against, certainty, conclude, misses
 
 NONE = np.empty((0, 4))
 
@@ -204,3 +204,33 @@ def test_only_what_the_held_out_part_bears_out_is_applied() -> None:
     assert 'exclude zero' in against(replace(good, error=doubtful))
     assert against(replace(good, verdict='undecided'))
     assert against(diagnosis('none', 10e-6, 10e-6))
+
+
+@pytest.mark.parametrize(
+    ('reached', 'without', 'verdict'),
+    [
+        (10.1e-6, 40e-6, 'missing-effect'),
+        (10.1e-6, 10.5e-6, 'undecided'),
+        (30e-6, 60e-6, 'undecided'),
+        (10.1e-6, None, 'undecided'),
+    ],
+)
+def test_what_likely_parameters_leave_bears_additions_out(
+    reached: float, without: float | None, verdict: str
+) -> None:
+    """Best parameters are far off under another stiffness, with additions more so than without.
+
+    Those that both parts allow must leave nothing with the additions, and something without.
+    """
+    asked = diagnosis('missing-effect', 80e-6, 90e-6, finding('backlash'))
+    error = replace(asked.error, reached=reached, reached_before=without)
+    assert conclude('missing-effect', True, error, asked.alarm.threshold) == verdict
+    told = replace(asked, error=error, verdict=verdict)
+    sure = certainty(0.95, error, asked.alarm.threshold)
+    assert sure == (0.95 if verdict == 'missing-effect' else 0.0)
+    assert (told.error.to_json()['reached_before'], told.complete) == (without, sure > 0.0)
+    if verdict == 'missing-effect':
+        assert told.summary() == (
+            'missing: backlash; held-out error 80.0 -> 90.0 um, noise 10.0 um; '
+            '10.1 um with parameters as likely, 40.0 um with such of Eq. (2) alone'
+        )

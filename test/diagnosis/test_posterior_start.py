@@ -12,8 +12,15 @@ from actuator_glue.inference.convergence import rhat_and_ess
 from actuator_glue.model.structure import Structure
 
 
-@pytest.mark.parametrize('which', [(1,), (0, 1)])
-@pytest.mark.parametrize(('effect', 'size'), [('backlash', 6e-5), ('valve-deadband', 2e-4)])
+@pytest.mark.parametrize(
+    ('effect', 'size', 'which'),
+    [
+        ('backlash', 6e-5, (0, 1)),
+        ('valve-deadband', 2e-4, (1,)),
+        pytest.param('backlash', 6e-5, (1,), marks=pytest.mark.slow),
+        pytest.param('valve-deadband', 2e-4, (0, 1), marks=pytest.mark.slow),
+    ],
+)
 def test_chains_keep_the_spread_of_the_posterior(
     effect: str, size: float, which: tuple[int, ...]
 ) -> None:

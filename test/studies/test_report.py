@@ -158,7 +158,10 @@ def test_curves_are_plain_tables(reproduced: Run) -> None:
 
 
 def test_results_are_not_overwritten_unasked(
-    reproduced: Run, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    reproduced: Run,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     before = (reproduced.out / 'results.json').read_bytes()
     assert command.main(['--quick', '--out', str(reproduced.out)]) == 2

@@ -1,0 +1,89 @@
+"""Whether parameters that the fitting part does not exclude explain the held-out part, too.
+
+Along a ridge of hundreds of per cent nothing is linear (spread.py goes by first order): a machine
+tried under one stiffness only is another one, to first order, under the next. So both parts are
+refitted together, and it is asked what that costs in the fitting part.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import scipy
+
+from actuator_glue.diagnosis.data import LANES, Data
+from actuator_glue.diagnosis.fit import fit, rms
+from actuator_glue.diagnosis.ranking import standard_error
+from actuator_glue.diagnosis.result import HeldOutError
+from actuator_glue.diagnosis.score import Scorer
+from actuator_glue.diagnosis.space import sum_of_squares
+from actuator_glue.diagnosis.verdict import misses, takes_nothing
+from actuator_glue.diagnosis.verify import Side
+from actuator_glue.records import Array
+
+_STARTS = 3  # draws that are nearest to the held-out part, beside the best fit
+_SURE = 2.0  # standard errors over the blocks
+
+
+def reached_by_both(
+    error: HeldOutError, material: float, scorer: Scorer, held: Data, before: Side, after: Side
+) -> HeldOutError:
+    """Ask what parameters leave that neither part excludes, where the best leave more than noise.
+
+    Args:
+        error: held-out error, with what is reached to first order.
+        material: smallest error that matters [m].
+        scorer: the fitting part, and whitening filters of its noise.
+        held: the held-out part.
+        before: Eq. (2) as fitted.
+        after: with the additions.
+    """
+    if misses(error, material):
+        found = reached(scorer, held, after)
+        error = error if found is None else replace(error, reached=found)
+    if len(after.theta) > len(before.theta) and takes_nothing(error):
+        without = reached(scorer, held, before)
+        error = replace(error, reached_before=error.before if without is None else without)
+    return error
+
+
+def reached(scorer: Scorer, held: Data, side: Side) -> float | None:
+    """Return what both parts' parameters leave of the held-out part, rms [m].
+
+    Args:
+        scorer: the fitting part, and whitening filters of its noise.
+        held: the held-out part.
+        side: the structure, its best parameters for the fitting part, draws of its posterior.
+
+    Returns:
+        None where the fitting part excludes those parameters: they cost more than the 95 %
+        region of a normal posterior does, and more than twice the standard error over its blocks.
+    """
+    data, model, theta, draws = scorer.data, side.model, side.theta, side.draws
+    some = draws[:: max(1, len(draws) // LANES)][:LANES]
+    nearest = np.argsort(sum_of_squares(held.target - held.simulate(model, some)))[:_STARTS]
+    both = fit(_together(data, held), model, np.vstack([theta, some[nearest]])).theta
+    errors = data.target - data.simulate(model, np.stack([theta, both]))
+    before, after = scorer.whiten(errors)
+    lost = _per_block(after**2 - before**2, scorer.blocks)
+    most = 0.5 * float(scipy.stats.chi2.ppf(0.95, len(theta)))
+    if not lost.sum() <= max(most, _SURE * standard_error(lost)):
+        return None
+    return rms(held.target - held.simulate(model, both)[0])
+
+
+def _per_block(squares: Array, blocks: Sequence[slice]) -> Array:
+    return np.array([0.5 * squares[block].sum() for block in blocks])
+
+
+def _together(a: Data, b: Data) -> Data:
+    return Data(
+        (*a.records, *b.records),
+        (*a.masks, *b.masks),
+        (*a.initials, *b.initials),
+        (*a.recorded, *b.recorded),
+        (*a.origins, *b.origins),
+        a.prior,
+    )
