@@ -1,22 +1,25 @@
 """Effects that are there beyond chance but remove too little to matter.
 
 They are not told as missing. But their size is free in the posterior of what is told: a gap that
-leaves 2 um doubles the damping that is found beside it. What is not beyond chance stays what it
-is, one of many that may be there (discrepancy.py).
+leaves 2 um doubles the damping that is found beside it. What is not beyond chance, or not told
+from others, stays what it is: one of many that may be there (discrepancy.py).
 """
 
 from __future__ import annotations
 
+import numpy as np
+
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.posterior import Draws
-from actuator_glue.diagnosis.ranking import removed
+from actuator_glue.diagnosis.ranking import removed, weights
 from actuator_glue.diagnosis.trial import Trial
 
 _MOST = 2
+_ALONE = 0.9  # weight among what was tried that is told from the others
 
 
 def with_companions(selection: ModelSelection, final: Trial) -> Trial:
-    """Return a structure with what else is there beyond chance, at the user's level.
+    """Return a structure with what else is there beyond chance, at the user's level, and alone.
 
     Args:
         selection: what chose the structure.
@@ -30,10 +33,11 @@ def with_companions(selection: ModelSelection, final: Trial) -> Trial:
         names = [n for n in search.names if n not in current.effects]
         ranked = search.screened(current, names)[: settings.tried]
         trials = search.additions(current, ranked, valves=False)
-        better = [t for t in trials if selection.better(t, current, 0.0)]
-        if not better:
+        if not trials or not selection.better(trials[0], current, 0.0):
             break
-        current = better[0]
+        if weights(np.stack([t.scores for t in trials]))[0] < _ALONE:
+            break
+        current = trials[0]
     return current
 
 
