@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.homogeneity import agreement
+from actuator_glue.diagnosis.homogeneity import agreement, between
 from actuator_glue.diagnosis.regression import Surrogate, compare
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.search import Search
@@ -58,6 +58,22 @@ def test_two_sizes_do_not_agree() -> None:
     assert found.agree is False
     assert found.p_value < 0.01
     assert max(found.values[:2]) < min(found.values[2:])
+
+
+def test_how_far_stretches_differ_is_in_every_parameter_s_unit() -> None:
+    """Play of 30 and 120 um: 52 um of standard deviation over four halves, half of it beside.
+
+    Of equal play nothing beyond what noise makes: at most three standard errors of a half.
+    """
+    search, trial = searched('backlash', (3e-5, 12e-5), 36)
+    apart = between(trial, scorer_of(search, trial))
+    assert 25e-6 < apart[4] < 80e-6
+    search, trial = searched('backlash', (6e-5, 6e-5), 37)
+    scorer = scorer_of(search, trial)
+    alike = between(trial, scorer)
+    error = max(agreement(trial, scorer)['backlash'].stddev)
+    assert alike[4] < 3.0 * error < 10e-6
+    assert (alike[:4] < 0.2).all()
 
 
 def test_a_stretch_that_cannot_know_is_not_asked() -> None:

@@ -249,3 +249,44 @@ def test_all_that_remains_may_count_as_noise() -> None:
     ]
     assert sizes[0] == pytest.approx(1.0, rel=0.2)
     assert sizes[1] > 1.25 * sizes[0]
+
+
+def payload_beside_a_skewed_clock() -> Data:
+    """Two sweeps, without and with a specimen: friction, a payload and a skewed clock."""
+    names = ('coulomb-friction', 'payload-inertia', 'clock-skew')
+    model, rng = Structure(names), np.random.default_rng()
+    t = np.arange(int(40 * RATE)) / RATE
+    u = 2e-3 * np.sin(np.pi * (10.0 / 40.0) * t**2)
+    theta = model.neutral(THETA)
+    for name, size in (('coulomb-friction', 200.0), ('clock-skew', 3e-4)):
+        theta[model.columns(name)] = size
+    theta[model.columns('payload-inertia')] = 500.0
+    records = []
+    for k in (0.0, 250e3):
+        y = model.simulate(theta, Record(u, u, 1 / RATE, k))
+        records.append(Record(u, y + 1e-5 * rng.standard_normal(len(t)), 1 / RATE, k))
+    return Data.whole(records)
+
+
+def test_what_was_not_tried_is_screened_beside_the_members() -> None:
+    """A payload is tried, which with Eq. (2) alone looked like others; nothing is tried again."""
+    found = selection(payload_beside_a_skewed_clock())
+    search = found.search
+    current = search.trial(())
+    for name in ('coulomb-friction', 'clock-skew'):
+        current = search.add(current, name)
+    found.renoise(search.finished(current))
+    current, most = search.trial(current.effects), found.settings.tried
+    alone = search.screened(current, set(search.names) - set(current.effects))[:most]
+    tried = {t.added for t in found.overlooked(current)}
+    assert len(tried) == most
+    assert 'payload-inertia' in tried - set(alone)
+    assert not {t.added for t in found.overlooked(current)} & tried
+
+
+def test_the_nearest_structure_gives_the_noise() -> None:
+    """By the error it leaves out of sample, not by nats: those may be of misfit alone."""
+    found = selection(stationary(('gain',), [1.05], 41))
+    search = found.search
+    trials = [search.add(search.trial(()), name) for name in ('bias', 'gain', 'drift')]
+    assert found._nearest(trials).added == 'gain'

@@ -106,7 +106,7 @@ def test_the_force_tells_damping_from_the_actuator(rng_seed: int) -> None:
     There chains do not even meet. The phase of the force is its own: the posterior is as narrow as
     the curvature of both errors says. A gain of 1.1 of the load cell is told, and is no
     stiffness. Bounds of five standard deviations are left by chance once in a million runs. With
-    half of the evaluations one of 15 seeds ended before its posterior was reached, with these none.
+    half of the evaluations one of 15 seeds ended before it had a posterior, with these none.
     """
     record = swept(np.random.default_rng(rng_seed), ('viscous-damping',), [3e4], gain=1.1)
     theta, alone = np.array([*THETA, 3e4]), Data.whole([record])
