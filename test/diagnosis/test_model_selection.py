@@ -269,7 +269,7 @@ def payload_beside_a_skewed_clock() -> Data:
 
 
 def test_what_was_not_tried_is_screened_beside_the_members() -> None:
-    """A payload is tried, which with Eq. (2) alone looked like others; nothing is tried again."""
+    """Damping is tried, which with Eq. (2) alone looks like others; nothing is tried again."""
     found = selection(payload_beside_a_skewed_clock())
     search = found.search
     current = search.trial(())
@@ -280,7 +280,7 @@ def test_what_was_not_tried_is_screened_beside_the_members() -> None:
     alone = search.screened(current, set(search.names) - set(current.effects))[:most]
     tried = {t.added for t in found.overlooked(current)}
     assert len(tried) == most
-    assert 'payload-inertia' in tried - set(alone)
+    assert 'viscous-damping' in tried - set(alone)
     assert not {t.added for t in found.overlooked(current)} & tried
 
 
