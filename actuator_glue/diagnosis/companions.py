@@ -15,6 +15,8 @@ from actuator_glue.diagnosis.ranking import removed, weights
 from actuator_glue.diagnosis.trial import Trial
 
 _MOST = 2
+# Of what matters: less is made by the steps of simulations, too, beyond chance on long records.
+_SEEN = 0.2
 _ALONE = 0.9  # weight among what was tried that is told from the others
 
 
@@ -32,8 +34,10 @@ def with_companions(selection: ModelSelection, final: Trial) -> Trial:
     for _ in range(_MOST):
         names = [n for n in search.names if n not in current.effects]
         ranked = search.screened(current, names)[: settings.tried]
-        trials = search.additions(current, ranked, valves=False)
-        if not trials or not selection.better(trials[0], current, 0.0):
+        least = _SEEN * selection.material
+        below = current.mean_square - least**2
+        trials = search.additions(current, ranked, valves=False, below=below)
+        if not trials or not selection.better(trials[0], current, least):
             break
         if weights(np.stack([t.scores for t in trials]))[0] < _ALONE:
             break
