@@ -173,7 +173,7 @@ def diagnose(
             *advice.zeros(error, found.material),
             *companions.sentences(final, larger),
             *advice.unidentified(data, estimates),
-            *advice.unconverged(told.rhat),
+            *advice.unconverged(float(np.fmax(draws.rhat, told.rhat))),
             *rest.compared(data.records, still, decision.noise),
             *([used.remark()] if used else []),
             *prepared.notes,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -35,6 +36,38 @@ class Homogeneity:
     stddev: tuple[float, ...]
     p_value: float
     agree: bool | None
+
+
+class _Step(NamedTuple):
+    """One Gauss-Newton step of scaled parameters; the first `own` are those of stretches.
+
+    Attributes:
+        rows: derivatives of unit length, of parameters that move anything (p, N).
+        scale: length that they had (p,).
+        inverse: of their normal matrix (p, p).
+        shift: the step (p,).
+        own: how many stretches are among them.
+    """
+
+    rows: Array
+    scale: Array
+    inverse: Array
+    shift: Array
+    own: int
+
+    @classmethod
+    def of(cls, rows: Array, error: Array, count: int) -> _Step:
+        """Solve for a step that takes an error (N,) away along rows (p, N)."""
+        scale = np.sqrt(np.einsum('pn,pn->p', rows, rows))
+        known = scale > 0.0
+        rows, scale = rows[known] / scale[known, None], scale[known]
+        inverse = np.asarray(np.linalg.pinv(rows @ rows.T, rcond=1e-10, hermitian=True))
+        return cls(rows, scale, inverse, inverse @ (rows @ error), int(known[:count].sum()))
+
+    @property
+    def nominal(self) -> Array:
+        """Variances of the stretches' scaled parameters under whitened noise (own,)."""
+        return np.asarray(np.diag(self.inverse)[: self.own])
 
 
 def agreement(trial: Trial, scorer: Scorer) -> dict[str, Homogeneity]:
@@ -69,13 +102,9 @@ def between(trial: Trial, scorer: Scorer) -> Array:
     error, jac = scorer.whiten(trial.fit.error), scorer.whiten(trial.fit.jacobian)
     edges, out = _halves(scorer), np.zeros(len(trial.fit.theta))
     for row, reach in enumerate(_reaches(trial)):
-        rows = _free_in_each(jac, row, edges)
-        scale = np.sqrt(np.einsum('pn,pn->p', rows, rows))
-        known = scale > 0.0
-        rows, count = rows[known] / scale[known, None], int(known[: len(edges)].sum())
-        inverse = np.linalg.pinv(rows @ rows.T, rcond=1e-10, hermitian=True)
-        shifts = (inverse @ (rows @ error))[:count] / scale[known][:count]
-        variance = np.diag(inverse)[:count] / scale[known][:count] ** 2
+        step = _Step.of(_free_in_each(jac, row, edges), error, len(edges))
+        scale = step.scale[: step.own]
+        shifts, variance = step.shift[: step.own] / scale, step.nominal / scale**2
         told = variance < (_KNOWN * reach) ** 2
         if told.sum() > 1:
             beyond = shifts[told].var(ddof=1) - variance[told].mean()
@@ -116,18 +145,14 @@ def _compare(
     size: float,
 ) -> Homogeneity:
     """Solve for the stretches' shifts (the first `count` rows) and test that they are equal."""
-    scale = np.sqrt(np.einsum('pn,pn->p', rows, rows))
-    known = scale > 0.0
-    rows, scale = rows[known] / scale[known, None], scale[known]
-    count = int(known[:count].sum())
+    step = _Step.of(rows, error, count)
+    rows, scale, inverse, shift, count = step
     if not count:  # its size moves nothing where the fit stands
         return Homogeneity((), (), float('nan'), None)
-    inverse = np.linalg.pinv(rows @ rows.T, rcond=1e-10, hermitian=True)
-    shift = inverse @ (rows @ error)
     left = error - shift @ rows
     pulls = np.stack([rows[:, b] @ left[b] for b in blocks])
     robust = inverse @ (pulls.T @ pulls) @ inverse * len(blocks) / max(1, len(blocks) - len(rows))
-    nominal = np.diag(inverse)[:count]
+    nominal = step.nominal
     inflation = max(1.0, float(np.mean(np.diag(robust)[:count] / np.maximum(nominal, 1e-300))))
     covariance = inflation * inverse[:count, :count] / np.outer(scale[:count], scale[:count])
     shifts = (shift / scale)[:count]
