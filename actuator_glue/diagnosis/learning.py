@@ -16,6 +16,7 @@ from actuator_glue.diagnosis.learned_forms import forms
 from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.ranking import removed
+from actuator_glue.diagnosis.score import evidence
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
@@ -55,6 +56,25 @@ def learned(selection: ModelSelection, found: Selection) -> Selection | None:
         return None
     singles = selection.rescored(found.singles)
     return selection.concluded(best, search.trial(()), singles)
+
+
+def plainly_better(selection: ModelSelection, found: Selection, named: Selection) -> bool:
+    """Whether a description explains all that is left, plainer and better than names do.
+
+    A name that fits only with what no record shows by itself, as a fault that the controller reads,
+    may stand for what the catalogue does not hold.
+
+    Args:
+        selection: the model selection that ended with both.
+        found: the description.
+        named: the names.
+    """
+    search, best, names = selection.search, found.final, named.final
+    if found.left >= selection.material or len(best.fit.theta) > len(names.fit.theta):
+        return False
+    assert search.scorer is not None
+    scores = (search.scorer.block_scores(t.fit) for t in (best, names))
+    return evidence(*scores) > selection.nats
 
 
 def _additions(

@@ -119,7 +119,12 @@ def _conclude(
             result = _searched(prepared, search, left, settings, tell)
     fed_back = transducer.in_the_loop(result.selection, result.found)
     if fed_back is not None:
-        result = _conclusion(prepared, result.selection, fed_back, result.line)
+        selection, best = result.selection, fed_back
+        if fed_back.left < selection.material:
+            apart, described = _described(result)
+            if described and learning.plainly_better(apart, described, fed_back):
+                selection, best = apart, described
+        result = _conclusion(prepared, selection, best, result.line)
     if result.decision.verdict == 'unexplained' and mean_effects(reserved=True):
         result = _with_reserved(prepared, result, settings, tell)
     if result.decision.verdict != 'unexplained':
@@ -130,6 +135,14 @@ def _conclude(
     found, held = result.found, prepared.held.records
     own = per_record_settings.setting(search, found, limit, held, settings)
     return result if own is None else _conclusion(prepared, selection, own, result.line)
+
+
+def _described(result: Conclusion) -> tuple[ModelSelection, Selection | None]:
+    """Go on with learned terms in a selection apart: its noise, and what it finds."""
+    selection = copy(result.selection)
+    search = _wider(selection.search, ())
+    selection.search = replace(search, entries=dict(search.entries))
+    return selection, learning.learned(selection, result.found)
 
 
 def _line_left(data: Data, final: Trial) -> Line | None:
@@ -197,7 +210,7 @@ def since_onset(first: Conclusion, settings: Thresholds, each: Each, tell: Progr
     materially less than effects that act all the time.
     """
     final = first.found.final
-    if first.decision.verdict == 'none' or final.own is not None:
+    if first.decision.verdict == 'none':
         return first
     if first.decision.left < first.found.material:
         # The answer is complete: only what it found can still have changed, and materially so.
@@ -205,9 +218,16 @@ def since_onset(first: Conclusion, settings: Thresholds, each: Each, tell: Progr
         if changed is None or changed[1] < final.fit.error.size * first.found.material**2:
             return first
     base_fit, whiten = first.found.base.fit, first.scorer.whiten
-    changed = onset.change(first.data, whiten(base_fit.error), whiten(base_fit.jacobian))
-    quiet = None if changed is None else onset.quiet_before(changed[0], first.data)
-    if changed is None or quiet is None:
+    # Whitened what is slow counts little beside misfit, as it is what is quick.
+    for rows in (
+        (whiten(base_fit.error), whiten(base_fit.jacobian)),
+        (base_fit.error, base_fit.jacobian),
+    ):
+        changed = onset.change(first.data, *rows)
+        quiet = None if changed is None else onset.quiet_before(changed[0], first.data)
+        if changed is not None and quiet is not None:
+            break
+    else:
         return first
     moment = changed[0]
     before, base = quiet
