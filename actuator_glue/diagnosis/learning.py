@@ -61,8 +61,8 @@ def learned(selection: ModelSelection, found: Selection) -> Selection | None:
 def plainly_better(selection: ModelSelection, found: Selection, named: Selection) -> bool:
     """Whether a description explains all that is left, plainer and better than names do.
 
-    A name that fits only with what no record shows by itself, as a fault that the controller reads,
-    may stand for what the catalogue does not hold.
+    A name that fits only with what no record shows by itself, as a fault that the controller
+    reads, may stand for what the catalogue does not hold.
 
     Args:
         selection: the model selection that ended with both.

@@ -217,13 +217,11 @@ def since_onset(first: Conclusion, settings: Thresholds, each: Each, tell: Progr
         changed = onset.change(first.data, final.fit.error, final.fit.jacobian)
         if changed is None or changed[1] < final.fit.error.size * first.found.material**2:
             return first
-    base_fit, whiten = first.found.base.fit, first.scorer.whiten
-    # Whitened what is slow counts little beside misfit, as it is what is quick.
-    for rows in (
-        (whiten(base_fit.error), whiten(base_fit.jacobian)),
-        (base_fit.error, base_fit.jacobian),
-    ):
-        changed = onset.change(first.data, *rows)
+    bare, whiten = first.found.base.fit, first.scorer.whiten
+    plain = bare.error, bare.jacobian
+    # Beside misfit what is slow counts little once it is whitened.
+    for error, jacobian in ((whiten(plain[0]), whiten(plain[1])), plain):
+        changed = onset.change(first.data, error, jacobian)
         quiet = None if changed is None else onset.quiet_before(changed[0], first.data)
         if changed is not None and quiet is not None:
             break

@@ -84,10 +84,10 @@ def compute(
 
 def warm_up() -> None:
     """Compile and import what windows need, and learn how long they take once that is done."""
-    for _ in range(2):
+    for windows, swap in (3, True), (1, False):
         # The first time compiling counts: ten windows would find no time left for sampling.
         _Reserve.seconds = _Reserve.tracking = 0.0
-        warm_windows(lambda job: computed(job, time.monotonic() + 60.0)[0])
+        warm_windows(lambda job: computed(job, time.monotonic() + 60.0)[0], swap, windows)
 
 
 def computed(job: Job, deadline: float) -> tuple[WindowResult, Tracked | None]:

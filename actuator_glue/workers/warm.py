@@ -19,16 +19,19 @@ from actuator_glue.sample_block import Block
 from actuator_glue.setups import StreamSetup
 
 
-def warm_windows(compute: Callable[[Job], WindowResult] = run, swap: bool = True) -> None:
+def warm_windows(
+    compute: Callable[[Job], WindowResult] = run, swap: bool = True, windows: int = 3
+) -> None:
     """Compile and import what windows need, by estimating a short stream as a live one.
 
     Args:
         compute: computes a job.
         swap: whether the model may be swapped for one with effects, too.
+        windows: how many are estimated; with `swap` all but the first have an effect.
     """
-    rng = np.random.default_rng(0)
-    command = 1e-3 * np.sin(2 * np.pi * 2.0 * np.arange(1200) / 200.0)
-    measured = command + 1e-5 * rng.standard_normal(1200)
+    rng, count = np.random.default_rng(0), 200 * (windows + 2)
+    command = 1e-3 * np.sin(2 * np.pi * 2.0 * np.arange(count) / 200.0)
+    measured = command + 1e-5 * rng.standard_normal(count)
     settings = EstimatorSettings(
         window=3.0, time_budget=1.0, evaluations=4000, start_evaluations=8000
     )

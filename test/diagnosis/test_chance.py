@@ -56,6 +56,7 @@ def test_friction_is_shares_of_what_resists(rng_seed: int) -> None:
     np.testing.assert_allclose(space.theta(z), expected, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_it_is_named_alone_with_what_does_not_count(rng_seed: int) -> None:
     """Two sweeps; what ends by chance is told.
 

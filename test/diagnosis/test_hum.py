@@ -44,7 +44,9 @@ def test_noise_has_no_line(seed: int) -> None:
     assert hum.find(*residual(50.0, 0.0, seed)) is None
 
 
-@pytest.mark.parametrize(('command', 'amplitude'), [(0, 12e-6), (1, 0.0)])
+@pytest.mark.parametrize(
+    ('command', 'amplitude'), [(0, 12e-6), pytest.param(1, 0.0, marks=pytest.mark.slow)]
+)
 def test_a_line_of_the_missing_effect_is_no_hum(
     command: int, amplitude: float, rng_seed: int
 ) -> None:

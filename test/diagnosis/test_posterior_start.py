@@ -15,8 +15,8 @@ from actuator_glue.model.structure import Structure
 @pytest.mark.parametrize(
     ('effect', 'size', 'which'),
     [
-        ('backlash', 6e-5, (0, 1)),
         ('valve-deadband', 2e-4, (1,)),
+        pytest.param('backlash', 6e-5, (0, 1), marks=pytest.mark.slow),
         pytest.param('backlash', 6e-5, (1,), marks=pytest.mark.slow),
         pytest.param('valve-deadband', 2e-4, (0, 1), marks=pytest.mark.slow),
     ],

@@ -26,7 +26,13 @@ def _uniform_step(z, uniforms, rows, size, tuning, knobs, scratch, candidate):
     return 0.0, NO_CLASS
 
 
-@pytest.mark.parametrize('share', [0.5, None], ids=['fixed', 'by what it achieves'])
+@pytest.mark.parametrize(
+    'share',
+    [
+        pytest.param(0.5, id='fixed'),
+        pytest.param(None, id='by what it achieves', marks=pytest.mark.slow),
+    ],
+)
 def test_a_fourth_move_is_registered_from_outside(share: float | None, rng_seed: int) -> None:
     """It is made as often as it says, samples right, and crossover statistics stay in place."""
     walk = Move('walk', _uniform_step, lambda dimension, pairs: 2, share=share, most=0.5)

@@ -32,8 +32,9 @@ def start(tmp_path):
     """Start nodes; whatever still runs at the end is killed."""
     running = []
 
-    def begin(executable, name=None, *, namespace='', **parameters):
-        process = Process(executable, name or executable, parameters, tmp_path, namespace)
+    def begin(executable, name=None, *, namespace='', installed=False, **parameters):
+        node = name or executable
+        process = Process(executable, node, parameters, tmp_path, namespace, installed)
         running.append(process)
         return process
 

@@ -14,6 +14,7 @@ import rclpy
 import yaml
 from actuator_glue_msgs.msg import PosteriorMoments, SampleBlock, TestSetup
 from diagnostic_msgs.msg import DiagnosticArray
+from forked import Forked
 from lifecycle_msgs.srv import ChangeState, GetState
 from rcl_interfaces.srv import DescribeParameters, GetParameters, ListParameters, SetParameters
 from rclpy.node import Node
@@ -44,21 +45,29 @@ def executable(name):
 
 
 class Process:
-    """One node in a process of its own."""
+    """One node in a process of its own, forked (see forked.py) or started as installed."""
 
-    def __init__(self, name, node, parameters, folder, namespace=''):
+    def __init__(self, name, node, parameters, folder, namespace='', installed=False):
         self.name = node
         self.log = folder / f'{namespace}{node}.log'
         file = folder / f'{namespace}{node}.yaml'
         file.write_text(yaml.safe_dump({'/**': {'ros__parameters': parameters}}))
-        command = [str(executable(name)), '--ros-args', '--params-file', str(file)]
+        arguments = ['--ros-args', '--params-file', str(file)]
         if node != name:
-            command += ['-r', f'__node:={node}']
+            arguments += ['-r', f'__node:={node}']
         if namespace:
-            command += ['-r', f'__ns:=/{namespace}']
-        with self.log.open('wb') as log:
+            arguments += ['-r', f'__ns:=/{namespace}']
+        self.log.touch()
+        if not installed:
+            self.process = Forked(name, arguments, folder, self.log)
+            return
+        with self.log.open('ab') as log:
             self.process = subprocess.Popen(
-                command, stdout=log, stderr=subprocess.STDOUT, cwd=folder, start_new_session=True
+                [str(executable(name)), *arguments],
+                stdout=log,
+                stderr=subprocess.STDOUT,
+                cwd=folder,
+                start_new_session=True,
             )
 
     @property
@@ -82,6 +91,7 @@ class Process:
         """End the process and its children, whatever they do."""
         with suppress(ProcessLookupError):
             os.killpg(self.process.pid, signal.SIGKILL)
+        self.process.kill()  # before it has a group of its own, too
         self.process.wait()
 
 

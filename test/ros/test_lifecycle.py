@@ -34,7 +34,7 @@ def needed(node, tmp_path):
 
 @pytest.mark.parametrize('node', NODES)
 def test_every_transition(node, start, probe, tmp_path):
-    process = start(node, autostart=False, **needed(node, tmp_path))
+    process = start(node, autostart=False, installed=True, **needed(node, tmp_path))
     assert probe.state(node) == 'unconfigured'
     for label, state in (
         ('configure', 'inactive'),
