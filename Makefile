@@ -37,7 +37,7 @@ demo: $(ROS_STAMP) ## about a minute of real nodes; results in out/demo
 		$(if $(STIFFNESS),--stiffness '$(STIFFNESS)') $(DEMO_ARGS)
 
 test: $(ROS_STAMP) ## all tests but the slow ones
-	@$(ROS) $(BIN)/python -m pytest -n 2 --dist loadfile --durations 10 $(PYTEST_ARGS)
+	@$(ROS) $(BIN)/python -m pytest -n 3 --dist loadfile --durations 10 $(PYTEST_ARGS)
 
 # A target of its own: before Python 3.12 every call is traced, and the tests take much longer.
 coverage: $(ROS_STAMP) ## the same tests, counting lines; fails below 90 %
