@@ -196,7 +196,11 @@ def test_a_gain_of_one_test_is_named_with_its_record(size: float) -> None:
 
 @pytest.mark.parametrize(
     ('effect', 'size'),
-    [('specimen-hardening', 2.5e5), ('specimen-gap', 6e-4), ('viscous-damping', 2e4)],
+    [
+        ('specimen-gap', 6e-4),
+        pytest.param('specimen-hardening', 2.5e5, marks=pytest.mark.slow),
+        pytest.param('viscous-damping', 2e4, marks=pytest.mark.slow),
+    ],
 )
 def test_a_specimen_effect_is_not_taken_for_a_setting(effect: str, size: float) -> None:
     """What only the specimen test shows is the specimen's where that explains it."""

@@ -13,7 +13,7 @@ from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.transducer import in_the_loop
 from actuator_glue.records import Array, Record
 
-NOISE, STROKE, RATE, SECONDS = 1e-5, 2e-3, 256.0, 24.0
+NOISE, STROKE, RATE, SECONDS = 1e-5, 2e-3, 256.0, 16.0
 PLANTS = np.array([[128.0, 1.01e9, 2.42e5, 0.3], [225.0, 5.3e9, 6e5, 0.3]])
 NAMES = ('backlash', 'stribeck-friction', 'specimen-yield', 'delay', 'gain')
 _FEEDBACK_PLAY = 7  # departure of smooth_machines.py
