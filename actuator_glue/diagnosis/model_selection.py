@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -27,6 +27,10 @@ _SURE = 2.0  # standard errors over the blocks: what is less is not told apart
 # random commands, 0.22 to 0.47 of shaking that swells and fades, below 0.12 of sines, and of
 # sweeps nearly always below this (100 of each).
 _STATIONARY = 0.2
+
+
+def _by_score(trials: Iterable[Trial]) -> list[Trial]:
+    return sorted(trials, key=lambda t: -float(t.scores.sum()))
 
 
 class ModelSelection:
@@ -83,8 +87,7 @@ class ModelSelection:
 
     def rescored(self, trials: Sequence[Trial]) -> list[Trial]:
         """Score with the present noise, best first."""
-        out = [self.search.trial(t.effects, t.added) for t in trials]
-        return sorted(out, key=lambda t: -float(t.scores.sum()))
+        return _by_score(self.search.trial(t.effects, t.added) for t in trials)
 
     def better(self, larger: Trial, smaller: Trial, threshold: float, cost: float = 0.0) -> bool:
         """Whether the larger structure is worth its parameters: significant and material.
@@ -108,7 +111,7 @@ class ModelSelection:
             tried = self.search.screened(current, names)[: self.settings.tried]
             for trial in self.search.additions(current, tried, valves=False):
                 found.setdefault(trial.effects, trial)
-        return sorted(found.values(), key=lambda t: -float(t.scores.sum()))
+        return _by_score(found.values())
 
     def overlooked(self, current: Trial) -> list[Trial]:
         """Refit a structure with effects whose motion beside its members is another than alone.
@@ -131,15 +134,13 @@ class ModelSelection:
         self.nats = false_alarms.threshold(*self.search.signatures(), s.false_alarms)
         current, ranked, threshold = base, list(singles), self.material
         for stage in range(1, s.most + 1):
-            # Nats weigh the whitened error, materiality the plain one: the best by nats may be
-            # immaterial where another effect is neither.
-            worth = [t for t in ranked if self.better(t, current, threshold)]
-            if not worth and self.left(current) >= threshold:
+            best = self._first_worth(ranked, current, threshold)
+            if best is None and self.left(current) >= threshold:
                 ranked = self.overlooked(current)
-                worth = [t for t in ranked if self.better(t, current, threshold)]
-            if not worth:
+                best = self._first_worth(ranked, current, threshold)
+            if best is None:
                 break
-            current = worth[0]
+            current = best
             self.renoise(current)
             base, singles = self.search.trial(()), self.rescored(singles)
             threshold = self.material
@@ -154,6 +155,16 @@ class ModelSelection:
                 ranked = self.rescored(ranked)
             current = self.search.trial(current.effects, current.added)
         return self.concluded(current, base, singles)
+
+    def _first_worth(
+        self, ranked: Sequence[Trial], current: Trial, threshold: float
+    ) -> Trial | None:
+        """Return the best structure that is worth its parameters.
+
+        Nats weigh the whitened error, materiality the plain one: the best by nats may be
+        immaterial where another effect is neither.
+        """
+        return next((t for t in ranked if self.better(t, current, threshold)), None)
 
     def _nearest(self, trials: Sequence[Trial]) -> Trial:
         """Return what leaves the least error out of sample: its residual is nearest to noise.

@@ -15,6 +15,7 @@ from actuator_glue.diagnosis.estimate import Json
 from actuator_glue.diagnosis.fit import Fit, base_fit
 from actuator_glue.diagnosis.score import pooled, splits_of
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.model.linear import systems
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 
@@ -234,17 +235,25 @@ def dated(data: Data, moment: Moment, base: Fit, found: Trial, noise: float) -> 
     best, growth = float(jump.max()), 0.0
     profile: Array = np.asarray(jump)
     times = time
+    # A jump may lie anywhere in the gap before the first sample that shows it.
+    earliest: Array = np.concatenate([time[:1], time[:-1]])
     coarse: Array = np.asarray(np.arange(0.0, end, _STEP), dtype=np.float64)
     for share in _GROWTHS:
         shapes = (np.clip((time - t) / max(share * (end - t), 1e-9), 0.0, 1.0) for t in coarse)
         slow = [-0.5 * float(np.sum((error - w * step) ** 2)) for w in shapes]
         if max(slow) > best + _WITHIN:
-            best, profile, times = max(slow), np.array(slow), coarse
+            best, profile, times, earliest = max(slow), np.array(slow), coarse, coarse
             growth = share * (end - float(coarse[int(np.argmax(slow))]))
-    inside = times[profile > best - _WITHIN]
-    at = float(times[int(np.argmax(profile))])
+    inside = np.flatnonzero(profile > best - _WITHIN)
+    top = int(np.argmax(profile))
+    gap = times[top] - earliest[top] > 1.5 * record.period
+    at = float(0.5 * (earliest[top] + times[top]) if gap else times[top])
     margin = _STEP if growth > 0.0 else record.period
+    # What acts at the valve shows as late as the loop follows a command: on average by its delay.
+    ((a1, a0, _),) = systems(base.theta, record.known_stiffness())
+    late = float(a1 / a0)
     return Onset(
-        record.source or f'record {i + 1}', at, max(0.0, float(inside[0]) - margin),
-        min(end, float(inside[-1]) + margin), growth, found.effects,
+        record.source or f'record {i + 1}', at,
+        max(0.0, float(earliest[inside[0]]) - margin - late),
+        min(end, float(times[inside[-1]]) + margin), growth, found.effects,
     )  # fmt: skip

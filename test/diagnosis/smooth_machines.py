@@ -65,7 +65,8 @@ def piston(
     4 leakage f|f| [1/(N s)], 5 leakage as through an orifice [N^0.5/s], 6 play of the command,
     7 of the controller's own transducer, 8 of half of the valve, the other half without, half
     widths [m], 9 flow that grows by a share as it warms, 10 specimen that stiffens by a share,
-    11 friction as tanh(v/1 mm/s), 12 that of the specimen's support [N].
+    11 friction as tanh(v/1 mm/s), 12 that of the specimen's support [N], 13 flow that falls with
+    the square of the position [1/m^2].
     """
     kind, size = departure
     b1, n0, a2, a3 = theta
@@ -91,6 +92,8 @@ def piston(
             middle = q + 0.5 * h * (drive - b1 * q)
             q += h * (drive - b1 * middle)
             flow = middle * (1.0 + size * warm) if kind == 9 else middle
+            if kind == 13:
+                flow = middle * (1.0 - size * x * x)
             stiff = k * (1.0 + size * warm) if kind == 10 else k
             leak = a3 * f
             if kind == 4:

@@ -2,16 +2,23 @@
 
 import json
 from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.diagnose import diagnose
+from actuator_glue.diagnosis.fit import base_fit, fit
+from actuator_glue.diagnosis.onset import Moment, dated
 from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
 
+BLIND = Path(__file__).parents[2] / 'benchmarks' / 'blind'
 RATE = 128.0
 THETA = np.array([235.0, 5.0e10, 4.23e6, 3.3])
 T = np.arange(int(36 * RATE)) / RATE
@@ -71,3 +78,55 @@ def test_a_changed_machine_is_no_missing_effect() -> None:
 def test_what_acts_all_the_time_or_never_has_no_onset(at: float) -> None:
     """A sweep that shows an effect only when it is fast does not make it appear."""
     assert diagnosed('coulomb-friction', 2500.0, at).onset is None
+
+
+@pytest.mark.slow
+def test_what_appears_in_one_record_is_no_setting_of_the_other(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A blind machine whose valve's null moves during the first test: no bias of the second.
+
+    Of whitened errors the change shows least, and the bias leaves less than the verdict's limit.
+    """
+    monkeypatch.syspath_prepend(str(BLIND))
+    case = import_module('mixed').build(20018)
+    records = [
+        Record(u, y, 1.0 / case.rate, stiffness=k, source=source)
+        for u, y, k, source in zip(
+            case.commands, case.measured, case.stiffness, ('first', 'second', 'held'), strict=True
+        )
+    ]
+    found = diagnose(records[:2], records[2], settings=Thresholds(evaluations=0))
+    assert found.onset is not None
+    assert found.onset.source == 'first'
+    assert found.onset.lower <= case.sizes['onset'] <= found.onset.upper
+    assert not any(e.records for e in found.effects)
+    (null,) = (e.parameters['null_offset'] for e in found.effects)
+    assert null.mean == pytest.approx(case.parameters['null_offset'], rel=0.03)
+
+
+def test_an_onset_may_lie_in_the_gap_before_it_shows() -> None:
+    """Samples that are held out say nothing: the interval holds all of the gap."""
+    rng = np.random.default_rng()
+    seconds = float(rng.uniform(11.0, 13.0))
+    bare = Record(COMMAND, np.zeros(len(T)), 1 / RATE, stiffness=250e3)
+    off, on = (
+        Structure(names).simulate(np.array([*THETA, *size]), bare)
+        for names, size in (((), ()), (('valve-null',), (5e-5,)))
+    )
+    measured = off + (seconds <= T) * (on - off) + 1e-6 * rng.standard_normal(len(T))
+    whole = Data.whole([replace(bare, measured=measured)])
+    counted = (T < 10.5) | (T >= 13.5)
+    data = replace(whole, masks=(counted,))
+    moment = Moment(0, 13.5)
+    before, since = moment.split(data)
+    found = Trial(
+        Structure(('valve-null',)),
+        'valve-null',
+        fit(since, Structure(('valve-null',)), np.array([[*THETA, 4e-5]])),
+        np.zeros(0),
+    )
+    told = dated(data, moment, base_fit(before), found, 1e-6)
+    assert told.lower == pytest.approx(10.5, abs=0.05)
+    assert told.upper == pytest.approx(13.5, abs=0.02)
+    assert told.lower < told.time < told.upper

@@ -6,6 +6,7 @@ from scipy.interpolate import CubicSpline
 from smooth_machines import piston
 
 from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
@@ -58,3 +59,26 @@ def test_play_inside_of_the_loop_is_told_from_play_beside_it(inside: bool) -> No
     sizes = dict(zip((p.name for p in final.structure.parameters), final.fit.theta, strict=True))
     assert sizes['backlash'] == pytest.approx(half, abs=1.5e-6)
     assert sizes.get('feedback_share', 1.0) == pytest.approx(1.0, abs=0.05)
+
+
+@pytest.mark.slow
+def test_a_plainer_description_comes_before_a_fault_in_the_loop() -> None:
+    """Flow that falls with the position is no curved transducer that the controller reads.
+
+    That fits to the noise, too, with two parameters more.
+    """
+    rng = np.random.default_rng()
+    size = float(rng.uniform(1e5, 1.6e5))
+    theta = PLANTS[1] * np.exp(0.1 * rng.standard_normal(4))
+    t = np.arange(0.0, SECONDS, 1.0 / RATE)
+    command = STROKE * np.sin(np.pi * (9.0 / SECONDS) * t**2)
+    records = []
+    for k in (0.0, 250e3):
+        measured = piston(command, 1.0 / RATE, theta, k, (13, size))
+        measured += NOISE * rng.standard_normal(len(t))
+        records.append(Record(command, measured, 1.0 / RATE, stiffness=k))
+    found = diagnose(records, settings=Thresholds(evaluations=0))
+    assert found.complete and found.error.after < 1.05 * NOISE
+    assert [e.name for e in found.effects] == ['learned-flow-q-x2']
+    (estimate,) = found.effects[0].parameters.values()
+    assert -estimate.mean == pytest.approx(size, rel=0.05)

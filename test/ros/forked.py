@@ -9,6 +9,7 @@ import os
 import signal
 import subprocess
 import sys
+from pathlib import Path
 
 from actuator_glue.nodes import parameter_file
 
@@ -24,7 +25,7 @@ def _node(name, arguments, folder, log, environment):
     os.chdir(folder)
     os.environ.clear()
     os.environ.update(environment)
-    with open(log, 'ab') as file:
+    with Path(log).open('ab') as file:
         for stream in sys.stdout, sys.stderr:
             os.dup2(file.fileno(), stream.fileno())
     sys.argv = [name, *arguments]
