@@ -119,12 +119,10 @@ def _conclude(
             result = _searched(prepared, search, left, settings, tell)
     fed_back = transducer.in_the_loop(result.selection, result.found)
     if fed_back is not None:
-        selection, best = result.selection, fed_back
-        if fed_back.left < selection.material:
-            apart, described = _described(result)
-            if described and learning.plainly_better(apart, described, fed_back):
-                selection, best = apart, described
-        result = _conclusion(prepared, selection, best, result.line)
+        described = _described(result, fed_back)
+        if described is not None:
+            return described
+        result = _conclusion(prepared, result.selection, fed_back, result.line)
     if result.decision.verdict == 'unexplained' and mean_effects(reserved=True):
         result = _with_reserved(prepared, result, settings, tell)
     if result.decision.verdict != 'unexplained':
@@ -137,12 +135,19 @@ def _conclude(
     return result if own is None else _conclusion(prepared, selection, own, result.line)
 
 
-def _described(result: Conclusion) -> tuple[ModelSelection, Selection | None]:
-    """Go on with learned terms in a selection apart: its noise, and what it finds."""
+def _described(result: Conclusion, fed_back: Selection) -> Conclusion | None:
+    """Describe by learned terms what a fault in the loop explains, where that is better."""
     selection = copy(result.selection)
+    if fed_back.left >= selection.material:
+        return None
+    # Apart: the noise of what is found here is not that of the names.
     search = _wider(selection.search, ())
     selection.search = replace(search, entries=dict(search.entries))
-    return selection, learning.learned(selection, result.found)
+    found = learning.learned(selection, result.found)
+    if found is None or not learning.plainly_better(selection, found, fed_back):
+        return None
+    described = _conclusion(result.prepared, selection, found, result.line)
+    return None if described.decision.verdict == 'unexplained' else described
 
 
 def _line_left(data: Data, final: Trial) -> Line | None:
