@@ -16,7 +16,6 @@ from actuator_glue.diagnosis.learned_forms import forms
 from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.ranking import removed
-from actuator_glue.diagnosis.score import evidence
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
@@ -58,11 +57,12 @@ def learned(selection: ModelSelection, found: Selection) -> Selection | None:
     return selection.concluded(best, search.trial(()), singles)
 
 
-def plainly_better(selection: ModelSelection, found: Selection, named: Selection) -> bool:
-    """Whether a description explains all that is left, plainer and better than names do.
+def as_good_and_plainer(selection: ModelSelection, found: Selection, named: Selection) -> bool:
+    """Whether a description explains all that is left, as well as names do with more parameters.
 
     A name that fits only with what no record shows by itself, as a fault that the controller
-    reads, may stand for what the catalogue does not hold.
+    reads, may stand for what the catalogue does not hold: it is told where it explains more than
+    a description, out of sample and less a nat per parameter.
 
     Args:
         selection: the model selection that ended with both.
@@ -70,11 +70,12 @@ def plainly_better(selection: ModelSelection, found: Selection, named: Selection
         named: the names.
     """
     search, best, names = selection.search, found.final, named.final
-    if found.left >= selection.material or len(best.fit.theta) > len(names.fit.theta):
+    fewer = len(names.fit.theta) - len(best.fit.theta)
+    if found.left >= selection.material or fewer < 0:
         return False
     assert search.scorer is not None
-    scores = (search.scorer.block_scores(t.fit) for t in (best, names))
-    return evidence(*scores) > selection.nats
+    gain = search.scorer.block_scores(best.fit) - search.scorer.block_scores(names.fit)
+    return float(gain.sum()) + fewer > 0.0
 
 
 def _additions(

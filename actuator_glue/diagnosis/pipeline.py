@@ -144,7 +144,7 @@ def _described(result: Conclusion, fed_back: Selection) -> Conclusion | None:
     search = _wider(selection.search, ())
     selection.search = replace(search, entries=dict(search.entries))
     found = learning.learned(selection, result.found)
-    if found is None or not learning.plainly_better(selection, found, fed_back):
+    if found is None or not learning.as_good_and_plainer(selection, found, fed_back):
         return None
     described = _conclusion(result.prepared, selection, found, result.line)
     return None if described.decision.verdict == 'unexplained' else described
