@@ -24,7 +24,7 @@ from actuator_glue.diagnosis.decimate import motion_bandwidth
 from actuator_glue.diagnosis.fit import Fit
 from actuator_glue.diagnosis.noise import whiten
 from actuator_glue.diagnosis.regression import library
-from actuator_glue.diagnosis.score import Scorer, evidence
+from actuator_glue.diagnosis.score import Scorer, evidence, splits_of
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 
@@ -36,6 +36,16 @@ _FADING = (0.1, 0.5, 2.0)  # s in which the expected square of an impulse respon
 # Expected squares of weights, of features of unit power and in units of the noise.
 _SIZES = (0.0, 1e-3, 1e-2, 0.1, 1.0, 10.0)
 _NONE = 1e-4  # weights that are expected this much smaller than the largest are not asked for
+# Share of a motion's power that passes for noise, above which a residual's may, too: 0.93 to 1 of
+# random commands, 0.22 to 0.47 of shaking that swells and fades, below 0.12 of sines, and of
+# sweeps nearly always below this (100 of each).
+_STATIONARY = 0.2
+
+
+def stationary(data: Data) -> list[bool]:
+    """Whether what follows the command may look like noise: the motion of a record does."""
+    motions = splits_of(data, data.target)
+    return [m.noise**2 > _STATIONARY * m.mean_square for m in motions]
 
 
 def noise(data: Data, scorer: Scorer, theta: Array, fit: Fit, nats: float) -> Array:

@@ -23,10 +23,6 @@ _SWAPS = 4
 # Share of the bounds within which a parameter is at one of them.
 _AT_BOUND = 1e-3
 _SURE = 2.0  # standard errors over the blocks: what is less is not told apart
-# Share of a motion's power that passes for noise, above which a residual's may, too: 0.93 to 1 of
-# random commands, 0.22 to 0.47 of shaking that swells and fades, below 0.12 of sines, and of
-# sweeps nearly always below this (100 of each).
-_STATIONARY = 0.2
 
 
 def _by_score(trials: Iterable[Trial]) -> list[Trial]:
@@ -80,10 +76,7 @@ class ModelSelection:
 
     @cached_property
     def _stationary(self) -> list[bool]:
-        """Whether what follows the command may look like noise: the motion of a record does."""
-        data = self.search.data
-        motions = splits_of(data, data.target)
-        return [m.noise**2 > _STATIONARY * m.mean_square for m in motions]
+        return forecast.stationary(self.search.data)
 
     def rescored(self, trials: Sequence[Trial]) -> list[Trial]:
         """Score with the present noise, best first."""
