@@ -34,7 +34,7 @@ class Onset:
     Attributes:
         source: the record in which it appeared.
         time: since that record's first sample [s].
-        lower: 95 % profile-likelihood interval of `time`, from [s]
+        lower: 95 % profile-likelihood interval of `time`, from [s]; earlier by the loop's delay
         upper: to [s].
         growth: time it took to grow to its size [s]; 0 where it was there at once.
         effects: what appeared; empty where Eq. (2)'s own parameters changed.
