@@ -9,6 +9,7 @@ import os
 import signal
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 from actuator_glue.nodes import parameter_file
@@ -62,7 +63,8 @@ class Forked:
     def send_signal(self, number):
         """Send a signal, unless it has ended."""
         if self._process.exitcode is None:
-            os.kill(self.pid, number)
+            with suppress(ProcessLookupError):
+                os.kill(self.pid, number)
 
     def kill(self):
         """End it at once."""

@@ -27,7 +27,7 @@ def end_as_launch_does(process):
 
 def test_a_doubled_signal_leaves_the_bag_whole(start, probe, tmp_path):
     bag = tmp_path / 'bag'
-    recorder = start('recorder', bag=str(bag))
+    recorder = start('recorder', installed=True, bag=str(bag))
     probe.open_stream()
     probe.setup()
     for _ in range(200):
@@ -91,11 +91,12 @@ def test_the_first_run_on_a_machine_is_whole(start, probe, tmp_path, monkeypatch
     monkeypatch.setenv('NUMBA_CACHE_DIR', str(tmp_path / 'cache'))
     bag, sealed = tmp_path / 'bag', tmp_path / 'truth.json'
     nodes = [
-        start('recorder', bag=str(bag)),
-        start('estimator', window=4.0, hop=2.0, time_budget=1.8),
-        start('diagnoser', minimum=10.0),
+        start('recorder', installed=True, bag=str(bag)),
+        start('estimator', installed=True, window=4.0, hop=2.0, time_budget=1.8),
+        start('diagnoser', installed=True, minimum=10.0),
         start(
             'actuator_sim',
+            installed=True,
             rate=200.0,
             duration=90.0,
             wait_for=3,
