@@ -243,7 +243,7 @@ def test_demo_from_end_to_end(tmp_path: Path) -> None:
     """
     _need_nodes()
     out = tmp_path / 'out'
-    # A window that starts anew takes several hops while others compile: time for five all the same.
+    # A window that starts anew takes several hops while others compile: time for five.
     arguments = ['--seconds', '18', '--rate', '200', '--window', '3', '--no-diagnosis']
     arguments += ['--effect', 'none']
     command = [sys.executable, '-m', 'examples.demonstration', '--out', str(out)]
