@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -12,7 +12,7 @@ from actuator_glue.diagnosis.fit import Fit
 from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.ranking import compare, removed, spokesman, standard_error, worth
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
-from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.search import Search, by_score
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
@@ -23,10 +23,6 @@ _SWAPS = 4
 # Share of the bounds within which a parameter is at one of them.
 _AT_BOUND = 1e-3
 _SURE = 2.0  # standard errors over the blocks: what is less is not told apart
-
-
-def _by_score(trials: Iterable[Trial]) -> list[Trial]:
-    return sorted(trials, key=lambda t: -float(t.scores.sum()))
 
 
 class ModelSelection:
@@ -80,7 +76,7 @@ class ModelSelection:
 
     def rescored(self, trials: Sequence[Trial]) -> list[Trial]:
         """Score with the present noise, best first."""
-        return _by_score(self.search.trial(t.effects, t.added) for t in trials)
+        return sorted((self.search.trial(t.effects, t.added) for t in trials), key=by_score)
 
     def better(self, larger: Trial, smaller: Trial, threshold: float, cost: float = 0.0) -> bool:
         """Whether the larger structure is worth its parameters: significant and material.
@@ -104,7 +100,7 @@ class ModelSelection:
             tried = self.search.screened(current, names)[: self.settings.tried]
             for trial in self.search.additions(current, tried, valves=False):
                 found.setdefault(trial.effects, trial)
-        return _by_score(found.values())
+        return sorted(found.values(), key=by_score)
 
     def overlooked(self, current: Trial) -> list[Trial]:
         """Refit a structure with effects whose motion beside its members is another than alone.

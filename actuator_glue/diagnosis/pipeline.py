@@ -137,9 +137,9 @@ def _conclude(
 
 def _described(result: Conclusion, fed_back: Selection) -> Conclusion | None:
     """Describe by learned terms what a fault in the loop explains, where that is better."""
-    selection = copy(result.selection)
-    if fed_back.left >= selection.material:
+    if fed_back.left >= result.selection.material:
         return None
+    selection = copy(result.selection)
     # Apart: the noise of what is found here is not that of the names.
     search = _wider(selection.search, ())
     selection.search = replace(search, entries=dict(search.entries))

@@ -45,7 +45,8 @@ _POLES = ('lag', 'gain', 'inertia')
 _VALVES = (1.0, 0.6, 1.6, 0.4, 2.5)
 
 
-def _by_score(trial: Trial) -> float:
+def by_score(trial: Trial) -> float:
+    """Sort the best out-of-sample score first."""
     return -float(trial.scores.sum())
 
 
@@ -234,7 +235,7 @@ class Search:
         for trial in self.each(lambda n: self.add(current, n), wanted):
             out.append(trial)
             progress(len(out) / len(wanted))
-        out.sort(key=_by_score)
+        out.sort(key=by_score)
         # Only what is near the best is worth the last digits, or what leaves less by far: short of
         # its optimum a fit has a bad score.
         error = out[0].mean_square if out else 0.0
@@ -243,7 +244,7 @@ class Search:
         tried += [t for t in least if 1.5 * t.mean_square < error]
         tried = [t for t in tried if t.mean_square < below]
         rest = [t for t in out if all(t is not other for other in tried)]
-        return sorted([*self.each(lambda t: self.polish(t, valves), tried), *rest], key=_by_score)
+        return sorted([*self.each(lambda t: self.polish(t, valves), tried), *rest], key=by_score)
 
     def screened(self, current: Trial, names: Iterable[str], *, beside: bool = False) -> list[str]:
         """Sort effects by what their signatures could remove from the present residual.

@@ -20,6 +20,7 @@ THETA = np.array([235.0, 5.0e10, 4.23e6, 3.3])
 T = np.arange(int(24 * RATE)) / RATE
 SWEEP = 2e-3 * np.sin(np.pi * (10.0 / 24.0) * T**2)
 QUICK = Thresholds(evaluations=0)
+SHARP = replace(QUICK, noise_share=0.4)
 
 
 def make(effects: Sequence[str], sizes: Sequence[float], seed: int) -> list[Record]:
@@ -160,14 +161,7 @@ def test_a_name_that_a_regression_beats_is_doubted() -> None:
     A linear effect is named for it; what v|v| explains by 50 nats and more better than the name
     is not the name's doing.
     """
-    rng = np.random.default_rng(21)
-    rated = SWEEP * (1 + 0.5 * np.abs(np.gradient(SWEEP, 1 / RATE)))
-    records = []
-    for k in (0.0, 250e3):
-        y = Structure(()).simulate(THETA, Record(rated, rated, 1 / RATE, stiffness=k))
-        y = y + 1e-5 * rng.standard_normal(len(T))
-        records.append(Record(SWEEP, y, 1 / RATE, stiffness=k))
-    found = diagnose(records, settings=replace(QUICK, noise_share=0.4))
+    found = diagnose(rate_gain(), settings=SHARP)
     assert found.verdict == 'unexplained'
     assert not found.complete
     # It takes error away and stays, but it is said that it may stand for something else.
@@ -175,6 +169,25 @@ def test_a_name_that_a_regression_beats_is_doubted() -> None:
     assert any('may stand for' in line for line in found.advice)
     assert found.surrogate['features'][0] == 'd/dt loop(v|v|)'
     assert found.surrogate['nats'] > 40.0
+
+
+@pytest.mark.slow
+def test_without_the_surrogate_the_name_is_trusted() -> None:
+    """What is doubted of the same machine is the surrogate's doing."""
+    trusting = diagnose(rate_gain(), settings=replace(SHARP, beaten_share=1.0))
+    assert trusting.verdict == 'missing-effect'
+
+
+def rate_gain() -> list[Record]:
+    """Two sweeps of a machine whose command gain depends on the command's rate."""
+    rng = np.random.default_rng(21)
+    rated = SWEEP * (1 + 0.5 * np.abs(np.gradient(SWEEP, 1 / RATE)))
+    records = []
+    for k in (0.0, 250e3):
+        y = Structure(()).simulate(THETA, Record(rated, rated, 1 / RATE, stiffness=k))
+        y = y + 1e-5 * rng.standard_normal(len(T))
+        records.append(Record(SWEEP, y, 1 / RATE, stiffness=k))
+    return records
 
 
 @pytest.mark.parametrize('size', [1.03, pytest.param(1.05, marks=pytest.mark.slow)])

@@ -17,7 +17,7 @@ from actuator_glue.records import Array, Record
 NOISE, STROKE, RATE, SECONDS = 1e-5, 2e-3, 256.0, 16.0
 PLANTS = np.array([[128.0, 1.01e9, 2.42e5, 0.3], [225.0, 5.3e9, 6e5, 0.3]])
 NAMES = ('backlash', 'stribeck-friction', 'specimen-yield', 'delay', 'gain')
-_FEEDBACK_PLAY = 7  # departure of smooth_machines.py
+_FEEDBACK_PLAY, _POSITION_GAIN = 7, 13  # departures of smooth_machines.py
 _FINER = 16
 
 
@@ -31,17 +31,26 @@ def play(x: Array, half: float) -> Array:
     return out[::_FINER]
 
 
-def selected(half: float, inside: bool, rng: np.random.Generator) -> Selection:
-    """What is chosen for two sweeps, without and with a specimen."""
-    theta = rng.choice(PLANTS) * np.exp(0.1 * rng.standard_normal(4))
+def sweeps(
+    plant: Array, departure: tuple[int, float], rng: np.random.Generator, half: float = 0.0
+) -> list[Record]:
+    """Two of a machine near a plant, without and with a specimen; a transducer may have play."""
+    theta = plant * np.exp(0.1 * rng.standard_normal(4))
     t = np.arange(0.0, SECONDS, 1.0 / RATE)
     command = STROKE * np.sin(np.pi * (9.0 / SECONDS) * t**2)
     records = []
     for k in (0.0, 250e3):
-        departure = (_FEEDBACK_PLAY, half) if inside else (0, 0.0)
-        measured = play(piston(command, 1.0 / RATE, theta, k, departure), half)
+        moved = piston(command, 1.0 / RATE, theta, k, departure)
+        measured = play(moved, half) if half else moved
         measured += NOISE * rng.standard_normal(len(t))
         records.append(Record(command, measured, 1.0 / RATE, stiffness=k))
+    return records
+
+
+def selected(half: float, inside: bool, rng: np.random.Generator) -> Selection:
+    """What is chosen for two sweeps."""
+    departure = (_FEEDBACK_PLAY, half) if inside else (0, 0.0)
+    records = sweeps(rng.choice(PLANTS), departure, rng, half)
     search = Search(Data.whole(records), NAMES)
     selection = ModelSelection(search, Thresholds(), lambda *_: None)
     found = selection.run()
@@ -69,14 +78,7 @@ def test_a_plainer_description_comes_before_a_fault_in_the_loop() -> None:
     """
     rng = np.random.default_rng()
     size = float(rng.uniform(1e5, 1.6e5))
-    theta = PLANTS[1] * np.exp(0.1 * rng.standard_normal(4))
-    t = np.arange(0.0, SECONDS, 1.0 / RATE)
-    command = STROKE * np.sin(np.pi * (9.0 / SECONDS) * t**2)
-    records = []
-    for k in (0.0, 250e3):
-        measured = piston(command, 1.0 / RATE, theta, k, (13, size))
-        measured += NOISE * rng.standard_normal(len(t))
-        records.append(Record(command, measured, 1.0 / RATE, stiffness=k))
+    records = sweeps(PLANTS[1], (_POSITION_GAIN, size), rng)
     found = diagnose(records, settings=Thresholds(evaluations=0))
     assert found.complete and found.error.after < 1.05 * NOISE
     assert [e.name for e in found.effects] == ['learned-flow-q-x2']

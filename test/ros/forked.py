@@ -3,7 +3,6 @@
 The executables themselves are started where starts and signals are tested (`installed=True`).
 """
 
-import importlib
 import multiprocessing
 import os
 import signal
@@ -12,7 +11,7 @@ import sys
 from contextlib import suppress
 from pathlib import Path
 
-from actuator_glue.nodes import parameter_file
+from actuator_glue.nodes import parameter_file, run
 
 _CONTEXT = multiprocessing.get_context('forkserver')
 _CONTEXT.set_forkserver_preload(
@@ -30,7 +29,6 @@ def _node(name, arguments, folder, log, environment):
         for stream in sys.stdout, sys.stderr:
             os.dup2(file.fileno(), stream.fileno())
     sys.argv = [name, *arguments]
-    run = importlib.import_module('actuator_glue.nodes.run')
     sys.exit(getattr(run, name)())
 
 
