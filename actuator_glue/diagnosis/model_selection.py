@@ -23,6 +23,8 @@ _SWAPS = 4
 # Share of the bounds within which a parameter is at one of them.
 _AT_BOUND = 1e-3
 _SURE = 2.0  # standard errors over the blocks: what is less is not told apart
+# Of what matters: two that remove this share each remove what matters.
+_PART = 0.5**0.5
 
 
 class ModelSelection:
@@ -90,6 +92,15 @@ class ModelSelection:
         extra = len(larger.fit.theta) - len(smaller.fit.theta)
         nats = evidence(larger.scores, smaller.scores) - extra - cost
         return removed(smaller, larger) >= threshold and nats >= self.nats
+
+    def part(self) -> float:
+        """Error that one of two effects must remove which matter only together [m]."""
+        return _PART * self.material
+
+    def least(self, larger: Trial, smaller: Trial) -> float:
+        """Error that a member must remove [m]: less where it makes what is left immaterial."""
+        completes = self.left(larger) < self.material <= self.left(smaller)
+        return self.part() if completes else self.material
 
     def extend(self, beam: Sequence[Trial], stage: int) -> list[Trial]:
         """Refit every structure of the beam with its most promising further effects."""
@@ -181,7 +192,7 @@ class ModelSelection:
         """Take members away that are not worth their parameters beside the others."""
         for name in current.effects if len(current.effects) > 1 else ():
             rest = self.search.without(current, name)
-            if not self.better(current, rest, self.material):
+            if not self.better(current, rest, self.least(current, rest)):
                 return self.pruned(rest)
         return current
 

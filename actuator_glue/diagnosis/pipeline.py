@@ -16,6 +16,7 @@ from actuator_glue.diagnosis import (
     per_record_settings,
     recorded,
     regression,
+    together,
     transducer,
 )
 from actuator_glue.diagnosis.completeness import Decision, decide
@@ -254,6 +255,8 @@ def with_learned_terms(result: Conclusion) -> Conclusion:
     if not left or found.final.own is not None:
         return result
     described = learning.learned(result.selection, found)
+    if described is None and decision.verdict == 'unexplained':
+        described = together.explained(result.selection, found)
     if described is None:
         return result
     learned = _conclusion(result.prepared, result.selection, described, result.line)

@@ -1,0 +1,60 @@
+"""Two effects that matter only together: each hides the other.
+
+A droop of the supply and a delay may each remove 3 um beside 10 um of noise, less than what
+matters, and both of them the 8 um that are missing. They are asked for last, where neither names
+nor descriptions are worth adding, and told only where they explain all that is left.
+"""
+
+from __future__ import annotations
+
+from actuator_glue.diagnosis import pairs
+from actuator_glue.diagnosis.model_selection import ModelSelection
+from actuator_glue.diagnosis.search import by_score
+from actuator_glue.diagnosis.selection import Selection
+from actuator_glue.diagnosis.trial import Trial
+
+
+def explained(selection: ModelSelection, found: Selection) -> Selection | None:
+    """Go on from a selection with two more effects at once.
+
+    Args:
+        selection: the model selection that ended with `found`.
+        found: what single additions explain.
+
+    Returns:
+        The selection with both, or None where no two explain the rest.
+    """
+    search, current = selection.search, found.final
+    selection.progress('two effects', 0.0)
+    worth = [t for t in _both(selection, current) if _is_worth(selection, t, current)]
+    if not worth:
+        return None
+    best = min(worth, key=by_score)
+    selection.renoise(best)
+    singles = selection.rescored(found.singles)
+    chosen = selection.concluded(search.trial(best.effects, best.added), search.trial(()), singles)
+    return chosen if chosen.left < chosen.material else None
+
+
+def _both(selection: ModelSelection, current: Trial) -> list[Trial]:
+    """Refit with two more: the best alone, each with what promises most beside it."""
+    search, most = selection.search, selection.settings.tried
+
+    def other(start: Trial) -> list[str]:
+        names = [n for n in search.names if n not in start.effects]
+        return search.screened(start, names, beside=True)[:most]
+
+    firsts = search.additions(current, other(current), valves=False)
+    return [pair for first in firsts for pair in search.additions(first, other(first))]
+
+
+def _is_worth(selection: ModelSelection, trial: Trial, current: Trial) -> bool:
+    """Whether two effects explain the rest, and neither is idle beside the other."""
+    cost = pairs.price(len(selection.search.names))
+    if selection.left(trial) >= selection.material:
+        return False
+    if not selection.better(trial, current, selection.material, cost):
+        return False
+    added = [n for n in trial.effects if n not in current.effects]
+    without = [selection.search.without(trial, n) for n in added]
+    return all(selection.better(trial, rest, selection.least(trial, rest)) for rest in without)
