@@ -8,7 +8,7 @@ it is screened, refitted and compared as the effects of the catalogue are.
 
 from __future__ import annotations
 
-from collections.abc import Container
+from collections.abc import Container, Mapping
 from itertools import groupby
 from typing import Final
 
@@ -17,6 +17,7 @@ from actuator_glue.diagnosis.learned_sizes import (
     DIMENSIONS,
     LARGEST,
     LEARNED,
+    command_rate,
     signal_size,
     sizes_of,
     unit_text,
@@ -28,8 +29,9 @@ from actuator_glue.model.parameters import Parameter
 
 # Terms added to the signal of a place: products of what is known there, '|x|' for a modulus.
 # Odd ones keep both directions alike, even ones do not; those with k act with a specimen only.
+# What acts on the command knows how fast that is (r), not how fast the piston follows it.
 _PRODUCTS: Final = {
-    'command': ('u |u|', 'u u u', 'u u', 'u |v|', '|x| v', 'v |v|', 'v v v'),
+    'command': ('u |u|', 'u u u', 'u u', 'u |r|', '|u| r', 'r |r|', 'r r r'),
     'valve': ('e |e|', 'e e e', 'e e', 'e |x|'),
     'flow': (
         'q x',
@@ -87,7 +89,8 @@ def _product(place: str, factors: list[str], sizes: dict[str, float]) -> Effect:
         full *= sizes[symbol]
         unit = [a - b for a, b in zip(unit, DIMENSIONS[symbol], strict=True)]
     powers = [(f, len(list(same))) for f, same in groupby(factors)]
-    text = '*'.join(_modulus(f) + (f'**{n}' if n > 1 else '') for f, n in powers)
+    texts = {'r': command_rate(sizes)}
+    text = '*'.join(_written(f, texts) + (f'**{n}' if n > 1 else '') for f, n in powers)
     name = '-'.join(_word(f) + (str(n) if n > 1 else '') for f, n in powers)
     largest = LARGEST * signal_size(place, sizes) / full
     return _effect(
@@ -95,8 +98,9 @@ def _product(place: str, factors: list[str], sizes: dict[str, float]) -> Effect:
     )
 
 
-def _modulus(factor: str) -> str:
-    return f'abs({factor.strip("|")})' if '|' in factor else factor
+def _written(factor: str, texts: Mapping[str, str]) -> str:
+    text = texts.get(factor.strip('|'), factor.strip('|'))
+    return f'abs({text})' if '|' in factor else f'{text}'
 
 
 def _word(factor: str) -> str:

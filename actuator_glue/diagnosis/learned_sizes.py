@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 from actuator_glue.model.effects import Scale
@@ -16,6 +16,7 @@ DIMENSIONS: Final = {
     'x': (0, 1, 0),
     'y': (0, 1, 0),
     'v': (0, 1, -1),
+    'r': (0, 1, -1),
     'q': (1, 0, -1),
     'f': (1, 0, 0),
     'k': (1, -1, 0),
@@ -24,7 +25,7 @@ DIMENSIONS: Final = {
 
 
 def sizes_of(scale: Scale) -> dict[str, float]:
-    """Return the size of everything that moves in a test, and its duration t [s]."""
+    """Return the size of everything that moves in a test, its duration t and period h [s]."""
     stroke, speed = scale.stroke, scale.velocity
     error = float(scale.theta[0] / max(scale.theta[1], 1e-9)) * scale.oil * speed
     return {
@@ -32,12 +33,20 @@ def sizes_of(scale: Scale) -> dict[str, float]:
         'x': stroke,
         'y': stroke,
         'v': speed,
+        'r': speed,
         'e': error,
         'q': scale.oil * speed,
         'f': scale.stiffness * stroke,
         'k': scale.stiffness,
         't': scale.duration,
+        'h': scale.period,
     }
+
+
+def command_rate(sizes: Mapping[str, float]) -> str:
+    """Return the rate of the command as an expression, over one of its samples [m/s]."""
+    period = f'{sizes["h"]:.3g}'
+    return f'((u - lag(u, {period}))/{period})'
 
 
 def signal_size(place: str, sizes: dict[str, float]) -> float:
