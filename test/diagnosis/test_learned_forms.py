@@ -49,3 +49,59 @@ def test_a_limited_transducer_is_described(name: str) -> None:
     best = search.additions(search.trial(()), [e.name for e in offered])
     most = 1.11 if name == 'a short bend' else 1.05
     assert min(trial.fit.rms for trial in best) < most * NOISE
+
+
+def _swept(t: Array) -> Array:
+    """Return a sweep whose amplitude comes and goes: else a rate is a frequency [m]."""
+    t = np.maximum(t, 0.0)
+    swelling = 0.6 - 0.4 * np.cos(2.0 * np.pi * 0.3 * t)
+    return np.asarray(STROKE * swelling * np.sin(np.pi * (9.0 / 24.0) * t**2))
+
+
+def _rate(t: Array) -> Array:
+    return (_swept(t) - _swept(t - 1.0 / RATE)) * RATE
+
+
+# What the actuator is told at a sample, of the command there and before.
+COMMANDS: dict[str, tuple[str, Callable[[Array], Array]]] = {
+    'a gain that rises with the rate': (
+        'learned-command-u-absr',
+        lambda t: _swept(t) * (1.0 + 1.5 * np.abs(_rate(t))),
+    ),
+    'a delay that rises with the amplitude': (
+        'learned-command-absu-r',
+        lambda t: _swept(t - 2e-3 * np.abs(_swept(t)) / STROKE),
+    ),
+    'a lead that rises with the rate': (
+        'learned-command-r-absr',
+        lambda t: _swept(t) + 0.02 * np.abs(_rate(t)) * _rate(t),
+    ),
+}
+
+
+@pytest.mark.parametrize('name', COMMANDS)
+def test_what_acts_on_the_command_knows_its_rate(name: str) -> None:
+    """Of all forms at the command the right one leaves least, and next to noise.
+
+    Some four standard deviations of the noise's own rms are allowed, and what the distance of the
+    samples makes of a rate: 1.7 % of the noise at most.
+    """
+    wanted, told = COMMANDS[name]
+    rng = np.random.default_rng()
+    t = np.arange(0.0, 24.0, 1.0 / RATE)
+    theta = np.array([235.0, 5e10, 4.2e6, 3.3]) * np.exp(0.1 * rng.standard_normal(4))
+    records = []
+    for k in (0.0, 250e3):
+        inside = Record(told(t), np.zeros(len(t)), 1.0 / RATE, stiffness=k)
+        measured = Structure(()).simulate(theta, inside) + NOISE * rng.standard_normal(len(t))
+        records.append(Record(_swept(t), measured, 1.0 / RATE, stiffness=k))
+    search = Search(Data.whole(records), ())
+    base = search.base()
+    search.scorer = Scorer.of(search.data, splits_of(search.data, base.error))
+    offered = [e for e in forms(search.scale()) if e.place == 'command']
+    search.entries |= {e.name: e for e in offered}
+    best = search.additions(search.trial(()), [e.name for e in offered])
+    assert base.rms > 1.1 * NOISE
+    least = min(best, key=lambda trial: trial.fit.rms)
+    assert least.added == wanted
+    assert least.fit.rms < 1.05 * NOISE

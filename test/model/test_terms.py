@@ -104,6 +104,8 @@ def test_neutral_is_eq_2_although_the_expression_has_no_value_there() -> None:
         ('valve: e = min(e)', 'min takes 2'),
         ('valve: e = lag(e, x)', 'second argument of lag'),
         ('force: f = f + lag(x, own)', 'lag remembers'),
+        ('valve: e = e + own*rate(e)', 'rate takes 2'),
+        ('sensor: y = y + own*rate(y, 0.01)', 'rate remembers'),
         ('valve: e = e + True', 'no number'),
         ('valve: e = e + 1' + '0' * 400, 'too large'),
         ('valve: e = ' + '(' * 500 + 'e' + ')' * 500, 'column'),
@@ -227,6 +229,14 @@ def test_blocks_and_neighbours_change_nothing(equation: str) -> None:
     stream = Stream(structure, theta, stiffness=K, period=1 / 256.0)
     parts = [stream.step(part)[0] for part in np.split(U, [1, 2, 100, 101, 400])]
     assert np.array_equal(np.concatenate(parts), own)
+
+
+def test_a_rate_is_what_a_lag_has_not_followed() -> None:
+    """As much of it taken away as its time is the lag."""
+    rate = simulated('command: u = u + own*rate(u, 0.02)', 0.01)
+    assert np.array_equal(rate, simulated('command: u = u + own*((u - lag(u, 0.02))/0.02)', 0.01))
+    late = simulated('command: u = u - own*rate(u, 0.02)', 0.02)
+    assert np.abs(late - simulated('command: u = lag(u, own)', 0.02)).max() < 1e-12
 
 
 @pytest.mark.parametrize('change', ['own*tanh(v/1e-2)', '0.1*own'])

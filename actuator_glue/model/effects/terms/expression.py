@@ -58,7 +58,7 @@ FUNCTIONS: Final = dict.fromkeys(
     'dead': 2,
 }
 # Functions that remember; the second argument, where there is one, holds during a test.
-MEMORY: Final = {'lag': 2, 'integral': 1, 'play': 2, 'limit_rate': 2}
+MEMORY: Final = {'lag': 2, 'rate': 2, 'integral': 1, 'play': 2, 'limit_rate': 2}
 REMEMBERING: Final = ('command', 'valve', 'flow')
 _LONGEST: Final = 2000
 _OPERATORS: Final[dict[type[ast.operator], str]] = {
@@ -191,6 +191,9 @@ class _Reader:
             self._refuse(
                 node.args[1].col_offset, f'the second argument of {name} holds during a test'
             )
+        if name == 'rate':
+            late = Tree('lag', arguments)
+            return Tree('div', (Tree('sub', (arguments[0], late)), arguments[1]))
         return Tree(name, arguments)
 
     def _changes(self, tree: Tree) -> bool:
