@@ -6,13 +6,18 @@ only where the signal goes on through the loop; what a sensor or a specimen reme
 the catalogue: backlash, yielding, friction. A gain that changes begins at the start of the test
 and settles; before it has, it drifts. Of command and sensor only the latter is offered: a slow
 change of both leaves the same.
+A pair of poles and zeros is written at the command: a transducer's or a frame's resonance is the
+same to a loop that is linear.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Final
+
+import numpy as np
 
 from actuator_glue.diagnosis.learned_sizes import LEARNED
 from actuator_glue.model.effects import Effect
@@ -32,6 +37,12 @@ _LOST: Final = ('command', 'feedback')  # of the valve it is in the catalogue
 _SETTLING: Final = (('flow', 'q'), ('specimen', 'k*x'), ('sensor', 'y'))
 _SHARE = (-1.0, 2.0)  # at -1 nothing is left
 _WIDTHS = (1e-3, 0.5)  # of the signal's size
+# Of the frequency at which a sine of the test's stroke has its speed; and of the samples'.
+_FREQUENCIES, _SAMPLED = (0.1, 4.0), 0.4
+_DAMPINGS = (0.005, 0.7)
+# Where it is looked for: its response is narrow.
+_LOOKED, _DAMPED, _SEEN = 10, (0.05, 0.2), 0.02
+_HEIGHT = 2.0  # by which a gain may change at a resonance, and above it
 _TIMES = (0.02, 5.0)  # of the test's duration: in the longest all but 9 % of a drift are linear
 
 
@@ -40,6 +51,7 @@ def forms(sizes: Mapping[str, float]) -> list[Effect]:
     return [
         *(_play(word, sizes) for word in _LOST),
         *(_hysteresis(word, sizes) for word in _LATE),
+        _resonance(sizes),
         *(
             _settling(place, of, sizes['t'])
             for place, of in _SETTLING
@@ -90,4 +102,30 @@ def _settling(place: str, of: str, duration: float) -> Effect:
             Parameter(f'{name}_time', 's', shortest, longest, 'time constant', duration),
         ),
         source=LEARNED,
+    )
+
+
+def _resonance(sizes: Mapping[str, float]) -> Effect:
+    """Return a pair of poles, and what changes by it at their frequency and above it."""
+    usual = sizes['v'] / (2.0 * math.pi * sizes['u'])
+    low, high = (share * usual for share in _FREQUENCIES)
+    high = max(2.0 * low, min(high, _SAMPLED / sizes['h']))
+    poles = 'resonance_hz, resonance_damping'
+    starts = (
+        (*sizes_of_it, hertz, damping)
+        for hertz in np.geomspace(low, high, _LOOKED).tolist()
+        for damping in _DAMPED
+        for sizes_of_it in ((_SEEN, 0.0), (-_SEEN, 0.0), (0.0, _SEEN), (0.0, -_SEEN))
+    )
+    return term(
+        'learned-command-resonance',
+        f'command: u = u + resonance*bandpass(u, {poles}) + beyond*(u - lowpass(u, {poles}))',
+        (
+            Parameter('resonance', '1', -_HEIGHT, _HEIGHT, 'change of the gain at it', 0.0),
+            Parameter('beyond', '1', -_HEIGHT, _HEIGHT, 'change of the gain above it', 0.0),
+            Parameter('resonance_hz', 'Hz', low, high, 'frequency', math.sqrt(low * high)),
+            Parameter('resonance_damping', '1', *_DAMPINGS, 'share of critical damping', 0.1),
+        ),
+        source=LEARNED,
+        starts=tuple(starts),
     )

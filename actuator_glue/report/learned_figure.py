@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import pairwise
 
 import numpy as np
@@ -15,8 +16,9 @@ from actuator_glue.model.effects.terms.expression import PLACES, SIGNAL
 from actuator_glue.records import Array
 from actuator_glue.report import style
 
-_CYCLES, _POINTS = 3, 200  # of a sine, the last of which is drawn; points a cycle
+_CYCLES, _POINTS = 20, 200  # of a sine, the last of which is drawn; points a cycle
 _DRAWS = 256
+_HAS_TIME = re.compile(r'\b(rate|lag|integral|limit_rate|lowpass|bandpass)\(')
 _QUICK = 'veq'  # are largest where the motion passes its middle
 _UNITS = {
     'm': (1e3, 'mm', 1e6, 'um'),
@@ -25,11 +27,19 @@ _UNITS = {
 }
 
 
+def usual_frequency(found: DiagnosisData) -> float:
+    """Return the frequency of a sine that is as large and as fast as the commands [Hz]."""
+    moving = [t for t in found.traces if np.ptp(t.command) > 0.0]
+    speeds = [np.gradient(t.command, t.time).std() / t.command.std() for t in moving]
+    return float(np.median(speeds)) / (2.0 * np.pi) if speeds else 1.0
+
+
 def curve(found: DiagnosisData, term: LearnedTerm) -> tuple[str, Array, Array]:
     """Return what a term adds along a motion over the range that was excited.
 
-    That is the last of some cycles of a sine, so that what remembers has forgotten its start; what
-    changes with time is followed over the test, where the signal is largest.
+    That is the last of some cycles of a sine of the usual frequency, so that what remembers has
+    forgotten its start; what changes with time is followed over the test, where the signal is
+    largest.
 
     Returns:
         The symbol that it is drawn over ('t', or the term's signal), its values (n,), and the
@@ -49,7 +59,9 @@ def curve(found: DiagnosisData, term: LearnedTerm) -> tuple[str, Array, Array]:
             motion[symbol] = np.linspace(low, high, len(turn)) if symbol == 't' else steady
     motion.setdefault(signal, np.zeros(len(turn)))
     stiffness = max(t.stiffness for t in found.traces)
-    step = float(motion[over][1] - motion[over][0]) if over == 't' else 1.0 / _POINTS
+    cycle = 1.0 / (usual_frequency(found) * _POINTS)
+    step = float(motion[over][1] - motion[over][0]) if over == 't' else cycle
+    motion.setdefault('t', step * np.arange(len(turn), dtype=np.float64))
     after = along(term.effect, draws, motion, step, stiffness, found.best[:4])
     added = after - motion[signal]
     drawn = slice(None) if over == 't' else slice(-_POINTS - 1, None)
@@ -74,7 +86,10 @@ def learned_terms(found: DiagnosisData) -> Figure:
         for part in _ways(at):
             axes.fill_between(x[part], fine * low[part], fine * high[part], color=style.LIGHT_BAND)
         axes.plot(x, fine * middle, color=style.TOTAL, lw=1.0)
-        axes.set_xlabel('time [s]' if over == 't' else f'{signal} [{unit}]')
+        at_hertz = (
+            f', at {usual_frequency(found):.2g} Hz' if _HAS_TIME.search(term.equation) else ''
+        )
+        axes.set_xlabel('time [s]' if over == 't' else f'{signal} [{unit}]{at_hertz}')
         axes.set_ylabel(f'added to {signal} [{fine_unit}]')
         axes.set_title(style.fit(term.name, style.WIDTH / columns - 0.5))
     return figure

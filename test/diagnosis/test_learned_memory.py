@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import signal
 from smooth_machines import piston
 
 from actuator_glue.diagnosis.data import Data
@@ -116,6 +117,36 @@ def test_a_reading_that_settles_is_described() -> None:
     best = search.additions(base, search.screened(base, names)[:4])[0]
     assert best.added == 'learned-sensor-settling'
     assert best.fit.rms < 1.1 * NOISE
+
+
+@pytest.mark.parametrize('kind', ['a frame', 'a notch', 'a peak'])
+def test_a_resonance_is_described(kind: str) -> None:
+    """Of the transducer, of any frequency that is excited; a loop that is linear has it as well.
+
+    Five standard deviations of the noise's rms. Of 32 machines none failed.
+    """
+    rng = np.random.default_rng()
+    hertz, damping = np.exp(rng.uniform(np.log([1.5, 0.03]), np.log([6.0, 0.2])))
+    w, more = 2.0 * np.pi * hertz, rng.uniform(0.04, 0.06)
+    below = np.array([1.0, 2.0 * damping * w, w * w])
+    above = {
+        'a frame': below * [1.0 + 0.3 * more, 1.0, 1.0],
+        'a notch': below * [1.0, 1.0 - 4.0 * more, 1.0],
+        'a peak': below * [1.0, 1.0 + 4.0 * more, 1.0],
+    }[kind]
+    b, a, _ = signal.cont2discrete((above, below), 1.0 / RATE, 'bilinear')
+    records = []
+    for record in sweeps(0, 0.0, PLANTS[1], rng):
+        measured = signal.lfilter(b.ravel(), a, record.measured)
+        records.append(Record(record.command, measured, 1.0 / RATE, stiffness=record.stiffness))
+    search, names = searched(records)
+    base = search.trial(())
+    assert base.fit.rms > 1.1 * NOISE
+    best = search.additions(base, search.screened(base, names)[:4])[0]
+    assert best.added == 'learned-command-resonance'
+    assert best.fit.rms < 1.05 * NOISE
+    # The bilinear rule bends frequencies: by 0.7 % at 6 Hz.
+    assert best.fit.theta[6] == pytest.approx(hertz, rel=0.03)
 
 
 def settling(duration: float) -> list[Effect]:

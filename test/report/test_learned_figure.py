@@ -14,12 +14,14 @@ from actuator_glue.model.parameters import TABLE_2
 from actuator_glue.report.learned_figure import curve, learned_terms
 
 SCALE = Scale(2e-3, 0.1, 60.0, 1 / 256, 250e3, TABLE_2)
+T = np.arange(0.0, 10.0, 1 / 256)
 FORMS = {effect.name: effect for effect in forms(SCALE)}
 # Term, its parameters, and what the records excited.
 CASES: dict[str, tuple[tuple[float, ...], dict[str, tuple[float, float]]]] = {
     'learned-sensor-y3': ((2e4,), {'y': (-3e-3, 1e-3)}),
     'learned-valve-hysteresis': ((0.5, 1e-4), {'e': (-1e-3, 1e-3)}),
     'learned-flow-settling': ((0.2, 8.0), {'q': (-1e5, 2e5), 't': (0.0, 40.0)}),
+    'learned-command-resonance': ((0.1, 0.02, 4.0, 0.05), {'u': (-2e-3, 2e-3)}),
     'learned-specimen-k-x2': ((5.0,), {'x': (-2e-3, 2e-3), 'f': (-500.0, 500.0)}),
 }
 
@@ -42,7 +44,10 @@ def found(*names: str, spread: float = 0.1) -> Any:
         names=('beta_1', *columns),
         posterior=np.column_stack([np.ones(2000), *draws]),
         best=np.array([*TABLE_2, 0.0]),
-        traces=(SimpleNamespace(stiffness=0.0), SimpleNamespace(stiffness=250e3)),
+        traces=tuple(
+            SimpleNamespace(stiffness=k, time=T, command=2e-3 * np.sin(2.0 * np.pi * 4.0 * T))
+            for k in (0.0, 250e3)
+        ),
     )
 
 
@@ -79,12 +84,22 @@ def test_what_changes_is_drawn_over_time() -> None:
     assert middle == pytest.approx(0.2 * 2e5 * (1.0 - np.exp(-t / 8.0)), rel=0.02, abs=10.0)
 
 
+def test_what_resonates_is_drawn_at_the_usual_frequency() -> None:
+    """There a resonance of 0.1 adds a tenth of the signal, its poles another way 0.02/0.1."""
+    answer = found('learned-command-resonance', spread=1e-3)
+    over, u, (middle, _, _) = curve(answer, answer.learned[0])
+    assert over == 'u'
+    expected = abs(0.1 + 0.02 * (1.0 - 1.0 / 0.1j))
+    assert np.abs(middle).max() == pytest.approx(expected * np.abs(u).max(), rel=0.03)
+
+
 def test_every_term_has_a_panel() -> None:
     """With its name, units that people read, and no line beyond the range excited."""
     figure = learned_terms(found(*CASES))
-    assert [a.get_title(loc='left') for a in figure.axes] == list(CASES)
+    assert [a.get_title(loc='left') for a in figure.axes if a.get_visible()] == list(CASES)
     labels = [(a.get_xlabel(), a.get_ylabel()) for a in figure.axes]
     assert labels[0] == ('y [mm]', 'added to y [um]')
     assert labels[2] == ('time [s]', 'added to q [N/s]')
-    assert labels[3] == ('f [kN]', 'added to f [N]')
+    assert labels[3] == ('u [mm], at 4 Hz', 'added to u [um]')
+    assert labels[4] == ('f [kN]', 'added to f [N]')
     assert figure.axes[0].lines[0].get_xdata().min() == pytest.approx(-3.0)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Final
 
 from actuator_glue.model.effects.terms import machine as m
-from actuator_glue.model.effects.terms.expression import REMEMBERING, SIGNAL, Expression, Tree
+from actuator_glue.model.effects.terms.expression import REMEMBERING, SIGNAL, Expression
 from actuator_glue.model.effects.terms.instructions import Dual, Emitter
+from actuator_glue.model.effects.terms.tree import Tree
 
 # Registers with what signals change by beside jumps.
 ROWS: Final = {'u': m.CHANGE_U, 'x': m.CHANGE_X, 'f': m.CHANGE_F, 'q': m.CHANGE_Q}

@@ -40,6 +40,7 @@ def term(
     source: str = '',
     searched: bool = True,
     check: bool = True,
+    starts: tuple[tuple[float, ...], ...] = (),
 ) -> Effect:
     """Return the entry of an effect written as `place: symbol = expression`.
 
@@ -52,6 +53,7 @@ def term(
         source: literature.
         searched: whether the diagnosis tries it.
         check: try the expression at once; the catalogue's own are tried by tests.
+        starts: parameters from which a fit starts; found from its response to a sine if empty.
 
     Raises:
         InputError: the expression or a parameter cannot be used.
@@ -70,7 +72,7 @@ def term(
             group=group or name,
             signature=signature or 'none described',
             source=source or 'an expression of the user',
-            starts=_Starts(name, equation, parameters),
+            starts=_Starts(name, equation, parameters, starts),
             expression=found,
             output=_Sensor(name, equation, parameters) if found.place == 'sensor' else None,
             searched=searched,
@@ -110,8 +112,11 @@ class _Starts:
     name: str
     equation: str
     parameters: tuple[Parameter, ...]
+    given: tuple[tuple[float, ...], ...] = ()
 
     def __call__(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
+        if self.given:
+            return self.given
         columns = range(len(self.parameters))
         found = {j: self._sizes(scale, j, {}) for j in columns}
         # What does nothing by itself (a width, an exponent) shapes the others.

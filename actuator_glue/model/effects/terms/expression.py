@@ -8,23 +8,11 @@ from dataclasses import dataclass
 from typing import Final, Literal, NoReturn, TypeAlias, get_args
 
 from actuator_glue.errors import InputError
+from actuator_glue.model.effects.terms.filters import FILTERS
+from actuator_glue.model.effects.terms.tree import Tree
 from actuator_glue.model.parameters import NAMES as BASE
 
 Place: TypeAlias = Literal['command', 'valve', 'flow', 'piston', 'specimen', 'sensor']
-
-
-@dataclass(frozen=True, slots=True)
-class Tree:
-    """A number, a symbol, or an operation (the name of an operator or a function) on others."""
-
-    operation: str
-    operands: tuple[Tree, ...] = ()
-    value: float = 0.0
-    name: str = ''
-
-    def words(self) -> set[str]:
-        """Return all operations, functions and symbols in it."""
-        return {self.operation, self.name}.union(*(part.words() for part in self.operands))
 
 
 # What a place changes, and what else is known there: u command, e control error, q flow (as rate
@@ -57,10 +45,12 @@ FUNCTIONS: Final = dict.fromkeys(
     'clip': 3,
     'dead': 2,
 }
-# Functions that remember; the second argument, where there is one, holds during a test.
-MEMORY: Final = {'lag': 2, 'rate': 2, 'integral': 1, 'play': 2, 'limit_rate': 2}
+# Functions that remember; all arguments but the first hold during a test.
+MEMORY: Final = {'lag': 2, 'integral': 1, 'play': 2, 'limit_rate': 2}
 REMEMBERING: Final = ('command', 'valve', 'flow')
+_REMEMBER: Final = MEMORY | {name: count for name, (count, _) in FILTERS.items()}
 _LONGEST: Final = 2000
+_WHICH: Final = ('second', 'third')
 _OPERATORS: Final[dict[type[ast.operator], str]] = {
     ast.Add: 'add',
     ast.Sub: 'sub',
@@ -88,7 +78,7 @@ class Expression:
 
 def reserved() -> frozenset[str]:
     """Return the words that cannot be a parameter's name."""
-    return frozenset({*'uqefxvty', 'pi', *CONSTANTS, *FUNCTIONS, *MEMORY})
+    return frozenset({*'uqefxvty', 'pi', *CONSTANTS, *FUNCTIONS, *_REMEMBER})
 
 
 def read(text: str, parameters: tuple[str, ...]) -> Expression:
@@ -176,25 +166,24 @@ class _Reader:
         )
 
     def _call(self, node: ast.Call, name: str) -> Tree:
-        count = FUNCTIONS.get(name, MEMORY.get(name))
+        count = FUNCTIONS.get(name, _REMEMBER.get(name))
         if count is None:
-            words = ', '.join((*FUNCTIONS, *MEMORY))
+            words = ', '.join((*FUNCTIONS, *_REMEMBER))
             self._refuse(node.col_offset, f'no function {name!r}; there are {words}')
         if len(node.args) != count:
             self._refuse(node.col_offset, f'{name} takes {count} argument{"s" * (count > 1)}')
-        if name in MEMORY and self._place not in REMEMBERING:
+        if name in _REMEMBER and self._place not in REMEMBERING:
             self._refuse(
                 node.col_offset, f'{name} remembers: it can act at {", ".join(REMEMBERING)} only'
             )
         arguments = tuple(self._node(a) for a in node.args)
-        if name in MEMORY and count == 2 and self._changes(arguments[1]):
-            self._refuse(
-                node.args[1].col_offset, f'the second argument of {name} holds during a test'
-            )
-        if name == 'rate':
-            late = Tree('lag', arguments)
-            return Tree('div', (Tree('sub', (arguments[0], late)), arguments[1]))
-        return Tree(name, arguments)
+        if name in _REMEMBER:
+            for which, argument, where in zip(_WHICH, arguments[1:], node.args[1:], strict=False):
+                if self._changes(argument):
+                    self._refuse(
+                        where.col_offset, f'the {which} argument of {name} holds during a test'
+                    )
+        return FILTERS[name][1](*arguments) if name in FILTERS else Tree(name, arguments)
 
     def _changes(self, tree: Tree) -> bool:
         """Whether a value depends on what moves."""

@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Final
 
 from actuator_glue.model.effects.terms import machine as m
-from actuator_glue.model.effects.terms.expression import MEMORY, Tree
+from actuator_glue.model.effects.terms.expression import MEMORY
+from actuator_glue.model.effects.terms.tree import Tree
 
 _ONE: Final = {
     name: int(getattr(m, name.upper()))
