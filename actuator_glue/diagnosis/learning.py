@@ -57,6 +57,33 @@ def learned(selection: ModelSelection, found: Selection) -> Selection | None:
     return selection.concluded(best, search.trial(()), singles)
 
 
+def instead(selection: ModelSelection, found: Selection) -> Selection | None:
+    """Return one term that explains all that several names do, as well and with less.
+
+    Lost motion of the command moves the piston nearly as play and a lag of the transducer do: two
+    names of one cause. The term pays for having been chosen among many, in nats beside one for
+    each parameter.
+
+    Args:
+        selection: the model selection that ended with `found`; its noise stays.
+        found: names that leave nothing material.
+    """
+    search, base = selection.search, selection.search.trial(())
+    offered = forms(search.scale(), search.entries)
+    search.entries |= {effect.name: effect for effect in offered}
+    names = [effect.name for effect in offered]
+    selection.progress('learned term', 0.0)
+    tried = search.additions(base, search.screened(base, names)[:_REFITS])
+    whole = [t for t in tried if selection.left(t) < selection.material]
+    if not whole:
+        return None
+    best = max(whole, key=lambda trial: _merit(search, trial))
+    gain = float(best.scores.sum() - search.trial(found.final.effects).scores.sum())
+    if gain + len(found.final.fit.theta) - len(best.fit.theta) <= math.log(len(names)):
+        return None
+    return selection.concluded(_plainer(selection, best), base, found.singles)
+
+
 def as_good_and_plainer(selection: ModelSelection, found: Selection, named: Selection) -> bool:
     """Whether a description explains all that is left, as well as names do with more parameters.
 

@@ -124,6 +124,10 @@ def _conclude(
         if described is not None:
             return described
         result = _conclusion(prepared, result.selection, fed_back, result.line)
+    elif result.decision.verdict == 'missing-effect' and len(result.found.final.effects) > 1:
+        selection = _apart(result.selection)
+        one = learning.instead(selection, result.found)
+        return result if one is None else _conclusion(prepared, selection, one, result.line)
     if result.decision.verdict == 'unexplained' and mean_effects(reserved=True):
         result = _with_reserved(prepared, result, settings, tell)
     if result.decision.verdict != 'unexplained':
@@ -140,15 +144,19 @@ def _described(result: Conclusion, fed_back: Selection) -> Conclusion | None:
     """Describe by learned terms what a fault in the loop explains, where that is better."""
     if fed_back.left >= result.selection.material:
         return None
-    selection = copy(result.selection)
-    # Apart: the noise of what is found here is not that of the names.
-    search = _wider(selection.search, ())
-    selection.search = replace(search, entries=dict(search.entries))
+    selection = _apart(result.selection)
     found = learning.learned(selection, result.found)
     if found is None or not learning.as_good_and_plainer(selection, found, fed_back):
         return None
     described = _conclusion(result.prepared, selection, found, result.line)
     return None if described.decision.verdict == 'unexplained' else described
+
+
+def _apart(selection: ModelSelection) -> ModelSelection:
+    """Return a selection to learn terms with: what it adds and its noise are its own."""
+    other, search = copy(selection), _wider(selection.search, ())
+    other.search = replace(search, entries=dict(search.entries))
+    return other
 
 
 def _line_left(data: Data, final: Trial) -> Line | None:
