@@ -62,8 +62,8 @@ def test_mts_is_explained_on_currents_it_was_not_fitted_to(fitted: int) -> None:
     # 11 um remain where 6 um are noise: what is found is not said to be everything.
     assert found.verdict in ('missing-effect', 'unexplained')
     names = {n for e in found.effects for n in (e.name, *e.alternatives)}
-    # A valve or a flow that is less to one side is what flow-asymmetry says with a corner, one that is
-    # less steep about its centre a dead zone with soft edges.
+    # A valve or a flow that is less to one side is what flow-asymmetry says with a corner, a valve
+    # that is less steep about its centre a dead zone with soft edges.
     assert names & {*FLOW, 'learned-valve-e2', 'learned-valve-end', 'learned-flow-end'}
     assert names & {*REVERSAL, 'valve-hysteresis', 'learned-valve-centre'}
     assert not {e.name for e in found.effects} & SPECIMEN
