@@ -1,17 +1,19 @@
 """Whole diagnoses of short simulated tests: effect named, healthy machine left alone."""
 
 import json
-from collections.abc import Sequence
+from collections.abc import Container, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from actuator_glue.diagnosis import learning
 from actuator_glue.diagnosis.diagnose import diagnose
+from actuator_glue.diagnosis.learned_forms import forms
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.errors import InputError
-from actuator_glue.model.effects import CATALOGUE
+from actuator_glue.model.effects import CATALOGUE, Effect, Scale
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
 
@@ -155,6 +157,17 @@ def test_play_is_named_and_removed() -> None:
     assert out['candidates'][0]['name'] == 'backlash'
 
 
+@pytest.fixture
+def few_forms(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No learned term but the sensor's."""
+
+    def sensors(scale: Scale, known: Container[str] = ()) -> tuple[Effect, ...]:
+        return tuple(effect for effect in forms(scale, known) if effect.place == 'sensor')
+
+    monkeypatch.setattr(learning, 'forms', sensors)
+
+
+@pytest.mark.usefixtures('few_forms')
 def test_a_name_that_a_regression_beats_is_doubted() -> None:
     """A command gain that depends on its rate: no effect of the catalogue, small enough to pass.
 
@@ -172,6 +185,17 @@ def test_a_name_that_a_regression_beats_is_doubted() -> None:
 
 
 @pytest.mark.slow
+def test_what_a_regression_explains_better_is_described() -> None:
+    """Of all forms the right one is learned: half a second per metre."""
+    found = diagnose(rate_gain(), settings=SHARP)
+    assert [e.name for e in found.effects] == ['learned-command-u-absr']
+    assert found.complete
+    # The gradient over two samples is less than the rate over one.
+    assert found.effects[0].parameters['command_u_absr'].mean == pytest.approx(0.5, rel=0.2)
+
+
+@pytest.mark.slow
+@pytest.mark.usefixtures('few_forms')
 def test_without_the_surrogate_the_name_is_trusted() -> None:
     """What is doubted of the same machine is the surrogate's doing."""
     trusting = diagnose(rate_gain(), settings=replace(SHARP, beaten_share=1.0))
