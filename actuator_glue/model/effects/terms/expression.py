@@ -50,6 +50,8 @@ MEMORY: Final = {'lag': 2, 'integral': 1, 'play': 2, 'limit_rate': 2}
 REMEMBERING: Final = ('command', 'valve', 'flow')
 _REMEMBER: Final = MEMORY | {name: count for name, (count, _) in FILTERS.items()}
 _LONGEST: Final = 2000
+# Each has its argument five times: one of another, and so on, would fill the memory.
+_FILTERS: Final = 4
 _WHICH: Final = ('second', 'third')
 _OPERATORS: Final[dict[type[ast.operator], str]] = {
     ast.Add: 'add',
@@ -105,6 +107,7 @@ class _Reader:
         self._text, self._right, self._place = text, right.strip(), place
         self._parameters = parameters
         self._offset = len(text.rstrip()) - len(self._right)
+        self._filters = 0
 
     def tree(self) -> Tree:
         if len(self._text) > _LONGEST:
@@ -176,6 +179,10 @@ class _Reader:
             self._refuse(
                 node.col_offset, f'{name} remembers: it can act at {", ".join(REMEMBERING)} only'
             )
+        if name in FILTERS:
+            self._filters += 1
+            if self._filters > _FILTERS:
+                self._refuse(node.col_offset, f'more than {_FILTERS} filters')
         arguments = tuple(self._node(a) for a in node.args)
         if name in _REMEMBER:
             for which, argument, where in zip(_WHICH, arguments[1:], node.args[1:], strict=False):
@@ -183,7 +190,12 @@ class _Reader:
                     self._refuse(
                         where.col_offset, f'the {which} argument of {name} holds during a test'
                     )
-        return FILTERS[name][1](*arguments) if name in FILTERS else Tree(name, arguments)
+        if name not in FILTERS:
+            return Tree(name, arguments)
+        try:
+            return FILTERS[name][1](*arguments)
+        except ValueError as error:
+            self._refuse(node.col_offset, f'{name}: {error}')
 
     def _changes(self, tree: Tree) -> bool:
         """Whether a value depends on what moves."""

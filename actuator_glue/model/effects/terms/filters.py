@@ -62,7 +62,15 @@ def bandpass(x: Tree, frequency: Tree, damping: Tree) -> Tree:
 
 
 def _turned(x: Tree, frequency: Tree, damping: Tree) -> tuple[Tree, Tree, Tree]:
-    """Return d times the responses of sine and cosine, and sqrt(1 - damping^2)."""
+    """Return d times the responses of sine and cosine, and sqrt(1 - damping^2).
+
+    Raises:
+        ValueError: numbers that no pair of complex poles has.
+    """
+    if damping.operation == 'number' and not 0.0 < damping.value < 1.0:
+        raise ValueError(f'a damping ratio is above 0 and below 1, not {damping.value:g}')
+    if frequency.operation == 'number' and not frequency.value > 0.0:
+        raise ValueError(f'a frequency is above 0 Hz, not {frequency.value:g}')
     natural = _times(_number(2.0 * math.pi), frequency)
     root = Tree('sqrt', (_less(_number(1.0), _times(damping, damping)),))
     turn = _times(_times(natural, root), Tree('symbol', name='t'))
