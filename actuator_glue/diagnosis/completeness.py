@@ -76,6 +76,8 @@ def decide(
     elif found.final.effects or seen:
         verdict = 'missing-effect'
     final = found.final
+    described = any(is_learned(e) for e in final.structure.entries)
+    doubted = verdict == 'unexplained' or (described and left >= found.material)
     return Decision(
         verdict=verdict,
         final=final,
@@ -84,7 +86,7 @@ def decide(
         noise=found.noise,
         left=left,
         certainty=(1.0 - settings.outside)
-        * (_certainty(found, left, surrogate, settings) if verdict == 'unexplained' else 1.0),
+        * (_certainty(found, left, surrogate, settings) if doubted else 1.0),
         limit=limit,
         remaining={'left': left, 'limit': limit, **remaining(data, final.fit.error)},
     )

@@ -12,6 +12,8 @@ from collections.abc import Container, Mapping
 from itertools import groupby
 from typing import Final
 
+import numpy as np
+
 from actuator_glue.diagnosis import learned_memory
 from actuator_glue.diagnosis.learned_sizes import (
     DIMENSIONS,
@@ -53,6 +55,8 @@ _PRODUCTS: Final = {
 _SATURATES: Final = ('command', 'valve', 'flow', 'sensor')
 _SHARPEST = 5.0  # times a limit may be overdriven
 _BENDS = (1e-3, 3.0)  # a bend of a thousandth is a corner
+# Of a step, over the signal's size: what is tried and what is most, and its width; places tried.
+_STEPS, _STEP_WIDTH, _PLACES = (0.01, 0.5), 0.005, 20
 
 
 def forms(scale: Scale, known: Container[str] = ()) -> tuple[Effect, ...]:
@@ -73,7 +77,7 @@ def forms(scale: Scale, known: Container[str] = ()) -> tuple[Effect, ...]:
             offered += [form(place, sizes) for form in (_limited, _one_sided, _fading)]
     if sizes['f'] > 0.0:
         offered.append(_turbulent(sizes))
-    offered += [_rounded_overlap(sizes), _friction('force', sizes)]
+    offered += [_step(sizes), _rounded_overlap(sizes), _friction('force', sizes)]
     if sizes['k'] > 0.0:
         offered.append(_friction('specimen', sizes))
     offered += learned_memory.forms(sizes)
@@ -150,6 +154,31 @@ def _fading(place: str, sizes: dict[str, float]) -> Effect:
     unit, bounds = [-d for d in DIMENSIONS[z]], (0.0, _SHARPEST / sizes[z])
     meaning = f'one over where {z} is halved'
     return _effect(place, f'fading-{z}', f'{z}/(1 + {{a}}*abs({z}))', unit, bounds, meaning)
+
+
+def _step(sizes: dict[str, float]) -> Effect:
+    """Return a reading that jumps where the piston passes a place, as at the joint of a scale.
+
+    Over a width that is small and fixed: none would have a likelihood of stairs.
+    """
+    size = sizes['y']
+    width, most = f'{_STEP_WIDTH * size:.3g}', _STEPS[1] * size
+    starts = (
+        (sign * _STEPS[0] * size, at * size)
+        for at in np.linspace(-1.0, 1.0, 2 * _PLACES + 1)[1::2].tolist()
+        for sign in (1.0, -1.0)
+    )
+    return term(
+        'learned-sensor-step',
+        'sensor: y = y + 0.5*sensor_step'
+        f'*(tanh((y - sensor_step_at)/{width}) + tanh(sensor_step_at/{width}))',
+        (
+            Parameter('sensor_step', 'm', -most, most, 'jump of the reading', 0.0),
+            Parameter('sensor_step_at', 'm', -size, size, 'where it jumps', 0.0),
+        ),
+        source=LEARNED,
+        starts=tuple(starts),
+    )
 
 
 def _turbulent(sizes: dict[str, float]) -> Effect:

@@ -18,6 +18,7 @@ LIMITS: dict[str, Callable[[Array], Array]] = {
     'to one side': lambda r: np.minimum(r, 0.8),
     'tanh': lambda r: 1.5 * np.tanh(r / 1.5),
     'fading': lambda r: r / (1.0 + 0.1 * np.abs(r)),
+    'a step': lambda r: r + 0.05 * (r > 0.41),
     'a short bend': lambda r: r / (1.0 + (r / 0.9) ** 8) ** 0.125,
 }
 
