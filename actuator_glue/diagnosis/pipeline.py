@@ -126,8 +126,7 @@ def _conclude(
         result = _conclusion(prepared, result.selection, fed_back, result.line)
     elif result.decision.verdict == 'missing-effect' and len(result.found.final.effects) > 1:
         selection = _apart(result.selection)
-        one = learning.instead(selection, result.found)
-        return result if one is None else _conclusion(prepared, selection, one, result.line)
+        return _complete(result, selection, learning.instead(selection, result.found)) or result
     if result.decision.verdict == 'unexplained' and mean_effects(reserved=True):
         result = _with_reserved(prepared, result, settings, tell)
     if result.decision.verdict != 'unexplained':
@@ -148,8 +147,17 @@ def _described(result: Conclusion, fed_back: Selection) -> Conclusion | None:
     found = learning.learned(selection, result.found)
     if found is None or not learning.as_good_and_plainer(selection, found, fed_back):
         return None
-    described = _conclusion(result.prepared, selection, found, result.line)
-    return None if described.decision.verdict == 'unexplained' else described
+    return _complete(result, selection, found)
+
+
+def _complete(
+    result: Conclusion, selection: ModelSelection, found: Selection | None
+) -> Conclusion | None:
+    """Return another answer about the same records, if there is one and it is complete."""
+    if found is None:
+        return None
+    other = _conclusion(result.prepared, selection, found, result.line)
+    return None if other.decision.verdict == 'unexplained' else replace(other, onset=result.onset)
 
 
 def _apart(selection: ModelSelection) -> ModelSelection:
@@ -257,18 +265,22 @@ def since_onset(first: Conclusion, settings: Thresholds, each: Each, tell: Progr
 
 
 def with_learned_terms(result: Conclusion) -> Conclusion:
-    """Describe by learned terms material structure that the catalogue leaves, or names badly."""
+    """Describe by learned terms material structure that the catalogue leaves, or names badly.
+
+    Where no term is worth it either, two effects may hide each other.
+    """
     decision, found = result.decision, result.found
     left = decision.verdict == 'unexplained' or decision.left >= found.material
     if not left or found.final.own is not None:
         return result
     described = learning.learned(result.selection, found)
-    if described is None and decision.verdict == 'unexplained':
-        described = together.explained(result.selection, found)
-    if described is None:
+    if described is not None:
+        learned = _conclusion(result.prepared, result.selection, described, result.line)
+        return replace(learned, onset=result.onset)
+    if decision.verdict != 'unexplained':
         return result
-    learned = _conclusion(result.prepared, result.selection, described, result.line)
-    return replace(learned, onset=result.onset)
+    selection = _apart(result.selection)
+    return _complete(result, selection, together.explained(selection, found)) or result
 
 
 def _conclusion(
