@@ -25,7 +25,7 @@ from actuator_glue.diagnosis.learned_sizes import (
     unit_text,
 )
 from actuator_glue.model.effects import Effect, Scale
-from actuator_glue.model.effects.terms.entry import term
+from actuator_glue.model.effects.terms.entry import starting_from, term
 from actuator_glue.model.effects.terms.expression import PLACES, SIGNAL
 from actuator_glue.model.parameters import Parameter
 
@@ -168,7 +168,7 @@ def _step(sizes: dict[str, float]) -> Effect:
         for at in np.linspace(-1.0, 1.0, 2 * _PLACES + 1)[1::2].tolist()
         for sign in (1.0, -1.0)
     )
-    return term(
+    step = term(
         'learned-sensor-step',
         'sensor: y = y + 0.5*sensor_step'
         f'*(tanh((y - sensor_step_at)/{width}) + tanh(sensor_step_at/{width}))',
@@ -177,8 +177,8 @@ def _step(sizes: dict[str, float]) -> Effect:
             Parameter('sensor_step_at', 'm', -size, size, 'where it jumps', 0.0),
         ),
         source=LEARNED,
-        starts=tuple(starts),
     )
+    return starting_from(step, starts)
 
 
 def _turbulent(sizes: dict[str, float]) -> Effect:

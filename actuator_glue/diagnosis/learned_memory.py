@@ -21,7 +21,7 @@ import numpy as np
 
 from actuator_glue.diagnosis.learned_sizes import LEARNED
 from actuator_glue.model.effects import Effect
-from actuator_glue.model.effects.terms.entry import term
+from actuator_glue.model.effects.terms.entry import starting_from, term
 from actuator_glue.model.effects.terms.expression import SIGNAL
 from actuator_glue.model.parameters import Parameter
 
@@ -117,7 +117,7 @@ def _resonance(sizes: Mapping[str, float]) -> Effect:
         for damping in _DAMPED
         for sizes_of_it in ((_SEEN, 0.0), (-_SEEN, 0.0), (0.0, _SEEN), (0.0, -_SEEN))
     )
-    return term(
+    poles_at = term(
         'learned-command-resonance',
         f'command: u = u + resonance*bandpass(u, {poles}) + beyond*(u - lowpass(u, {poles}))',
         (
@@ -127,5 +127,5 @@ def _resonance(sizes: Mapping[str, float]) -> Effect:
             Parameter('resonance_damping', '1', *_DAMPINGS, 'share of critical damping', 0.1),
         ),
         source=LEARNED,
-        starts=tuple(starts),
     )
+    return starting_from(poles_at, starts)

@@ -20,8 +20,6 @@ from actuator_glue.diagnosis.trial import Trial
 Progress = Callable[[str, float], None]
 # Rounds in which members may be swapped for better or simpler ones.
 _SWAPS = 4
-# Share of the bounds within which a parameter is at one of them.
-_AT_BOUND = 1e-3
 _SURE = 2.0  # standard errors over the blocks: what is less is not told apart
 # Of what matters: two that remove this share each remove what matters.
 _PART = 0.5**0.5
@@ -211,7 +209,7 @@ class ModelSelection:
                 two = pairs.rivals(self.search, name, trials, self.settings.tried, below)
                 rivals[name] = self._rivals(rest, current, name, [*trials, *two])
                 for trial in (*trials, *pairs.ahead(self, name, rivals[name], two)):
-                    pressed = self._pressed_form(trial, trial.added, name)
+                    pressed = ranking.pressed_form(self.search, trial, trial.added, name)
                     if not pressed and self._ahead(trial, best, complete):
                         best = trial
             if best is current:
@@ -274,22 +272,6 @@ class ModelSelection:
         cost = pairs.price(len(self.search.names))
         return compare(rest, best, name, trials, scorer, self.settings, cost)
 
-    def _pressed_form(self, trial: Trial, name: str, simpler: str) -> bool:
-        """Whether an effect is a richer form of another only by a parameter at its bound.
-
-        Such a form mends the other's equation. Near its neutral value a size is small, not held.
-        """
-        entry = self.search.entries.get(name)
-        if entry is None or entry.holds is None or entry.holds[0] != simpler:
-            return False
-        columns = trial.structure.columns(name)
-        return any(
-            abs(value - end) < _AT_BOUND * (p.upper - p.lower)
-            for p, value in zip(entry.parameters, trial.fit.theta[columns], strict=True)
-            for end in (p.lower, p.upper)
-            if end != p.neutral
-        )
-
     def simpler(
         self, current: Trial, rivals: dict[str, tuple[Rival, ...]], complete: bool
     ) -> Trial:
@@ -300,7 +282,7 @@ class ModelSelection:
                 entries = self.search.entries
                 fewer = len(entries[rival.name].parameters) < len(entries[name].parameters)
                 alike = complete and rival.nats < self.settings.tie_nats
-                alike = alike or self._pressed_form(current, name, rival.name)
+                alike = alike or ranking.pressed_form(self.search, current, name, rival.name)
                 named = is_learned(entries[name]) and rival.excess < self.material
                 if rival.tied and ((named and rival.name != name) or (fewer and alike)):
                     return self.search.trial(effects, rival.name)

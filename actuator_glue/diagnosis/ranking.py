@@ -24,6 +24,8 @@ from actuator_glue.records import Array
 _DRAWS = 2000
 _SEED = 0
 _NORMAL_95 = 1.959964
+# Share of the bounds within which a parameter is at one of them.
+_AT_BOUND = 1e-3
 _NOT_NEAR = 0.1  # of the best's weight: excess beyond the tolerance
 _SAME = 0.5  # of what the best removes: a rival that removes less is none
 
@@ -45,6 +47,23 @@ def worth(search: Search, final: Trial) -> tuple[dict[str, float], dict[str, flo
         rest = search.without(final, name)
         gains[name], nats[name] = removed(rest, final), evidence(final.scores, rest.scores)
     return gains, nats
+
+
+def pressed_form(search: Search, trial: Trial, name: str, simpler: str) -> bool:
+    """Whether an effect is a richer form of another only by a parameter at its bound.
+
+    Such a form mends the other's equation. Near its neutral value a size is small, not held.
+    """
+    entry = search.entries.get(name)
+    if entry is None or entry.holds is None or entry.holds[0] != simpler:
+        return False
+    columns = trial.structure.columns(name)
+    return any(
+        abs(value - end) < _AT_BOUND * (p.upper - p.lower)
+        for p, value in zip(entry.parameters, trial.fit.theta[columns], strict=True)
+        for end in (p.lower, p.upper)
+        if end != p.neutral
+    )
 
 
 def standard_error(difference: Array) -> float:

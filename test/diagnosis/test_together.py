@@ -47,8 +47,8 @@ def test_two_that_hide_each_other_are_found() -> None:
     assert chosen is not None
     assert chosen.final.effects == ('delay', 'supply-droop')
     assert chosen.left < chosen.material
-    theta, columns = chosen.final.fit.theta, chosen.final.structure.columns
-    assert theta[columns('delay')][0] == pytest.approx(DELAY, rel=0.1)
+    # Noise is left: four standard deviations of the rms of 7680 samples, and a few fitted.
+    assert chosen.final.fit.rms == pytest.approx(1e-5, rel=0.035)
 
 
 def test_one_alone_is_no_pair() -> None:

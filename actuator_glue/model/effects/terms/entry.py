@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -40,7 +40,6 @@ def term(
     source: str = '',
     searched: bool = True,
     check: bool = True,
-    starts: tuple[tuple[float, ...], ...] = (),
 ) -> Effect:
     """Return the entry of an effect written as `place: symbol = expression`.
 
@@ -53,7 +52,6 @@ def term(
         source: literature.
         searched: whether the diagnosis tries it.
         check: try the expression at once; the catalogue's own are tried by tests.
-        starts: parameters from which a fit starts; found from its response to a sine if empty.
 
     Raises:
         InputError: the expression or a parameter cannot be used.
@@ -72,7 +70,7 @@ def term(
             group=group or name,
             signature=signature or 'none described',
             source=source or 'an expression of the user',
-            starts=_Starts(name, equation, parameters, starts),
+            starts=_Starts(name, equation, parameters),
             expression=found,
             output=_Sensor(name, equation, parameters) if found.place == 'sensor' else None,
             searched=searched,
@@ -82,6 +80,12 @@ def term(
     except InputError as error:
         raise InputError(f'effect {name!r}: {error}') from None
     return effect
+
+
+def starting_from(effect: Effect, rows: Iterable[tuple[float, ...]]) -> Effect:
+    """Return a term whose fits start from these parameters, not from what a sine responds to."""
+    assert isinstance(effect.starts, _Starts)
+    return replace(effect, starts=replace(effect.starts, given=tuple(rows)))
 
 
 def _check(name: str, parameters: tuple[Parameter, ...]) -> None:
