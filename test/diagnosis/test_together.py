@@ -16,7 +16,7 @@ from actuator_glue.records import Record
 RATE = 128.0
 THETA = np.array([235.0, 5.0e10, 4.23e6, 3.3])
 NAMES = ('delay', 'supply-droop', 'viscous-damping', 'gain-drift', 'bias')
-DELAY, DROOP = 7e-3, 5.0  # together 7.5 um, the delay alone 3, the droop alone 1
+DELAY, DROOP = 8e-3, 6.0  # together some 8 um, each alone less than 3
 
 
 def selected(delay: float, droop: float) -> tuple[ModelSelection, Selection]:
@@ -38,7 +38,7 @@ def selected(delay: float, droop: float) -> tuple[ModelSelection, Selection]:
 
 
 def test_two_that_hide_each_other_are_found() -> None:
-    """Alone they are ten standard deviations from what matters, together as far beyond."""
+    """Of 25 machines what is left was 0.76 to 0.85 of the noise, alone half of what matters goes."""
     selection, found = selected(DELAY, DROOP)
     assert found.final.effects == ()
     assert found.left > Thresholds().left_noise * found.noise
