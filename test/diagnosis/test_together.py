@@ -38,7 +38,7 @@ def selected(delay: float, droop: float) -> tuple[ModelSelection, Selection]:
 
 
 def test_two_that_hide_each_other_are_found() -> None:
-    """Of 25 machines what is left was 0.76 to 0.85 of the noise, alone half of what matters goes."""
+    """Of 25 machines 0.76 to 0.85 of the noise was left; alone half of what matters goes."""
     selection, found = selected(DELAY, DROOP)
     assert found.final.effects == ()
     assert found.left > Thresholds().left_noise * found.noise
