@@ -31,7 +31,8 @@ def with_the_right_hold(
     found for it (a gain that drifts, say). The other hold is taken where Eq. (2) alone explains
     materially more with it, and what is found with it explains more, beyond chance. Held
     commands taken for linear ones are a delay, which is in the catalogue. Where the catalogue
-    explains neither, terms are learned with both: what it lacks may look like the other hold.
+    explains neither, terms are learned with both: what it lacks may look like the other hold,
+    which must explain more beyond chance then, or all that remains with fewer parameters.
     """
     other = _linearly(first, settings, each, tell)
     if other is None:
@@ -40,7 +41,11 @@ def with_the_right_hold(
     if first.decision.verdict != 'unexplained':
         return described
     held = with_learned_terms(first)
-    return described if _gained(held, described) >= settings.nats else held
+    fewer = len(described.found.final.fit.theta) < len(held.found.final.fit.theta)
+    whole = described.decision.verdict != 'unexplained'
+    # A hold is a plainer answer than a term that leads by half a sample as well.
+    least = 0.0 if whole and fewer else settings.nats
+    return described if _gained(held, described) >= least else held
 
 
 def _linearly(
