@@ -4,20 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import two_sweeps
 
 from actuator_glue.diagnosis import companions, discrepancy, posterior
-from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.posterior import Draws
-from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
-from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
-from actuator_glue.model.structure import Structure
-from actuator_glue.records import Record
 
-RATE = 128.0
-THETA = np.array([235.0, 5.0e10, 4.23e6, 3.3])
 NAMES = ('viscous-damping', 'specimen-gap', 'valve-deadband', 'bias', 'delay', 'drift')
 # The gap removes 1.7 um, 0.1 um from one draw of the noise to the next: between the 1 um that
 # is looked for and the 5 um that matter.
@@ -26,20 +20,8 @@ DAMPING, GAP = 5e4, 9e-5
 
 def selected(gap: float) -> tuple[ModelSelection, Selection]:
     """Two sweeps with damping and perhaps a gap at the specimen; 10 um of noise."""
-    rng = np.random.default_rng()
-    model = Structure(('viscous-damping', 'specimen-gap'))
-    t = np.arange(int(40 * RATE)) / RATE
-    command = 2e-3 * np.sin(np.pi * (10.0 / 40.0) * t**2)
-    values = model.neutral(THETA)
-    values[model.columns('viscous-damping')] = DAMPING
-    values[model.columns('specimen-gap')] = gap
-    records = []
-    for k in (100e3, 400e3):
-        y = model.simulate(values, Record(command, command, 1 / RATE, stiffness=k))
-        y = y + 1e-5 * rng.standard_normal(len(t))
-        records.append(Record(command, y, 1 / RATE, stiffness=k))
-    selection = ModelSelection(Search(Data.whole(records), NAMES), Thresholds(), lambda s, d: None)
-    return selection, selection.run()
+    effects = {'viscous-damping': DAMPING, 'specimen-gap': gap}
+    return two_sweeps.selected(NAMES, effects, stroke=2e-3, hertz=10.0, seconds=40.0)
 
 
 def sampled(selection: ModelSelection, found: Selection, trial: Trial) -> Draws:
@@ -99,5 +81,5 @@ def test_damping_is_found_on_either_side_of_the_valve() -> None:
     """
     for _ in range(4):
         final = selected(0.0)[1].final
-        assert final.fit.theta[0] == pytest.approx(THETA[0], rel=0.1)
+        assert final.fit.theta[0] == pytest.approx(two_sweeps.THETA[0], rel=0.1)
         assert final.fit.theta[4] == pytest.approx(DAMPING, rel=0.1)

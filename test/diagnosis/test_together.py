@@ -1,40 +1,22 @@
 """Two effects of which each hides the other are found though neither alone matters."""
 
-import numpy as np
 import pytest
+import two_sweeps
 
 from actuator_glue.diagnosis import together
-from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.ranking import removed
-from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
-from actuator_glue.model.structure import Structure
-from actuator_glue.records import Record
 
-RATE = 128.0
-THETA = np.array([235.0, 5.0e10, 4.23e6, 3.3])
 NAMES = ('delay', 'supply-droop', 'viscous-damping', 'gain-drift', 'bias')
 DELAY, DROOP = 8e-3, 6.0  # together some 8 um, each alone less than 3
 
 
 def selected(delay: float, droop: float) -> tuple[ModelSelection, Selection]:
     """Two sweeps with both effects; 10 um of noise."""
-    rng = np.random.default_rng()
-    model = Structure(('delay', 'supply-droop'))
-    t = np.arange(int(30 * RATE)) / RATE
-    command = 2.2e-3 * np.sin(np.pi * (8.0 / 30.0) * t**2)
-    values = model.neutral(THETA)
-    values[model.columns('delay')] = delay
-    values[model.columns('supply-droop')] = droop
-    records = []
-    for k in (100e3, 400e3):
-        y = model.simulate(values, Record(command, command, 1 / RATE, stiffness=k))
-        y = y + 1e-5 * rng.standard_normal(len(t))
-        records.append(Record(command, y, 1 / RATE, stiffness=k))
-    selection = ModelSelection(Search(Data.whole(records), NAMES), Thresholds(), lambda s, d: None)
-    return selection, selection.run()
+    effects = {'delay': delay, 'supply-droop': droop}
+    return two_sweeps.selected(NAMES, effects, stroke=2.2e-3, hertz=8.0, seconds=30.0)
 
 
 def test_two_that_hide_each_other_are_found() -> None:
