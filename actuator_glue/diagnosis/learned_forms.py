@@ -104,7 +104,7 @@ def _product(place: str, factors: list[str], sizes: dict[str, float]) -> Effect:
 
 def _written(factor: str, texts: Mapping[str, str]) -> str:
     text = texts.get(factor.strip('|'), factor.strip('|'))
-    return f'abs({text})' if '|' in factor else f'{text}'
+    return f'abs({text})' if '|' in factor else text
 
 
 def _word(factor: str) -> str:

@@ -58,7 +58,7 @@ def learned(selection: ModelSelection, found: Selection) -> Selection | None:
 
 
 def instead(selection: ModelSelection, found: Selection) -> Selection | None:
-    """Return one term that explains all that several names do, as well and with less.
+    """Return one term that explains all that several names do, better for its parameters.
 
     Lost motion of the command moves the piston nearly as play and a lag of the transducer do: two
     names of one cause. The term pays for having been chosen among many, in nats beside one for
