@@ -32,8 +32,7 @@ def with_companions(selection: ModelSelection, final: Trial) -> Trial:
         return final
     current, least = final, _SEEN * selection.material
     for _ in range(_MOST):
-        names = [n for n in search.names if n not in current.effects]
-        ranked = search.screened(current, names)[: settings.tried]
+        ranked = search.screened(current, search.others(current))[: settings.tried]
         below = current.mean_square - least**2
         trials = search.additions(current, ranked, valves=False, below=below)
         if not trials or not selection.better(trials[0], current, least):

@@ -76,8 +76,7 @@ def decide(
     elif found.final.effects or seen:
         verdict = 'missing-effect'
     final = found.final
-    described = any(is_learned(e) for e in final.structure.entries)
-    doubted = verdict == 'unexplained' or (described and left >= found.material)
+    doubted = verdict == 'unexplained' or (_described(found) and left >= found.material)
     return Decision(
         verdict=verdict,
         final=final,
@@ -90,6 +89,10 @@ def decide(
         limit=limit,
         remaining={'left': left, 'limit': limit, **remaining(data, final.fit.error)},
     )
+
+
+def _described(found: Selection) -> bool:
+    return any(is_learned(e) for e in found.final.structure.entries)
 
 
 def _certainty(found: Selection, left: float, surrogate: Surrogate, settings: Thresholds) -> float:
@@ -106,8 +109,7 @@ def _certainty(found: Selection, left: float, surrogate: Surrogate, settings: Th
     explained = gained / (gained + left**2) if gained > 0.0 else 0.0
     theirs = surrogate.structure_error**2 - found.noise**2
     generic = max(0.0, surrogate.error**2 - found.noise**2)
-    described = any(is_learned(e) for e in found.final.structure.entries)
-    own = explained * (settings.described if described else 1.0)
+    own = explained * (settings.described if _described(found) else 1.0)
     return own * (min(1.0, generic / theirs) if theirs > 0.0 else 1.0)
 
 

@@ -8,7 +8,7 @@ it is screened, refitted and compared as the effects of the catalogue are.
 
 from __future__ import annotations
 
-from collections.abc import Container, Mapping
+from collections.abc import Container
 from itertools import groupby
 from typing import Final
 
@@ -93,8 +93,7 @@ def _product(place: str, factors: list[str], sizes: dict[str, float]) -> Effect:
         full *= sizes[symbol]
         unit = [a - b for a, b in zip(unit, DIMENSIONS[symbol], strict=True)]
     powers = [(f, len(list(same))) for f, same in groupby(factors)]
-    texts = {'r': command_rate(sizes)}
-    text = '*'.join(_written(f, texts) + (f'**{n}' if n > 1 else '') for f, n in powers)
+    text = '*'.join(_written(f, sizes) + (f'**{n}' if n > 1 else '') for f, n in powers)
     name = '-'.join(_word(f) + (str(n) if n > 1 else '') for f, n in powers)
     largest = LARGEST * signal_size(place, sizes) / full
     return _effect(
@@ -102,8 +101,9 @@ def _product(place: str, factors: list[str], sizes: dict[str, float]) -> Effect:
     )
 
 
-def _written(factor: str, texts: Mapping[str, str]) -> str:
-    text = texts.get(factor.strip('|'), factor.strip('|'))
+def _written(factor: str, sizes: dict[str, float]) -> str:
+    symbol = factor.strip('|')
+    text = command_rate(sizes) if symbol == 'r' else symbol
     return f'abs({text})' if '|' in factor else text
 
 

@@ -35,9 +35,7 @@ def learned(selection: ModelSelection, found: Selection) -> Selection | None:
         The selection with learned terms, or None where none is worth it.
     """
     search = selection.search
-    offered = forms(search.scale(), search.entries)
-    search.entries |= {effect.name: effect for effect in offered}
-    names = [effect.name for effect in offered]
+    names = _offered(search)
     best = found.final
     for turn in range(_MOST):
         selection.progress('learned term', turn / _MOST)
@@ -69,17 +67,14 @@ def instead(selection: ModelSelection, found: Selection) -> Selection | None:
         found: names that leave nothing material.
     """
     search, base = selection.search, selection.search.trial(())
-    offered = forms(search.scale(), search.entries)
-    search.entries |= {effect.name: effect for effect in offered}
-    names = [effect.name for effect in offered]
+    names = _offered(search)
     selection.progress('learned term', 0.0)
     tried = search.additions(base, search.screened(base, names)[:_REFITS])
     whole = [t for t in tried if selection.left(t) < selection.material]
     if not whole:
         return None
     best = max(whole, key=lambda trial: _merit(search, trial))
-    gain = float(best.scores.sum() - search.trial(found.final.effects).scores.sum())
-    if gain + len(found.final.fit.theta) - len(best.fit.theta) <= math.log(len(names)):
+    if _gain(search, best, found.final) <= math.log(len(names)):
         return None
     return selection.concluded(_plainer(selection, best), base, found.singles)
 
@@ -96,13 +91,24 @@ def as_good_and_plainer(selection: ModelSelection, found: Selection, named: Sele
         found: the description.
         named: the names.
     """
-    search, best, names = selection.search, found.final, named.final
-    fewer = len(names.fit.theta) - len(best.fit.theta)
-    if found.left >= selection.material or fewer < 0:
+    best, names = found.final, named.final
+    if found.left >= selection.material or len(best.fit.theta) > len(names.fit.theta):
         return False
+    return _gain(selection.search, best, names) > 0.0
+
+
+def _offered(search: Search) -> list[str]:
+    """Let a search know the forms of this test; return their names."""
+    offered = forms(search.scale(), search.entries)
+    search.entries |= {effect.name: effect for effect in offered}
+    return [effect.name for effect in offered]
+
+
+def _gain(search: Search, best: Trial, other: Trial) -> float:
+    """Nats out of sample by which a structure is better, less one for each further parameter."""
     assert search.scorer is not None
-    gain = search.scorer.block_scores(best.fit) - search.scorer.block_scores(names.fit)
-    return float(gain.sum()) + fewer > 0.0
+    gain = search.scorer.block_scores(best.fit) - search.scorer.block_scores(other.fit)
+    return float(gain.sum()) + len(other.fit.theta) - len(best.fit.theta)
 
 
 def _additions(

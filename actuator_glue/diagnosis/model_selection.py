@@ -104,8 +104,8 @@ class ModelSelection:
         """Refit every structure of the beam with its most promising further effects."""
         found: dict[tuple[str, ...], Trial] = {}
         for i, current in enumerate(beam):
-            names = [n for n in self.search.names if n not in current.effects]
             self.progress(f'effect {stage}', i / len(beam))
+            names = self.search.others(current)
             tried = self.search.screened(current, names)[: self.settings.tried]
             for trial in self.search.additions(current, tried, valves=False):
                 found.setdefault(trial.effects, trial)
@@ -116,10 +116,15 @@ class ModelSelection:
 
         Beside a clock's skew a payload looks like one; with Eq. (2) alone it looked like the skew.
         """
-        names = [n for n in self.search.names if n not in current.effects]
-        new = [n for n in names if self.search.known((*current.effects, n)) is None]
-        tried = self.search.screened(current, new, beside=True)[: self.settings.tried]
-        return self.search.additions(current, tried, valves=False)
+        new = [n for n in self.search.others(current) if not self._refitted(current, n)]
+        return self.search.additions(current, self.promising(current, new), valves=False)
+
+    def _refitted(self, current: Trial, name: str) -> bool:
+        return self.search.known((*current.effects, name)) is not None
+
+    def promising(self, current: Trial, names: Sequence[str]) -> list[str]:
+        """Return the effects that promise most beside the present ones."""
+        return self.search.screened(current, names, beside=True)[: self.settings.tried]
 
     def run(self) -> Selection:
         """Add effects while each is worth it, then check each against its rivals."""
@@ -201,7 +206,7 @@ class ModelSelection:
             best, complete = current, self.left(current) < self.material
             for name in current.effects:
                 rest = self.search.without(current, name)
-                names = [n for n in self.search.names if n not in current.effects]
+                names = self.search.others(current)
                 if len(current.effects) > 1:
                     names = self.search.screened(rest, names)[: self.settings.tried]
                 below = ranking.left_by_rivals(rest, current)

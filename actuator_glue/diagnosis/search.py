@@ -107,6 +107,10 @@ class Search:
         names = tuple(effects)
         return self.trial(names) if frozenset(names) in self._tried else None
 
+    def others(self, trial: Trial) -> list[str]:
+        """Return the names that a structure does not have."""
+        return [n for n in self.names if n not in trial.effects]
+
     def left_at_most(self, mean_square: float) -> list[tuple[Structure, Fit]]:
         """Return all refitted structures that leave no more than a mean squared error [m^2]."""
         found = [(key, fit) for key, fit in self._tried.items() if fit.rms**2 <= mean_square]

@@ -38,11 +38,10 @@ def explained(selection: ModelSelection, found: Selection) -> Selection | None:
 
 def _both(selection: ModelSelection, current: Trial) -> list[Trial]:
     """Refit with two more: the best alone, each with what promises most beside it."""
-    search, most = selection.search, selection.settings.tried
+    search = selection.search
 
     def other(start: Trial) -> list[str]:
-        names = [n for n in search.names if n not in start.effects]
-        return search.screened(start, names, beside=True)[:most]
+        return selection.promising(start, search.others(start))
 
     firsts = search.additions(current, other(current), valves=False)
     return [pair for first in firsts for pair in search.additions(first, other(first))]

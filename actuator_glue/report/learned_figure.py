@@ -12,13 +12,15 @@ from actuator_glue.diagnosis.learned_sizes import DIMENSIONS, unit_text
 from actuator_glue.diagnosis.learned_term import LearnedTerm
 from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.model.effects.terms.entry import along
-from actuator_glue.model.effects.terms.expression import PLACES, SIGNAL
+from actuator_glue.model.effects.terms.expression import MEMORY, PLACES, SIGNAL
+from actuator_glue.model.effects.terms.filters import FILTERS
 from actuator_glue.records import Array
 from actuator_glue.report import style
 
 _CYCLES, _POINTS = 20, 200  # of a sine, the last of which is drawn; points a cycle
 _DRAWS = 256
-_HAS_TIME = re.compile(r'\b(rate|lag|integral|limit_rate|lowpass|bandpass)\(')
+# Functions that depend on how fast things move.
+_TIMED = {*MEMORY, *FILTERS} - {'play'}
 _QUICK = 'veq'  # are largest where the motion passes its middle
 _UNITS = {
     'm': (1e3, 'mm', 1e6, 'um'),
@@ -87,7 +89,9 @@ def learned_terms(found: DiagnosisData) -> Figure:
             axes.fill_between(x[part], fine * low[part], fine * high[part], color=style.LIGHT_BAND)
         axes.plot(x, fine * middle, color=style.TOTAL, lw=1.0)
         at_hertz = (
-            f', at {usual_frequency(found):.2g} Hz' if _HAS_TIME.search(term.equation) else ''
+            f', at {usual_frequency(found):.2g} Hz'
+            if _TIMED.intersection(re.findall(r'\w+', term.equation))
+            else ''
         )
         axes.set_xlabel('time [s]' if over == 't' else f'{signal} [{unit}]{at_hertz}')
         axes.set_ylabel(f'added to {signal} [{fine_unit}]')
