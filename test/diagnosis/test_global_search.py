@@ -43,13 +43,17 @@ def slopes_alone(data: Data) -> Fit:
 def test_the_lowest_minimum_is_found(rng_seed: int) -> None:
     """Slopes alone leave 10 to 59 um (median 22) where 10 are noise, the population 9.8 to 11.5.
 
-    False failures: 0 of 600 seeds (95 % interval 0 to 0.6 %); with slopes alone 91 % fail.
+    The population misses 3 of 1 031 machines (95 % interval 0.1 to 0.9 %), slopes alone 91 %:
+    three of six are missed once in 70 000 tests even at 0.9 %.
     """
-    data = Data.whole(held_up(rng_seed))
-    slopes = slopes_alone(data)
-    found = global_search.refit(data, COULOMB, slopes, 8, 1e-4)
-    assert found.rms < 1.2e-5
-    assert found.theta[4] == pytest.approx(150.0, rel=0.04)
+    seeds = np.random.default_rng(rng_seed).integers(1 << 31, size=6)
+    missed = 0
+    for seed in seeds.tolist():
+        data = Data.whole(held_up(seed))
+        slopes = slopes_alone(data)
+        found = global_search.refit(data, COULOMB, slopes, 8, 1e-4)
+        missed += not (found.rms < 1.2e-5 and found.theta[4] == pytest.approx(150.0, rel=0.04))
+    assert missed < 3
     again = global_search.refit(data, COULOMB, slopes, 8, 1e-4)
     np.testing.assert_array_equal(again.theta, found.theta)
 

