@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
+from functools import partial
 
 from actuator_glue.records import Record
 
@@ -14,12 +15,22 @@ _LARGE = 4 << 20  # bytes
 _LONG = 2_000_000
 
 
-def give_back(records: Sequence[Record]) -> None:
+def give_back(records: Sequence[Record]) -> Callable[[], None]:
     """Let large blocks go back when they are freed; of other C libraries nothing is asked.
+
+    Returns what lets the small ones go back, too: threads leave 0.1 GB of freed pieces in a
+    diagnosis of ten minutes at 10 kHz. For short records it does nothing.
 
     By default glibc keeps up to 64 MB in the heap of every thread: 0.2 of 1.05 GB in a diagnosis
     of ten minutes at 10 kHz.
     """
     if sum(map(len, records)) >= _LONG:
         with suppress(OSError, AttributeError, TypeError):  # other C libraries have no mallopt
-            ctypes.CDLL(None).mallopt(_M_MMAP_THRESHOLD, _LARGE)
+            library = ctypes.CDLL(None)
+            library.mallopt(_M_MMAP_THRESHOLD, _LARGE)
+            return partial(library.malloc_trim, 0)
+    return _nothing
+
+
+def _nothing() -> None:
+    """Leave the heap alone."""

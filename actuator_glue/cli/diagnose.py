@@ -94,7 +94,7 @@ def run(args: argparse.Namespace) -> int:
     """
     load_effects(args)
     records, held = _load(args)
-    give_back([*records, *held])
+    trim = give_back([*records, *held])
 
     from actuator_glue.api.diagnosis import diagnose
 
@@ -103,6 +103,7 @@ def run(args: argparse.Namespace) -> int:
 
         def tell(stage: str, share: float) -> None:
             nonlocal at
+            trim()
             later = [v for v in _STAGES.values() if v > _STAGES[stage]] or [1.0]
             at = max(at, _STAGES[stage] + share * (min(later) - _STAGES[stage]))
             done(at)

@@ -76,6 +76,15 @@ def chunks(rows: int, columns: int, least: int = _ROWS) -> Iterator[slice]:
         yield slice(begin, begin + size)
 
 
+def _shorter(y: Array, count: int) -> Iterator[tuple[slice, Array]]:
+    """Yield rows of y (m, n), and them with one sample for `count`, (r, n / count)."""
+    if count == 1:
+        yield slice(None), y
+        return
+    for i, row in enumerate(y):
+        yield slice(i, i + 1), means(row, count)[np.newaxis]
+
+
 @dataclass(frozen=True)
 class Data:
     """Records and the samples of each that count.
@@ -176,10 +185,10 @@ class Data:
             (record, count), initial, origin = self._run[i], self.initials[i], self.origins[i]
             for some in chunks(len(table), len(record), LANES):
                 y = simulated(model, table[some], record, initial, origin)
-                if count > 1:
-                    y = np.stack([means(row, count) for row in y])
-                for run, at in (r for j in same for r in self.runs[j]):
-                    out[some, at] = y[:, run]
+                # Row by row where they become shorter: all would be there twice.
+                for rows, part in _shorter(y, count):
+                    for run, at in (r for j in same for r in self.runs[j]):
+                        out[some, at][rows] = part[:, run]
         return out
 
     @cached_property
@@ -198,6 +207,11 @@ class Data:
             times = next(k for k in range(most, 0, -1) if count % k == 0)
             out.append((decimated(whole, count // times), times))
         return out
+
+    @property
+    def simulated(self) -> int:
+        """How many samples a structure simulates of one parameter set."""
+        return sum(len(self._run[same[0]][0]) for same in self._repeats)
 
     @property
     def _singles(self) -> list[list[int]]:

@@ -133,7 +133,12 @@ def diagnose(
         larger = companions.with_companions(result.selection, final)
     told = draws
     if larger is not final:
-        told = companions.reduced(sample(larger, settings.evaluations), larger, final)
+        # The ridge that keeps chains of a long record apart is there with companions, too.
+        apart = draws.cut and any(draws.unmet)
+        beside = sample(larger, 0 if apart else settings.evaluations)
+        told = companions.reduced(beside, larger, final)
+        if apart:
+            told = told._replace(unmet=draws.unmet)
     mixed = alternatives.mixed(told.points, final, others, lambda t: sample(t).points, rng)
     error = reconciled.reached_by_both(error, found.material, scorer, prepared.held, before, after)
     judged = verdict.conclude(decision.verdict, bool(decision.names), error, found.material)

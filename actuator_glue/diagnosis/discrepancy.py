@@ -69,7 +69,9 @@ class Discrepancy:
         values, vectors = np.linalg.eigh(rows @ rows.T)
         kept = values > _SAME * values.max(initial=0.0)
         powers = values[kept]
-        return cls(vectors[:, kept].T @ rows / np.sqrt(powers)[:, None], powers)
+        shapes = vectors[:, kept].T @ rows
+        shapes /= np.sqrt(powers)[:, None]
+        return cls(shapes, powers)
 
     def without(self, error: Array) -> Array:
         """Return what no shape takes up of a whitened error (N,)."""

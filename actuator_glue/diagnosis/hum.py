@@ -6,6 +6,7 @@ of the fitting records before any effect is sought, each with its own phase.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -17,6 +18,7 @@ from actuator_glue.records import Array
 
 _CLEAR = 60.0  # of the median power, 40 times the mean: one in 10^6 records of noise
 _LOWEST = 2.0  # Hz
+_PIECE = 1 << 20  # samples
 _ORDERS = 9  # harmonics of a sinusoidal command are its response, not hum
 
 
@@ -147,8 +149,27 @@ def without(data: Data, line: Line) -> Data:
 
 
 def regressed(data: Data, errors: Array, line: Line) -> Array:
-    """Errors (N,) with the line's frequency regressed out of each record [m]."""
-    out = []
-    for error, time in zip(data.split(errors), data.times, strict=True):
-        out.append(error - amplitudes(error, time, line.frequency) @ _basis(time, line.frequency))
-    return np.concatenate(out)
+    """Errors (N,) with the line's frequency regressed out of each record [m].
+
+    Some samples at a time: cosines and sines of all would be twice a long record.
+    """
+    out = errors.copy()
+    for period, runs in zip(data.periods, data.runs, strict=True):
+        normal, along = np.zeros((2, 2)), np.zeros(2)
+        for time, at in _pieces(period, runs):
+            basis = _basis(time, line.frequency)
+            normal += basis @ basis.T
+            along += basis @ out[at]
+        amplitude = np.linalg.solve(normal, along)
+        for time, at in _pieces(period, runs):
+            out[at] -= amplitude @ _basis(time, line.frequency)
+    return out
+
+
+def _pieces(period: float, runs: Sequence[tuple[slice, slice]]) -> Iterator[tuple[Array, slice]]:
+    """Yield the times of a record's counted samples, piece by piece, and where they lie joined."""
+    for run, at in runs:
+        for begin in range(0, run.stop - run.start, _PIECE):
+            count = min(_PIECE, run.stop - run.start - begin)
+            time = (run.start + begin + np.arange(count)) * period
+            yield time, slice(at.start + begin, at.start + begin + count)
