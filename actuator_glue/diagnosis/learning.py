@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Final
 
 from actuator_glue.diagnosis.learned_forms import forms
 from actuator_glue.diagnosis.learned_term import is_learned
@@ -22,6 +23,9 @@ from actuator_glue.diagnosis.trial import Trial
 
 _MOST = 2  # learned terms
 _REFITS = 4  # per structure and turn
+# Forms of what has a name in the catalogue, and that name.
+_SHAPES: Final = {'learned-force-friction': 'coulomb-friction'}
+_SEEN = 0.3  # of what matters: another shape of the same cause removes so much
 
 
 def learned(selection: ModelSelection, found: Selection) -> Selection | None:
@@ -79,6 +83,41 @@ def instead(selection: ModelSelection, found: Selection) -> Selection | None:
     return selection.concluded(_plainer(selection, best), base, found.singles)
 
 
+def reshaped(selection: ModelSelection, found: Selection) -> Selection | None:
+    """Return an answer whose cause has another shape, where the records show that beyond chance.
+
+    Friction that is reached over 1 mm/s leaves less than what matters as friction that is there
+    at once; but what that shifts, damping and speed of the valve, is wrong by much on records of
+    another kind.
+
+    Args:
+        selection: the model selection that ended with `found`; its noise stays.
+        found: names that leave nothing material.
+    """
+    search, best = selection.search, found.final
+    shapes = [
+        (form, name)
+        for form, of in _SHAPES.items()
+        for name, row in found.rivals.items()
+        if any(r.tied and r.name == of for r in row)  # the name itself, or told as well as it
+    ]
+    if not shapes or best.own is not None:
+        return None
+    offered = len(_offered(search))
+    selection.progress('learned term', 0.0)
+    least = math.log(offered) + selection.settings.nats
+    for form, name in shapes:
+        # In its place, or beside it: friction may fall with velocity, too.
+        for start in (search.without(found.final, name), found.final):
+            for trial in search.additions(start, [form]):
+                worth = removed(found.final, trial) > _SEEN * selection.material
+                if worth and _gain(search, trial, best) > least:
+                    best, least = trial, 0.0
+    if best is found.final:
+        return None
+    return selection.concluded(best, search.trial(()), found.singles)
+
+
 def as_good_and_plainer(selection: ModelSelection, found: Selection, named: Selection) -> bool:
     """Whether a description explains all that is left, as well as names do with more parameters.
 
@@ -98,10 +137,10 @@ def as_good_and_plainer(selection: ModelSelection, found: Selection, named: Sele
 
 
 def _offered(search: Search) -> list[str]:
-    """Let a search know the forms of this test; return their names."""
+    """Let a search know the forms of this test; return the names of those that are no effects."""
     offered = forms(search.scale(), search.entries)
     search.entries |= {effect.name: effect for effect in offered}
-    return [effect.name for effect in offered]
+    return [n for n, e in search.entries.items() if is_learned(e) and n not in search.names]
 
 
 def _gain(search: Search, best: Trial, other: Trial) -> float:

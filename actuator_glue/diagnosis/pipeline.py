@@ -124,9 +124,15 @@ def _conclude(
         if described is not None:
             return described
         result = _conclusion(prepared, result.selection, fed_back, result.line)
-    elif result.decision.verdict == 'missing-effect' and len(result.found.final.effects) > 1:
-        selection = _apart(result.selection)
-        return _complete(result, selection, learning.instead(selection, result.found)) or result
+    elif result.decision.verdict == 'missing-effect':
+        ways = [learning.reshaped]
+        if len(result.found.final.effects) > 1:
+            ways.insert(0, learning.instead)
+        for way in ways:
+            selection = _apart(result.selection)
+            other = _complete(result, selection, way(selection, result.found))
+            if other is not None:
+                return other
     if result.decision.verdict == 'unexplained' and mean_effects(reserved=True):
         result = _with_reserved(prepared, result, settings, tell)
     if result.decision.verdict != 'unexplained':

@@ -1,0 +1,77 @@
+"""A cause whose shape the catalogue does not hold is described by its own."""
+
+import numpy as np
+import pytest
+from smooth_machines import piston
+
+from actuator_glue.diagnosis import learning
+from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.model_selection import ModelSelection
+from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.selection import Selection
+from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.model import commands
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Array, Record
+
+RATE, NOISE, FRICTION = 128.0, 1e-5, 125.0
+THETA = np.array([400.0, 5.5e10, 2e6, 1.5])
+NAMES = ('coulomb-friction', 'stribeck-friction', 'gain', 'viscous-damping', 'bias')
+
+
+def sweep(seconds: float = 32.0) -> Array:
+    """2 mm to 8 Hz [m]."""
+    t = np.arange(0.0, seconds, 1.0 / RATE)
+    return np.asarray(2e-3 * np.sin(np.pi * (8.0 / seconds) * t**2))
+
+
+def selected(motions: list[tuple[float, Array, Array]]) -> tuple[ModelSelection, Selection]:
+    """What names say of stiffness, command and displacement of each test, noise added."""
+    rng = np.random.default_rng()
+    records = [
+        Record(u, y + NOISE * rng.standard_normal(len(y)), 1.0 / RATE, stiffness=k)
+        for k, u, y in motions
+    ]
+    selection = ModelSelection(Search(Data.whole(records), NAMES), Thresholds(), lambda *_: None)
+    return selection, selection.run()
+
+
+def held_out(found: Selection) -> float:
+    """Error of a structure on slow small motion without any noise [m]."""
+    u = commands.noise(RATE, 30.0, 0.2, 3.0, seed=5)
+    u *= 5e-4 / np.abs(u).max()
+    y = piston(u, 1.0 / RATE, THETA, 250e3, (11, FRICTION))
+    record, final = Record(u, y, 1.0 / RATE, stiffness=250e3), found.final
+    left = y - final.structure.simulate(final.fit.theta, record)
+    return float(np.sqrt(np.mean(left**2)))
+
+
+def test_friction_that_is_reached_over_a_velocity_has_its_shape() -> None:
+    """As Coulomb friction it leaves less than what matters here, and more on slow motion.
+
+    Over noises the force scatters by 1 % and the velocity by 4 %; the form removes 3.2 to 3.4 um,
+    1.6 are asked for, and 300 nats and more.
+    """
+    u = sweep()
+    machine = [(k, u, piston(u, 1.0 / RATE, THETA, k, (11, FRICTION))) for k in (0.0, 250e3)]
+    selection, found = selected(machine)
+    assert found.left < found.material
+    shaped = learning.reshaped(selection, found)
+    assert shaped is not None
+    assert shaped.final.effects == ('learned-force-friction',)
+    force, velocity = shaped.final.fit.theta[4:]
+    assert force == pytest.approx(FRICTION, rel=0.06)
+    assert velocity == pytest.approx(1e-3, rel=0.25)
+    assert held_out(shaped) < 0.4 * held_out(found)
+
+
+def test_friction_that_is_there_at_once_keeps_its_name() -> None:
+    """Its shape is that of the catalogue."""
+    u, model = sweep(), Structure(('coulomb-friction',))
+    values = np.array([*THETA, FRICTION])
+    machine = [
+        (k, u, model.simulate(values, Record(u, u, 1.0 / RATE, stiffness=k))) for k in (0.0, 250e3)
+    ]
+    selection, found = selected(machine)
+    assert found.final.effects == ('coulomb-friction',)
+    assert learning.reshaped(selection, found) is None
