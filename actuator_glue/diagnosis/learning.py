@@ -28,12 +28,16 @@ _SHAPES: Final = {'learned-force-friction': 'coulomb-friction'}
 _SEEN = 0.3  # of what matters: another shape of the same cause removes so much
 
 
-def learned(selection: ModelSelection, found: Selection) -> Selection | None:
+def learned(
+    selection: ModelSelection, found: Selection, complete: bool = False
+) -> Selection | None:
     """Go on from a selection with learned terms.
 
     Args:
         selection: the model selection that ended with `found`.
         found: what the catalogue explains.
+        complete: whether that counts as all: structure may pass for noise until a form explains
+            it. A form takes the place of such names only where it removes materially more.
 
     Returns:
         The selection with learned terms, or None where none is worth it.
@@ -45,7 +49,7 @@ def learned(selection: ModelSelection, found: Selection) -> Selection | None:
         selection.progress('learned term', turn / _MOST)
         # A wrong name of the catalogue may stand where the term belongs: Eq. (2) starts, too.
         starts = [best] if turn or not best.effects else [best, search.trial(())]
-        better = _additions(selection, starts, best, names)
+        better = _additions(selection, starts, best, names, complete)
         if better is None:
             break
         best = _plainer(selection, better)
@@ -151,7 +155,11 @@ def _gain(search: Search, best: Trial, other: Trial) -> float:
 
 
 def _additions(
-    selection: ModelSelection, starts: Sequence[Trial], best: Trial, names: Sequence[str]
+    selection: ModelSelection,
+    starts: Sequence[Trial],
+    best: Trial,
+    names: Sequence[str],
+    complete: bool,
 ) -> Trial | None:
     """Return the best structure with one more term, where it is worth more than the present."""
     search, worth, cost = selection.search, [], math.log(len(names))
@@ -165,7 +173,8 @@ def _additions(
                 whole = selection.left(trial) < selection.material
                 if not whole or not selection.better(trial, start, least, cost):
                     continue
-                least = selection.settings.tie_share * removed(start, trial)
+                tied = selection.settings.tie_share * removed(start, trial)
+                least = max(tied, selection.material) if complete else tied
             if selection.better(trial, best, least, cost):
                 worth.append(trial)
     worth.sort(key=lambda trial: _merit(search, trial), reverse=True)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, fields, replace
+from functools import partial
 
 from actuator_glue.diagnosis import (
     chance,
@@ -35,6 +36,7 @@ from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.effects import CATALOGUE
 
+Way = Callable[[ModelSelection, Selection], Selection | None]
 Progress = Callable[[str, float], None]
 # Share of the squared error that impulses must carry to have swayed a search: two per cent are a
 # hundredth of its size.
@@ -125,7 +127,8 @@ def _conclude(
             return described
         result = _conclusion(prepared, result.selection, fed_back, result.line)
     elif result.decision.verdict == 'missing-effect':
-        ways = [learning.reshaped]
+        # Structure of which names leave much may pass for noise until a form explains it.
+        ways: list[Way] = [learning.reshaped, partial(learning.learned, complete=True)]
         if len(result.found.final.effects) > 1:
             ways.insert(0, learning.instead)
         for way in ways:
