@@ -3,37 +3,17 @@
 import numpy as np
 import pytest
 from smooth_machines import piston
+from two_sweeps import RATE, selected_of, sweep
 
 from actuator_glue.diagnosis import learning
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.model_selection import ModelSelection
-from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
-from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.model import commands
 from actuator_glue.model.structure import Structure
-from actuator_glue.records import Array, Record
+from actuator_glue.records import Record
 
-RATE, NOISE, FRICTION = 128.0, 1e-5, 125.0
+FRICTION = 125.0
 THETA = np.array([400.0, 5.5e10, 2e6, 1.5])
 NAMES = ('coulomb-friction', 'stribeck-friction', 'gain', 'viscous-damping', 'bias')
-
-
-def sweep(seconds: float = 32.0) -> Array:
-    """2 mm to 8 Hz [m]."""
-    t = np.arange(0.0, seconds, 1.0 / RATE)
-    return np.asarray(2e-3 * np.sin(np.pi * (8.0 / seconds) * t**2))
-
-
-def selected(motions: list[tuple[float, Array, Array]]) -> tuple[ModelSelection, Selection]:
-    """What names say of stiffness, command and displacement of each test, noise added."""
-    rng = np.random.default_rng()
-    records = [
-        Record(u, y + NOISE * rng.standard_normal(len(y)), 1.0 / RATE, stiffness=k)
-        for k, u, y in motions
-    ]
-    selection = ModelSelection(Search(Data.whole(records), NAMES), Thresholds(), lambda *_: None)
-    return selection, selection.run()
 
 
 def held_out(found: Selection) -> float:
@@ -52,9 +32,9 @@ def test_friction_that_is_reached_over_a_velocity_has_its_shape() -> None:
     Over noises the force scatters by 1 % and the velocity by 4 %; the form removes 3.2 to 3.4 um,
     1.6 are asked for, and 300 nats and more.
     """
-    u = sweep()
+    u = sweep(2e-3, 8.0, 32.0)
     machine = [(k, u, piston(u, 1.0 / RATE, THETA, k, (11, FRICTION))) for k in (0.0, 250e3)]
-    selection, found = selected(machine)
+    selection, found = selected_of(NAMES, machine)
     assert found.left < found.material
     shaped = learning.reshaped(selection, found)
     assert shaped is not None
@@ -67,11 +47,11 @@ def test_friction_that_is_reached_over_a_velocity_has_its_shape() -> None:
 
 def test_friction_that_is_there_at_once_keeps_its_name() -> None:
     """Its shape is that of the catalogue."""
-    u, model = sweep(), Structure(('coulomb-friction',))
+    u, model = sweep(2e-3, 8.0, 32.0), Structure(('coulomb-friction',))
     values = np.array([*THETA, FRICTION])
     machine = [
         (k, u, model.simulate(values, Record(u, u, 1.0 / RATE, stiffness=k))) for k in (0.0, 250e3)
     ]
-    selection, found = selected(machine)
+    selection, found = selected_of(NAMES, machine)
     assert found.final.effects == ('coulomb-friction',)
     assert learning.reshaped(selection, found) is None

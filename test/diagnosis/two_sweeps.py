@@ -1,8 +1,8 @@
-"""A machine with known effects under two sweeps, and what a search says of it."""
+"""Machines under sweeps, and what a search says of them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 
@@ -12,10 +12,16 @@ from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.model.structure import Structure
-from actuator_glue.records import Record
+from actuator_glue.records import Array, Record
 
 RATE, NOISE = 128.0, 1e-5
 THETA = np.array([235.0, 5.0e10, 4.23e6, 3.3])
+
+
+def sweep(stroke: float, hertz: float, seconds: float) -> Array:
+    """Sweep from 0 Hz [m]."""
+    t = np.arange(int(seconds * RATE)) / RATE
+    return np.asarray(stroke * np.sin(np.pi * (hertz / seconds) * t**2))
 
 
 def selected(
@@ -26,17 +32,23 @@ def selected(
     seconds: float,
 ) -> tuple[ModelSelection, Selection]:
     """Sweeps with two specimens; `names` are tried, all parameters of an effect are its size."""
-    rng = np.random.default_rng()
-    model = Structure(tuple(effects))
-    t = np.arange(int(seconds * RATE)) / RATE
-    command = stroke * np.sin(np.pi * (hertz / seconds) * t**2)
+    u, model = sweep(stroke, hertz, seconds), Structure(tuple(effects))
     values = model.neutral(THETA)
     for name, size in effects.items():
         values[model.columns(name)] = size
-    records = []
-    for k in (100e3, 400e3):
-        y = model.simulate(values, Record(command, command, 1 / RATE, stiffness=k))
-        y = y + NOISE * rng.standard_normal(len(t))
-        records.append(Record(command, y, 1 / RATE, stiffness=k))
+    tests = [Record(u, u, 1 / RATE, stiffness=k) for k in (100e3, 400e3)]
+    motions = [(r.known_stiffness(), u, model.simulate(values, r)) for r in tests]
+    return selected_of(names, motions)
+
+
+def selected_of(
+    names: tuple[str, ...], motions: Iterable[tuple[float, Array, Array]]
+) -> tuple[ModelSelection, Selection]:
+    """What `names` say of stiffness, command and displacement of each test, noise added."""
+    rng = np.random.default_rng()
+    records = [
+        Record(u, y + NOISE * rng.standard_normal(len(y)), 1 / RATE, stiffness=k)
+        for k, u, y in motions
+    ]
     selection = ModelSelection(Search(Data.whole(records), names), Thresholds(), lambda s, d: None)
     return selection, selection.run()
