@@ -18,8 +18,8 @@ _LONG = 2_000_000
 def give_back(records: Sequence[Record]) -> Callable[[], None]:
     """Let large blocks go back when they are freed; of other C libraries nothing is asked.
 
-    Returns what lets the small ones go back, too: threads leave 0.1 GB of freed pieces in a
-    diagnosis of ten minutes at 10 kHz. For short records it does nothing.
+    Returns what lets the small ones go back, too, which lie between others that stay. For short
+    records it does nothing.
 
     By default glibc keeps up to 64 MB in the heap of every thread: 0.2 of 1.05 GB in a diagnosis
     of ten minutes at 10 kHz.

@@ -126,7 +126,7 @@ def _conclude(
         if described is not None:
             return described
         result = _conclusion(prepared, result.selection, fed_back, result.line)
-    elif result.decision.verdict == 'missing-effect':
+    elif result.decision.verdict == 'missing-effect' and result.found.final.effects:
         # Structure of which names leave much may pass for noise until a form explains it.
         ways: list[Way] = [learning.reshaped, partial(learning.learned, complete=True)]
         if len(result.found.final.effects) > 1:
