@@ -10,7 +10,8 @@ its place only where it explains the rest, or much that the name does not.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Final
 
 from actuator_glue.diagnosis.learned_forms import forms
@@ -21,11 +22,23 @@ from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
 
+Way = Callable[[ModelSelection, Selection], Selection | None]
 _MOST = 2  # learned terms
 _REFITS = 4  # per structure and turn
 # Forms of what has a name in the catalogue, and that name.
 _SHAPES: Final = {'learned-force-friction': 'coulomb-friction'}
 _SEEN = 0.3  # of what matters: another shape of the same cause removes so much
+
+
+def ways(found: Selection) -> list[Way]:
+    """Return what is asked where names leave nothing material, in this order.
+
+    Structure of which they leave much may pass for noise until a form explains it.
+    """
+    if not found.final.effects:
+        return []
+    several = [instead] if len(found.final.effects) > 1 else []
+    return [*several, reshaped, partial(learned, complete=True)]
 
 
 def learned(

@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, fields, replace
-from functools import partial
 
 from actuator_glue.diagnosis import (
     chance,
@@ -36,7 +35,6 @@ from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.effects import CATALOGUE
 
-Way = Callable[[ModelSelection, Selection], Selection | None]
 Progress = Callable[[str, float], None]
 # Share of the squared error that impulses must carry to have swayed a search: two per cent are a
 # hundredth of its size.
@@ -126,15 +124,10 @@ def _conclude(
         if described is not None:
             return described
         result = _conclusion(prepared, result.selection, fed_back, result.line)
-    elif result.decision.verdict == 'missing-effect' and result.found.final.effects:
-        # Structure of which names leave much may pass for noise until a form explains it.
-        ways: list[Way] = [learning.reshaped, partial(learning.learned, complete=True)]
-        if len(result.found.final.effects) > 1:
-            ways.insert(0, learning.instead)
-        for way in ways:
+    elif result.decision.verdict == 'missing-effect':
+        for way in learning.ways(result.found):
             selection = _apart(result.selection)
-            other = _complete(result, selection, way(selection, result.found))
-            if other is not None:
+            if other := _complete(result, selection, way(selection, result.found)):
                 return other
     if result.decision.verdict == 'unexplained' and mean_effects(reserved=True):
         result = _with_reserved(prepared, result, settings, tell)

@@ -1,4 +1,4 @@
-"""Scores of the blind benchmark with exact binomial intervals, as issue 4 lists them."""
+"""Scores of the blind benchmark with exact binomial intervals."""
 
 from __future__ import annotations
 
