@@ -23,6 +23,7 @@ from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
 
 Way = Callable[[ModelSelection, Selection], Selection | None]
+_LONG = 100_000  # samples
 _MOST = 2  # learned terms
 _REFITS = 4  # per structure and turn
 # Forms of what has a name in the catalogue, and that name.
@@ -33,12 +34,14 @@ _SEEN = 0.3  # of what matters: another shape of the same cause removes so much
 def ways(found: Selection) -> list[Way]:
     """Return what is asked where names leave nothing material, in this order.
 
-    Structure of which they leave much may pass for noise until a form explains it.
+    Structure of which they leave much may pass for noise until a form explains it; of long
+    records that is not asked, as it would take half as long as all the rest.
     """
     if not found.final.effects:
         return []
     several = [instead] if len(found.final.effects) > 1 else []
-    return [*several, reshaped, partial(learned, complete=True)]
+    long = found.final.fit.error.size > _LONG
+    return [*several, reshaped, *([] if long else [partial(learned, complete=True)])]
 
 
 def learned(
