@@ -6,7 +6,7 @@ of the fitting records before any effect is sought, each with its own phase.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -75,8 +75,17 @@ def _basis(time: Array, frequency: float) -> Array:
 
 def amplitudes(error: Array, time: Array, frequency: float) -> Array:
     """Least-squares cosine and sine amplitudes of a line (2,) [m]."""
-    basis = _basis(time, frequency)
-    return np.asarray(np.linalg.solve(basis @ basis.T, basis @ error))
+    return _fitted([(time, error)], frequency)
+
+
+def _fitted(pieces: Iterable[tuple[Array, Array]], frequency: float) -> Array:
+    """As `amplitudes`, of times and errors piece by piece."""
+    normal, along = np.zeros((2, 2)), np.zeros(2)
+    for time, error in pieces:
+        basis = _basis(time, frequency)
+        normal += basis @ basis.T
+        along += basis @ error
+    return np.asarray(np.linalg.solve(normal, along))
 
 
 def _peaks(error: Array, mask: Mask, period: float) -> tuple[Array, Array]:
@@ -155,12 +164,8 @@ def regressed(data: Data, errors: Array, line: Line) -> Array:
     """
     out = errors.copy()
     for period, runs in zip(data.periods, data.runs, strict=True):
-        normal, along = np.zeros((2, 2)), np.zeros(2)
-        for time, at in _pieces(period, runs):
-            basis = _basis(time, line.frequency)
-            normal += basis @ basis.T
-            along += basis @ out[at]
-        amplitude = np.linalg.solve(normal, along)
+        seen = ((time, out[at]) for time, at in _pieces(period, runs))
+        amplitude = _fitted(seen, line.frequency)
         for time, at in _pieces(period, runs):
             out[at] -= amplitude @ _basis(time, line.frequency)
     return out

@@ -12,7 +12,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import Final
 
 from actuator_glue.diagnosis.learned_forms import forms
 from actuator_glue.diagnosis.learned_term import is_learned
@@ -26,8 +25,8 @@ Way = Callable[[ModelSelection, Selection], Selection | None]
 _LONG = 100_000  # samples
 _MOST = 2  # learned terms
 _REFITS = 4  # per structure and turn
-# Forms of what has a name in the catalogue, and that name.
-_SHAPES: Final = {'learned-force-friction': 'coulomb-friction'}
+# A form of what has a name in the catalogue, and that name.
+_SHAPE, _CAUSE = 'learned-force-friction', 'coulomb-friction'
 _SEEN = 0.3  # of what matters: another shape of the same cause removes so much
 
 
@@ -114,26 +113,19 @@ def reshaped(selection: ModelSelection, found: Selection) -> Selection | None:
         selection: the model selection that ended with `found`; its noise stays.
         found: names that leave nothing material.
     """
-    search, best = selection.search, found.final
-    shapes = [
-        (form, name)
-        for form, of in _SHAPES.items()
-        for name, row in found.rivals.items()
-        if any(r.tied and r.name == of for r in row)  # the name itself, or told as well as it
-    ]
-    if not shapes or best.own is not None:
+    search, named = selection.search, found.final
+    # The name itself, or one that is told as well as it.
+    told = [n for n, row in found.rivals.items() if any(r.tied and r.name == _CAUSE for r in row)]
+    if not told:
         return None
-    offered = len(_offered(search))
+    least = math.log(len(_offered(search))) + selection.settings.nats
     selection.progress('learned term', 0.0)
-    least = math.log(offered) + selection.settings.nats
-    for form, name in shapes:
-        # In its place, or beside it: friction may fall with velocity, too.
-        for start in (search.without(found.final, name), found.final):
-            for trial in search.additions(start, [form]):
-                worth = removed(found.final, trial) > _SEEN * selection.material
-                if worth and _gain(search, trial, best) > least:
-                    best, least = trial, 0.0
-    if best is found.final:
+    # In its place, or beside it: friction may fall with velocity, too.
+    starts = [*(search.without(named, name) for name in told), named]
+    trials = [trial for start in starts for trial in search.additions(start, [_SHAPE])]
+    worth = [t for t in trials if removed(named, t) > _SEEN * selection.material]
+    best = max(worth, key=lambda t: _gain(search, t, named), default=named)
+    if best is named or _gain(search, best, named) <= least:
         return None
     return selection.concluded(best, search.trial(()), found.singles)
 

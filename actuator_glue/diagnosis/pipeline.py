@@ -125,8 +125,8 @@ def _conclude(
             return described
         result = _conclusion(prepared, result.selection, fed_back, result.line)
     elif result.decision.verdict == 'missing-effect':
+        selection = _apart(result.selection)  # forms and their signatures serve all ways
         for way in learning.ways(result.found):
-            selection = _apart(result.selection)
             if other := _complete(result, selection, way(selection, result.found)):
                 return other
     if result.decision.verdict == 'unexplained' and mean_effects(reserved=True):

@@ -1,13 +1,12 @@
 """Chains of a long record take fewer evaluations, and what they leave open is told."""
 
-from collections.abc import Callable
 from typing import Any
 
 import pytest
 from test_diagnose import make
 
 from actuator_glue.diagnosis import companions, posterior
-from actuator_glue.diagnosis.diagnose import DiagnosisData, diagnose
+from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference import importance
@@ -15,10 +14,8 @@ from actuator_glue.inference import importance
 CUT = 2000  # evaluations
 
 
-@pytest.fixture
-def chains_cut(monkeypatch: pytest.MonkeyPatch) -> Callable[[], tuple[DiagnosisData, list[str]]]:
-    """Diagnose a dead zone with a companion whose chains are few and do not meet."""
-    records = make(['valve-deadband'], [2e-4], 31)[1:2]
+def test_chains_of_a_long_record_are_cut(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside a companion they would not meet either: it has the normal approximation."""
     monkeypatch.setattr(posterior, '_SIMULATED', 1)
     monkeypatch.setattr(posterior, 'RHAT', 0.9)
     monkeypatch.setattr(importance, 'sample', lambda *args: None)
@@ -27,23 +24,15 @@ def chains_cut(monkeypatch: pytest.MonkeyPatch) -> Callable[[], tuple[DiagnosisD
         return selection.search.additions(final, ['delay'])[0]
 
     monkeypatch.setattr(companions, 'with_companions', larger)
-    methods: list[str] = []
+    drawn, methods = posterior.sample, []
 
     def spied(*args: Any, **options: Any) -> posterior.Draws:
         draws = drawn(*args, **options)
         methods.append(draws.method)
         return draws
 
-    drawn = posterior.sample
     monkeypatch.setattr(posterior, 'sample', spied)
-    return lambda: (diagnose(records, seed=2), methods)
-
-
-def test_chains_of_a_long_record_are_cut(
-    chains_cut: Callable[[], tuple[DiagnosisData, list[str]]],
-) -> None:
-    """Beside a companion they would not meet either: it has the normal approximation."""
-    found, methods = chains_cut()
+    found = diagnose(make(['valve-deadband'], [2e-4], 31)[1:2], seed=2)
     assert [e.name for e in found.effects] == ['valve-deadband']
     assert found.sampler['method'] == 'dream' and found.sampler['evaluations'] <= CUT
     assert methods[1] == 'dream' and set(methods[2:]) == {'laplace'}

@@ -2,11 +2,9 @@
 
 import pytest
 from smooth_machines import piston
-from two_sweeps import RATE, THETA, selected_of, sweep
+from two_sweeps import RATE, THETA, motions, selected_of, sweep
 
 from actuator_glue.diagnosis import learning
-from actuator_glue.model.structure import Structure
-from actuator_glue.records import Record
 
 PLAY, LAG = 60e-6, 8e-3
 NAMES = ('backlash', 'sensor-lag', 'gain', 'viscous-damping', 'bias')
@@ -26,12 +24,8 @@ def test_lost_motion_of_the_command_is_one_cause() -> None:
 
 def test_two_causes_stay_two_names() -> None:
     """Play and a lag of the transducer: no term explains both."""
-    u, model = sweep(2e-3, 9.0, 24.0), Structure(('backlash', 'sensor-lag'))
-    values = model.neutral(THETA)
-    values[model.columns('backlash')], values[model.columns('sensor-lag')] = PLAY, LAG
-    machine = [
-        (k, u, model.simulate(values, Record(u, u, 1.0 / RATE, stiffness=k))) for k in (0.0, 250e3)
-    ]
+    effects = {'backlash': PLAY, 'sensor-lag': LAG}
+    machine = motions(effects, THETA, sweep(2e-3, 9.0, 24.0), (0.0, 250e3))
     selection, found = selected_of(NAMES, machine)
     assert set(found.final.effects) == {'backlash', 'sensor-lag'}
     assert learning.instead(selection, found) is None

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 from smooth_machines import piston
-from two_sweeps import RATE, selected_of, sweep
+from two_sweeps import RATE, motions, selected_of, sweep
 
 from actuator_glue.diagnosis import learning
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.model import commands
-from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
 
 FRICTION = 125.0
@@ -47,11 +46,8 @@ def test_friction_that_is_reached_over_a_velocity_has_its_shape() -> None:
 
 def test_friction_that_is_there_at_once_keeps_its_name() -> None:
     """Its shape is that of the catalogue."""
-    u, model = sweep(2e-3, 8.0, 32.0), Structure(('coulomb-friction',))
-    values = np.array([*THETA, FRICTION])
-    machine = [
-        (k, u, model.simulate(values, Record(u, u, 1.0 / RATE, stiffness=k))) for k in (0.0, 250e3)
-    ]
+    effects = {'coulomb-friction': FRICTION}
+    machine = motions(effects, THETA, sweep(2e-3, 8.0, 32.0), (0.0, 250e3))
     selection, found = selected_of(NAMES, machine)
     assert found.final.effects == ('coulomb-friction',)
     assert learning.reshaped(selection, found) is None

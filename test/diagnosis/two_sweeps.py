@@ -32,23 +32,31 @@ def selected(
     seconds: float,
 ) -> tuple[ModelSelection, Selection]:
     """Sweeps with two specimens; `names` are tried, all parameters of an effect are its size."""
-    u, model = sweep(stroke, hertz, seconds), Structure(tuple(effects))
-    values = model.neutral(THETA)
+    u = sweep(stroke, hertz, seconds)
+    return selected_of(names, motions(effects, THETA, u, (100e3, 400e3)))
+
+
+def motions(
+    effects: Mapping[str, float], theta: Array, u: Array, stiffnesses: tuple[float, ...]
+) -> list[tuple[float, Array, Array]]:
+    """Stiffness, command and displacement of tests of a machine that the catalogue holds."""
+    model = Structure(tuple(effects))
+    values = model.neutral(theta)
     for name, size in effects.items():
         values[model.columns(name)] = size
-    tests = [Record(u, u, 1 / RATE, stiffness=k) for k in (100e3, 400e3)]
-    motions = [(r.known_stiffness(), u, model.simulate(values, r)) for r in tests]
-    return selected_of(names, motions)
+    return [
+        (k, u, model.simulate(values, Record(u, u, 1 / RATE, stiffness=k))) for k in stiffnesses
+    ]
 
 
 def selected_of(
-    names: tuple[str, ...], motions: Iterable[tuple[float, Array, Array]]
+    names: tuple[str, ...], tests: Iterable[tuple[float, Array, Array]]
 ) -> tuple[ModelSelection, Selection]:
     """What `names` say of stiffness, command and displacement of each test, noise added."""
     rng = np.random.default_rng()
     records = [
         Record(u, y + NOISE * rng.standard_normal(len(y)), 1 / RATE, stiffness=k)
-        for k, u, y in motions
+        for k, u, y in tests
     ]
     selection = ModelSelection(Search(Data.whole(records), names), Thresholds(), lambda s, d: None)
     return selection, selection.run()
