@@ -10,7 +10,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from actuator_glue.diagnosis import global_search
+from actuator_glue.diagnosis import global_search, poles
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.fit import Fit, base_fit, fit, rms
 from actuator_glue.diagnosis.score import Scorer, splits_of
@@ -39,10 +39,6 @@ _FINISHED = 2  # iterations on all samples after those on stretches of them
 _PROMISING = 0.95  # of the error at most is left by friction that is looked at twice
 _POLISHED = 4
 _LAST = 60  # iterations at most of a structure that is told
-# What adds a pole may change places with the valve's: a second minimum, which a valve that is
-# slower or quicker by these factors, of the same bandwidth, leads to.
-_POLES = ('lag', 'gain', 'inertia')
-_VALVES = (1.0, 0.6, 1.6, 0.4, 2.5)
 
 
 def by_score(trial: Trial) -> float:
@@ -135,14 +131,15 @@ class Search:
 
     def polish(self, trial: Trial, valves: bool = True) -> Trial:
         """Finish the refit of a trial that is in the running, from other valves if need be."""
-        key = frozenset(trial.effects)
-        factors = _VALVES if valves and self.entries[trial.added].group in _POLES else _VALVES[:1]
-        if self._polished.get(key, 0) < len(factors):
+        key, added = frozenset(trial.effects), self.entries[trial.added]
+        wanted = 2 if valves and poles.may_change(added) else 1
+        if self._polished.get(key, 0) < wanted:
             start = global_search.along_ridge(self.data, trial.structure, self._tried[key].theta)
-            starts = np.tile(start, (len(factors), 1))
-            starts[:, :2] *= np.array(factors)[:, None]
-            self._tried[key] = fit(self.data, trial.structure, starts)
-            self._polished[key] = len(factors)
+            if wanted > 1:
+                stiffness = frozenset(r.known_stiffness() for r in self.data.records)
+                start = poles.starts(trial.structure, added, start, stiffness)
+            self._tried[key] = fit(self.data, trial.structure, start)
+            self._polished[key] = wanted
         return self.trial(trial.effects, trial.added)
 
     def finished(self, trial: Trial) -> Trial:
