@@ -35,6 +35,7 @@ EXACT: dict[int, Callable[[Array, Array, Array], Array]] = {
     m.MAX: lambda a, b, c: np.where((a > b) | np.isnan(a), a, b),
     m.LESS: lambda a, b, c: 1.0 * (a < b),
     m.SELECT: lambda a, b, c: np.where(c != 0.0, a, b),
+    m.RECALL: lambda a, b, c: np.where(np.isnan(a), b, a),
 }
 CLOSE: dict[int, Callable[[Array, Array, Array], Array]] = {
     m.EXP: lambda a, b, c: np.exp(a),
@@ -94,7 +95,7 @@ def test_functions_are_those_of_the_library(op: int, scale: float) -> None:
 
 def test_what_remembers() -> None:
     """At first 0 for an integral, else the signal itself; then what the last step has left."""
-    assert set(REMEMBERING) | set(PURE) == set(range(24)) == {*REMEMBERING, *EXACT, *CLOSE}
+    assert set(REMEMBERING) | set(PURE) == set(range(25)) == {*REMEMBERING, *EXACT, *CLOSE}
     values = np.random.default_rng().standard_normal((4, 32))
     a, b, c = values[:3] = values[0], np.abs(values[1]), values[2]
     values[3, :5] = np.nan

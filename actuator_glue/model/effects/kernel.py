@@ -136,6 +136,8 @@ def _search(
             w[r.IN_DX + n] = balance.look(w, n, push, stiff, dry, guess, force, tangent)
         if terms and balance.settled(w):
             break
+    if terms:
+        stage.keep(w, g, parts, rate, yields)
     for n in range(r.LANES):
         dx = w[r.IN_DX + n]
         if falls:
@@ -174,7 +176,7 @@ def substep(
         elif gaps or on[r.ON_CURVED]:
             _search(w, g, parts, rate, False, False, True)
         else:
-            stage.proportional(w, g, parts)
+            stage.proportional(w, g, parts, rate)
             for n in range(r.LANES):
                 _end(w, n, rate, w[r.IN_DX + n])
         return

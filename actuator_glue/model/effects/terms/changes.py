@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Final
 
 from actuator_glue.model.effects.terms import machine as m
 from actuator_glue.model.effects.terms.expression import REMEMBERING, SIGNAL, Expression
 from actuator_glue.model.effects.terms.instructions import Dual, Emitter
-from actuator_glue.model.effects.terms.tree import Tree
 
 # Registers with what signals change by beside jumps.
 ROWS: Final = {'u': m.CHANGE_U, 'x': m.CHANGE_X, 'f': m.CHANGE_F, 'q': m.CHANGE_Q}
 _TURNING: Final = {'play', 'limit_rate'}
 
 
-def asked(trees: list[Tree]) -> bool:
-    """Return whether any expression needs to know."""
-    return any(tree.words() & _TURNING for tree in trees)
+def asked(expressions: Iterable[Expression]) -> bool:
+    """Return whether any needs to know; a force is that at the end of the step."""
+    return any(e.tree.words() & _TURNING for e in expressions if e.place in REMEMBERING)
 
 
 class Changes:

@@ -45,9 +45,12 @@ FUNCTIONS: Final = dict.fromkeys(
     'clip': 3,
     'dead': 2,
 }
-# Functions that remember; all arguments but the first hold during a test.
+# Functions that remember; all arguments but the first hold during a test. A force is one of the
+# step's end, sought by Newton's steps: what is carried over must not depend on how many.
 MEMORY: Final = {'lag': 2, 'integral': 1, 'play': 2, 'limit_rate': 2}
 REMEMBERING: Final = ('command', 'valve', 'flow')
+FORCES: Final = ('specimen', 'piston')
+_OF_FORCES: Final = ('play',)
 _REMEMBER: Final = MEMORY | {name: count for name, (count, _) in FILTERS.items()}
 _LONGEST: Final = 2000
 # Each has its argument five times: one of another, and so on, would fill the memory.
@@ -175,9 +178,10 @@ class _Reader:
             self._refuse(node.col_offset, f'no function {name!r}; there are {words}')
         if len(node.args) != count:
             self._refuse(node.col_offset, f'{name} takes {count} argument{"s" * (count > 1)}')
-        if name in _REMEMBER and self._place not in REMEMBERING:
+        places = (*REMEMBERING, *(FORCES if name in _OF_FORCES else ()))
+        if name in _REMEMBER and self._place not in places:
             self._refuse(
-                node.col_offset, f'{name} remembers: it can act at {", ".join(REMEMBERING)} only'
+                node.col_offset, f'{name} remembers: it can act at {", ".join(places)} only'
             )
         if name in FILTERS:
             self._filters += 1

@@ -36,6 +36,8 @@ class Emitter:
         symbols: register and slope of what an expression may name.
         changes, jumps: the same with what it changes by over the step in place of the slope:
             steadily, and in the leap of a held command.
+        at_end: whether values are those of the step's end, which may be tried more than once.
+        ends: what then is remembered: its register, and that with the value.
     """
 
     def __init__(self, held: set[int]) -> None:
@@ -47,6 +49,8 @@ class Emitter:
         self.symbols: dict[str, Dual] = {}
         self.changes: dict[str, Dual] = {}
         self.jumps: dict[str, Dual] = {}
+        self.at_end = False
+        self.ends: dict[int, int] = {}
         self._held = set(held)
         self._prepared: dict[tuple[int, ...], int] = {}
         self._known: dict[tuple[int, ...], int] = {}
@@ -214,6 +218,8 @@ class Emitter:
     def _remembered(self, name: str, operand: Tree, *sizes: Tree) -> Dual:
         """What remembers, and its slope; along `changes` its own change, and it does not jump."""
         a, da = self.emit(operand)
+        if self.at_end:  # of these only play is, see expression.py
+            return self._dragged(a, da, self.emit(sizes[0])[0])
         one, b = self.constant(1.0), m.STEP
         if name == 'lag':
             steps = self.do(m.DIV, m.STEP, self.emit(sizes[0])[0])
@@ -233,6 +239,15 @@ class Emitter:
         if self.symbols is self.changes:
             return out, moved
         return out, self._times(gain, da)
+
+    def _dragged(self, a: int, da: int | None, half: int) -> Dual:
+        """Play at the step's end, which keeps nothing until the step is known."""
+        kept = self._keep(m.PLAY, a, half)
+        before = self.do(m.RECALL, kept, a), None
+        above, below = (self.do(op, a, half) for op in (m.ADD, m.SUB))
+        out, slope = self._chosen('max', self._chosen('min', before, (above, da)), (below, da))
+        self.ends[kept] = out
+        return out, slope
 
     def _turning(
         self, plays: bool, a: int, b: int, change: int | None, jump: int | None

@@ -20,7 +20,7 @@ from actuator_glue.jit import njit
 from actuator_glue.records import Array
 
 COPY, ADD, SUB, MUL, DIV, NEG, ABS, SIGN, SQRT, EXP, LOG, SIN, COS, TANH, ATAN, POW = range(16)
-MIN, MAX, LESS, SELECT, LAG, INTEGRAL, PLAY, LIMIT = range(16, 24)
+MIN, MAX, LESS, SELECT, LAG, INTEGRAL, PLAY, LIMIT, RECALL = range(16, 25)
 # Fixed registers: what moves, what of it changes with the increment dx, what holds. A part leaves
 # its signal, and d/d(dx) of it, where it has found them. NONE stands for no operand.
 NONE, T, U, E, Q, F, X, V, Y, D_E, D_Q, D_F, ORIGIN, STEP, D_V_MIDDLE, D_V_END = range(16)
@@ -30,8 +30,9 @@ BETA_1, ALPHA_1_BETA_0, ALPHA_2, ALPHA_3, K = range(16, 21)
 CHANGE_U, CHANGE_X, CHANGE_F, CHANGE_Q, JUMP, SHARE = range(21, 27)
 FIXED: Final = 27
 # The parts of a program, and what the compiled step is told (`Parts`): where the code of each is,
-# 0 if it has none; Newton steps at most of the balance of forces; which of `NEEDS` it reads.
-PREPARE, COMMAND, VALVE, FLOW, FORCE, SENSOR, BALANCE, TIMES, NEEDS = range(9)
+# 0 if it has none (KEEP: what forces remember of a step that is done); Newton steps at most of the
+# balance of forces; which of `NEEDS` it reads.
+PREPARE, COMMAND, VALVE, FLOW, FORCE, SENSOR, BALANCE, KEEP, TIMES, NEEDS = range(10)
 NEEDS_T, NEEDS_U, NEEDS_E, NEEDS_Q, NEEDS_F, NEEDS_X, NEEDS_V, NEEDS_FLOW, NEEDS_CHANGE = (
     1 << i for i in range(9)
 )

@@ -96,6 +96,7 @@ PURE: Final[dict[int, Callable[[LaneNumbers, LaneNumbers, LaneNumbers], LaneNumb
     m.MAX: lambda a, b, _: ((a > b) | a.differs(a)).choose(a, b),
     m.LESS: lambda a, b, _: (a < b).choose(1.0, 0.0),
     m.SELECT: lambda a, b, c: c.differs(0.0).choose(a, b),
+    m.RECALL: lambda a, b, _: a.differs(a).choose(b, a),  # b where nothing is remembered yet
 }
 
 

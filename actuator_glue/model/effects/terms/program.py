@@ -18,7 +18,7 @@ from actuator_glue.model.effects import layout as r
 from actuator_glue.model.effects.balance import MOST
 from actuator_glue.model.effects.terms import changes
 from actuator_glue.model.effects.terms import machine as m
-from actuator_glue.model.effects.terms.expression import SIGNAL, Expression
+from actuator_glue.model.effects.terms.expression import FORCES, SIGNAL, Expression
 from actuator_glue.model.effects.terms.instructions import Dual, Emitter
 from actuator_glue.model.effects.terms.native import InstructionGroup, Native, native
 from actuator_glue.model.parameters import NAMES as BASE
@@ -60,7 +60,7 @@ _LEAST: Final = -0.5
 # d/d(dx) of the control error before any effect on it: the mean of the step.
 _E_SLOPE: Final = -0.5
 # Functions with a kink.
-_KINKS: Final = {'abs', 'sign', 'min', 'max', 'clip', 'dead', 'sqrt'}
+_KINKS: Final = {'abs', 'sign', 'min', 'max', 'clip', 'dead', 'sqrt', 'play'}
 _HOLDS: Final = dict(zip((*BASE, 'k'), range(m.BETA_1, m.K + 1), strict=True))
 
 
@@ -76,7 +76,7 @@ class Program:
     """Instructions of some effects and the registers they work on.
 
     Attributes:
-        code: its parts, machine.PREPARE to machine.BALANCE.
+        code: its parts, machine.PREPARE to machine.KEEP.
         constants: registers that hold a number, and the number.
         times: Newton steps at most of the balance of forces.
         rows: number of registers.
@@ -145,11 +145,12 @@ class Program:
 def compiled(effects: Iterable[Written]) -> Program:
     """Return the program of some effects."""
     written = tuple(effects)
-    builder = _Builder(changes.asked([e.expression.tree for e in written]))
+    builder = _Builder(changes.asked(e.expression for e in written))
     for places in _PARTS:
         here = (e for place in places for e in written if e.expression.place == place)
         builder.part(SIGNAL[places[0]], here)
     builder.balance()
+    builder.keep()
     return builder.program()
 
 
@@ -213,6 +214,11 @@ class _Builder:
         moved = into.do(m.DIV, into.do(m.SUB, trial, taken), into.do(m.ADD, oil, tangent))
         self._parts.append(InstructionGroup(tuple(code), ((dx, moved),)))
 
+    def keep(self) -> None:
+        """Add what forces remember of a step, once that is known."""
+        code = self._parts[m.FORCE - 1].code
+        self._parts.append(InstructionGroup(code, tuple(self._emitter.ends.items())))
+
     def _add(self, effect: Written) -> None:
         into, names = self._emitter, tuple(p.name for p in effect.parameters)
         place = effect.expression.place
@@ -230,6 +236,7 @@ class _Builder:
             **{name: (self._parameters[name], None) for name in names},
         }
         self._changes.follow(into.symbols)
+        into.at_end = place in FORCES
         signal = SIGNAL[place]
         before, slope_before = into.symbols[signal]
         used = effect.expression.tree.words()
@@ -246,7 +253,7 @@ class _Builder:
                 slope = into.do(m.SELECT, slope, slope_before, on)
         self._signals[signal] = after, slope
         self._changes.passed(effect.expression, on)
-        if place in ('specimen', 'piston'):
+        if place in FORCES:
             # One Newton step where a force bends slowly, as for a hardening specimen.
             bends = 'v' in used or used & _KINKS
             self._times = max(self._times, MOST if bends else 1)

@@ -140,7 +140,22 @@ def before_the_oil(
 
 @njit
 def force(w: Array, g: Array, parts: m.Parts, rate: float, yields: bool) -> None:
-    """Write the force of specimen and piston at the end of a step by IN_DX, and its slope.
+    """Write the force of specimen and piston at the end of a step by IN_DX, and its slope."""
+    _end(w, g, rate, yields)
+    m.execute(parts[m.FORCE], g, w)
+
+
+@njit
+def keep(w: Array, g: Array, parts: m.Parts, rate: float, yields: bool) -> None:
+    """Let forces remember the step by IN_DX."""
+    if parts[m.KEEP]:
+        _end(w, g, rate, yields)
+        m.execute(parts[m.KEEP], g, w)
+
+
+@njit
+def _end(w: Array, g: Array, rate: float, yields: bool) -> None:
+    """Write what moves at the end of a step by IN_DX.
 
     The velocity is that of the parabola through the last three positions: that of the scheme
     itself may alternate from step to step.
@@ -150,14 +165,14 @@ def force(w: Array, g: Array, parts: m.Parts, rate: float, yields: bool) -> None
         g[m.F, n], g[m.D_F, n] = balance.specimen(w, n, w[r.IN_DX + n], True, yields)
         g[m.X, n] = w[r.X + n] + w[r.IN_DX + n]
         g[m.V, n] = quarter * (3.0 * w[r.IN_DX + n] - w[r.DX + n])
-    m.execute(parts[m.FORCE], g, w)
 
 
 @njit
-def proportional(w: Array, g: Array, parts: m.Parts) -> None:
+def proportional(w: Array, g: Array, parts: m.Parts, rate: float) -> None:
     """Write the increment against a proportional specimen and the force, after Newton steps."""
     balance.begin(w, True)
     for _ in range(parts[m.TIMES]):
         m.execute(parts[m.BALANCE], g, w)
         if parts[m.TIMES] == 1 or balance.settled(w):
             break
+    keep(w, g, parts, rate, False)

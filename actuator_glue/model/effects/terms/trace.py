@@ -80,4 +80,7 @@ def run(
             g[_REGISTERS[symbol]] = trace[i]
         m.once(code, g)
         out[i] = g[row]
+        if made.parts[m.KEEP]:
+            g[row] = motion[SIGNAL[place]][i]
+            m.once(made.parts[m.KEEP], g)
     return out
