@@ -68,6 +68,8 @@ class Finding:
             that fix it; None where fewer than two do (see diagnosis/homogeneity.py).
         windows: the leading parameter in each of these halves [unit of the parameter].
         records: sources of the records that alone have it; empty where all do.
+        cause: name in the catalogue of what a learned term is another shape of, where that name
+            comes nearest to it; empty for all others.
     """
 
     name: str
@@ -84,6 +86,7 @@ class Finding:
     records: tuple[str, ...] = ()
     noise: float | None = None
     rivals: tuple[Rival, ...] = ()
+    cause: str = ''
 
     @property
     def none(self) -> float:

@@ -10,8 +10,9 @@ import numpy as np
 from actuator_glue.diagnosis import learned_term, per_record_settings
 from actuator_glue.diagnosis.completeness import Decision
 from actuator_glue.diagnosis.estimate import Estimate
-from actuator_glue.diagnosis.finding import Candidate, Finding
+from actuator_glue.diagnosis.finding import Candidate, Finding, Rival
 from actuator_glue.diagnosis.homogeneity import Homogeneity
+from actuator_glue.diagnosis.learned_forms import SHAPES
 from actuator_glue.diagnosis.measurement import Measured
 from actuator_glue.diagnosis.ranking import standard_error, weights
 from actuator_glue.diagnosis.selection import Selection
@@ -62,6 +63,7 @@ def of(
                 windows=stretches[name].values,
                 records=_records_of(decision.final, name),
                 rivals=() if described else rivals,
+                cause=_cause(name, rivals),
             )
         )
     for effect in decision.measured:
@@ -82,6 +84,15 @@ def of(
     return tuple(
         sorted(out, key=lambda f: f.error_with**2 - f.error_without**2 - (f.noise or 0.0) ** 2)
     )
+
+
+def _cause(name: str, rivals: tuple[Rival, ...]) -> str:
+    """Name what a form is another shape of, where one of its kind comes nearest to it."""
+    named = [r for r in rivals if r.name in CATALOGUE]
+    if name not in SHAPES or not named:
+        return ''
+    nearest = CATALOGUE[min(named, key=lambda r: r.excess).name]
+    return SHAPES[name] if nearest.group == CATALOGUE[SHAPES[name]].group else ''
 
 
 def _records_of(trial: Trial, name: str) -> tuple[str, ...]:

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 def _named(effect: Finding, found: DiagnosisData) -> str:
     equations = [term.numbers for term in found.learned if term.name == effect.name]
     if equations:
-        return f'a learned term {effect.name} ({equations[0]})'
+        term = f'a learned term {effect.name} ({equations[0]})'
+        return f'{effect.cause} in another shape, {term}' if effect.cause else term
     where = f' in {", ".join(map(source_name, effect.records))} only' if effect.records else ''
     others = f' (or {", ".join(effect.alternatives)})' if effect.alternatives else ''
     return effect.name + where + others

@@ -57,6 +57,12 @@ _SHARPEST = 5.0  # times a limit may be overdriven
 _BENDS = (1e-3, 3.0)  # a bend of a thousandth is a corner
 # Of a step, over the signal's size: what is tried and what is most, and its width; places tried.
 _STEPS, _STEP_WIDTH, _PLACES = (0.01, 0.5), 0.005, 20
+# The way over which friction is reached, over the stroke.
+_WAYS = (1e-4, 0.1)
+# Forms of what has a name in the catalogue, and that name.
+SHAPES: Final = dict.fromkeys(
+    ('learned-force-friction', 'learned-force-presliding'), 'coulomb-friction'
+)
 
 
 def forms(scale: Scale, known: Container[str] = ()) -> tuple[Effect, ...]:
@@ -77,9 +83,9 @@ def forms(scale: Scale, known: Container[str] = ()) -> tuple[Effect, ...]:
             offered += [form(place, sizes) for form in (_limited, _one_sided, _fading)]
     if sizes['f'] > 0.0:
         offered.append(_turbulent(sizes))
-    offered += [_step(sizes), _rounded_overlap(sizes), _friction('force', sizes)]
-    if sizes['k'] > 0.0:
-        offered.append(_friction('specimen', sizes))
+    offered += [_step(sizes), _rounded_overlap(sizes)]
+    for place in ('force', 'specimen') if sizes['k'] > 0.0 else ('force',):
+        offered += [_friction(place, sizes), _presliding(place, sizes)]
     offered += learned_memory.forms(sizes)
     return tuple(effect for effect in offered if effect.name not in known)
 
@@ -210,21 +216,45 @@ def _rounded_overlap(sizes: dict[str, float]) -> Effect:
 def _friction(place: str, sizes: dict[str, float]) -> Effect:
     """Return friction that rises over some velocity; at the specimen, what its supports add."""
     name, speed = f'{place}_friction', sizes['v']
-    force, unit, largest = name, 'N', LARGEST * signal_size(place, sizes)
-    if place == 'specimen':
-        force, unit, largest = f'k*{name}', 'm', sizes['x']
+    force, size = _dry(place, name, sizes)
     return term(
         f'learned-{place}-friction',
         f'{place}: f = f + {force}*tanh(v/{name}_speed)',
         (
-            # Negative it would weaken faster than the oil column is stiff.
-            Parameter(name, unit, 0.0, largest, f'friction as {unit}', 0.0),
+            size,
             Parameter(
                 f'{name}_speed', 'm/s', 1e-3 * speed, speed, 'where it is reached', 1e-2 * speed
             ),
         ),
         source=LEARNED,
     )
+
+
+def _presliding(place: str, sizes: dict[str, float]) -> Effect:
+    """Return friction that rises over some way, as a spring does until it slips (Prandtl)."""
+    name = f'{place}_presliding'
+    force, size = _dry(place, name, sizes)
+    low, high = (share * sizes['x'] for share in _WAYS)
+    return term(
+        f'learned-{place}-presliding',
+        f'{place}: f = f + {force}*(x - play(x, {name}_way))/{name}_way',
+        (
+            size,
+            Parameter(f'{name}_way', 'm', low, high, 'where it is reached', 10.0 * low),
+        ),
+        source=LEARNED,
+    )
+
+
+def _dry(place: str, name: str, sizes: dict[str, float]) -> tuple[str, Parameter]:
+    """Return friction's size as a force, and the parameter: at the specimen over its stiffness.
+
+    Negative it would weaken faster than the oil column is stiff.
+    """
+    if place == 'specimen':
+        return f'k*{name}', Parameter(name, 'm', 0.0, sizes['x'], 'friction as m', 0.0)
+    largest = LARGEST * signal_size(place, sizes)
+    return name, Parameter(name, 'N', 0.0, largest, 'friction as N', 0.0)
 
 
 def _effect(

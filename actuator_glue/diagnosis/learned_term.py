@@ -59,7 +59,7 @@ class LearnedTerm:
         )
         return (
             f'{self.name} was learned from these records, at the {self.place}: {self.equation} '
-            f'with {sizes}; a description and no cause, not valid beyond {ranges}'
+            f'with {sizes}; a description, not valid beyond {ranges}'
         )
 
     def to_json(self) -> Json:

@@ -13,7 +13,7 @@ import math
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from actuator_glue.diagnosis.learned_forms import forms
+from actuator_glue.diagnosis.learned_forms import SHAPES, forms
 from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.ranking import removed
@@ -25,9 +25,7 @@ Way = Callable[[ModelSelection, Selection], Selection | None]
 _LONG = 100_000  # samples
 _MOST = 2  # learned terms
 _REFITS = 4  # per structure and turn
-# A form of what has a name in the catalogue, and that name.
-_SHAPE, _CAUSE = 'learned-force-friction', 'coulomb-friction'
-_SEEN = 0.3  # of what matters: another shape of the same cause removes so much
+_SEEN = 0.1  # of what matters: another shape of the same cause removes so much
 
 
 def ways(found: Selection) -> list[Way]:
@@ -115,17 +113,21 @@ def reshaped(selection: ModelSelection, found: Selection) -> Selection | None:
     """
     search, named = selection.search, found.final
     # The name itself, or one that is told as well as it.
-    told = [n for n, row in found.rivals.items() if any(r.tied and r.name == _CAUSE for r in row)]
+    causes = set(SHAPES.values())
+    told = [n for n, row in found.rivals.items() if any(r.tied and r.name in causes for r in row)]
     if not told:
         return None
     least = math.log(len(_offered(search))) + selection.settings.nats
     selection.progress('learned term', 0.0)
     # In its place, or beside it: friction may fall with velocity, too.
-    starts = [*(search.without(named, name) for name in told), named]
-    trials = [trial for start in starts for trial in search.additions(start, [_SHAPE])]
-    worth = [t for t in trials if removed(named, t) > _SEEN * selection.material]
-    best = max(worth, key=lambda t: _gain(search, t, named), default=named)
-    if best is named or _gain(search, best, named) <= least:
+    best = named
+    for starts in ([search.without(named, name) for name in told], [named]):
+        trials = [trial for start in starts for trial in search.additions(start, SHAPES)]
+        worth = [t for t in trials if removed(best, t) > _SEEN * selection.material]
+        better = max(worth, key=lambda t: _gain(search, t, best), default=best)
+        if better is not best and _gain(search, better, best) > least:
+            best = better
+    if best is named:
         return None
     return selection.concluded(best, search.trial(()), found.singles)
 

@@ -25,11 +25,11 @@ def share(hits: list[bool]) -> Json:
 
 
 def _named(result: Json) -> list[list[str]]:
-    """Names of causes, which learned terms are not."""
+    """Names of causes, which learned terms are not, unless they are another shape of one."""
     d = result['diagnosis']
     described = {term['name'] for term in d.get('learned', ())}
-    rows = [e for e in d['effects'] if e['name'] not in described]
-    return [[e['name'], *e['alternatives']] for e in rows]
+    rows = [(e.get('cause') if e['name'] in described else e['name'], e) for e in d['effects']]
+    return [[name, *e['alternatives']] for name, e in rows if name]
 
 
 def _told(result: Json) -> bool:

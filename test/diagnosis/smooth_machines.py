@@ -13,6 +13,7 @@ Array = NDArray[np.float64]
 _STEPS = 128
 _WARM = 8.0  # s, time constant of what settles
 _SLIP = 1e-3  # m/s, where friction is nearly all there
+_BRISTLE = 5e-6  # m, before it slides (LuGre without a Stribeck curve)
 
 
 @njit
@@ -56,6 +57,26 @@ def _sliding(rest: float, slope: float, friction: float) -> float:
 
 
 @njit
+def _bent(bristle: float, v: float, h: float) -> float:
+    """Deflection after a step h of z' = v - |v| z/_BRISTLE, implicit [m]."""
+    return (bristle + h * v) / (1.0 + h * abs(v) / _BRISTLE)
+
+
+@njit
+def _held_back(rest: float, slope: float, friction: float, bristle: float, h: float) -> float:
+    """The velocity at which slope v + friction z/_BRISTLE is what is left to push."""
+    high = (abs(rest) + friction) / slope
+    low = -high
+    for _ in range(60):
+        v = 0.5 * (low + high)
+        if slope * v + friction * _bent(bristle, v, h) / _BRISTLE > rest:
+            high = v
+        else:
+            low = v
+    return 0.5 * (low + high)
+
+
+@njit
 def piston(
     command: Array, period: float, theta: Array, k: float, departure: tuple[int, float]
 ) -> Array:
@@ -66,13 +87,13 @@ def piston(
     7 of the controller's own transducer, 8 of half of the valve, the other half without, half
     widths [m], 9 flow that grows by a share as it warms, 10 specimen that stiffens by a share,
     11 friction as tanh(v/1 mm/s), 12 that of the specimen's support [N], 13 flow that falls with
-    the square of the position [1/m^2].
+    the square of the position [1/m^2], 14 friction of a bristle that bends by 5 um [N].
     """
     kind, size = departure
     b1, n0, a2, a3 = theta
     h = period / _STEPS
     c = size if kind == 3 else 0.0
-    q = f = x = late = 0.0
+    q = f = x = late = bristle = 0.0
     out = np.empty(len(command))
     for i in range(len(command)):
         out[i] = x
@@ -107,6 +128,9 @@ def piston(
                 v = np.sign(rest) * (np.sqrt(slope**2 + 4.0 * c * abs(rest)) - slope) / (2.0 * c)
             if kind == 11 or (kind == 12 and k > 0.0):
                 v = _sliding(rest, slope, size)
+            if kind == 14:
+                v = _held_back(rest, slope, size, bristle, h)
+                bristle = _bent(bristle, v, h)
             x += h * v
             f = push - h * a2 * v
     return out
