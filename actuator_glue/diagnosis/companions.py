@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from actuator_glue.diagnosis.learned_forms import SHAPES
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.posterior import Draws
 from actuator_glue.diagnosis.ranking import removed, weights
+from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.trial import Trial
 
 _MOST = 2
@@ -32,7 +34,8 @@ def with_companions(selection: ModelSelection, final: Trial) -> Trial:
         return final
     current, least = final, _SEEN * selection.material
     for _ in range(_MOST):
-        ranked = search.screened(current, search.others(current))[: settings.tried]
+        others = [n for n in search.others(current) if not _of_one_kind(search, n, final)]
+        ranked = search.screened(current, others)[: settings.tried]
         below = current.mean_square - least**2
         trials = search.additions(current, ranked, valves=False, below=below)
         if not trials or not selection.better(trials[0], current, least):
@@ -41,6 +44,13 @@ def with_companions(selection: ModelSelection, final: Trial) -> Trial:
             break
         current = trials[0]
     return current
+
+
+def _of_one_kind(search: Search, name: str, final: Trial) -> bool:
+    """Whether an effect shares the size of one that is told: two dry frictions are one."""
+    causes = {SHAPES.get(told, told) for told in final.effects}
+    holds = search.entries[name].holds
+    return name in causes or (holds is not None and holds[0] in causes)
 
 
 def reduced(draws: Draws, larger: Trial, final: Trial) -> Draws:

@@ -25,7 +25,9 @@ Way = Callable[[ModelSelection, Selection], Selection | None]
 _LONG = 100_000  # samples
 _MOST = 2  # learned terms
 _REFITS = 4  # per structure and turn
-_SEEN = 0.1  # of what matters: another shape of the same cause removes so much
+# Another shape of the same cause removes so much of what matters in its place, and beside it; and
+# more than means over samples and the steps of a simulation leave, of the stroke.
+_SHAPED, _BESIDE, _STEPS = 0.1, 0.5, 3e-4
 
 
 def ways(found: Selection) -> list[Way]:
@@ -121,9 +123,12 @@ def reshaped(selection: ModelSelection, found: Selection) -> Selection | None:
     selection.progress('learned term', 0.0)
     # In its place, or beside it: friction may fall with velocity, too.
     best = named
-    for starts in ([search.without(named, name) for name in told], [named]):
-        trials = [trial for start in starts for trial in search.additions(start, SHAPES)]
-        worth = [t for t in trials if removed(best, t) > _SEEN * selection.material]
+    in_place = [search.without(named, name) for name in told]
+    for starts, share in ((in_place, _SHAPED), ([named], _BESIDE)):
+        seen = max(share * selection.material, _STEPS * search.scale().stroke)
+        below = best.mean_square
+        trials = [t for s in starts for t in search.additions(s, SHAPES, below=below)]
+        worth = [t for t in trials if removed(best, t) > seen]
         better = max(worth, key=lambda t: _gain(search, t, best), default=best)
         if better is not best and _gain(search, better, best) > least:
             best = better
