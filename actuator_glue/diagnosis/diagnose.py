@@ -132,14 +132,13 @@ def diagnose(
     if decision.verdict in verdict.COMPLETE:
         larger = companions.with_companions(result.selection, final)
     told = draws
-    if larger is not final:
-        # The ridge that keeps chains of a long record apart is there with companions, too.
-        apart = draws.cut and any(draws.unmet)
-        beside = sample(larger, 0 if apart else settings.evaluations)
-        told = companions.reduced(beside, larger, final)
-        if apart:
-            told = told._replace(unmet=draws.unmet)
-    mixed = alternatives.mixed(told.points, final, others, lambda t: sample(t).points, rng)
+    # Chains that met nowhere give no interval that anything beside, or in place, could widen.
+    nowhere = bool(draws.unmet) and all(draws.unmet)
+    if larger is not final and not nowhere:
+        told = companions.reduced(sample(larger, settings.evaluations), larger, final)
+    mixed = told.points
+    if not nowhere:
+        mixed = alternatives.mixed(mixed, final, others, lambda t: sample(t).points, rng)
     error = reconciled.reached_by_both(error, found.material, scorer, prepared.held, before, after)
     judged = verdict.conclude(decision.verdict, bool(decision.names), error, found.material)
     if judged not in verdict.COMPLETE:

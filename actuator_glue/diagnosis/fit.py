@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from actuator_glue.diagnosis.data import LANES, Data, Model
 from actuator_glue.diagnosis.space import Space, jacobian, sum_of_squares, with_jacobian
@@ -20,6 +21,7 @@ from actuator_glue.records import Array
 _P = len(BASE)
 _DAMPINGS = np.array([1e-2, 1.0, 1e2])
 _STRAIGHT = 0.01  # of the squared motion between two starts may be beyond the linear
+_LONG = 100_000  # samples: of each structure tried its slopes stay
 _MORE = 5  # steps as large as the last one that a start may be behind
 
 
@@ -30,16 +32,22 @@ class Fit:
     Attributes:
         theta: best parameters, physical units, (p,).
         error: target minus simulation at the counted samples, (N,) [m].
-        jacobian: derivative of the simulation to the working coordinates, (p, N).
+        slopes: derivative of the simulation to the working coordinates, (p, N); of long records
+            in single precision, which holds all that finite differences tell.
         z: the working coordinates of `theta`, (p,).
         room: how far their bounds let them move down and up, (2, p); empty for freely.
     """
 
     theta: Array
     error: Array
-    jacobian: Array
+    slopes: Array | NDArray[np.float32]
     z: Array
     room: Array = field(default_factory=lambda: np.empty((2, 0)))
+
+    @property
+    def jacobian(self) -> Array:
+        """Derivative of the simulation to the working coordinates, (p, N)."""
+        return np.asarray(self.slopes, dtype=np.float64)
 
     @property
     def rms(self) -> float:
@@ -210,7 +218,8 @@ def fit(
         final = jacobian(data, model, space, z[best : best + 1], output[best : best + 1])[0]
     # Copies: views would keep what all starts left.
     room = np.stack([space.lower, space.upper]) - z[best]
-    return Fit(space.theta(z[best]), error[best].copy(), final.copy(), z[best].copy(), room)
+    kept = final.astype(np.float32 if final.shape[1] > _LONG else np.float64)
+    return Fit(space.theta(z[best]), error[best].copy(), kept, z[best].copy(), room)
 
 
 def _tried(data: Data, model: Model, space: Space, tries: Array) -> tuple[Array, Array | None]:

@@ -126,7 +126,7 @@ def reshaped(selection: ModelSelection, found: Selection) -> Selection | None:
     in_place = [search.without(named, name) for name in told]
     for starts, share in ((in_place, _SHAPED), ([named], _BESIDE)):
         seen = max(share * selection.material, _STEPS * search.scale().stroke)
-        below = best.mean_square
+        below = best.mean_square - 0.5 * seen**2  # or nearly
         trials = [t for s in starts for t in search.additions(s, SHAPES, below=below)]
         worth = [t for t in trials if removed(best, t) > seen]
         better = max(worth, key=lambda t: _gain(search, t, best), default=best)

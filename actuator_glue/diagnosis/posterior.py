@@ -53,7 +53,6 @@ class Draws(NamedTuple):
         rhat: largest R-hat of chains, else not-a-number.
         pareto_k: shape of the tail of importance weights, else not-a-number.
         unmet: of each parameter whether chains have not met in it; empty without chains.
-        cut: whether a long record left them fewer evaluations than were asked for.
     """
 
     points: Array
@@ -63,7 +62,6 @@ class Draws(NamedTuple):
     rhat: float = math.nan
     pareto_k: float = math.nan
     unmet: tuple[bool, ...] = ()
-    cut: bool = False
 
     def told(self) -> Json:
         """Return how they were drawn, as JSON."""
@@ -203,5 +201,4 @@ def sample(
         effective=float(chains.ess.min()),
         rhat=float(chains.rhat.max()),
         unmet=tuple(bool(r > RHAT) for r in chains.rhat),
-        cut=affordable < evaluations,
     )

@@ -39,6 +39,7 @@ _FINISHED = 2  # iterations on all samples after those on stretches of them
 _PROMISING = 0.95  # of the error at most is left by friction that is looked at twice
 _POLISHED = 4
 _LAST = 60  # iterations at most of a structure that is told
+_LONG = 5.0  # times its stretches: there they tell which minimum is the lowest
 
 
 def by_score(trial: Trial) -> float:
@@ -134,10 +135,15 @@ class Search:
         key, added = frozenset(trial.effects), self.entries[trial.added]
         wanted = 2 if valves and poles.may_change(added) else 1
         if self._polished.get(key, 0) < wanted:
-            start = global_search.along_ridge(self.data, trial.structure, self._tried[key].theta)
+            some = self._stand_in(trial.structure).data
+            data = some if _LONG * some.target.size < self.data.target.size else self.data
+            before = self._tried[key].theta
+            start = global_search.along_ridge(data, trial.structure, before)
             if wanted > 1:
-                stiffness = frozenset(r.known_stiffness() for r in self.data.records)
+                stiffness = frozenset(r.known_stiffness() for r in data.records)
                 start = poles.starts(trial.structure, added, start, stiffness)
+            if data is not self.data:
+                start = np.stack([fit(data, trial.structure, start).theta, before])
             self._tried[key] = fit(self.data, trial.structure, start)
             self._polished[key] = wanted
         return self.trial(trial.effects, trial.added)

@@ -117,6 +117,6 @@ def test_a_size_that_moves_nothing_is_fixed_by_no_stretch() -> None:
     search, trial = searched('delay', (2e-3, 2e-3), 3)
     jacobian = trial.fit.jacobian.copy()
     jacobian[4] = 0.0
-    still = replace(trial, fit=replace(trial.fit, jacobian=jacobian))
+    still = replace(trial, fit=replace(trial.fit, slopes=jacobian))
     (found,) = agreement(still, scorer_of(search, trial)).values()
     assert found.values == () and found.agree is None and np.isnan(found.p_value)

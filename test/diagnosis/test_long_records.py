@@ -15,7 +15,7 @@ CUT = 2000  # evaluations
 
 
 def test_chains_of_a_long_record_are_cut(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Beside a companion they would not meet either: it has the normal approximation."""
+    """Where they have met nowhere nothing beside, or in place, is drawn: no interval shows it."""
     monkeypatch.setattr(posterior, '_SIMULATED', 1)
     monkeypatch.setattr(posterior, 'RHAT', 0.9)
     monkeypatch.setattr(importance, 'sample', lambda *args: None)
@@ -35,7 +35,7 @@ def test_chains_of_a_long_record_are_cut(monkeypatch: pytest.MonkeyPatch) -> Non
     found = diagnose(make(['valve-deadband'], [2e-4], 31)[1:2], seed=2)
     assert [e.name for e in found.effects] == ['valve-deadband']
     assert found.sampler['method'] == 'dream' and found.sampler['evaluations'] <= CUT
-    assert methods[1] == 'dream' and set(methods[2:]) == {'laplace'}
+    assert methods == ['laplace', 'dream']
     size = found.effects[0].parameters['deadband']
     assert not size.identified
     assert any('have not met' in line for line in found.advice)

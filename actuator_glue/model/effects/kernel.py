@@ -3,9 +3,8 @@
 Derivation in docs/effects.md. Per sub-step one scalar equation is solved for the displacement
 increment: trapezoidal rule in the valve, the oil and the specimen, then the balance of forces.
 Each stage is a loop over lanes that the compiler turns into vector code; a stage whose effects
-are off is skipped, so that the cost follows the number of effects switched on. Stages that follow
-one another share a loop only while the processor can look ahead over several vectors of lanes:
-one vector alone waits for its own results.
+are off is skipped. Stages that follow one another share a loop only while the processor can look
+ahead over several vectors of lanes: one vector alone waits for its own results.
 
 The scheme's own error on the linear model is removed at every step: the exact solution of Eq. (2)
 and the scheme's solution of Eq. (2) run along and their difference is added to the displacement.
