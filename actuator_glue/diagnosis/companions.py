@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from actuator_glue.diagnosis.learned_forms import SHAPES
+from actuator_glue.diagnosis.learned_friction import SHAPES
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.posterior import Draws
 from actuator_glue.diagnosis.ranking import removed, weights

@@ -12,7 +12,7 @@ from actuator_glue.diagnosis.completeness import Decision
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.finding import Candidate, Finding, Rival
 from actuator_glue.diagnosis.homogeneity import Homogeneity
-from actuator_glue.diagnosis.learned_forms import SHAPES
+from actuator_glue.diagnosis.learned_friction import SHAPES
 from actuator_glue.diagnosis.measurement import Measured
 from actuator_glue.diagnosis.ranking import standard_error, weights
 from actuator_glue.diagnosis.selection import Selection

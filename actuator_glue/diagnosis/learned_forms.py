@@ -1,7 +1,7 @@
 """Forms that a learned term may take: functions of what is known at a place of the loop.
 
-What is smooth and holds at any time is written here, what remembers or changes with time in
-learned_memory.py.
+What is smooth and holds at any time is written here, friction in learned_friction.py, what else
+remembers or changes with time in learned_memory.py.
 Each is an effect written as an expression (docs/effects.md), its sizes scaled to the test, so that
 it is screened, refitted and compared as the effects of the catalogue are.
 """
@@ -14,7 +14,7 @@ from typing import Final
 
 import numpy as np
 
-from actuator_glue.diagnosis import learned_memory
+from actuator_glue.diagnosis import learned_friction, learned_memory
 from actuator_glue.diagnosis.learned_sizes import (
     DIMENSIONS,
     LARGEST,
@@ -57,12 +57,9 @@ _SHARPEST = 5.0  # times a limit may be overdriven
 _BENDS = (1e-3, 3.0)  # a bend of a thousandth is a corner
 # Of a step, over the signal's size: what is tried and what is most, and its width; places tried.
 _STEPS, _STEP_WIDTH, _PLACES = (0.01, 0.5), 0.005, 20
-# The way over which friction is reached, over the stroke.
-_WAYS = (1e-4, 0.1)
-# Forms of what has a name in the catalogue, and that name.
-SHAPES: Final = dict.fromkeys(
-    ('learned-force-friction', 'learned-force-presliding'), 'coulomb-friction'
-)
+# What may act in one direction only: damping, a stop or a bracing, a valve in a leak.
+_ONE_WAY: Final = (('force', 'v'), ('specimen', 'k x'), ('flow', 'f'))
+_WAYS: Final = {'forth': 'max', 'back': 'min'}
 
 
 def forms(scale: Scale, known: Container[str] = ()) -> tuple[Effect, ...]:
@@ -84,13 +81,35 @@ def forms(scale: Scale, known: Container[str] = ()) -> tuple[Effect, ...]:
     if sizes['f'] > 0.0:
         offered.append(_turbulent(sizes))
     offered += [_step(sizes), _rounded_overlap(sizes)]
-    for place in ('force', 'specimen') if sizes['k'] > 0.0 else ('force',):
-        offered += [_friction(place, sizes), _presliding(place, sizes)]
+    offered += [
+        _one_way(place, product.split(), way, sizes)
+        for place, product in _ONE_WAY
+        for way in _WAYS
+        if all(sizes[f] > 0.0 for f in product.split())
+    ]
+    offered += learned_friction.forms(sizes)
     offered += learned_memory.forms(sizes)
     return tuple(effect for effect in offered if effect.name not in known)
 
 
 def _product(place: str, factors: list[str], sizes: dict[str, float]) -> Effect:
+    powers = [(f, len(list(same))) for f, same in groupby(factors)]
+    text = '*'.join(_written(f, sizes) + (f'**{n}' if n > 1 else '') for f, n in powers)
+    name = '-'.join(_word(f) + (str(n) if n > 1 else '') for f, n in powers)
+    return _added(place, name, text, factors, sizes)
+
+
+def _one_way(place: str, factors: list[str], way: str, sizes: dict[str, float]) -> Effect:
+    """Return what acts in one direction only."""
+    *others, last = factors
+    text = '*'.join([*others, f'{_WAYS[way]}({last}, 0)'])
+    return _added(place, '-'.join([*factors, way]), text, factors, sizes)
+
+
+def _added(
+    place: str, name: str, text: str, factors: list[str], sizes: dict[str, float]
+) -> Effect:
+    """Return something times a parameter, added to the signal of a place."""
     signal = SIGNAL[PLACES[place]]
     full = 1.0
     unit = list(DIMENSIONS[signal])
@@ -98,9 +117,6 @@ def _product(place: str, factors: list[str], sizes: dict[str, float]) -> Effect:
         symbol = factor.strip('|')
         full *= sizes[symbol]
         unit = [a - b for a, b in zip(unit, DIMENSIONS[symbol], strict=True)]
-    powers = [(f, len(list(same))) for f, same in groupby(factors)]
-    text = '*'.join(_written(f, sizes) + (f'**{n}' if n > 1 else '') for f, n in powers)
-    name = '-'.join(_word(f) + (str(n) if n > 1 else '') for f, n in powers)
     largest = LARGEST * signal_size(place, sizes) / full
     return _effect(
         place, name, f'{signal} + {{a}}*{text}', unit, (-largest, largest), f'size of {text}'
@@ -211,50 +227,6 @@ def _rounded_overlap(sizes: dict[str, float]) -> Effect:
         ),
         source=LEARNED,
     )
-
-
-def _friction(place: str, sizes: dict[str, float]) -> Effect:
-    """Return friction that rises over some velocity; at the specimen, what its supports add."""
-    name, speed = f'{place}_friction', sizes['v']
-    force, size = _dry(place, name, sizes)
-    return term(
-        f'learned-{place}-friction',
-        f'{place}: f = f + {force}*tanh(v/{name}_speed)',
-        (
-            size,
-            Parameter(
-                f'{name}_speed', 'm/s', 1e-3 * speed, speed, 'where it is reached', 1e-2 * speed
-            ),
-        ),
-        source=LEARNED,
-    )
-
-
-def _presliding(place: str, sizes: dict[str, float]) -> Effect:
-    """Return friction that rises over some way, as a spring does until it slips (Prandtl)."""
-    name = f'{place}_presliding'
-    force, size = _dry(place, name, sizes)
-    low, high = (share * sizes['x'] for share in _WAYS)
-    return term(
-        f'learned-{place}-presliding',
-        f'{place}: f = f + {force}*(x - play(x, {name}_way))/{name}_way',
-        (
-            size,
-            Parameter(f'{name}_way', 'm', low, high, 'where it is reached', 10.0 * low),
-        ),
-        source=LEARNED,
-    )
-
-
-def _dry(place: str, name: str, sizes: dict[str, float]) -> tuple[str, Parameter]:
-    """Return friction's size as a force, and the parameter: at the specimen over its stiffness.
-
-    Negative it would weaken faster than the oil column is stiff.
-    """
-    if place == 'specimen':
-        return f'k*{name}', Parameter(name, 'm', 0.0, sizes['x'], 'friction as m', 0.0)
-    largest = LARGEST * signal_size(place, sizes)
-    return name, Parameter(name, 'N', 0.0, largest, 'friction as N', 0.0)
 
 
 def _effect(

@@ -52,7 +52,7 @@ def command_rate(sizes: Mapping[str, float]) -> str:
     return f'rate(u, {0.5 * sizes["h"]:.3g})'
 
 
-def signal_size(place: str, sizes: dict[str, float]) -> float:
+def signal_size(place: str, sizes: Mapping[str, float]) -> float:
     """Return the size that a change of a place's signal is compared with."""
     if place in ('force', 'specimen'):
         # What holds the piston is the oil, with or without a specimen.

@@ -13,7 +13,8 @@ import math
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from actuator_glue.diagnosis.learned_forms import SHAPES, forms
+from actuator_glue.diagnosis.learned_forms import forms
+from actuator_glue.diagnosis.learned_friction import SHAPES
 from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.ranking import removed

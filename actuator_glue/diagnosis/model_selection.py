@@ -9,7 +9,7 @@ from functools import cached_property
 from actuator_glue.diagnosis import false_alarms, forecast, pairs, ranking
 from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.fit import Fit
-from actuator_glue.diagnosis.learned_forms import SHAPES
+from actuator_glue.diagnosis.learned_friction import SHAPES
 from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.ranking import compare, removed, spokesman, standard_error, worth
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of

@@ -87,7 +87,8 @@ def piston(
     7 of the controller's own transducer, 8 of half of the valve, the other half without, half
     widths [m], 9 flow that grows by a share as it warms, 10 specimen that stiffens by a share,
     11 friction as tanh(v/1 mm/s), 12 that of the specimen's support [N], 13 flow that falls with
-    the square of the position [1/m^2], 14 friction of a bristle that bends by 5 um [N].
+    the square of the position [1/m^2], 14 friction of a bristle that bends by 5 um [N], 15 damping
+    of the way back only [N s/m].
     """
     kind, size = departure
     b1, n0, a2, a3 = theta
@@ -128,6 +129,8 @@ def piston(
                 v = np.sign(rest) * (np.sqrt(slope**2 + 4.0 * c * abs(rest)) - slope) / (2.0 * c)
             if kind == 11 or (kind == 12 and k > 0.0):
                 v = _sliding(rest, slope, size)
+            if kind == 15 and rest < 0.0:
+                v = rest / (slope + size)
             if kind == 14:
                 v = _held_back(rest, slope, size, bristle, h)
                 bristle = _bent(bristle, v, h)

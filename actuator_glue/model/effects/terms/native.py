@@ -65,7 +65,7 @@ class Native:
 
 
 # More than there are forms of a learned term, each of which takes 0.7 MB.
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=96)
 def native(
     parts: tuple[InstructionGroup, ...], constants: tuple[tuple[int, float], ...]
 ) -> Native:
