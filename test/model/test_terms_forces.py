@@ -8,6 +8,7 @@ from actuator_glue.model.commands import sweep
 from actuator_glue.model.effects.terms.entry import term
 from actuator_glue.model.effects.terms.expression import read
 from actuator_glue.model.parameters import Parameter
+from actuator_glue.model.stream import Stream
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 
@@ -98,6 +99,22 @@ def test_neighbours_do_not_matter(rng_seed: int) -> None:
     together = Structure((SLIPS,)).simulate(table, record)
     for i in rng.integers(0, 40, 3):
         assert np.array_equal(moved(record, Structure((SLIPS,)), forces[i], ways[i]), together[i])
+
+
+def test_blocks_are_the_whole(rng_seed: int) -> None:
+    """A stream remembers from block to block, and its force is what the piston works against."""
+    rng = np.random.default_rng(rng_seed)
+    record = sweeping(250e3)
+    theta = [*THETA, FORCE, 2e-5]
+    stream = Stream(
+        Structure((SLIPS,)), theta, stiffness=250e3, period=record.period, hold='linear'
+    )
+    cuts = np.sort(rng.integers(0, len(record), 20))
+    parts = [stream.step(block) for block in np.split(record.command, cuts)]
+    y, force = (np.concatenate(rows) for rows in zip(*parts, strict=True))
+    assert np.allclose(y, moved(record, Structure((SLIPS,)), FORCE, 2e-5), rtol=0.0, atol=1e-12)
+    rest = force - 250e3 * y
+    assert np.abs(rest).max() == pytest.approx(FORCE, rel=0.02)
 
 
 @pytest.mark.parametrize('name', ['lag(x, a)', 'integral(x)', 'limit_rate(x, a)'])
