@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 import matplotlib as mpl
+import numpy as np
 import pytest
 import yaml
 
@@ -154,7 +155,7 @@ def laboratory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     monkeypatch.chdir(tmp_path)
     names = {
         'free': ('free', 'raw'),
-        'clamped': ('clamped', 'test'),
+        'clamped': ('clamped', 'test', 'tuesday'),
         'undeclared_earthquake': ('earthquake',),
     }
     for bag, files in names.items():
@@ -162,6 +163,11 @@ def laboratory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         for file in files:
             write(tmp_path / f'{file}.csv', record)
     write(tmp_path / 'test.mat', load(tmp_path / 'test.csv'))
+    shaking = 0.3 * np.sin(np.linspace(0.0, 40.0, 1000)) * np.linspace(1.0, 0.0, 1000)
+    (tmp_path / 'elcentro.AT2').write_text(
+        'Ground motion\nof nowhere\nACCELERATION IN UNITS OF G\nNPTS= 1000, DT= .0100 SEC\n'
+        + '\n'.join(f'{a:.6E}' for a in shaking)
+    )
     lines = (tmp_path / 'raw.csv').read_text('utf-8').splitlines()
     rows = [line.split(',')[1:] for line in lines if line[0].isdigit()]
     text = '\n'.join(['Logger', 'a,b,f', *(','.join(row) for row in rows)]) + '\n'
@@ -169,6 +175,8 @@ def laboratory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     (tmp_path / 'out').mkdir()
     shutil.copytree(ROOT / 'bags' / 'session', tmp_path / 'out' / 'tuesday')
     shutil.copytree(ROOT / 'bags', tmp_path / 'bags')
+    monday = ['free.csv', 'clamped.csv', '--stiffness', '0', '250e3', '--save', 'monday.npz']
+    assert main(['calibrate', *monday]) == 0
     assert main(['map', 'raw.txt', '--rate', '200', '--out', 'map.yaml']) == 0
     return tmp_path
 

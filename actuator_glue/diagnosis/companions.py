@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from actuator_glue.diagnosis.learned_friction import SHAPES
+from actuator_glue.diagnosis.learned_forms import CAUSES
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.posterior import Draws
 from actuator_glue.diagnosis.ranking import removed, weights
@@ -48,7 +48,7 @@ def with_companions(selection: ModelSelection, final: Trial) -> Trial:
 
 def _of_one_kind(search: Search, name: str, final: Trial) -> bool:
     """Whether an effect shares the size of one that is told: two dry frictions are one."""
-    causes = {SHAPES.get(told, told) for told in final.effects}
+    causes = {CAUSES.get(told, told) for told in final.effects}
     holds = search.entries[name].holds
     return name in causes or (holds is not None and holds[0] in causes)
 

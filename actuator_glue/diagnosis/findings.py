@@ -12,7 +12,7 @@ from actuator_glue.diagnosis.completeness import Decision
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.finding import Candidate, Finding, Rival
 from actuator_glue.diagnosis.homogeneity import Homogeneity
-from actuator_glue.diagnosis.learned_friction import SHAPES
+from actuator_glue.diagnosis.learned_forms import CAUSES
 from actuator_glue.diagnosis.measurement import Measured
 from actuator_glue.diagnosis.ranking import standard_error, weights
 from actuator_glue.diagnosis.selection import Selection
@@ -89,10 +89,10 @@ def of(
 def _cause(name: str, rivals: tuple[Rival, ...]) -> str:
     """Name what a form is another shape of, where one of its kind comes nearest to it."""
     named = [r for r in rivals if r.name in CATALOGUE]
-    if name not in SHAPES or not named:
+    if name not in CAUSES or not named:
         return ''
     nearest = CATALOGUE[min(named, key=lambda r: r.excess).name]
-    return SHAPES[name] if nearest.group == CATALOGUE[SHAPES[name]].group else ''
+    return CAUSES[name] if nearest.group == CATALOGUE[CAUSES[name]].group else ''
 
 
 def _records_of(trial: Trial, name: str) -> tuple[str, ...]:

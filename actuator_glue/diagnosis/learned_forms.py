@@ -60,6 +60,12 @@ _STEPS, _STEP_WIDTH, _PLACES = (0.01, 0.5), 0.005, 20
 # What may act in one direction only: damping, a stop or a bracing, a valve in a leak.
 _ONE_WAY: Final = (('force', 'v'), ('specimen', 'k x'), ('flow', 'f'))
 _WAYS: Final = {'forth': 'max', 'back': 'min'}
+# Forms of what has a name in the catalogue, and that name.
+CAUSES: Final = {
+    **dict.fromkeys(learned_friction.SHAPES, learned_friction.DRY),
+    'learned-flow-limit': 'flow-saturation',
+    'learned-valve-limit': 'flow-saturation',
+}
 
 
 def forms(scale: Scale, known: Container[str] = ()) -> tuple[Effect, ...]:

@@ -10,12 +10,11 @@ from actuator_glue.model.effects import Effect
 from actuator_glue.model.effects.terms.entry import term
 from actuator_glue.model.parameters import Parameter
 
+# Other shapes of a name of the catalogue.
+DRY: Final = 'coulomb-friction'
+SHAPES: Final = ('learned-force-friction', 'learned-force-presliding')
 # The way over which friction is reached, over the stroke.
 _WAYS: Final = (1e-4, 0.1)
-# Forms of what has a name in the catalogue, and that name.
-SHAPES: Final = dict.fromkeys(
-    ('learned-force-friction', 'learned-force-presliding'), 'coulomb-friction'
-)
 
 
 def forms(sizes: Mapping[str, float]) -> list[Effect]:

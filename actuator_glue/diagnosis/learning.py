@@ -13,11 +13,11 @@ import math
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from actuator_glue.diagnosis.learned_forms import forms
-from actuator_glue.diagnosis.learned_friction import SHAPES
+from actuator_glue.diagnosis.learned_forms import CAUSES, forms
+from actuator_glue.diagnosis.learned_friction import DRY, SHAPES
 from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.model_selection import ModelSelection
-from actuator_glue.diagnosis.ranking import removed
+from actuator_glue.diagnosis.ranking import MUCH, decisive, removed
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
@@ -26,9 +26,9 @@ Way = Callable[[ModelSelection, Selection], Selection | None]
 _LONG = 100_000  # samples
 _MOST = 2  # learned terms
 _REFITS = 4  # per structure and turn
-# Another shape of the same cause removes so much of what matters in its place, and beside it; and
-# more than means over samples and the steps of a simulation leave, of the stroke.
-_SHAPED, _BESIDE, _STEPS = 0.1, 0.5, 3e-4
+# Another shape of the same cause removes so much of what matters; and more than means over samples
+# and the steps of a simulation leave, of the stroke.
+_SHAPED, _STEPS = 0.1, 3e-4
 
 
 def ways(found: Selection) -> list[Way]:
@@ -39,9 +39,9 @@ def ways(found: Selection) -> list[Way]:
     """
     if not found.final.effects:
         return []
-    several = [instead] if len(found.final.effects) > 1 else []
-    long = found.final.fit.error.size > _LONG
-    return [*several, reshaped, *([] if long else [partial(learned, complete=True)])]
+    if found.final.fit.error.size > _LONG:
+        return [*([instead] if len(found.final.effects) > 1 else []), reshaped]
+    return [instead, reshaped, partial(learned, complete=True)]
 
 
 def learned(
@@ -80,11 +80,12 @@ def learned(
 
 
 def instead(selection: ModelSelection, found: Selection) -> Selection | None:
-    """Return one term that explains all that several names do, better for its parameters.
+    """Return one term that explains all that names do, better for its parameters.
 
     Lost motion of the command moves the piston nearly as play and a lag of the transducer do: two
-    names of one cause. The term pays for having been chosen among many, in nats beside one for
-    each parameter.
+    names of one cause; or as a dead band of the valve, a wrong one. The term pays for having been
+    chosen among many, in nats beside one for each parameter; in the place of one name for what
+    any addition must gain, too, and it removes half of what matters, for a name is more.
 
     Args:
         selection: the model selection that ended with `found`; its noise stays.
@@ -98,7 +99,13 @@ def instead(selection: ModelSelection, found: Selection) -> Selection | None:
     if not whole:
         return None
     best = max(whole, key=lambda trial: _merit(search, trial))
-    if _gain(search, best, found.final) <= math.log(len(names)):
+    least = math.log(len(names))
+    if len(found.final.effects) == 1:
+        least = decisive(search, selection.settings)
+        same = CAUSES.get(best.added) in found.final.effects  # in another shape
+        if removed(found.final, best) < (1.0 if same else MUCH) * selection.material:
+            return None
+    if _gain(search, best, found.final) <= least:
         return None
     return selection.concluded(_plainer(selection, best), base, found.singles)
 
@@ -116,16 +123,16 @@ def reshaped(selection: ModelSelection, found: Selection) -> Selection | None:
     """
     search, named = selection.search, found.final
     # The name itself, or one that is told as well as it.
-    causes = set(SHAPES.values())
-    told = [n for n, row in found.rivals.items() if any(r.tied and r.name in causes for r in row)]
+    told = [n for n, row in found.rivals.items() if any(r.tied and r.name == DRY for r in row)]
     if not told:
         return None
-    least = math.log(len(_offered(search))) + selection.settings.nats
+    _offered(search)
+    least = decisive(search, selection.settings)
     selection.progress('learned term', 0.0)
     # In its place, or beside it: friction may fall with velocity, too.
     best = named
     in_place = [search.without(named, name) for name in told]
-    for starts, share in ((in_place, _SHAPED), ([named], _BESIDE)):
+    for starts, share in ((in_place, _SHAPED), ([named], MUCH)):
         seen = max(share * selection.material, _STEPS * search.scale().stroke)
         below = best.mean_square - 0.5 * seen**2  # or nearly
         trials = [t for s in starts for t in search.additions(s, SHAPES, below=below)]

@@ -9,7 +9,6 @@ from functools import cached_property
 from actuator_glue.diagnosis import false_alarms, forecast, pairs, ranking
 from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.fit import Fit
-from actuator_glue.diagnosis.learned_friction import SHAPES
 from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.ranking import compare, removed, spokesman, standard_error, worth
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
@@ -290,8 +289,7 @@ class ModelSelection:
                 alike = complete and rival.nats < self.settings.tie_nats
                 alike = alike or ranking.pressed_form(self.search, current, name, rival.name)
                 named = is_learned(entries[name]) and rival.excess < self.material
-                if name in SHAPES:  # of a cause that is told all the same
-                    named = named and rival.nats < self.settings.tie_nats
+                named &= not ranking.stays(self.search, self.settings, name, rival, self.material)
                 if rival.tied and ((named and rival.name != name) or (fewer and alike)):
                     return self.search.trial(effects, rival.name)
         return current

@@ -13,6 +13,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from actuator_glue.diagnosis.finding import BESIDE, Rival
+from actuator_glue.diagnosis.learned_forms import CAUSES
+from actuator_glue.diagnosis.learned_friction import SHAPES
+from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.likelihood import inflation
 from actuator_glue.diagnosis.score import Scorer, evidence
 from actuator_glue.diagnosis.search import Search
@@ -27,12 +30,30 @@ _NORMAL_95 = 1.959964
 # Share of the bounds within which a parameter is at one of them.
 _AT_BOUND = 1e-3
 _NOT_NEAR = 0.1  # of the best's weight: excess beyond the tolerance
+MUCH = 0.5  # of what matters: a description in the place of a name removes so much
 _SAME = 0.5  # of what the best removes: a rival that removes less is none
 
 
 def removed(before: Trial, after: Trial) -> float:
     """Rms error that a larger structure removes [m]."""
     return float(np.sqrt(max(0.0, before.mean_square - after.mean_square)))
+
+
+def decisive(search: Search, settings: Thresholds) -> float:
+    """Return by how many nats a description, one of many, must be better than a name."""
+    forms = sum(map(is_learned, search.entries.values()))
+    return settings.nats + math.log(max(forms, 1))
+
+
+def stays(search: Search, settings: Thresholds, name: str, rival: Rival, material: float) -> bool:
+    """Return whether a description stays where a name comes near to it.
+
+    Beyond chance and by half of what matters, or by all of that where it is a shape of that name:
+    a name is more than a description. Dry friction's shapes move what else is found.
+    """
+    much = material if CAUSES.get(name) == rival.name else MUCH * material
+    much = 0.0 if name in SHAPES else much
+    return rival.nats >= decisive(search, settings) and rival.excess >= much
 
 
 def left_by_rivals(rest: Trial, best: Trial) -> float:

@@ -66,3 +66,28 @@ def test_friction_that_is_there_at_once_keeps_its_name() -> None:
     selection, found = selected_of(NAMES, machine)
     assert found.final.effects == ('coulomb-friction',)
     assert learning.reshaped(selection, found) is None
+
+
+VALVE = ('valve-deadband', 'coulomb-friction', 'valve-null', 'gain', 'bias')
+MACHINE = np.array([230.0, 3.5e9, 4e5, 0.6])
+
+
+def test_a_wrong_name_that_seems_enough_gives_way() -> None:
+    """Lost motion of the command leaves next to nothing as a dead band of the valve."""
+    u = sweep(2e-3, 8.0, 32.0)
+    machine = [(k, u, piston(u, 1.0 / RATE, MACHINE, k, (6, 25e-6))) for k in (0.0, 250e3)]
+    selection, found = selected_of(VALVE, machine)
+    assert len(found.final.effects) == 1 and found.left < found.material
+    told = learning.instead(selection, found)
+    assert told is not None
+    assert told.final.effects == ('learned-command-play',)
+    assert told.final.fit.theta[4] == pytest.approx(25e-6, rel=0.1)
+
+
+def test_a_right_name_stays() -> None:
+    """No form of all is better by what a description must be."""
+    effects = {'valve-deadband': 60e-6}
+    machine = motions(effects, MACHINE, sweep(2e-3, 8.0, 32.0), (0.0, 250e3))
+    selection, found = selected_of(VALVE, machine)
+    assert found.final.effects == ('valve-deadband',)
+    assert learning.instead(selection, found) is None
