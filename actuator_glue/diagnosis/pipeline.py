@@ -242,28 +242,25 @@ def since_onset(first: Conclusion, settings: Thresholds, each: Each, tell: Progr
         if changed is None or changed[1] < final.fit.error.size * first.found.material**2:
             return first
     bare, whiten = first.found.base.fit, first.scorer.whiten
-    plain = bare.error, bare.jacobian
+    plain, seen = (bare.error, bare.jacobian), set()
     # Beside misfit what is slow counts little once it is whitened.
     for error, jacobian in ((whiten(plain[0]), whiten(plain[1])), plain):
         changed = onset.change(first.data, error, jacobian)
         quiet = None if changed is None else onset.quiet_before(changed[0], first.data)
-        if changed is not None and quiet is not None:
-            break
-    else:
-        return first
-    moment = changed[0]
-    before, base = quiet
-    tell('onset', 0.0)
-    second = conclude(first.prepared.since(moment), settings, each, tell, fixed=True)
-    always, final = final, second.found.final
-    nats = settings.nats + len(base.theta)
-    sides = before, moment.split(first.data)[1]
-    rivals = always, final
-    if not onset.explains(sides, base, rivals, nats, second.found.material):
-        return first
-    return replace(
-        second, onset=onset.dated(first.data, moment, base, final, second.decision.noise)
-    )
+        if changed is None or quiet is None or changed[0] in seen:
+            continue
+        moment = changed[0]
+        seen.add(moment)
+        before, base = quiet
+        tell('onset', 0.0)
+        second = conclude(first.prepared.since(moment), settings, each, tell, fixed=True)
+        found = second.found
+        nats = settings.nats + len(base.theta)
+        sides = before, moment.split(first.data)[1]
+        if onset.explains(sides, base, (final, found.final), nats, found.material):
+            when = onset.dated(first.data, moment, base, found.final, second.decision.noise)
+            return replace(second, onset=when)
+    return first
 
 
 def with_learned_terms(result: Conclusion) -> Conclusion:
