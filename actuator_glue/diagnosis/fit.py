@@ -47,7 +47,11 @@ class Fit:
     @property
     def jacobian(self) -> Array:
         """Derivative of the simulation to the working coordinates, (p, N)."""
-        return np.asarray(self.slopes, dtype=np.float64)
+        return self.jacobian_of(slice(None))
+
+    def jacobian_of(self, rows: NDArray[np.intp] | slice) -> Array:
+        """Return the derivative at some of the counted samples, (p, n)."""
+        return np.asarray(self.slopes[:, rows], dtype=np.float64)
 
     @property
     def rms(self) -> float:

@@ -58,7 +58,7 @@ _BENDS = (1e-3, 3.0)  # a bend of a thousandth is a corner
 # Of a step, over the signal's size: what is tried and what is most, and its width; places tried.
 _STEPS, _STEP_WIDTH, _PLACES = (0.01, 0.5), 0.005, 20
 # What may act in one direction only: damping, a stop or a bracing, a valve in a leak.
-_ONE_WAY: Final = (('force', 'v'), ('specimen', 'k x'), ('flow', 'f'))
+_ONE_WAY: Final = {'force': ['v'], 'specimen': ['k', 'x'], 'flow': ['f']}
 _WAYS: Final = {'forth': 'max', 'back': 'min'}
 # Forms of what has a name in the catalogue, and that name.
 CAUSES: Final = {
@@ -88,10 +88,10 @@ def forms(scale: Scale, known: Container[str] = ()) -> tuple[Effect, ...]:
         offered.append(_turbulent(sizes))
     offered += [_step(sizes), _rounded_overlap(sizes)]
     offered += [
-        _one_way(place, product.split(), way, sizes)
-        for place, product in _ONE_WAY
+        _one_way(place, factors, way, sizes)
+        for place, factors in _ONE_WAY.items()
         for way in _WAYS
-        if all(sizes[f] > 0.0 for f in product.split())
+        if all(sizes[f] > 0.0 for f in factors)
     ]
     offered += learned_friction.forms(sizes)
     offered += learned_memory.forms(sizes)

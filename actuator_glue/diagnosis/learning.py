@@ -13,11 +13,11 @@ import math
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from actuator_glue.diagnosis.learned_forms import CAUSES, forms
+from actuator_glue.diagnosis.learned_forms import forms
 from actuator_glue.diagnosis.learned_friction import DRY, SHAPES
 from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.model_selection import ModelSelection
-from actuator_glue.diagnosis.ranking import MUCH, decisive, removed
+from actuator_glue.diagnosis.ranking import MUCH, decisive, least_removed, removed
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
@@ -102,8 +102,8 @@ def instead(selection: ModelSelection, found: Selection) -> Selection | None:
     least = math.log(len(names))
     if len(found.final.effects) == 1:
         least = decisive(search, selection.settings)
-        same = CAUSES.get(best.added) in found.final.effects  # in another shape
-        if removed(found.final, best) < (1.0 if same else MUCH) * selection.material:
+        much = least_removed(best.added, found.final.effects, selection.material)
+        if removed(found.final, best) < much:
             return None
     if _gain(search, best, found.final) <= least:
         return None

@@ -242,15 +242,17 @@ def since_onset(first: Conclusion, settings: Thresholds, each: Each, tell: Progr
         if changed is None or changed[1] < final.fit.error.size * first.found.material**2:
             return first
     bare, whiten = first.found.base.fit, first.scorer.whiten
-    plain, seen = (bare.error, bare.jacobian), set()
+    plain, asked = (bare.error, bare.jacobian), set[onset.Moment]()
     # Beside misfit what is slow counts little once it is whitened.
     for error, jacobian in ((whiten(plain[0]), whiten(plain[1])), plain):
         changed = onset.change(first.data, error, jacobian)
-        quiet = None if changed is None else onset.quiet_before(changed[0], first.data)
-        if changed is None or quiet is None or changed[0] in seen:
+        if changed is None or changed[0] in asked:
             continue
         moment = changed[0]
-        seen.add(moment)
+        asked.add(moment)
+        quiet = onset.quiet_before(moment, first.data)
+        if quiet is None:
+            continue
         before, base = quiet
         tell('onset', 0.0)
         second = conclude(first.prepared.since(moment), settings, each, tell, fixed=True)

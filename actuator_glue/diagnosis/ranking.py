@@ -48,12 +48,19 @@ def decisive(search: Search, settings: Thresholds) -> float:
 def stays(search: Search, settings: Thresholds, name: str, rival: Rival, material: float) -> bool:
     """Return whether a description stays where a name comes near to it.
 
-    Beyond chance and by half of what matters, or by all of that where it is a shape of that name:
-    a name is more than a description. Dry friction's shapes move what else is found.
+    Beyond chance, and by what it must; dry friction's shapes by less, as they move what else is
+    found.
     """
-    much = material if CAUSES.get(name) == rival.name else MUCH * material
-    much = 0.0 if name in SHAPES else much
+    much = 0.0 if name in SHAPES else least_removed(name, rival.effects, material)
     return rival.nats >= decisive(search, settings) and rival.excess >= much
+
+
+def least_removed(form: str, names: Sequence[str], material: float) -> float:
+    """Return what a description must remove in the place of names, which are more than it [m].
+
+    Half of what matters, or all of that where it is another shape of one of them.
+    """
+    return material if CAUSES.get(form) in names else MUCH * material
 
 
 def left_by_rivals(rest: Trial, best: Trial) -> float:

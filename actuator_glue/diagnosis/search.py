@@ -190,7 +190,7 @@ class Search:
             own, seen = self._stand_in(self.structure(name)), self.signature(name)[1]
             rows.append(seen if own is part else seen[:, part.rows])
         every = np.concatenate(rows)
-        jacobian = self._tried[frozenset()].jacobian[:, part.rows]
+        jacobian = self._tried[frozenset()].jacobian_of(part.rows)
         # A metre of response: it diverged.
         alive = np.nan_to_num(np.abs(every), nan=np.inf).max(axis=1) < 1.0
         return every[alive], jacobian, self.scorer.of_part(part)
@@ -218,7 +218,7 @@ class Search:
         error = fit.error[part.rows]
         if beside:
             seen = part.data.simulate(model, with_others(sizes)) - (part.data.target - error)
-        parameters, jacobian = self.entries[name].parameters, fit.jacobian[:, part.rows]
+        parameters, jacobian = self.entries[name].parameters, fit.jacobian_of(part.rows)
         share, best = screen(parameters, sizes, seen, error, jacobian)
         return share, with_others(best)
 

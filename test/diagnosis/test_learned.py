@@ -149,7 +149,7 @@ def test_without_a_specimen_no_form_needs_its_force() -> None:
 def test_a_sentence_names_no_cause() -> None:
     """The range is that of the symbols in the equation."""
     term = LearnedTerm('learned-x', 'sensor', 'y = y', 'y = y', {}, {'y': (-1e-3, 2e-3)}, {})
-    assert 'a description, not valid beyond y from -0.001 to 0.002 m' in (term.sentence())
+    assert 'a description, not valid beyond y from -0.001 to 0.002 m' in term.sentence()
 
 
 @pytest.mark.slow

@@ -36,7 +36,7 @@ def moved(record: Record, effect: Structure, *sizes: float) -> Array:
 
 
 def by_fine_steps(record: Record, force: float, way: float, steps: int) -> Array:
-    """Displacement by Heun's rule; f' = alpha_1 ... of Eq. (2) with the friction's slope in it."""
+    """Displacement by Heun's rule: Eq. (2) with the slope of friction beside the oil's."""
     beta_1, into, alpha_2, alpha_3 = THETA
     k, h = record.known_stiffness(), record.period / steps
     x = q = kept = 0.0
