@@ -30,11 +30,11 @@ from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.force import check_forces
 from actuator_glue.diagnosis.hold import with_the_right_hold
 from actuator_glue.diagnosis.next_experiment import Experiment, ranked
+from actuator_glue.diagnosis.onset_search import since_onset
 from actuator_glue.diagnosis.pipeline import (
     Conclusion,
     Progress,
     conclude,
-    since_onset,
     with_learned_terms,
 )
 from actuator_glue.diagnosis.preparation import prepare, rest_samples

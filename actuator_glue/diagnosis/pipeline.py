@@ -6,13 +6,13 @@ import math
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, fields, replace
+from functools import cached_property
 
 from actuator_glue.diagnosis import (
     chance,
     force_ranking,
     hum,
     learning,
-    onset,
     per_record_settings,
     recorded,
     regression,
@@ -25,7 +25,7 @@ from actuator_glue.diagnosis.fit import fit
 from actuator_glue.diagnosis.hum import Line
 from actuator_glue.diagnosis.measurement import Measured
 from actuator_glue.diagnosis.model_selection import ModelSelection
-from actuator_glue.diagnosis.onset import Onset
+from actuator_glue.diagnosis.onset import Appeared, Onset, dated
 from actuator_glue.diagnosis.preparation import Prepared
 from actuator_glue.diagnosis.regression import Surrogate
 from actuator_glue.diagnosis.score import Scorer
@@ -61,7 +61,7 @@ class Conclusion:
         generic: the regression beside them.
         decision: the verdict.
         selection: what chose `found`, to go on from.
-        onset: when the effects appeared, where all this is about the data since then.
+        appeared: where all this is about the data since something appeared, what is known of that.
     """
 
     prepared: Prepared
@@ -73,7 +73,14 @@ class Conclusion:
     generic: Surrogate
     decision: Decision
     selection: ModelSelection
-    onset: Onset | None = None
+    appeared: Appeared | None = None
+
+    @cached_property
+    def onset(self) -> Onset | None:
+        """When the effects appeared that are found now; None for from the beginning."""
+        if self.appeared is None:
+            return None
+        return dated(self.appeared, self.decision.final, self.decision.noise)
 
 
 def conclude(
@@ -159,7 +166,11 @@ def _complete(
     if found is None:
         return None
     other = _conclusion(result.prepared, selection, found, result.line)
-    return None if other.decision.verdict == 'unexplained' else replace(other, onset=result.onset)
+    return (
+        None
+        if other.decision.verdict == 'unexplained'
+        else replace(other, appeared=result.appeared)
+    )
 
 
 def _apart(selection: ModelSelection) -> ModelSelection:
@@ -227,44 +238,6 @@ def _wider(search: Search, names: Sequence[str]) -> Search:
     return replace(search, names=(*search.names, *names), **own)
 
 
-def since_onset(first: Conclusion, settings: Thresholds, each: Each, tell: Progress) -> Conclusion:
-    """Ask whether what is missing was not there from the beginning.
-
-    Taken where Eq. (2) alone up to a moment, and what is found in the data since then, leave
-    materially less than effects that act all the time.
-    """
-    final = first.found.final
-    if first.decision.verdict == 'none':
-        return first
-    if first.decision.left < first.found.material:
-        # The answer is complete: only what it found can still have changed, and materially so.
-        changed = onset.change(first.data, final.fit.error, final.fit.jacobian)
-        if changed is None or changed[1] < final.fit.error.size * first.found.material**2:
-            return first
-    bare, whiten = first.found.base.fit, first.scorer.whiten
-    plain, asked = (bare.error, bare.jacobian), set[onset.Moment]()
-    # Beside misfit what is slow counts little once it is whitened.
-    for error, jacobian in ((whiten(plain[0]), whiten(plain[1])), plain):
-        changed = onset.change(first.data, error, jacobian)
-        if changed is None or changed[0] in asked:
-            continue
-        moment = changed[0]
-        asked.add(moment)
-        quiet = onset.quiet_before(moment, first.data)
-        if quiet is None:
-            continue
-        before, base = quiet
-        tell('onset', 0.0)
-        second = conclude(first.prepared.since(moment), settings, each, tell, fixed=True)
-        found = second.found
-        nats = settings.nats + len(base.theta)
-        sides = before, moment.split(first.data)[1]
-        if onset.explains(sides, base, (final, found.final), nats, found.material):
-            when = onset.dated(first.data, moment, base, found.final, second.decision.noise)
-            return replace(second, onset=when)
-    return first
-
-
 def with_learned_terms(result: Conclusion) -> Conclusion:
     """Describe by learned terms material structure that the catalogue leaves, or names badly.
 
@@ -277,7 +250,7 @@ def with_learned_terms(result: Conclusion) -> Conclusion:
     described = learning.learned(result.selection, found)
     if described is not None:
         learned = _conclusion(result.prepared, result.selection, described, result.line)
-        return replace(learned, onset=result.onset)
+        return replace(learned, appeared=result.appeared)
     if decision.verdict != 'unexplained':
         return result
     selection = _apart(result.selection)

@@ -12,7 +12,7 @@ from actuator_glue.diagnosis import decimate, despike, frozen
 from actuator_glue.diagnosis.base_prior import BasePrior
 from actuator_glue.diagnosis.checks import check, refuse_repeats, where
 from actuator_glue.diagnosis.data import SETTLE, Data, Mask, Model
-from actuator_glue.diagnosis.onset import Moment
+from actuator_glue.diagnosis.moments import Moment
 from actuator_glue.errors import InputError
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure

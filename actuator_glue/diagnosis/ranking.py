@@ -96,7 +96,9 @@ def pressed_form(search: Search, trial: Trial, name: str, simpler: str) -> bool:
 
 def standard_error(difference: Array) -> float:
     """Return the standard error of the sum of block differences (B,) [nats]."""
-    return float(np.sqrt(len(difference)) * difference.std(ddof=1))
+    # Of a structure that diverges without a block, squares may overflow.
+    size = float(np.abs(difference).max()) or 1.0
+    return float(np.sqrt(len(difference)) * (difference / size).std(ddof=1)) * size
 
 
 def weights(scores: Array) -> Array:

@@ -12,7 +12,8 @@ import pytest
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.fit import base_fit, fit
-from actuator_glue.diagnosis.onset import Moment, dated
+from actuator_glue.diagnosis.moments import Moment
+from actuator_glue.diagnosis.onset import Appeared, dated
 from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
@@ -27,11 +28,16 @@ T = np.arange(int(36 * RATE)) / RATE
 COMMAND = 2e-3 * np.sin(2 * np.pi * (0.5 * T + 1.25 * (1.0 - np.cos(2.0 * np.pi * T / 12.0))))
 
 
-def diagnosed(effect: str, size: float, at: float, growth: float = 0.0) -> DiagnosisData:
-    """Diagnose a machine in which an effect appears, at once or slowly."""
+def diagnosed(
+    effect: str, size: float, at: float, growth: float = 0.0, friction: float = 0.0
+) -> DiagnosisData:
+    """Diagnose a machine in which an effect appears, at once or slowly, maybe beside friction."""
     bare = Record(COMMAND, np.zeros(len(T)), 1 / RATE, stiffness=250e3, source='run.csv')
-    off = Structure(()).simulate(THETA, bare)
-    on = Structure((effect,)).simulate(np.array([*THETA, size]), bare)
+    always = {'coulomb-friction': friction} if friction else {}
+    off, on = (
+        Structure(tuple(some)).simulate(np.array([*THETA, *some.values()]), bare)
+        for some in (always, always | {effect: size})
+    )
     share = np.clip((T - at) / growth, 0.0, 1.0) if growth else (at <= T)
     noise = 3e-6 * np.random.default_rng(1).standard_normal(len(T))
     record = replace(bare, measured=off + share * (on - off) + noise)
@@ -73,6 +79,20 @@ def test_a_changed_machine_is_no_missing_effect() -> None:
     assert found.onset.time == pytest.approx(20.0, abs=0.5)
     assert found.onset.effects == ()
     assert 'where its parameters changed' in found.summary()
+
+
+@pytest.mark.slow
+def test_what_appears_beside_what_acts_all_the_time_is_told_from_it() -> None:
+    """Play of the transducer on a machine that has had friction all along."""
+    at = float(np.random.default_rng().uniform(13.0, 22.0))
+    found = diagnosed('backlash', 6e-5, at, friction=2500.0)
+    assert found.onset is not None
+    assert found.onset.lower - 0.05 <= at <= found.onset.upper + 0.05
+    assert found.onset.effects == ('backlash',)
+    assert found.onset.before == ('coulomb-friction',)
+    assert {e.name for e in found.effects} == {'coulomb-friction', 'backlash'}
+    assert found.error.after < 3.6e-6
+    assert 'backlash appeared, beside coulomb-friction, ' in found.summary()
 
 
 @pytest.mark.parametrize('at', [0.0, 100.0])
@@ -125,6 +145,19 @@ def test_a_moment_that_explains_nothing_is_not_the_last(
     assert found.error.after < 1.1 * found.error.noise_floor
 
 
+@pytest.mark.slow
+def test_what_shows_only_when_it_is_fast_does_not_hide_when_it_appeared(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A limit of the command's rate from 29.4 s of the first test on, under another stiffness.
+
+    The residual changes most near the end of the second test.
+    """
+    _, found = blind(monkeypatch, 23006)
+    assert [e.name for e in found.effects] == ['command-rate']
+    assert found.error.after < 1.1 * found.error.noise_floor
+
+
 def test_an_onset_may_lie_in_the_gap_before_it_shows() -> None:
     """Samples that are held out say nothing: the interval holds all of the gap."""
     rng = np.random.default_rng()
@@ -146,7 +179,8 @@ def test_an_onset_may_lie_in_the_gap_before_it_shows() -> None:
         fit(since, Structure(('valve-null',)), np.array([[*THETA, 4e-5]])),
         np.zeros(0),
     )
-    told = dated(data, moment, base_fit(before), found, 1e-6)
+    base = Trial(Structure(()), '', base_fit(before), np.zeros(0))
+    told = dated(Appeared(data, moment, base), found, 1e-6)
     assert told.lower == pytest.approx(10.5, abs=0.05)
     assert told.upper == pytest.approx(13.5, abs=0.02)
     assert told.lower < told.time < told.upper

@@ -1,0 +1,209 @@
+"""The moment at which an effect may have appeared, and whether it did.
+
+What acts all the time must be enough for what comes before, the effect one that would have been
+seen there, and both together must explain materially more than effects that act all the time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_glue.diagnosis.data import SETTLE, Data, Mask
+from actuator_glue.diagnosis.fit import base_fit, fit
+from actuator_glue.diagnosis.score import pooled, splits_of
+from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Array
+
+_SHORTEST = 5.0  # s on either side
+_STEP = 0.25  # s between the times tried
+_EARLIER = (1.0, 0.75, 0.5, 0.35)
+_LEFT_NOISE = 0.6  # structure before it, of the noise, at most
+
+
+@dataclass(frozen=True)
+class Moment:
+    """A time in a series of records: in which of them, and when since its first sample [s]."""
+
+    record: int
+    time: float
+
+    def near(self, other: Moment) -> bool:
+        """Whether another moment is of the same record and too near to be one of its own."""
+        return self.record == other.record and abs(self.time - other.time) < 2.0 * SETTLE
+
+    def inside(self, data: Data) -> bool:
+        """Whether it is away from both ends of its record: nothing else sets its sides apart."""
+        end = data.records[self.record].duration
+        return _SHORTEST < self.time < end - _SHORTEST
+
+    def split(self, data: Data) -> tuple[Data, Data]:
+        """Return what counts before and what counts since, with time to settle in between."""
+        before, since = [], []
+        for i, (record, mask) in enumerate(zip(data.records, data.masks, strict=True)):
+            now = record.time
+            early = (now < self.time) if i == self.record else np.full(len(mask), i < self.record)
+            late = (now >= self.time + SETTLE) if i == self.record else ~early
+            before.append(mask & early)
+            since.append(mask & late)
+        return _of(data, before), _of(data, since)
+
+
+def _of(data: Data, masks: list[Mask]) -> Data:
+    """Return the records of which something counts."""
+    use = [i for i, m in enumerate(masks) if m.sum() * data.periods[i] > 1.0]
+    return Data(
+        tuple(data.records[i] for i in use),
+        tuple(masks[i] for i in use),
+        tuple(data.initials[i] for i in use),
+        tuple(data.recorded[i] for i in use),
+        tuple(data.origins[i] for i in use),
+        data.prior,
+    )
+
+
+def _counted(data: Data) -> float:
+    """Time that counts [s]."""
+    pairs = zip(data.masks, data.periods, strict=True)
+    return float(sum(m.sum() * period for m, period in pairs))
+
+
+def changes(data: Data, error: Array, jac: Array) -> Iterator[tuple[Moment, float]]:
+    """Yield where a residual changes most: its size, or what parameters it asks for.
+
+    With it by how much less is left of its square sum than without a change. Near the end of a
+    record that may be what sets the records apart, and what shows in one of them only when it is
+    fast hides what appears in another: the best moment inside of each follows.
+
+    Each side has its own parameters, by one Gauss-Newton step, and its own error; the likelihood
+    of both is that of two normal variances (Hinkley 1970).
+
+    Args:
+        data: what counts.
+        error: what a fit leaves (n,), as it is or whitened.
+        jac: its derivatives (p, n), likewise.
+    """
+    size = max(1, round(_STEP / min(data.periods)))
+    edges = np.arange(0, len(error), size)
+    rows = np.concatenate([jac, error[None]])
+    scale = np.sqrt(np.einsum('pn,pn->p', rows, rows))
+    rows = rows / np.where(scale > 0.0, scale, 1.0)[:, None]
+    blocks = np.array([rows[:, a : a + size] @ rows[:, a : a + size].T for a in edges])
+    left = np.cumsum(blocks, axis=0)
+    counts = np.minimum(np.arange(1, len(edges) + 1) * size, len(error))
+    least = _SHORTEST / min(data.periods)
+    tried = np.flatnonzero((counts > least) & (counts < len(error) - least))
+    gains, removed = np.full(len(edges), -np.inf), np.zeros(len(edges))
+    for k in tried:
+        early, late = _remaining(left[k]), _remaining(left[-1] - left[k])
+        rest = len(error) - counts[k]
+        gains[k] = -counts[k] * np.log(early / counts[k]) - rest * np.log(late / rest)
+        removed[k] = _remaining(left[-1]) - early - late
+    best = [int(np.argmax(gains)), *_inside(data, counts, gains)]
+    for k in dict.fromkeys(best):
+        if np.isfinite(gains[k]):
+            at = int(counts[k])
+            index = next(i for i, part in enumerate(data.parts) if part.start <= at < part.stop)
+            time = float(data.times[index][at - data.parts[index].start])
+            # The rows were scaled to unit size.
+            yield Moment(index, time), removed[k] * float(scale[-1]) ** 2
+
+
+def _inside(data: Data, counts: NDArray[np.intp], gains: Array) -> list[int]:
+    """Return which gain is the largest inside of each record, larger ones first."""
+    best = []
+    for part, period in zip(data.parts, data.periods, strict=True):
+        least = _SHORTEST / period
+        inside = (counts > part.start + least) & (counts < part.stop - least)
+        best.append(int(np.argmax(np.where(inside, gains, -np.inf))))
+    return sorted(best, key=lambda k: -gains[k])
+
+
+def _remaining(normal: Array) -> float:
+    """Square sum of an error (the last row) that its Jacobian leaves."""
+    cross = normal[:-1, -1]
+    solved = np.linalg.lstsq(normal[:-1, :-1], cross, rcond=1e-9)[0]
+    return max(float(normal[-1, -1] - cross @ solved), 1e-12)
+
+
+def quiet_before(moment: Moment, data: Data, trials: Sequence[Trial]) -> tuple[Data, Trial] | None:
+    """Return what comes before a moment, and the first structure that leaves noise only there.
+
+    What grows slowly begins earlier than it is half grown: some of what comes before is left out
+    where that helps.
+
+    Args:
+        moment: when something may have appeared.
+        data: all that counts.
+        trials: what may be enough for what comes before, each refitted to that; plainer first.
+    """
+    if _counted(moment.split(data)[1]) < _SHORTEST:
+        return None
+    sides = (Moment(moment.record, share * moment.time).split(data)[0] for share in _EARLIER)
+    long = [before for before in sides if _counted(before) >= _SHORTEST]
+    for trial in trials:
+        for before in long:
+            base = base_fit(before) if not trial.effects else (
+                fit(before, trial.model, trial.fit.theta)
+            )  # fmt: skip
+            left, noise = pooled(before, splits_of(before, base.error))
+            if left <= _LEFT_NOISE * noise:
+                return before, replace(trial, fit=base)
+    return None
+
+
+def enough_before(before: Data, quiet: Trial, since: Trial, cost: float) -> Trial:
+    """Return what explains most before a moment: what was enough, or what came since less one.
+
+    What the records leave may pass for noise before the moment until it is known what it is.
+
+    Args:
+        before: data before the moment.
+        quiet: what was enough there.
+        since: what explains the data since then.
+        cost: square sum that a further parameter must remove [m^2].
+    """
+    tried = [quiet]
+    if since.own is None:
+        for gone in since.structure.entries:
+            model = Structure(e for e in since.structure.entries if e is not gone)
+            kept = np.delete(since.fit.theta, since.structure.columns(gone.name))
+            tried.append(Trial(model, '', fit(before, model, kept), np.zeros(0)))
+
+    def charged(trial: Trial) -> float:
+        return float(trial.fit.error @ trial.fit.error) + cost * len(trial.fit.theta)
+
+    return min(tried, key=charged)
+
+
+def explains(
+    sides: tuple[Data, Data], rivals: tuple[Trial, Trial, Trial], nats: float, material: float
+) -> bool:
+    """Whether an effect that appears explains more than effects that act all the time.
+
+    Before the moment the effect must be one that would have been seen.
+
+    Args:
+        sides: data before and data since it appeared.
+        rivals: what acts all the time, what is enough before, and what explains the data since.
+        nats: least evidence for one over the other.
+        material: least rms error to be removed [m].
+    """
+    before, after = sides
+
+    def squares(side: Data, trial: Trial) -> float:
+        error = side.target - side.simulate(trial.model, trial.fit.theta)[0]
+        return float(error @ error)
+
+    always, without, appears = rivals
+    since = squares(after, appears)
+    noise = pooled(after, splits_of(after, appears.fit.error))[1]
+    quiet = float(without.fit.error @ without.fit.error)
+    gained = squares(before, always) + squares(after, always) - quiet - since
+    seen = squares(before, appears) - quiet
+    count = before.target.size + after.target.size
+    return min(gained, seen) > 2.0 * nats * noise**2 and gained > count * material**2
