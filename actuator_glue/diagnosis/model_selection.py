@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import cached_property
 
 from actuator_glue.diagnosis import false_alarms, forecast, pairs, ranking
-from actuator_glue.diagnosis.finding import Rival
+from actuator_glue.diagnosis.finding import BESIDE, Rival
 from actuator_glue.diagnosis.fit import Fit
 from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.ranking import compare, removed, spokesman, standard_error, worth
@@ -150,7 +150,7 @@ class ModelSelection:
             if self.left(current) < max(threshold, s.left_share * self.first):
                 # Most is explained: small change may only mend the form of what was found.
                 threshold = max(threshold, s.later_share * removed(base, current))
-            if self.left(current) < threshold or stage == s.most:
+            if self.left(current) < self.material or stage == s.most:
                 break
             ranked = self.extend(self.rescored(ranked[: s.beam]), stage + 1)
             if ranked and self.left(current) >= self.material:
@@ -165,9 +165,14 @@ class ModelSelection:
         """Return the best structure that is worth its parameters.
 
         Nats weigh the whitened error, materiality the plain one: the best by nats may be
-        immaterial where another effect is neither.
+        immaterial where another effect is neither. What leaves nothing material mends no form.
         """
-        return next((t for t in ranked if self.better(t, current, threshold)), None)
+
+        def worth_it(trial: Trial) -> bool:
+            whole = self.left(trial) < self.material
+            return self.better(trial, current, self.material if whole else threshold)
+
+        return next((t for t in ranked if worth_it(t)), None)
 
     def _nearest(self, trials: Sequence[Trial]) -> Trial:
         """Return what leaves the least error out of sample: its residual is nearest to noise.
@@ -269,13 +274,15 @@ class ModelSelection:
         """Say how far behind the best each rival is; misfit that remains counts as noise."""
         scorer = self.search.scorer
         assert scorer is not None
+        whole = [False] * len(trials)
         if self.left(best) >= self.material:
+            whole = [BESIDE in t.added and self.left(t) < self.material for t in trials]
             scorer = self.search.with_misfit(best)
             rest, best, *trials = (
                 replace(t, scores=scorer.block_scores(t.fit)) for t in (rest, best, *trials)
             )
         cost = pairs.price(len(self.search.names))
-        return compare(rest, best, name, trials, scorer, self.settings, cost)
+        return compare(rest, best, name, trials, scorer, self.settings, cost, whole)
 
     def simpler(
         self, current: Trial, rivals: dict[str, tuple[Rival, ...]], complete: bool

@@ -133,6 +133,7 @@ def compare(
     scorer: Scorer,
     settings: Thresholds,
     cost: float = 0.0,
+    whole: Sequence[bool] = (),
 ) -> tuple[Rival, ...]:
     """Say how far behind the best each rival is, best first.
 
@@ -144,8 +145,9 @@ def compare(
         scorer: noise that they were scored with.
         settings: thresholds.
         cost: nats that a pair of effects pays for being one of many.
+        whole: which of `trials` leave nothing material where the best does: they mend no form.
     """
-    whole = removed(rest, best)
+    explained = removed(rest, best)
     odds = np.array([math.exp(-cost) if BESIDE in t.added else 1.0 for t in trials])
     scores = _without_best_blocks(np.stack([t.scores for t in (best, *trials, rest)]))
     scores[1:-1] += np.log(odds)[:, None] / scores.shape[1]
@@ -160,15 +162,16 @@ def compare(
         for t, limit in zip(trials, limits, strict=True)
     ]
     alike = [math.inf if i else e for i, e in zip(idle, excess, strict=True)]
-    tolerance = settings.tie_share * whole
-    for pair, weight, chance in zip(trials, known[1:-1], odds, strict=True):
-        if chance < 1.0 and weight > known[0]:  # not told, but better by the blocks
+    tolerance = settings.tie_share * explained
+    mending = [not w for w in whole] or [True] * len(trials)
+    for pair, weight, chance, mends in zip(trials, known[1:-1], odds, mending, strict=True):
+        if mends and chance < 1.0 and weight > known[0]:  # not told, but better by the blocks
             known[0] = max(known[0], weight * _near(removed(best, pair), tolerance))
     known = _tolerant(known, alike, tolerance, odds)
     out = [Rival(name, 0.0, 0.0, 0.0, True, float(known[0]))]
     for i, trial in enumerate(trials):
         near = known[1 + i] > math.exp(-settings.tie_nats) * known[0]
-        tied = bool(near and removed(rest, trial) > _SAME * whole and not idle[i])
+        tied = bool(near and removed(rest, trial) > _SAME * explained and not idle[i])
         nats = max(0.0, evidence(best.scores, trial.scores))
         stderr = standard_error(best.scores - trial.scores)
         limit = limits[i] if near else None
