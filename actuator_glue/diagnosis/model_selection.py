@@ -138,7 +138,7 @@ class ModelSelection:
         current, ranked, threshold = base, list(singles), self.material
         for stage in range(1, s.most + 1):
             best = self._first_worth(ranked, current, threshold)
-            if best is None and self.left(current) >= threshold:
+            if best is None and self.left(current) >= self.material:
                 ranked = self.overlooked(current)
                 best = self._first_worth(ranked, current, threshold)
             if best is None:
