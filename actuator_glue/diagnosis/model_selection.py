@@ -276,7 +276,9 @@ class ModelSelection:
         assert scorer is not None
         whole = [False] * len(trials)
         if self.left(best) >= self.material:
-            whole = [BESIDE in t.added and self.left(t) < self.material for t in trials]
+            less = [BESIDE in t.added and t.mean_square < best.mean_square for t in trials]
+            pairs_less = zip(trials, less, strict=True)
+            whole = [ahead and self.left(t) < self.material for t, ahead in pairs_less]
             scorer = self.search.with_misfit(best)
             rest, best, *trials = (
                 replace(t, scores=scorer.block_scores(t.fit)) for t in (rest, best, *trials)

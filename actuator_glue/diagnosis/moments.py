@@ -156,23 +156,28 @@ def quiet_before(moment: Moment, data: Data, trials: Sequence[Trial]) -> tuple[D
     return None
 
 
-def enough_before(before: Data, quiet: Trial, since: Trial, cost: float) -> Trial:
+def enough_before(before: Data, quiet: Trial, since: Trial, cost: float, material: float) -> Trial:
     """Return what explains most before a moment: what was enough, or what came since less one.
 
     What the records leave may pass for noise before the moment until it is known what it is.
+    What acts all the time has the same parameters on either side: else each side is a fit of its
+    own, and any two fits leave less than one.
 
     Args:
         before: data before the moment.
         quiet: what was enough there.
         since: what explains the data since then.
         cost: square sum that a further parameter must remove [m^2].
+        material: rms error that the parameters of one side may leave more on the other [m].
     """
     tried = [quiet]
-    if since.own is None:
-        for gone in since.structure.entries:
-            model = Structure(e for e in since.structure.entries if e is not gone)
-            kept = np.delete(since.fit.theta, since.structure.columns(gone.name))
-            tried.append(Trial(model, '', fit(before, model, kept), np.zeros(0)))
+    for gone in since.structure.entries if since.own is None else ():
+        model = Structure(e for e in since.structure.entries if e is not gone)
+        kept = np.delete(since.fit.theta, since.structure.columns(gone.name))
+        again = fit(before, model, kept)
+        more = before.target - before.simulate(model, kept)[0]
+        if float(np.mean(more**2)) - again.rms**2 <= material**2:
+            tried.append(Trial(model, '', again, np.zeros(0)))
 
     def charged(trial: Trial) -> float:
         return float(trial.fit.error @ trial.fit.error) + cost * len(trial.fit.theta)

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.signal
 
-from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.data import Data, Mask
 from actuator_glue.diagnosis.estimate import Json
 from actuator_glue.diagnosis.moments import Moment
 from actuator_glue.diagnosis.trial import Trial
@@ -16,6 +17,8 @@ from actuator_glue.records import Array
 
 _STEP = 0.25  # s between the times tried where it grows
 _WITHIN = 1.92  # nats: what a 95 % interval of one parameter excludes (Wilks 1938)
+_FADED = 7.0  # time constants after which the loop's own motion is no more
+_SWINGS = 10.0  # nats that the loop's own motion after a jump must gain, more for many times tried
 _GROWTHS = (0.05, 0.1, 0.2, 0.4, 0.7, 1.0)  # shares of the rest that it may take to grow
 
 
@@ -105,6 +108,12 @@ def dated(appeared: Appeared, found: Trial, noise: float) -> Onset:
     until = np.concatenate([[0.0], np.cumsum(error**2)[:-1]])
     since = np.cumsum(((error - step) ** 2)[::-1])[::-1]
     jump = np.asarray(-0.5 * (until + since), dtype=np.float64)
+    # What acts at the valve shows as late as the loop follows a command: on average by its delay.
+    ((a1, a0, _),) = systems(before.fit.theta[: len(BASE)], record.known_stiffness())
+    late = float(a1 / a0)
+    swings = _swings(error - step, mask, record.period, (1.0, float(a1), float(a0)))
+    if float((jump + swings).max() - jump.max()) > _SWINGS + np.log(len(jump)):
+        jump = jump + swings
     best, growth = float(jump.max()), 0.0
     profile: Array = np.asarray(jump)
     times = time
@@ -122,12 +131,40 @@ def dated(appeared: Appeared, found: Trial, noise: float) -> Onset:
     gap = times[top] - earliest[top] > 1.5 * record.period
     at = float(0.5 * (earliest[top] + times[top]) if gap else times[top])
     margin = _STEP if growth > 0.0 else record.period
-    # What acts at the valve shows as late as the loop follows a command: on average by its delay.
-    ((a1, a0, _),) = systems(before.fit.theta[: len(BASE)], record.known_stiffness())
-    late = float(a1 / a0)
     return Onset(
         record.source or f'record {i + 1}', at,
         max(0.0, float(earliest[inside[0]]) - margin - late),
         min(end, float(times[inside[-1]]) + margin), growth,
         tuple(name for name in found.effects if name not in before.effects), before.effects,
     )  # fmt: skip
+
+
+def _swings(rest: Array, mask: Mask, period: float, loop: tuple[float, ...]) -> Array:
+    """Nats that the loop's own motion explains after each counted sample, of any size (N,).
+
+    What changes at once leaves the loop in a state that is not the changed machine's: it swings
+    into that as it does from rest.
+
+    Args:
+        rest: what the changed machine leaves of the counted samples (N,), of the noise.
+        mask: which samples count (n,).
+        period: time between samples [s].
+        loop: its characteristic polynomial in seconds.
+    """
+    first, second = np.roots(loop).astype(complex)
+    until = min(period * len(mask), -_FADED / max(first.real, second.real))
+    now = np.arange(0.0, max(until, 2.0 * period), period)
+    slow = np.exp(first * now)
+    modes = np.stack([slow.real, slow.imag if slow.imag.any() else np.exp(second * now).real])
+    full, seen = np.zeros(len(mask)), mask.astype(np.float64)
+    full[mask] = rest
+
+    def sums(kernel: Array, signal: Array) -> Array:
+        padded = np.concatenate([signal, np.zeros(len(kernel) - 1)])
+        return np.asarray(scipy.signal.correlate(padded, kernel, mode='valid')[mask])
+
+    pull = np.stack([sums(mode, full) for mode in modes], axis=1)
+    normal = np.stack([sums(a * b, seen) for a in modes for b in modes], axis=1).reshape(-1, 2, 2)
+    normal += 1e-9 * float(np.abs(normal).max()) * np.eye(2)
+    moved = np.linalg.solve(normal, pull[..., None])[..., 0]
+    return np.asarray(0.5 * np.einsum('np,np->n', pull, moved))

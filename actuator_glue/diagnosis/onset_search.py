@@ -37,10 +37,9 @@ def since_onset(first: Conclusion, settings: Thresholds, each: Each, tell: Progr
         tell('onset', 0.0)
         return conclude(first.prepared.since(moment), settings, each, tell, fixed=True)
 
-    trials = (found.base, final) if final.effects and final.own is None else (found.base,)
     best, least = first, math.inf
-    for moment in _moments(first, trials):
-        told = _since(first, moment, trials, settings, search)
+    for moment in _moments(first):
+        told = _since(first, moment, (found.base,), settings, search)
         if told is None:
             continue
         if told.decision.verdict != 'unexplained':
@@ -73,7 +72,7 @@ def _since(
     second = search(moment)
     found, (before, base) = second.found, quiet
     square = 2.0 * second.decision.noise**2  # of one nat
-    base = moments.enough_before(before, base, found.final, settings.nats * square)
+    base = moments.enough_before(before, base, found.final, settings.nats * square, found.material)
     rivals = first.found.final, base, found.final
     sides = before, moment.split(first.data)[1]
     nats = settings.nats + len(base.fit.theta)
@@ -88,11 +87,11 @@ def _since(
     return _since(first, later, (*enough, base), settings, search) or told
 
 
-def _moments(first: Conclusion, trials: Sequence[Trial]) -> Iterator[Moment]:
+def _moments(first: Conclusion) -> Iterator[Moment]:
     """Yield when something may have appeared, likelier moments first."""
     whiten, told = first.scorer.whiten, list[Moment]()
-    for trial in trials:
-        error, jacobian = trial.fit.error, trial.fit.jacobian
+    for fit in dict.fromkeys((first.found.base.fit, first.found.final.fit)):
+        error, jacobian = fit.error, fit.jacobian
         # Beside misfit what is slow counts little once it is whitened.
         for pair in ((whiten(error), whiten(jacobian)), (error, jacobian)):
             for moment, _ in moments.changes(first.data, *pair):
