@@ -16,6 +16,7 @@ from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 
+_DROPPED = 10  # times a reading repeats that may be that of a channel without signal
 _TRIMS = 2  # refits without what stood out of the last
 
 
@@ -53,7 +54,8 @@ def without_impulses(
         speed = np.abs(np.gradient(output, record.period))
         # By the reading, too: one that drops out is off where the piston alone is far out.
         far = np.minimum(*(np.abs(y - np.median(y)) for y in (output, record.measured)))
-        found = find(record.measured - output, (speed, far), record.period)
+        phase = _phase(output, record.measured)
+        found = find(record.measured - output, (speed, far), record.period, phase)
         counts.append(len(found.samples))
         if found.count:
             measured = record.measured.copy()
@@ -62,6 +64,21 @@ def without_impulses(
             record = replace(record, measured=measured)
         records.append(record)
     return (replace(data, records=tuple(records)) if notes else data), tuple(counts), notes
+
+
+def _phase(output: Array, measured: Array) -> Array:
+    """Phase of a motion (n,) in its plane of displacement and velocity [rad].
+
+    NaN where a channel may have dropped out: its reading is one that a motion returns to, and
+    shows only where the piston is away from it.
+    """
+    speed, away = np.gradient(output), output - np.median(output)
+    phase = np.arctan2(
+        speed / max(float(speed.std()), 1e-30), away / max(float(away.std()), 1e-30)
+    )
+    values, counts = np.unique(measured, return_counts=True)
+    common = values[counts > max(_DROPPED, 3.0 * float(np.median(counts)))]
+    return np.where(np.isin(measured, common), np.nan, phase)
 
 
 def without_frozen(data: Data, model: Model, theta: Array) -> tuple[Data, list[str]]:

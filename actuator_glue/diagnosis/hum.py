@@ -19,7 +19,8 @@ from actuator_glue.records import Array
 _CLEAR = 60.0  # of the median power, 40 times the mean: one in 10^6 records of noise
 _LOWEST = 2.0  # Hz
 _PIECE = 1 << 20  # samples
-_ORDERS = 9  # harmonics of a sinusoidal command are its response, not hum
+_ORDERS = 9  # harmonics of a sinusoidal command are its response, not hum: of one that
+_STEADY = 0.05  # bins of its spectrum that it may be off, where it lasts: all of them
 
 
 @dataclass(frozen=True)
@@ -108,13 +109,33 @@ def _of_command(frequency: Array, command: Array, period: float) -> NDArray[np.b
     spectrum = np.abs(np.fft.rfft(scipy.signal.detrend(command) * np.hanning(len(command)))) ** 2
     f = np.fft.rfftfreq(len(command), period)
     # A sinusoid holds its power in three bins, a sweep or an earthquake in hundreds.
-    tones = f[spectrum > 0.03 * spectrum.sum()]
-    width = 3.0 / (len(command) * period)
+    strong = spectrum > 0.03 * spectrum.sum()
+    bin_width = 1.0 / (len(command) * period)
     out = np.zeros(len(frequency), dtype=np.bool_)
     for order in range(1, _ORDERS + 1):
-        for tone in tones:
-            out |= np.abs(frequency - order * tone) < order * width
+        for tone in f[strong]:
+            out |= np.abs(frequency - order * tone) < order * 3.0 * bin_width
+    # Friction answers one that lasts with harmonics of every order, each a line as sharp as it.
+    for tone in _steady(spectrum, strong) * bin_width:
+        order = np.maximum(np.round(frequency / tone), 1.0)
+        out |= np.abs(frequency - order * tone) < (2.0 + order * _STEADY) * bin_width
     return out
+
+
+def _steady(spectrum: Array, strong: NDArray[np.bool_]) -> Array:
+    """Where sinusoids of constant frequency lie in a power spectrum under a Hann window [bins].
+
+    By the larger neighbour of a peak (Grandke 1983).
+    """
+    edges = np.flatnonzero(np.diff(strong, prepend=False, append=False)).reshape(-1, 2)
+    found = []
+    for first, end in edges[np.diff(edges)[:, 0] <= 3]:
+        at = first + int(np.argmax(spectrum[first:end]))
+        if 0 < at < len(spectrum) - 1:
+            side = 1 if spectrum[at + 1] >= spectrum[at - 1] else -1
+            ratio = float(np.sqrt(spectrum[at + side] / spectrum[at]))
+            found.append(at + side * (2.0 * ratio - 1.0) / (ratio + 1.0))
+    return np.array(found)
 
 
 def find(data: Data, errors: Array) -> Line | None:

@@ -23,6 +23,7 @@ _BLOCK = 1.0  # s in which the noise has one size
 _BEYOND = 6.0  # times the noise: one Gaussian sample in 10^9
 _LONGEST = 40  # samples of one impulse
 _SURE = 3.5  # standard deviations
+_AGREED = 0.5  # mean resultant of phases that agree
 _MOST = 0.05  # of all samples: what is more frequent is no accident, and stays
 
 
@@ -111,7 +112,9 @@ def _explained(error: Array, noise: Array, taps: Array) -> tuple[list[int], Arra
     return [chosen[i] for i in order], sizes[order]
 
 
-def find(residual: Array, motion: Sequence[Array], period: float) -> Impulses:
+def find(
+    residual: Array, motion: Sequence[Array], period: float, phase: Array | None = None
+) -> Impulses:
     """Return the impulses of a residual.
 
     None where they are too many to be accidents, or come with the motion.
@@ -120,6 +123,8 @@ def find(residual: Array, motion: Sequence[Array], period: float) -> Impulses:
         residual: of a model that was fitted, (n,) [m].
         motion: sizes of what accidents do not know of, (n,) each: how fast the piston is, say.
         period: time between samples [s].
+        phase: of the motion's cycle (n,) [rad], which they do not know of either; NaN where a
+            reading could be off at some phases only.
     """
     if len(residual) < 40 * _REACH:
         return _NONE
@@ -142,6 +147,8 @@ def find(residual: Array, motion: Sequence[Array], period: float) -> Impulses:
         starts += [part.start + found[0][i] for i in runs]
     if not samples or len(samples) > _MOST * len(residual) or _with_motion(starts, motion):
         return _NONE
+    if phase is not None and _at_a_phase(phase[starts], phase):
+        return _NONE
     return Impulses(np.array(samples, dtype=np.intp), np.array(sizes), len(starts))
 
 
@@ -149,3 +156,19 @@ def _with_motion(starts: list[int], motion: Sequence[Array]) -> bool:
     """Whether impulses come when the piston is fast or far out: accidents do not know of that."""
     ranks = [scipy.stats.rankdata(size)[starts].mean() / len(size) for size in motion]
     return bool((max(ranks) - 0.5) * np.sqrt(12.0 * len(starts)) > _SURE)
+
+
+def _at_a_phase(own: Array, every: Array) -> bool:
+    """Whether impulses come at one phase of the motion's cycle, or at two opposite ones.
+
+    What sticks and slips does so once in each direction, neither where the piston is fastest nor
+    where it is farthest out. By the mean resultant of phases that are even over the record
+    (Rayleigh 1919), where most of them agree.
+    """
+    known = own[np.isfinite(own)]
+    if len(known) < 0.5 * len(own):
+        return False
+    places = np.sort(every[np.isfinite(every)])
+    even = 2.0 * np.pi * np.searchsorted(places, known) / len(places)
+    largest = max(abs(np.exp(1j * k * even).mean()) for k in (1, 2))
+    return bool(largest > _AGREED and len(known) * largest**2 > _SURE**2)
