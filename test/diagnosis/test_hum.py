@@ -44,6 +44,20 @@ def test_noise_has_no_line(seed: int) -> None:
     assert hum.find(*residual(50.0, 0.0, seed)) is None
 
 
+@pytest.mark.parametrize('hertz', [0.0, 50.0])
+def test_no_harmonic_of_a_sinusoidal_test_is_hum(hertz: float) -> None:
+    """Friction answers it with lines of every odd order; hum between them is found."""
+    rng = np.random.default_rng()
+    # Its 29th and 30th harmonics are 0.25 Hz and more from 50 Hz.
+    own = float(rng.uniform(1.675, 1.715))
+    command = 2e-3 * np.sin(2 * np.pi * own * T)
+    error = 3e-6 * rng.standard_normal(len(T)) + 4e-6 * np.sin(2 * np.pi * hertz * T)
+    error += sum(6e-6 / n**0.5 * np.sin(2 * np.pi * n * own * T + n) for n in range(1, 60, 2))
+    data = Data.whole([Record(command, command + error, 1 / RATE, stiffness=250e3)])
+    line = hum.find(data, error)
+    assert (line.frequency if line else 0.0) == pytest.approx(hertz, abs=0.01)
+
+
 @pytest.mark.parametrize(
     ('command', 'amplitude'), [(0, 12e-6), pytest.param(1, 0.0, marks=pytest.mark.slow)]
 )

@@ -92,6 +92,43 @@ def test_what_the_model_lacks_is_no_impulse(
     assert changed.mean() < 1e-3
 
 
+def sine(rng: np.random.Generator) -> tuple[Array, Array]:
+    """Times of a steady test at 500 Hz, and its motion."""
+    t = np.arange(40 * 500) / 500.0
+    return t, 2.9e-3 * np.sin(2 * np.pi * rng.uniform(1.65, 1.8) * t)
+
+
+def test_slips_are_no_impulses_whatever_their_phase() -> None:
+    """Neither where the piston is fastest nor where it is farthest out, but in each cycle."""
+    rng = np.random.default_rng()
+    _, x = sine(rng)
+    # It breaks away beyond 2 mm, on either side, and catches up in 8 ms.
+    release = np.flatnonzero(np.diff((np.abs(x) < 2e-3).astype(int)) == 1)
+    error = NOISE * rng.standard_normal(len(x))
+    lag = np.array([30, 80, 60, 25]) * 1e-6
+    for at in release[2:-2]:
+        error[at - 1 : at + 3] += np.sign(x[at]) * lag
+    motion = np.abs(np.gradient(x)), np.abs(x)
+    assert impulses.find(error, motion, 2e-3).count > 30
+    phase = np.arctan2(np.gradient(x) / np.gradient(x).std(), x / x.std())
+    assert impulses.find(error, motion, 2e-3, phase).count == 0
+
+
+@pytest.mark.parametrize('dropped', [False, True])
+def test_accidents_of_a_sinusoidal_test_are_accidents(dropped: bool) -> None:
+    """Spikes at any phase, and readings of zero, which show only away from it."""
+    rng = np.random.default_rng()
+    _, command = sine(rng)
+    bare = Record(command, np.zeros(len(command)), 2e-3, stiffness=250e3)
+    x = Structure(()).simulate(THETA, bare)
+    y = x + NOISE * rng.standard_normal(len(x))
+    at = rng.choice(np.arange(500, len(x) - 20, 13), 150, replace=False)
+    y[at] = 0.0 if dropped else y[at] + 1e-4
+    clean, notes, _ = despiked([replace(bare, measured=y)], ['rest'])
+    assert len(notes) == 1
+    assert np.abs(clean[0].measured - x).max() < 60e-6
+
+
 @pytest.mark.parametrize('late', [False, True])
 @pytest.mark.parametrize('share', [0.75, 0.85, 0.95])
 def test_the_end_of_a_transducer_is_no_impulse(share: float, late: bool) -> None:
