@@ -7,7 +7,7 @@ from dataclasses import replace
 from functools import cached_property
 
 from actuator_glue.diagnosis import false_alarms, forecast, pairs, ranking
-from actuator_glue.diagnosis.finding import BESIDE, Rival
+from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.fit import Fit
 from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.ranking import compare, removed, spokesman, standard_error, worth
@@ -167,12 +167,9 @@ class ModelSelection:
         Nats weigh the whitened error, materiality the plain one: the best by nats may be
         immaterial where another effect is neither. What leaves nothing material mends no form.
         """
-
-        def worth_it(trial: Trial) -> bool:
-            whole = self.left(trial) < self.material
-            return self.better(trial, current, self.material if whole else threshold)
-
-        return next((t for t in ranked if worth_it(t)), None)
+        whole = (self.left(t) < self.material for t in ranked)
+        asked = zip(ranked, (self.material if w else threshold for w in whole), strict=True)
+        return next((t for t, least in asked if self.better(t, current, least)), None)
 
     def _nearest(self, trials: Sequence[Trial]) -> Trial:
         """Return what leaves the least error out of sample: its residual is nearest to noise.
@@ -274,11 +271,9 @@ class ModelSelection:
         """Say how far behind the best each rival is; misfit that remains counts as noise."""
         scorer = self.search.scorer
         assert scorer is not None
-        whole = [False] * len(trials)
+        whole: list[bool] = []
         if self.left(best) >= self.material:
-            less = [BESIDE in t.added and t.mean_square < best.mean_square for t in trials]
-            pairs_less = zip(trials, less, strict=True)
-            whole = [ahead and self.left(t) < self.material for t, ahead in pairs_less]
+            whole = [pairs.whole(self, t, best) for t in trials]
             scorer = self.search.with_misfit(best)
             rest, best, *trials = (
                 replace(t, scores=scorer.block_scores(t.fit)) for t in (rest, best, *trials)

@@ -72,19 +72,27 @@ def _since(
     second = search(moment)
     found, (before, base) = second.found, quiet
     square = 2.0 * second.decision.noise**2  # of one nat
-    base = moments.enough_before(before, base, found.final, settings.nats * square, found.material)
-    rivals = first.found.final, base, found.final
     sides = before, moment.split(first.data)[1]
-    nats = settings.nats + len(base.fit.theta)
-    if not moments.explains(sides, rivals, nats, found.material):
+
+    def told(material: float) -> Conclusion | None:
+        since = found.final
+        bare = moments.enough_before(before, base, since, settings.nats * square, material)
+        nats = settings.nats + len(bare.fit.theta)
+        rivals = first.found.final, bare, since
+        if not moments.explains(sides, rivals, nats, found.material):
+            return None
+        return replace(second, appeared=Appeared(first.data, moment, bare))
+
+    near = told(math.inf)
+    if near is None or near.onset is None:
         return None
-    told = replace(second, appeared=Appeared(first.data, moment, base))
-    onset = told.onset
-    if onset is None or onset.growth > 0.0 or onset.time <= moment.time + SETTLE:
-        return told
-    # It appeared later than the residual began to change: the data since then are its own.
-    later = Moment(moment.record, onset.time)
-    return _since(first, later, (*enough, base), settings, search) or told
+    onset = near.onset
+    if onset.growth == 0.0 and onset.time > moment.time + SETTLE:
+        # What came before it bends what is found: the data since then are its own.
+        later = Moment(moment.record, onset.time)
+        if other := _since(first, later, enough, settings, search):
+            return other
+    return told(found.material)
 
 
 def _moments(first: Conclusion) -> Iterator[Moment]:

@@ -80,6 +80,12 @@ def ahead(
     ]
 
 
+def whole(selection: ModelSelection, trial: Trial, best: Trial) -> bool:
+    """Whether a structure is a pair that leaves nothing material, and less than another."""
+    less = BESIDE in trial.added and trial.mean_square < best.mean_square
+    return less and selection.left(trial) < selection.material
+
+
 def screened(
     search: Search, name: str, trials: Sequence[Trial], room: int, below: float
 ) -> list[tuple[Trial, str]]:

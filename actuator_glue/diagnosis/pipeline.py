@@ -166,11 +166,9 @@ def _complete(
     if found is None:
         return None
     other = _conclusion(result.prepared, selection, found, result.line)
-    return (
-        None
-        if other.decision.verdict == 'unexplained'
-        else replace(other, appeared=result.appeared)
-    )
+    if other.decision.verdict == 'unexplained':
+        return None
+    return replace(other, appeared=result.appeared)
 
 
 def _apart(selection: ModelSelection) -> ModelSelection:
