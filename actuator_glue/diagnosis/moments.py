@@ -6,14 +6,14 @@ seen there, and both together must explain materially more than effects that act
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.diagnosis.data import SETTLE, Data, Mask
-from actuator_glue.diagnosis.fit import base_fit, fit
+from actuator_glue.diagnosis.fit import Fit, base_fit, fit
 from actuator_glue.diagnosis.score import pooled, splits_of
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.structure import Structure
@@ -130,29 +130,22 @@ def _remaining(normal: Array) -> float:
     return max(float(normal[-1, -1] - cross @ solved), 1e-12)
 
 
-def quiet_before(moment: Moment, data: Data, trials: Sequence[Trial]) -> tuple[Data, Trial] | None:
-    """Return what comes before a moment, and the first structure that leaves noise only there.
+def quiet_before(moment: Moment, data: Data) -> tuple[Data, Fit] | None:
+    """Return what comes before a moment, and Eq. (2) fitted to it, where it leaves noise only.
 
     What grows slowly begins earlier than it is half grown: some of what comes before is left out
     where that helps.
-
-    Args:
-        moment: when something may have appeared.
-        data: all that counts.
-        trials: what may be enough for what comes before, each refitted to that; plainer first.
     """
     if _counted(moment.split(data)[1]) < _SHORTEST:
         return None
-    sides = (Moment(moment.record, share * moment.time).split(data)[0] for share in _EARLIER)
-    long = [before for before in sides if _counted(before) >= _SHORTEST]
-    for trial in trials:
-        for before in long:
-            base = base_fit(before) if not trial.effects else (
-                fit(before, trial.model, trial.fit.theta)
-            )  # fmt: skip
-            left, noise = pooled(before, splits_of(before, base.error))
-            if left <= _LEFT_NOISE * noise:
-                return before, replace(trial, fit=base)
+    for share in _EARLIER:
+        before = Moment(moment.record, share * moment.time).split(data)[0]
+        if _counted(before) < _SHORTEST:
+            return None
+        base = base_fit(before)
+        left, noise = pooled(before, splits_of(before, base.error))
+        if left <= _LEFT_NOISE * noise:
+            return before, base
     return None
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from actuator_glue.diagnosis import moments
@@ -13,7 +13,6 @@ from actuator_glue.diagnosis.onset import Appeared
 from actuator_glue.diagnosis.pipeline import Conclusion, Progress, conclude
 from actuator_glue.diagnosis.search import Each
 from actuator_glue.diagnosis.thresholds import Thresholds
-from actuator_glue.diagnosis.trial import Trial
 
 
 def since_onset(first: Conclusion, settings: Thresholds, each: Each, tell: Progress) -> Conclusion:
@@ -39,7 +38,7 @@ def since_onset(first: Conclusion, settings: Thresholds, each: Each, tell: Progr
 
     best, least = first, math.inf
     for moment in _moments(first):
-        told = _since(first, moment, (found.base,), settings, search)
+        told = _since(first, moment, settings, search)
         if told is None:
             continue
         if told.decision.verdict != 'unexplained':
@@ -53,7 +52,6 @@ def since_onset(first: Conclusion, settings: Thresholds, each: Each, tell: Progr
 def _since(
     first: Conclusion,
     moment: Moment,
-    enough: Sequence[Trial],
     settings: Thresholds,
     search: Callable[[Moment], Conclusion],
 ) -> Conclusion | None:
@@ -62,15 +60,15 @@ def _since(
     Args:
         first: what was found in all data.
         moment: when something may have appeared.
-        enough: what may be enough before it.
         settings: thresholds.
         search: searches the data since a moment.
     """
-    quiet = moments.quiet_before(moment, first.data, enough)
+    quiet = moments.quiet_before(moment, first.data)
     if quiet is None:
         return None
     second = search(moment)
-    found, (before, base) = second.found, quiet
+    found, before = second.found, quiet[0]
+    base = replace(first.found.base, fit=quiet[1])
     square = 2.0 * second.decision.noise**2  # of one nat
     sides = before, moment.split(first.data)[1]
 
@@ -90,7 +88,7 @@ def _since(
     if onset.growth == 0.0 and onset.time > moment.time + SETTLE:
         # What came before it bends what is found: the data since then are its own.
         later = Moment(moment.record, onset.time)
-        if other := _since(first, later, enough, settings, search):
+        if other := _since(first, later, settings, search):
             return other
     return told(found.material)
 
