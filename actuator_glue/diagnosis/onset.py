@@ -50,7 +50,7 @@ class Onset:
         what = f'{", ".join(self.effects)} appeared' if self.effects else (
             f'the parameters of Eq. (2){" or of an effect" if self.before else ""} changed'
         )  # fmt: skip
-        before = f', beside {", ".join(self.before)}' if self.before else ''
+        before = f', beside {", ".join(self.before)},' if self.before else ''
         return (
             f'{what}{before} {self.time:.2f} s (95 % {self.lower:.2f} to {self.upper:.2f} s) into '
             f'{self.source}, {how}; sizes and errors are those of the data since then'
@@ -112,8 +112,11 @@ def dated(appeared: Appeared, found: Trial, noise: float) -> Onset:
     ((a1, a0, _),) = systems(before.fit.theta[: len(BASE)], record.known_stiffness())
     late = float(a1 / a0)
     swings = _swings(error - step, mask, record.period, (1.0, float(a1), float(a0)))
+    likely = jump > jump.max() - _WITHIN
     if float((jump + swings).max() - jump.max()) > _SWINGS + np.log(len(jump)):
+        # How it begins is not known: the interval holds what is likely with the swing, or without.
         jump = jump + swings
+        likely |= jump > jump.max() - _WITHIN
     best, growth = float(jump.max()), 0.0
     profile: Array = np.asarray(jump)
     times = time
@@ -125,8 +128,9 @@ def dated(appeared: Appeared, found: Trial, noise: float) -> Onset:
         slow = [-0.5 * float(np.sum((error - w * step) ** 2)) for w in shapes]
         if max(slow) > best + _WITHIN:
             best, profile, times, earliest = max(slow), np.array(slow), coarse, coarse
+            likely = profile > best - _WITHIN
             growth = share * (end - float(coarse[int(np.argmax(slow))]))
-    inside = np.flatnonzero(profile > best - _WITHIN)
+    inside = np.flatnonzero(likely)
     top = int(np.argmax(profile))
     gap = times[top] - earliest[top] > 1.5 * record.period
     at = float(0.5 * (earliest[top] + times[top]) if gap else times[top])

@@ -97,7 +97,7 @@ def test_what_appears_beside_what_acts_all_the_time_is_told_from_it() -> None:
         assert found.onset.lower - 0.05 <= at <= found.onset.upper + 0.05
         assert found.onset.effects == ('backlash',)
         assert {e.name for e in found.effects} == {friction, 'backlash'}
-        assert f'backlash appeared, beside {friction}, ' in found.summary()
+        assert f'backlash appeared, beside {friction}, ' in found.onset.sentence()
         told += found.error.after < 3.6e-6
     assert told >= 2
 
