@@ -31,12 +31,7 @@ from actuator_glue.diagnosis.force import check_forces
 from actuator_glue.diagnosis.hold import with_the_right_hold
 from actuator_glue.diagnosis.next_experiment import Experiment, ranked
 from actuator_glue.diagnosis.onset_search import since_onset
-from actuator_glue.diagnosis.pipeline import (
-    Conclusion,
-    Progress,
-    conclude,
-    with_learned_terms,
-)
+from actuator_glue.diagnosis.pipeline import Conclusion, Progress, conclude, with_learned_terms
 from actuator_glue.diagnosis.preparation import prepare, rest_samples
 from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.diagnosis.search import Each

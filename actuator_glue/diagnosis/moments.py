@@ -149,8 +149,10 @@ def quiet_before(moment: Moment, data: Data) -> tuple[Data, Fit] | None:
     return None
 
 
-def enough_before(before: Data, quiet: Trial, since: Trial, cost: float, material: float) -> Trial:
-    """Return what explains most before a moment: what was enough, or what came since less one.
+def enough_before(
+    before: Data, quiet: Trial, since: Trial, cost: float
+) -> list[tuple[Trial, float]]:
+    """Return what may act before a moment, best first: what was enough, what came since less one.
 
     What the records leave may pass for noise before the moment until it is known what it is.
     What acts all the time has the same parameters on either side: else each side is a fit of its
@@ -161,21 +163,24 @@ def enough_before(before: Data, quiet: Trial, since: Trial, cost: float, materia
         quiet: what was enough there.
         since: what explains the data since then.
         cost: square sum that a further parameter must remove [m^2].
-        material: rms error that the parameters of one side may leave more on the other [m].
+
+    Returns:
+        Each with the rms error that its parameters since then leave more before [m].
     """
-    tried = [quiet]
+    tried = [(quiet, 0.0)]
     for gone in since.structure.entries if since.own is None else ():
         model = Structure(e for e in since.structure.entries if e is not gone)
         kept = np.delete(since.fit.theta, since.structure.columns(gone.name))
         again = fit(before, model, kept)
         more = before.target - before.simulate(model, kept)[0]
-        if float(np.mean(more**2)) - again.rms**2 <= material**2:
-            tried.append(Trial(model, '', again, np.zeros(0)))
+        excess = float(np.sqrt(np.maximum(np.mean(more**2) - again.rms**2, 0.0)))
+        tried.append((Trial(model, '', again, np.zeros(0)), excess))
 
-    def charged(trial: Trial) -> float:
-        return float(trial.fit.error @ trial.fit.error) + cost * len(trial.fit.theta)
+    def charged(side: tuple[Trial, float]) -> float:
+        again = side[0].fit
+        return float(again.error @ again.error) + cost * len(again.theta)
 
-    return min(tried, key=charged)
+    return sorted(tried, key=charged)
 
 
 def explains(

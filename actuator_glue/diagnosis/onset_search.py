@@ -69,14 +69,14 @@ def _since(
     second = search(moment)
     found, before = second.found, quiet[0]
     base = replace(first.found.base, fit=quiet[1])
-    square = 2.0 * second.decision.noise**2  # of one nat
+    cost = settings.nats * 2.0 * second.decision.noise**2
+    enough = moments.enough_before(before, base, found.final, cost)
     sides = before, moment.split(first.data)[1]
 
-    def told(material: float) -> Conclusion | None:
-        since = found.final
-        bare = moments.enough_before(before, base, since, settings.nats * square, material)
+    def told(most: float) -> Conclusion | None:
+        bare = next(trial for trial, excess in enough if excess <= most)
         nats = settings.nats + len(bare.fit.theta)
-        rivals = first.found.final, bare, since
+        rivals = first.found.final, bare, found.final
         if not moments.explains(sides, rivals, nats, found.material):
             return None
         return replace(second, appeared=Appeared(first.data, moment, bare))

@@ -163,9 +163,9 @@ def compare(
     ]
     alike = [math.inf if i else e for i, e in zip(idle, excess, strict=True)]
     tolerance = settings.tie_share * explained
-    mending = [not w for w in whole] or [True] * len(trials)
-    for pair, weight, chance, mends in zip(trials, known[1:-1], odds, mending, strict=True):
-        if mends and chance < 1.0 and weight > known[0]:  # not told, but better by the blocks
+    ends = whole or [False] * len(trials)
+    for pair, weight, chance, end in zip(trials, known[1:-1], odds, ends, strict=True):
+        if not end and chance < 1.0 and weight > known[0]:  # not told, but better by the blocks
             known[0] = max(known[0], weight * _near(removed(best, pair), tolerance))
     known = _tolerant(known, alike, tolerance, odds)
     out = [Rival(name, 0.0, 0.0, 0.0, True, float(known[0]))]
