@@ -230,10 +230,12 @@ class Probe(Node):
             self.for_a_while(pause)
 
 
-def posteriors_of_a_test(start, probe, found):
-    """Stream six simulated seconds to an estimator that has started; return its posteriors.
+def windows_of_a_test(start, probe, found):
+    """Stream six simulated seconds to an estimator that has started.
 
-    They are there when as many of what follows them have been found.
+    Returns pairs of a posterior and what followed it, window by window. These topics keep nothing
+    for who is not known yet, and a machine that is busy may take seconds to make a subscription
+    known: pairs are from the first window that both have shown to the last, gaps not allowed.
     """
     posteriors = []
     probe.create_subscription(PosteriorMoments, 'posterior', posteriors.append, 10)
@@ -247,8 +249,19 @@ def posteriors_of_a_test(start, probe, found):
         exit_at_end=True,
     )
     assert simulator.wait(60) == 0, simulator.text
-    probe.until(lambda: len(posteriors) > 2 and len(found) >= len(posteriors), 30)
-    return posteriors
+
+    def seen(messages):
+        return [m.window for m in messages] or [0]
+
+    def common():
+        first = max(seen(posteriors)[0], seen(found)[0])
+        last = min(seen(posteriors)[-1], seen(found)[-1])
+        return list(range(first, last + 1))
+
+    probe.until(lambda: len(common()) > 2, 30, 'three windows that both show')
+    both = [[m for m in messages if m.window in common()] for messages in (posteriors, found)]
+    assert [m.window for m in both[0]] == [m.window for m in both[1]] == common()
+    return list(zip(*both, strict=True))
 
 
 def recorded(bag):

@@ -2,7 +2,7 @@
 
 import numpy as np
 from actuator_glue_msgs.msg import TrackingIndicators
-from ros_nodes import QUICK, posteriors_of_a_test
+from ros_nodes import QUICK, windows_of_a_test
 
 
 def test_one_for_each_window(start, probe):
@@ -10,9 +10,7 @@ def test_one_for_each_window(start, probe):
     estimator = start('estimator', **QUICK, tracking_frequencies=[2.0, 5.0])
     found = []
     probe.create_subscription(TrackingIndicators, 'tracking', found.append, 10)
-    posteriors = posteriors_of_a_test(start, probe, found)
-    assert [m.window for m in found] == [m.window for m in posteriors]
-    for message, posterior in zip(found, posteriors, strict=True):
+    for posterior, message in windows_of_a_test(start, probe, found):
         assert message.header.stamp == posterior.header.stamp
         assert list(message.frequency) == [2.0, 5.0]
         assert (np.array(message.delay_lower) <= message.delay_upper).all()
