@@ -116,7 +116,10 @@ def diagnose(
     if final.effects:
         draws = sample(final, settings.evaluations)
         after = Side(final.model, final.fit.theta, draws.points)
-    still = [rest.noise_at_rest(r, rest_samples(r)) for r in data.records]
+    still = [
+        rest.noise_at_rest(r, rest_samples(r), initial)
+        for r, initial in zip(data.records, data.initials, strict=True)
+    ]
     tell('held-out', 0.0)
     error, coverage, curves = verify(
         data, prepared.held, before, after, decision.noise, seed, result.line, len(found.singles)

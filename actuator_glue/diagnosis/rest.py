@@ -7,6 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from actuator_glue.diagnosis.checks import where
+from actuator_glue.diagnosis.data import SETTLE
+from actuator_glue.model.exact import Initial
 from actuator_glue.records import Record
 
 _SAMPLES = 100  # at least, at rest
@@ -14,18 +16,21 @@ _SURELY = 0.9  # of the rest: where it ends is not known to the sample
 _APART = 1.5  # times as large is another noise
 
 
-def noise_at_rest(record: Record, samples: int) -> float | None:
+def noise_at_rest(record: Record, samples: int, initial: Initial = 'rest') -> float | None:
     """Return the rms about a line of the measured channel before anything moves [m].
 
     Args:
         record: the test.
         samples: at its beginning, in which the command does not move; None for fewer than 100.
+        initial: where the piston starts; what does not rest there first comes to rest.
     """
-    samples = round(_SURELY * samples)
+    begin = 0 if initial == 'rest' else round(SETTLE / record.period)
+    y = record.measured[begin : round(_SURELY * samples)]
+    samples = len(y)
     if samples < _SAMPLES:
         return None
     at = np.arange(samples) - 0.5 * (samples - 1)
-    y = record.measured[:samples] - record.measured[:samples].mean()
+    y = y - y.mean()
     y = y - at * (at @ y) / (at @ at)
     return float(np.sqrt(y @ y / (samples - 2)))
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from actuator_glue.diagnosis.diagnose import diagnose
+from actuator_glue.diagnosis.preparation import initial_state, rest_samples
 from actuator_glue.diagnosis.rest import compared, noise_at_rest
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.model.structure import Structure
@@ -52,3 +53,15 @@ def test_nothing_is_said_without_rest_or_noise() -> None:
     assert noise_at_rest(record, 99) is None
     assert compared([record], [None], 1e-5) == ()
     assert compared([record], [0.0], 1e-5) == ()
+
+
+def test_a_piston_that_comes_to_rest_is_not_at_rest() -> None:
+    """A test that is asked to begin 2 mm away: the way there is no noise."""
+    record = machine(1e-5, 1e-5)
+    away = 2e-3 * (1.0 - np.exp(-record.time / 0.05))
+    begun = replace(record, command=record.command + 2e-3, measured=record.measured + away)
+    rest = rest_samples(begun)
+    assert initial_state(begun) == 'measured' and rest * begun.period > 2.0
+    # A standard deviation of 430 values is known to 3.4 %: four times that.
+    assert noise_at_rest(begun, rest, 'measured') == pytest.approx(1e-5, rel=0.14)
+    assert noise_at_rest(begun, round(1.3 * RATE), 'measured') is None
