@@ -16,8 +16,9 @@ import scipy
 
 from actuator_glue.diagnosis import global_search
 from actuator_glue.diagnosis.checks import where
-from actuator_glue.diagnosis.data import Data, Mask, Model, simulated
+from actuator_glue.diagnosis.data import Data, Mask
 from actuator_glue.diagnosis.fit import Fit, fit, rms
+from actuator_glue.diagnosis.free_run import Model, simulated
 from actuator_glue.diagnosis.preparation import Prepared
 from actuator_glue.diagnosis.score import Scorer, pooled, splits_of
 from actuator_glue.diagnosis.search import Search

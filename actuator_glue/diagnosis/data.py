@@ -2,64 +2,25 @@
 
 from __future__ import annotations
 
+import bisect
+import itertools
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.diagnosis.base_prior import BasePrior
-from actuator_glue.diagnosis.decimate import decimated, means
+from actuator_glue.diagnosis.decimate import decimated
+from actuator_glue.diagnosis.free_run import Model, ObservedChannel, parts
 from actuator_glue.model.exact import Initial
-from actuator_glue.model.parameters import Parameter
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 
 SETTLE = 1.0  # s in which an unknown initial state is forgotten
 
 Mask = NDArray[np.bool_]
-
-
-class Model(Protocol):
-    """What a structure must offer here (see actuator_glue.model.structure.Structure)."""
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Parameters in the order of theta's columns."""
-
-    def simulate(
-        self,
-        theta: Array,
-        record: Record,
-        *,
-        initial: Initial = 'rest',
-        origin: float = 0.0,
-        force: bool = False,
-    ) -> Array:
-        """Free-run sensor output (m, n) [m] of theta (m, p); the test began `origin` s before.
-
-        Or the actuator force [N].
-        """
-
-
-@runtime_checkable
-class ObservedChannel(Protocol):
-    """A record that shows something else than the displacement (see diagnosis/force.py)."""
-
-    def simulate(self, model: Model, theta: Array, initial: Initial, origin: float) -> Array:
-        """What its measured channel shows of theta (m, p), (m, n)."""
-
-
-def simulated(
-    model: Model, theta: Array, record: Record, initial: Initial, origin: float = 0.0
-) -> Array:
-    """Return what a record's measured channel shows of theta (m, p), free-run, (m, n) [m]."""
-    if isinstance(record, ObservedChannel):
-        return record.simulate(model, theta, initial, origin)
-    return model.simulate(theta, record, initial=initial, origin=origin)
-
 
 # Numbers of a block that is worked on at a time, where that is not fewer rows than these.
 _BLOCK = 1 << 21
@@ -69,20 +30,15 @@ _FINER, _LONGEST = 8, 600_000
 _ROWS = LANES // 2  # two threads share the draws of one step
 
 
+def _in_a_row(which: NDArray[np.intp]) -> bool:
+    return int(which[-1] - which[0]) == len(which) - 1
+
+
 def chunks(rows: int, columns: int, least: int = _ROWS) -> Iterator[slice]:
     """Yield slices of rows, of so few that their columns stay within a block, or of `least`."""
     size = max(1, _BLOCK // max(columns, 1) // least) * least
     for begin in range(0, rows, size):
         yield slice(begin, begin + size)
-
-
-def _shorter(y: Array, count: int) -> Iterator[tuple[slice, Array]]:
-    """Yield rows of y (m, n), and them with one sample for `count`, (r, n / count)."""
-    if count == 1:
-        yield slice(None), y
-        return
-    for i, row in enumerate(y):
-        yield slice(i, i + 1), means(row, count)[np.newaxis]
 
 
 @dataclass(frozen=True)
@@ -174,9 +130,9 @@ class Data:
     def simulate(self, model: Model, theta: Array) -> Array:
         """Simulate all records free-run and return the counted samples (m, N) [m].
 
-        Few parameter sets at a time: beyond some 20 MB the memory of a simulation goes back to
-        the system each time, and asking for it anew costs time; but no fewer than the kernels work
-        on at once.
+        Few parameter sets at a time, for what is not simulated part by part: beyond some 20 MB
+        the memory of a simulation goes back to the system each time, and asking for it anew costs
+        time; but no fewer than the kernels work on at once.
         """
         table = np.atleast_2d(theta)
         out = np.empty((len(table), self.target.size))
@@ -184,12 +140,24 @@ class Data:
             i = same[0]
             (record, count), initial, origin = self._run[i], self.initials[i], self.origins[i]
             for some in chunks(len(table), len(record), LANES):
-                y = simulated(model, table[some], record, initial, origin)
-                # Row by row where they become shorter: all would be there twice.
-                for rows, part in _shorter(y, count):
-                    for run, at in (r for j in same for r in self.runs[j]):
-                        out[some, at][rows] = part[:, run]
+                part = out[some]
+                for which, at, y in parts(model, table[some], record, initial, origin, count):
+                    lanes = slice(which[0], which[-1] + 1) if _in_a_row(which) else which
+                    for j in same:
+                        for run, to in self._overlaps(j, at, at + len(y)):
+                            part[lanes, to] = y[run].T
         return out
+
+    def _overlaps(self, i: int, begin: int, end: int) -> Iterator[tuple[slice, slice]]:
+        """Yield where counted samples of a record's stretch lie in it, and in joined vectors."""
+        runs = self.runs[i]
+        first = bisect.bisect_right(runs, begin, key=lambda run: run[0].stop)
+        for run, to in itertools.islice(runs, first, None):
+            a, b = max(run.start, begin), min(run.stop, end)
+            if a >= b:
+                return
+            shift = to.start - run.start
+            yield slice(a - begin, b - begin), slice(a + shift, b + shift)
 
     @cached_property
     def _run(self) -> list[tuple[Record, int]]:

@@ -9,8 +9,9 @@ import numpy as np
 
 from actuator_glue.diagnosis import decimate, frozen
 from actuator_glue.diagnosis.checks import where
-from actuator_glue.diagnosis.data import SETTLE, Data, Model
+from actuator_glue.diagnosis.data import SETTLE, Data
 from actuator_glue.diagnosis.fit import base_fit, fit
+from actuator_glue.diagnosis.free_run import Model
 from actuator_glue.diagnosis.impulses import Impulses, beyond, find
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure

@@ -8,8 +8,9 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from actuator_glue.diagnosis.checks import pull, where
-from actuator_glue.diagnosis.data import Data, Model
+from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.decimate import decimated
+from actuator_glue.diagnosis.free_run import Model
 from actuator_glue.errors import InputError
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.force_errors import recorded_force, shown

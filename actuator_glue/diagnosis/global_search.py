@@ -17,8 +17,9 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from actuator_glue.diagnosis.data import Data, Model
+from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.fit import Fit, base_starts, fit
+from actuator_glue.diagnosis.free_run import Model
 from actuator_glue.diagnosis.space import Space, sum_of_squares
 from actuator_glue.model.effects import scale
 from actuator_glue.model.parameters import BASE

@@ -12,7 +12,8 @@ from collections.abc import Callable
 
 import numpy as np
 
-from actuator_glue.diagnosis.data import Data, Model
+from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.free_run import Model
 from actuator_glue.diagnosis.space import Space, diverged
 from actuator_glue.inference.transforms.inverse_response import Ridge
 from actuator_glue.model.parameters import BASE

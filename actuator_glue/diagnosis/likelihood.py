@@ -11,10 +11,11 @@ from functools import cached_property
 
 import numpy as np
 
-from actuator_glue.diagnosis.data import LANES, Data, Model, chunks
+from actuator_glue.diagnosis.data import LANES, Data, chunks
 from actuator_glue.diagnosis.discrepancy import Discrepancy, ScaleMixture
 from actuator_glue.diagnosis.fit import Fit
 from actuator_glue.diagnosis.fit import fit as fit_to
+from actuator_glue.diagnosis.free_run import Model
 from actuator_glue.diagnosis.identifiable import Straight, Working, derivatives
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.search import Each

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.diagnosis import proposals
-from actuator_glue.diagnosis.data import Model
 from actuator_glue.diagnosis.discrepancy import Discrepancy
 from actuator_glue.diagnosis.fit import Fit
+from actuator_glue.diagnosis.free_run import Model
 from actuator_glue.diagnosis.identifiable import Straight, Working, coordinates
 from actuator_glue.diagnosis.likelihood import Likelihood, inflation, most_likely
 from actuator_glue.diagnosis.score import Scorer

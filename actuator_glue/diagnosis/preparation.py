@@ -11,7 +11,8 @@ import scipy
 from actuator_glue.diagnosis import decimate, despike, frozen
 from actuator_glue.diagnosis.base_prior import BasePrior
 from actuator_glue.diagnosis.checks import check, refuse_repeats, where
-from actuator_glue.diagnosis.data import SETTLE, Data, Mask, Model
+from actuator_glue.diagnosis.data import SETTLE, Data, Mask
+from actuator_glue.diagnosis.free_run import Model
 from actuator_glue.diagnosis.moments import Moment
 from actuator_glue.errors import InputError
 from actuator_glue.model.exact import Initial

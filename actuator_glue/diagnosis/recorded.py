@@ -10,7 +10,8 @@ from dataclasses import replace
 import numpy as np
 
 from actuator_glue.diagnosis import decimate, hum, measurement
-from actuator_glue.diagnosis.data import Data, Model
+from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.free_run import Model
 from actuator_glue.diagnosis.hum import Line
 from actuator_glue.diagnosis.measurement import Measured
 from actuator_glue.diagnosis.per_record_settings import OneRecord

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.diagnosis import hum, zero
-from actuator_glue.diagnosis.data import Data, Model
+from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.fit import rms
+from actuator_glue.diagnosis.free_run import Model
 from actuator_glue.diagnosis.hum import Line
 from actuator_glue.diagnosis.result import HeldOutError, Trace
 from actuator_glue.diagnosis.score import BLOCK, pooled, splits_of

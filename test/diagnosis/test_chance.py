@@ -82,13 +82,13 @@ def test_it_is_named_alone_with_what_does_not_count(rng_seed: int) -> None:
 
 def test_equal_tests_are_simulated_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """From rest under one stiffness; another hold, or another start, is another test."""
-    calls, plain = [], of_data.simulated
+    calls, plain = [], of_data.parts
 
-    def counted(*args: object) -> np.ndarray:
+    def counted(*args: object) -> object:
         calls.append(args)
         return plain(*args)
 
-    monkeypatch.setattr(of_data, 'simulated', counted)
+    monkeypatch.setattr(of_data, 'parts', counted)
     record = sweep(10.0)
     other = Record(record.command, record.command, record.period, 250e3, hold='linear')
     data = Data.whole([record, other, record, record])

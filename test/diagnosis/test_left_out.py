@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from actuator_glue.diagnosis.data import Data, Model
+from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.fit import Fit, fit
+from actuator_glue.diagnosis.free_run import Model
 from actuator_glue.diagnosis.likelihood import most_likely
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.space import sum_of_squares
