@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 from actuator_glue.diagnosis.data import Data, Mask
 from actuator_glue.records import Array
 
-_CLEAR = 60.0  # of the median power, 40 times the mean: one in 10^6 records of noise
+_CLEAR = 18.0  # times what a tenth of its neighbours exceed, 40 times the mean of noise:
+# one in 10^6 records of that. Half of them lie between the lines of a sweep that is repeated.
+_NEIGHBOURS, _EXCEEDED = 201, 90.0  # bins, percentile
 _LOWEST = 2.0  # Hz
 _PIECE = 1 << 20  # samples
 _ORDERS = 9  # harmonics of a sinusoidal command are its response, not hum: of one that
@@ -90,7 +92,7 @@ def _fitted(pieces: Iterable[tuple[Array, Array]], frequency: float) -> Array:
 
 
 def _peaks(error: Array, mask: Mask, period: float) -> tuple[Array, Array]:
-    """Frequencies and power over the local median, zero outside the usable band.
+    """Frequencies and power over what few neighbours exceed, zero outside the usable band.
 
     The counted samples (N,) stand at their own times among the others, which are zero: spliced
     together, a line would change its phase at every seam.
@@ -98,10 +100,10 @@ def _peaks(error: Array, mask: Mask, period: float) -> tuple[Array, Array]:
     values = np.zeros(len(mask))
     values[mask] = scipy.signal.detrend(error)
     spectrum = np.abs(np.fft.rfft(values * np.hanning(len(values)))) ** 2
-    level = scipy.ndimage.median_filter(spectrum, 201, mode='reflect') + 1e-300
+    level = scipy.ndimage.percentile_filter(spectrum, _EXCEEDED, _NEIGHBOURS, mode='reflect')
     f = np.fft.rfftfreq(len(values), period)
     inside = (f > _LOWEST) & (f < 0.48 / period)
-    return np.asarray(f), np.asarray(np.where(inside, spectrum / level, 0.0))
+    return np.asarray(f), np.asarray(np.where(inside, spectrum / (level + 1e-300), 0.0))
 
 
 def _of_command(frequency: Array, command: Array, period: float) -> NDArray[np.bool_]:

@@ -12,9 +12,11 @@ from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.preparation import prepare
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
 
 RATE = 256.0
+THETA = np.array([134.0, 1.1e9, 2.5e5, 0.5])
 T = np.arange(int(48 * RATE)) / RATE
 SWEEP = 2e-3 * np.sin(np.pi * (8.0 / 48.0) * T**2)
 
@@ -42,6 +44,26 @@ def test_a_line_between_held_out_blocks_is_found(frequency: float) -> None:
 def test_noise_has_no_line(seed: int) -> None:
     """Nor do gaps make one; the threshold is exceeded in one of 10^6 records."""
     assert hum.find(*residual(50.0, 0.0, seed)) is None
+
+
+@pytest.mark.parametrize('amplitude', [0.0, 10e-6])
+@pytest.mark.parametrize('effect', ['coulomb-friction', 'backlash'])
+def test_repeated_sweeps_have_no_hum_of_their_own(effect: str, amplitude: float) -> None:
+    """Their response has lines, as many as sweeps fit into a second; hum is one."""
+    t = np.arange(int(6 * RATE)) / RATE
+    sweep = 2e-3 * np.sin(np.pi * (8.0 / 6.0) * t**2)
+    command = np.concatenate([scale * sweep for scale in np.linspace(0.6, 1.0, 20)])
+    structure = Structure((effect,))
+    theta = np.array([*THETA, 500.0 if effect == 'coulomb-friction' else 2e-4])
+    bare = Record(command, np.zeros(len(command)), 1 / RATE, stiffness=250e3)
+    line = amplitude * np.sin(2 * np.pi * 50.03 * bare.time + 1.0)
+    noise = 1e-6 * np.random.default_rng(3).standard_normal(len(bare))
+    measured = structure.simulate(theta, bare) + line + noise
+    data = prepare([replace(bare, measured=measured)], []).fit
+    error = data.target - data.simulate(Structure(()), THETA)[0]
+    found = hum.find(data, error)
+    assert (found is not None) == bool(amplitude)
+    assert found is None or found.frequency == pytest.approx(50.03, abs=0.01)
 
 
 @pytest.mark.parametrize('hertz', [0.0, 50.0])
