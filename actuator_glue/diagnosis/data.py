@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from actuator_glue.diagnosis.base_prior import BasePrior
 from actuator_glue.diagnosis.decimate import decimated
 from actuator_glue.diagnosis.free_run import Model, ObservedChannel, parts
+from actuator_glue.model.effects.run import sample_steps
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
@@ -41,6 +42,25 @@ def chunks(rows: int, columns: int, least: int = _ROWS) -> Iterator[slice]:
         yield slice(begin, begin + size)
 
 
+def _times(whole: Record, period: float, most: int = 1) -> int:
+    """Return how many simulated samples become one: as many as the kernel's steps, or most."""
+    count = round(period / whole.period)
+    divisors = [k for k in range(1, count + 1) if count % k == 0]
+    steps = next((k for k in divisors if sample_steps(period / k) == 1), count)
+    return max(steps, *(k for k in divisors if k <= most))
+
+
+def _stepped(record: Record, whole: Record) -> Record:
+    """Return a decimated record with the kernel's steps as samples.
+
+    Decimated, what sticks, slips or saturates does so at other moments between the samples: a
+    linear actuator answers the same, but with friction of 300 N at 1 kHz the truth was hundreds of
+    nats from the fit, outside of nearly every interval. With steps as samples a run takes as long.
+    """
+    count = round(record.period / whole.period)
+    return decimated(whole, count // _times(whole, record.period))
+
+
 @dataclass(frozen=True)
 class Data:
     """Records and the samples of each that count.
@@ -53,6 +73,8 @@ class Data:
         origins: per record, time of its first sample since the test began [s].
         prior: what was known of Eq. (2)'s parameters before; None for nothing.
         finer: whether records are simulated as they were sampled, or nearly, and decimated then.
+        steps: records of which the kernel's steps are samples, where it takes some for one; none
+            for those that follow from `recorded`.
     """
 
     records: tuple[Record, ...]
@@ -62,6 +84,13 @@ class Data:
     origins: tuple[float, ...]
     prior: BasePrior | None = None
     finer: bool = False
+    steps: tuple[Record, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.steps:
+            pairs = zip(self.records, self.recorded, strict=True)
+            steps = tuple(_stepped(record, whole) for record, whole in pairs)
+            object.__setattr__(self, 'steps', steps)
 
     @classmethod
     def whole(cls, records: Sequence[Record]) -> Data:
@@ -138,7 +167,8 @@ class Data:
         out = np.empty((len(table), self.target.size))
         for same in self._repeats if isinstance(model, Structure) else self._singles:
             i = same[0]
-            (record, count), initial, origin = self._run[i], self.initials[i], self.origins[i]
+            (record, count), initial = self._runs_as(model, i), self.initials[i]
+            origin = self.origins[i]
             for some in chunks(len(table), len(record), LANES):
                 part = out[some]
                 for which, at, y in parts(model, table[some], record, initial, origin, count):
@@ -159,27 +189,30 @@ class Data:
             shift = to.start - run.start
             yield slice(a - begin, b - begin), slice(a + shift, b + shift)
 
+    def _runs_as(self, model: Model, i: int) -> tuple[Record, int]:
+        """A record as a model simulates it, and how many samples of that become one."""
+        record = self.records[i]
+        if self.factors[i] == 1 or isinstance(record, ObservedChannel):
+            return record, 1
+        if not isinstance(model, Structure) or model.linear:
+            return record, 1
+        run = self._finer[i] if self.finer else self.steps[i]
+        return run, round(record.period / run.period)
+
     @cached_property
-    def _run(self) -> list[tuple[Record, int]]:
-        """Each record as it is simulated, and how many samples of that become one.
-
-        Decimated, what sticks, slips or saturates does so at other moments between the samples:
-        a linear actuator answers the same, but with friction of 300 N at 1 kHz the truth was
-        hundreds of nats from the fit, outside of nearly every interval.
-        """
-        if not self.finer:
-            return [(record, 1) for record in self.records]
+    def _finer(self) -> tuple[Record, ...]:
         out = []
-        for record, whole, count in zip(self.records, self.recorded, self.factors, strict=True):
-            most = max(1, min(count, _FINER, _LONGEST // len(record)))
-            times = next(k for k in range(most, 0, -1) if count % k == 0)
-            out.append((decimated(whole, count // times), times))
-        return out
+        rows = zip(self.records, self.recorded, self.factors, self.steps, strict=True)
+        for record, whole, count, steps in rows:
+            most = min(_FINER, _LONGEST // len(record))
+            times = _times(whole, record.period, most)
+            same = times == round(record.period / steps.period)
+            out.append(steps if same else decimated(whole, count // times))
+        return tuple(out)
 
-    @property
-    def simulated(self) -> int:
+    def simulated(self, model: Model) -> int:
         """How many samples a structure simulates of one parameter set."""
-        return sum(len(self._run[same[0]][0]) for same in self._repeats)
+        return sum(len(self._runs_as(model, same[0])[0]) for same in self._repeats)
 
     @property
     def _singles(self) -> list[list[int]]:

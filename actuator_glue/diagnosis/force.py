@@ -116,4 +116,5 @@ def with_forces(data: Data, model: Model, theta: Array) -> Data:
         initials=2 * data.initials,
         recorded=2 * data.recorded,
         origins=2 * data.origins,
+        steps=2 * data.steps,
     )

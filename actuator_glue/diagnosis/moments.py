@@ -63,6 +63,7 @@ def _of(data: Data, masks: list[Mask]) -> Data:
         tuple(data.recorded[i] for i in use),
         tuple(data.origins[i] for i in use),
         data.prior,
+        steps=tuple(data.steps[i] for i in use),
     )
 
 

@@ -39,7 +39,7 @@ _ESS, RHAT = 400.0, 1.05
 _HALVINGS = 40  # bring any point of it inside the bounds of the prior
 # Samples that chains simulate, all evaluations together, and evaluations they have anyway. Ten
 # minutes of 10 kHz take 4 ms each: where 2600 did not do, 12 000 did not, as a ridge was left.
-_SIMULATED, _FEWEST = 1_000_000_000, 2_000
+_SIMULATED, _FEWEST = 2_000_000_000, 2_600
 
 
 class Draws(NamedTuple):
@@ -169,9 +169,12 @@ def sample(
     def loosened(points: Array) -> Array:
         return _loosened(around, points, centre - phi, rng)
 
-    if evaluations <= 0:
+    def approximated() -> Draws:
         normal = Laplace(centre, moves.moments()[1], around.widest)
         return Draws(loosened(_normal(Composed(around, normal), len(phi), rng)), 'laplace')
+
+    if evaluations <= 0:
+        return approximated()
 
     bounds = space.theta(space.lower), space.theta(space.upper)
     transform, start = proposals.proposed(around, centre, moves)
@@ -183,17 +186,20 @@ def sample(
     if found is not None:
         points = loosened(transform.inverse(found.points)[0])
         return Draws(points, 'importance', len(points), found.effective, pareto_k=found.pareto_k)
-    affordable = min(evaluations, max(_FEWEST, _SIMULATED // scorer.data.simulated))
+    affordable = min(evaluations, max(_FEWEST, _SIMULATED // scorer.data.simulated(model)))
     near = _inside(transform, start.draw(rng, 320), transform.forward(fit.theta[None])[0])
-    chains = posterior.sample(
-        goal,
-        seed,
-        affordable,
-        settings=SamplerSettings(chains=32, population=128, steps=2, adaptation=20, parts=48),
-        archive=near,
-        enough=_enough,
-        progress=lambda done, all_: progress(done / all_),
-    )
+    try:
+        chains = posterior.sample(
+            goal,
+            seed,
+            affordable,
+            settings=SamplerSettings(chains=32, population=128, steps=2, adaptation=20, parts=48),
+            archive=near,
+            enough=_enough,
+            progress=lambda done, all_: progress(done / all_),
+        )
+    except posterior.NoPosteriorError:
+        return approximated()  # which is told
     return Draws(
         loosened(chains.posterior()),
         'dream',

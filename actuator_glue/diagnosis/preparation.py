@@ -218,7 +218,8 @@ def prepare(
         tuple(m & side(_folds(r)) for m, r in zip(masks, every, strict=True))
         for side in (np.logical_not, np.asarray)
     ]
-    fit, held = (Data(tuple(every), side, initials, recorded, origins, prior) for side in both)
+    fit = Data(tuple(every), both[0], initials, recorded, origins, prior)
+    held = replace(fit, masks=both[1])
     return _mended(Prepared(fit, held, tuple(notes), (0,) * n, True))
 
 

@@ -86,4 +86,5 @@ def _together(a: Data, b: Data) -> Data:
         (*a.recorded, *b.recorded),
         (*a.origins, *b.origins),
         a.prior,
+        steps=(*a.steps, *b.steps),
     )

@@ -155,6 +155,10 @@ class Problem:
         return Composed(ridge, Triangular(ridge.forward(self.shown)))
 
 
+class NoPosteriorError(InputError):
+    """A run was over before it had draws of the posterior."""
+
+
 def sample(
     target: Target,
     seed: Sequence[int],
@@ -182,7 +186,8 @@ def sample(
         progress: see `dream.sample`.
 
     Raises:
-        InputError: see `dream.sample`; the run ended before it had draws of the posterior.
+        InputError: see `dream.sample`.
+        NoPosteriorError: the run ended before it had draws of the posterior.
     """
     settings = settings or SamplerSettings()
     density, bounds, published = target.log_likelihood, target.bounds, settings.start == 'prior'
@@ -206,7 +211,7 @@ def sample(
         watch=dream.Watchers(stop, enough, progress),
     )
     if len(chains.kept) < _FEWEST:
-        raise InputError(
+        raise NoPosteriorError(
             f'the run ended after {len(chains.draws)} steps, of which {chains.burn} are burn-in: '
             'no posterior was reached; give it more time or evaluations'
         )

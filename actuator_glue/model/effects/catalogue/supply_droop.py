@@ -35,7 +35,11 @@ class _Envelope:
         # Over 20 ms: sensor noise must not pass for speed.
         gap = min(max(1, round(0.02 / record.period)), len(record) - 1)
         speed = np.abs(record.measured[gap:] - record.measured[:-gap]) / (gap * record.period)
-        weight = np.exp(-record.time[np.newaxis, : len(speed)] / self._TIMES[:, np.newaxis])
+        # The shortest time constant is 20 ms: a quarter of that shows what is averaged.
+        every = max(1, int(0.005 / record.period))
+        speed = speed[: len(speed) // every * every].reshape(-1, every).mean(axis=1)
+        time = every * record.time[: len(speed)]
+        weight = np.exp(-time[np.newaxis] / self._TIMES[:, np.newaxis])
         self._speeds = (weight @ speed) / weight.sum(axis=1)
 
     def __call__(self, values: Mapping[str, Array], origin: float) -> dict[str, Array]:
