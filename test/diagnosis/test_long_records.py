@@ -11,7 +11,21 @@ from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference import importance
 
-CUT = 2000  # evaluations
+CUT = posterior._FEWEST  # evaluations
+
+
+def test_chains_that_reach_no_posterior_leave_the_normal_approximation(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Too few evaluations are no fault of the records: there is an answer all the same."""
+    monkeypatch.setattr(posterior, '_SIMULATED', 1)
+    monkeypatch.setattr(posterior, '_FEWEST', 900)
+    monkeypatch.setattr(importance, 'sample', lambda *args: None)
+    found = diagnose(make(['valve-deadband'], [2e-4], 31)[1:2], seed=2)
+    assert [e.name for e in found.effects] == ['valve-deadband']
+    assert found.sampler['method'] == 'laplace'
+    size = found.effects[0].parameters['deadband']
+    assert size.lower < 2e-4 < size.upper and size.identified
 
 
 def test_chains_of_a_long_record_are_cut(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -250,17 +250,13 @@ def windows_of_a_test(start, probe, found):
     )
     assert simulator.wait(60) == 0, simulator.text
 
-    def seen(messages):
-        return [m.window for m in messages] or [0]
-
     def common():
-        first = max(seen(posteriors)[0], seen(found)[0])
-        last = min(seen(posteriors)[-1], seen(found)[-1])
-        return list(range(first, last + 1))
+        both = [[m.window for m in messages] or [0] for messages in (posteriors, found)]
+        return range(max(w[0] for w in both), min(w[-1] for w in both) + 1)
 
     probe.until(lambda: len(common()) > 2, 30, 'three windows that both show')
     both = [[m for m in messages if m.window in common()] for messages in (posteriors, found)]
-    assert [m.window for m in both[0]] == [m.window for m in both[1]] == common()
+    assert all([m.window for m in messages] == list(common()) for messages in both)
     return list(zip(*both, strict=True))
 
 
