@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 from actuator_glue_msgs.msg import PosteriorDraws, StabilityMargin
-from ros_nodes import QUICK, windows_of_a_test
+from ros_nodes import QUICK
+from windows import windows_of_a_test
 
 from actuator_glue.nodes import topics
 

@@ -2,7 +2,8 @@
 
 import numpy as np
 from actuator_glue_msgs.msg import TrackingIndicators
-from ros_nodes import QUICK, windows_of_a_test
+from ros_nodes import QUICK
+from windows import windows_of_a_test
 
 
 def test_one_for_each_window(start, probe):
