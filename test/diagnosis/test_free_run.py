@@ -74,3 +74,18 @@ def test_a_decimated_record_is_simulated_finer_part_by_part() -> None:
     y = structure.simulate(theta, record)[0]
     expected = means(y, factor)[fit.masks[0]]
     np.testing.assert_allclose(finer.simulate(structure, theta)[0], expected, rtol=0.0, atol=1e-15)
+
+
+@pytest.mark.filterwarnings('error')
+def test_what_diverges_is_not_finite_and_nothing_else() -> None:
+    """Absurd parameters are seen by who asked for them; the others beside them are as alone."""
+    record = shaken(4096)
+    structure = Structure(('backlash',))
+    table = sets(structure, 3, np.random.default_rng(1))
+    table[1] = [1e-9, 1e30, 1e3, 1e9, 0.5]
+    out = np.zeros((3, 1024))
+    for which, at, y in parts(structure, table, record, 'rest', 0.0, 4):
+        out[which, at : at + len(y)] = y.T
+    assert not np.isfinite(out[1]).all()
+    alone = means(structure.simulate(table[0], record), 4)
+    np.testing.assert_allclose(out[0], alone, rtol=0.0, atol=1e-15)
