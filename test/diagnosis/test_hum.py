@@ -10,7 +10,6 @@ from actuator_glue.diagnosis import hum
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.preparation import prepare
-from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
@@ -86,7 +85,7 @@ def test_no_harmonic_of_a_sinusoidal_test_is_hum(hertz: float) -> None:
 def test_a_line_of_the_missing_effect_is_no_hum(
     command: int, amplitude: float, rng_seed: int
 ) -> None:
-    """Integral action under a random command leaves one in the residual of Eq. (2).
+    """Integral action under a random command leaves peaks in the residual of Eq. (2).
 
     Hum beside it is told all the same: its evidence is against what integral action leaves.
     """
@@ -110,9 +109,6 @@ def test_a_line_of_the_missing_effect_is_no_hum(
         )
         line = amplitude * np.sin(2 * np.pi * 50.0 * moved.time + rng.uniform(0.0, 6.28))
         records.append(replace(moved, measured=moved.measured + line))
-    if not amplitude:
-        data = prepare(records[:2], records[2:]).fit
-        assert hum.find(data, Search(data, ()).base().error) is not None
     found = diagnose(records[:2], records[2], settings=Thresholds(evaluations=0))
     names = {e.name for e in found.effects}
     assert names == ({'integral-action', 'hum'} if amplitude else {'integral-action'})
