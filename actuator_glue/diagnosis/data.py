@@ -47,7 +47,7 @@ def _times(whole: Record, period: float, most: int = 1) -> int:
     count = round(period / whole.period)
     divisors = [k for k in range(1, count + 1) if count % k == 0]
     steps = next((k for k in divisors if sample_steps(period / k) == 1), count)
-    return max(steps, *(k for k in divisors if k <= most))
+    return max([steps, *(k for k in divisors if k <= most)])
 
 
 def _stepped(record: Record, whole: Record) -> Record:

@@ -75,6 +75,13 @@ def test_a_long_record_is_simulated_as_fine_as_may_be(
     assert misfit(finer(data), THETA) < 1.2 * misfit(coarse(data), THETA) / most
 
 
+def test_a_record_too_long_for_more_keeps_its_steps(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Half an hour of 10 kHz has more samples than are simulated finer."""
+    data = decimated(5000.0)
+    monkeypatch.setattr(module, '_LONGEST', len(data.records[0]) - 1)
+    assert finer(data).simulated(MODEL) == data.simulated(MODEL)
+
+
 def ahead(data: Data, start: np.ndarray) -> float:
     """Nats by which a fit is ahead of the truth."""
     found = fit(data, MODEL, start, iterations=25)
