@@ -31,10 +31,6 @@ _FINER, _LONGEST = 8, 600_000
 _ROWS = LANES // 2  # two threads share the draws of one step
 
 
-def _in_a_row(which: NDArray[np.intp]) -> bool:
-    return int(which[-1] - which[0]) == len(which) - 1
-
-
 def chunks(rows: int, columns: int, least: int = _ROWS) -> Iterator[slice]:
     """Yield slices of rows, of so few that their columns stay within a block, or of `least`."""
     size = max(1, _BLOCK // max(columns, 1) // least) * least
@@ -172,10 +168,9 @@ class Data:
             for some in chunks(len(table), len(record), LANES):
                 part = out[some]
                 for which, at, y in parts(model, table[some], record, initial, origin, count):
-                    lanes = slice(which[0], which[-1] + 1) if _in_a_row(which) else which
                     for j in same:
                         for run, to in self._overlaps(j, at, at + len(y)):
-                            part[lanes, to] = y[run].T
+                            part[which, to] = y[run].T
         return out
 
     def _overlaps(self, i: int, begin: int, end: int) -> Iterator[tuple[slice, slice]]:

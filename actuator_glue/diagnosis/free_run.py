@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 
 from actuator_glue.diagnosis.decimate import window
 from actuator_glue.model.exact import Initial
-from actuator_glue.model.linear import initial_state
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
@@ -63,13 +62,10 @@ def parts(
 ) -> Iterator[Part]:
     """Yield what `simulated` returns, part by part, with one sample for `count` of the record."""
     if isinstance(model, Structure) and not isinstance(record, ObservedChannel):
-        start = initial_state(record) if initial == 'measured' else (0.0, 0.0)
-        onsets = model.onsets(record, initial)
-        run = model.parts(model.table(theta), record, start, onsets, origin)
+        run = model.stretches(model.table(theta), record, initial, origin=origin)
     else:
-        run = iter(
-            [(np.arange(len(theta)), 0, simulated(model, theta, record, initial, origin).T)]
-        )
+        whole = simulated(model, theta, record, initial, origin)
+        run = iter([(np.arange(len(theta)), 0, whole.T)])
     return run if count == 1 else _decimated(run, count, len(record))
 
 
@@ -86,6 +82,6 @@ def _decimated(run: Iterator[Part], count: int, samples: int) -> Iterator[Part]:
         out = np.zeros((n, piece.shape[1]))
         with np.errstate(all='ignore'):  # absurd parameters diverge
             for i, tap in enumerate(taps[:, np.newaxis]):
-                out += tap * piece[i : i + n * count : count][:n]
+                out += tap * piece[i : i + n * count : count]
         yield which, first, out
         kept, first = piece[n * count :], first + n

@@ -97,8 +97,8 @@ def _explains_less(first: Conclusion, other: Prepared, base: Fit) -> bool:
 def _linear(data: Data) -> Data:
     whole = tuple(replace(r, hold='linear') for r in data.recorded)
     pairs = zip(whole, data.factors, strict=True)
-    linear = (decimated(r, n) for r, n in pairs)
-    same = zip(linear, data.records, strict=True)
+    records = (decimated(r, n) for r, n in pairs)
+    same = zip(records, data.records, strict=True)
     return replace(
         data,
         records=tuple(replace(r, measured=d.measured) for r, d in same),

@@ -153,12 +153,24 @@ class Structure:
             InputError: wrong shape of theta, or the specimen stiffness is not known.
         """
         table = self.table(theta)
-        start = linear.initial_state(record) if initial == 'measured' else (0.0, 0.0)
         out = np.empty((len(table), len(record)))
-        onsets = self.onsets(record, initial)
-        for which, begin, part in self.parts(table, record, start, onsets, origin, rate, force):
+        for which, begin, part in self.stretches(table, record, initial, rate, origin, force):
             out[which, begin : begin + len(part)] = part.T
         return out.reshape(*np.shape(theta)[:-1], len(record))
+
+    def stretches(
+        self,
+        table: Array,
+        record: Record,
+        initial: Initial = 'rest',
+        rate: int = 1,
+        origin: float = 0.0,
+        force: bool = False,
+    ) -> Iterator[tuple[NDArray[np.intp], int, Array]]:
+        """Iterate over what `simulate` returns of theta (m, p), as `parts` yields it."""
+        start = linear.initial_state(record) if initial == 'measured' else (0.0, 0.0)
+        onsets = self.onsets(record, initial)
+        return self.parts(table, record, start, onsets, origin, rate, force)
 
     def errors(
         self,
