@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -29,6 +30,29 @@ _HALVINGS = 40  # bring any point of it inside the bounds of the prior
 _NATS, _MOST_STEPS = 0.5, 10
 
 
+class Optimum(NamedTuple):
+    """An optimum of a likelihood.
+
+    Attributes:
+        centre: coordinates (p,) from which it is linear about.
+        moves: of the coordinates from there, were all linear.
+        height: log density at the centre, the prior of the coordinates in it.
+    """
+
+    centre: Array
+    moves: ScaleMixture
+    height: float
+
+    def log_mass(self) -> float:
+        """Logarithm of the share that it would have were all linear, up to a constant."""
+        return self.height + 0.5 * float(np.linalg.slogdet(self.moves.moments()[1])[1])
+
+    def is_about(self, other: Optimum) -> bool:
+        """Return whether it is within a standard deviation of another one."""
+        off = self.centre - other.centre
+        return bool(off @ np.linalg.pinv(self.moves.moments()[1]) @ off < 1.0)
+
+
 @dataclass(frozen=True)
 class Whitened(Data):
     """The same samples, whitened: least squares on them is most likely."""
@@ -46,15 +70,16 @@ class Whitened(Data):
         return self.scorer.whiten(super().simulate(model, theta))
 
 
-def most_likely(data: Data, model: Model, found: Fit, scorer: Scorer) -> Fit:
-    """Go on from the least-squares fit to the optimum of the likelihood that is sampled.
+def most_likely(data: Data, model: Model, theta: Array, scorer: Scorer) -> Fit:
+    """Go on to the optimum of the likelihood that is sampled, from parameters (p,).
 
-    Under slow noise they are up to 12 nats apart; a covariance of the likelihood belongs to its
-    own optimum. What is simulated and compared stays the least-squares fit: where structure
-    remains, it is nearer in the error itself. Error and Jacobian of what is returned are whitened.
+    That of least squares is up to 12 nats from it under slow noise; a covariance of the likelihood
+    belongs to its own optimum. What is simulated and compared stays the least-squares fit: where
+    structure remains, it is nearer in the error itself. Error and Jacobian of what is returned are
+    whitened.
     """
     white = Whitened(**{f.name: getattr(data, f.name) for f in fields(Data)}, scorer=scorer)
-    return fit_to(white, model, found.theta, iterations=_STEPS)
+    return fit_to(white, model, theta, iterations=_STEPS)
 
 
 def inflation(error: Array) -> float:
@@ -129,8 +154,8 @@ class Likelihood:
         error = np.concatenate([white, np.zeros(len(seen) - len(white))]) - seen
         return value, self.beside.gaussians(jac, error, self.noise, self.around.widest)
 
-    def optimum(self, phi: Array) -> tuple[Array, ScaleMixture]:
-        """Return the optimum (p,) from where it is linear about, and moves from it.
+    def optimum(self, phi: Array) -> Optimum:
+        """Return the optimum next to coordinates.
 
         The allowance may take a long record thousands of nats from the optimum without it, over
         which no response is linear.
@@ -147,7 +172,7 @@ class Likelihood:
                 break
             centre, best, moves = new, value, found
             new = _inside(self.around, centre, moves.moments()[0])
-        return centre, moves
+        return Optimum(centre, moves, best)
 
 
 def _inside(around: Working | Straight, phi: Array, move: Array) -> Array:

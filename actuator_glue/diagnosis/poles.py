@@ -1,4 +1,4 @@
-"""Other starts for a refit whose poles may have changed places: each order is a minimum.
+"""Poles that may have changed places: each order is a minimum, of a refit and of a posterior.
 
 To the records a fast valve with a slow filter behind it is nearly a slow valve with a fast filter:
 under one stiffness to the last digit, under two a second minimum, a dozen nats behind the first,
@@ -41,11 +41,25 @@ def starts(
     """
     found = np.tile(theta, (len(_VALVES), 1))
     found[:, :2] *= np.array(_VALVES)[:, None]
-    if added.name not in _IN_SERIES:
-        return found
-    column = structure.columns(added.name).start
+    return np.concatenate([found, exchanged(structure, added.name, theta, stiffness)])
+
+
+def exchanged(structure: Structure, name: str, theta: Array, stiffness: frozenset[float]) -> Array:
+    """Return parameters (m, p) with the pole of an effect in series exchanged with the loop's.
+
+    None for other effects, nor where the loop's poles oscillate.
+
+    Args:
+        structure: with p parameters.
+        name: of one of its effects.
+        theta: parameters (p,).
+        stiffness: of the specimen in the records [N/m]; under each the exchange is another one.
+    """
+    if name not in _IN_SERIES:
+        return np.empty((0, len(theta)))
+    column = structure.columns(name).start
     rows = [row for k in sorted(stiffness) for row in _exchanged(theta, column, k)]
-    return np.concatenate([found, *(row[np.newaxis] for row in rows)])
+    return np.reshape(rows, (-1, len(theta)))
 
 
 def _exchanged(theta: Array, column: int, stiffness: float) -> list[Array]:

@@ -12,12 +12,12 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.diagnosis import proposals
+from actuator_glue.diagnosis import poles, proposals
 from actuator_glue.diagnosis.discrepancy import Discrepancy
 from actuator_glue.diagnosis.fit import Fit
 from actuator_glue.diagnosis.free_run import Model
 from actuator_glue.diagnosis.identifiable import Straight, Working, coordinates
-from actuator_glue.diagnosis.likelihood import Likelihood, inflation, most_likely
+from actuator_glue.diagnosis.likelihood import Likelihood, Optimum, inflation, most_likely
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.search import Each
 from actuator_glue.diagnosis.space import Space
@@ -29,6 +29,7 @@ from actuator_glue.inference.transforms import Composed, Transform
 from actuator_glue.inference.transforms.laplace import Laplace
 from actuator_glue.json_value import Json, json_value
 from actuator_glue.model.parameters import BASE
+from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 
 _P = len(BASE)
@@ -38,6 +39,7 @@ _DRAWS = 500  # of the normal approximation
 # of many chains.
 _ESS, RHAT = 400.0, 1.05
 _MOVES_WITH = 0.9  # rank correlation
+_UNLIKELY = 10.0  # nats behind the first optimum: another one has next to no share
 _HALVINGS = 40  # bring any point of it inside the bounds of the prior
 # Samples that chains simulate, all evaluations together, and evaluations they have anyway. Ten
 # minutes of 10 kHz take 4 ms each: where 2600 did not do, 12 000 did not, as a ridge was left.
@@ -137,6 +139,23 @@ def _inside(transform: Transform, points: Array, fit: Array) -> Array:
     return np.asarray(points[~outside])
 
 
+def _exchanged(likelihood: Likelihood, fit: Fit, first: Optimum) -> list[Optimum]:
+    """Return optima with other orders of the poles than the first one's that are as likely."""
+    model, data = likelihood.model, likelihood.scorer.data
+    if not isinstance(model, Structure):
+        return []
+    stiffness = frozenset(r.known_stiffness() for r in data.records)
+    rows = [r for n in model.effects for r in poles.exchanged(model, n, fit.theta, stiffness)]
+    known = [first]
+    for row in rows:
+        theta = most_likely(data, model, row, likelihood.scorer).theta
+        found = likelihood.optimum(likelihood.around.forward(theta[None])[0])
+        likely = found.log_mass() > first.log_mass() - _UNLIKELY
+        if likely and not any(found.is_about(other) for other in known):
+            known.append(found)
+    return known[1:]
+
+
 def _enough(chains: Chains) -> bool:
     rhat, ess = quick_rhat_and_ess(chains.kept)
     return bool(ess.min() >= _ESS and rhat.max() <= RHAT)
@@ -166,26 +185,27 @@ def sample(
         progress: called with the share done.
         each: evaluates some draws at a time: `map`, or that of a pool of threads.
     """
-    fit = most_likely(scorer.data, model, fit, scorer)
+    fit = most_likely(scorer.data, model, fit.theta, scorer)
     space = Space(model, max(r.duration for r in scorer.data.records))
     around = coordinates(space, model, scorer.data, fit.z)
     phi = around.forward(fit.theta[None])[0]
     noise = inflation(beside.without(fit.error))
     likelihood = Likelihood(model, scorer, beside, noise, space, around, each)
-    centre, moves = likelihood.optimum(phi)
+    first = likelihood.optimum(phi)
 
     def loosened(points: Array) -> Array:
-        return _loosened(around, points, centre - phi, rng)
+        return _loosened(around, points, first.centre - phi, rng)
 
     def approximated() -> Draws:
-        normal = Laplace(centre, moves.moments()[1], around.widest)
+        normal = Laplace(first.centre, first.moves.moments()[1], around.widest)
         return Draws(loosened(_normal(Composed(around, normal), len(phi), rng)), 'laplace')
 
     if evaluations <= 0:
         return approximated()
 
     bounds = space.theta(space.lower), space.theta(space.upper)
-    transform, start = proposals.proposed(around, centre, moves)
+    optima = [first, *_exchanged(likelihood, fit, first)]
+    transform, start = proposals.proposed(around, optima)
     goal = posterior.Target(likelihood, bounds, transform)
     seed = [int(word) for word in rng.integers(0, 2**32, 3)]
     found = importance.sample(

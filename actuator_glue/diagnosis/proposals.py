@@ -6,10 +6,13 @@ times as wide for the largest as for the least: no single one of its moments is 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from actuator_glue.diagnosis.discrepancy import ScaleMixture
 from actuator_glue.diagnosis.identifiable import Straight, Working
+from actuator_glue.diagnosis.likelihood import Optimum
 from actuator_glue.inference.importance import StudentMixture, lower_factor
 from actuator_glue.inference.transforms import Composed, Transform
 from actuator_glue.inference.transforms.laplace import Laplace
@@ -23,29 +26,39 @@ _LEAST = 1e-6  # of all draws
 
 
 def proposed(
-    around: Working | Straight, centre: Array, moves: ScaleMixture
+    around: Working | Straight, optima: Sequence[Optimum]
 ) -> tuple[Transform, StudentMixture]:
     """Return the coordinates to sample in, and what to draw from in them.
 
     Args:
-        around: coordinates in which the posterior is linear.
-        centre: where, (p,).
-        moves: of the parameters from there.
+        around: coordinates in which the posterior is linear about each of its optima.
+        optima: at least one.
     """
-    parts = _bounded(moves, around.widest)
-    parts = parts._replace(means=centre + parts.means)
+    parts = _together(optima, around.widest)
     outer: Transform = around
     if isinstance(around, Straight) and around.least > 0.0:
         parts, bent = _near_zero(parts, around.least)
         outer = Composed(around, bent)
     kept = parts.weights > _LEAST
     parts = ScaleMixture(parts.weights[kept], parts.means[kept], parts.covariances[kept])
-    (mean, covariance), free = parts.moments(), np.full(len(centre), np.inf)
+    (mean, covariance), free = parts.moments(), np.full(parts.means.shape[1], np.inf)
     normal = Laplace(mean, covariance, free)
     scale = np.linalg.pinv(normal.root)
     factors = [lower_factor((scale @ Laplace(mean, c, free).root).T) for c in parts.covariances]
     start = StudentMixture(parts.weights, (parts.means - mean) @ scale.T, np.array(factors))
     return Composed(outer, normal), start
+
+
+def _together(optima: Sequence[Optimum], widest: Array) -> ScaleMixture:
+    """Return the coordinates' normal distributions about all optima, each as likely as it is."""
+    masses = np.array([o.log_mass() for o in optima])
+    shares = np.exp(masses - np.logaddexp.reduce(masses))
+    all_ = [_bounded(o.moves, widest) for o in optima]
+    return ScaleMixture(
+        np.concatenate([s * m.weights for s, m in zip(shares, all_, strict=True)]),
+        np.concatenate([o.centre + m.means for o, m in zip(optima, all_, strict=True)]),
+        np.concatenate([m.covariances for m in all_]),
+    )
 
 
 def _bounded(moves: ScaleMixture, widest: Array) -> ScaleMixture:

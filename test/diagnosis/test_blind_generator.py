@@ -96,7 +96,7 @@ def test_truth_is_where_the_posterior_has_it(
         data = Data.whole([Record(u, y + e, 1.0 / module.plant.RATE, k) for u, y, e, k in rows])
         found = fit(data, model, theta)
         scorer = Scorer.of(data, splits_of(data, found.error))
-        best = most_likely(data, model, found, scorer)
+        best = most_likely(data, model, found.theta, scorer)
         seen = best.jacobian.T @ (best.z - np.log(theta))
         total += float(seen @ seen) / inflation(best.error)
     assert total < stats.chi2.isf(2e-4, 48)

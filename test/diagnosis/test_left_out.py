@@ -88,7 +88,7 @@ def test_noise_is_weighed_about_its_own_optimum(kind: str, seed: int) -> None:
     data, model, found, scorer = fitted(kind, 'delay', seed)
     nats = refitted(data, model, found.theta, scorer).sum()
     assert scorer.block_scores(found).sum() == pytest.approx(nats, abs=2.2)
-    best = most_likely(data, model, found, scorer)
+    best = most_likely(data, model, found.theta, scorer)
     distance = 0.5 * float(sum_of_squares(scorer.whiten(found.error)) - best.error @ best.error)
     assert distance > 1.5
 
