@@ -89,13 +89,24 @@ def certainty(fitted: float, error: HeldOutError, material: float) -> float:
 
     Args:
         fitted: by the fitting part.
-        error: held-out error; where it shows more than noise, or the additions take nothing of it
-            away, names explain at most their share.
+        error: held-out error; where it shows more than noise, or the best additions take nothing
+            of it away, names explain at most the share that they, or parameters as likely, do.
         material: smallest error that matters [m].
     """
-    share = max(0.0, min(1.0, error.removable_removed))
-    doubted = misses(error, material) or not borne_out(error, material)
-    return min(fitted, share) if doubted else fitted
+    share = error.removable_removed
+    if borne_out(error, material):
+        if not takes_nothing(error):
+            return min(fitted, max(0.0, share)) if misses(error, material) else fitted
+        share = _share_reached(error)
+    return min(fitted, max(0.0, share))
+
+
+def _share_reached(error: HeldOutError) -> float:
+    """Return the share of what Eq. (2) leaves with likely parameters that additions explain so."""
+    floor, without = error.noise_floor, error.reached_before or 0.0
+    if not without > floor:
+        return 0.0
+    return (without**2 - error.least**2) / (without**2 - floor**2)
 
 
 def against(found: DiagnosisData) -> str:

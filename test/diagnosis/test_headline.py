@@ -207,30 +207,33 @@ def test_only_what_the_held_out_part_bears_out_is_applied() -> None:
 
 
 @pytest.mark.parametrize(
-    ('reached', 'without', 'verdict'),
+    ('reached', 'without', 'verdict', 'share'),
     [
-        (10.1e-6, 40e-6, 'missing-effect'),
-        (10.1e-6, 10.5e-6, 'undecided'),
-        (30e-6, 60e-6, 'undecided'),
-        (10.1e-6, None, 'undecided'),
+        (10.1e-6, 40e-6, 'missing-effect', 0.95),
+        (11.0e-6, 18e-6, 'missing-effect', (18**2 - 11**2) / (18**2 - 10**2)),
+        (10.1e-6, 10.5e-6, 'undecided', 0.0),
+        (30e-6, 60e-6, 'undecided', 0.0),
+        (10.1e-6, None, 'undecided', 0.0),
     ],
 )
 def test_what_likely_parameters_leave_bears_additions_out(
-    reached: float, without: float | None, verdict: str
+    reached: float, without: float | None, verdict: str, share: float
 ) -> None:
     """Best parameters are far off under another stiffness, with additions more so than without.
 
-    Those that both parts allow must leave nothing with the additions, and something without.
+    Those that both parts allow must leave nothing with the additions, and something without; the
+    names are as sure as the share that they explain then.
     """
     asked = diagnosis('missing-effect', 80e-6, 90e-6, finding('backlash'))
     error = replace(asked.error, reached=reached, reached_before=without)
     assert conclude('missing-effect', True, error, asked.alarm.threshold) == verdict
     told = replace(asked, error=error, verdict=verdict)
     sure = certainty(0.95, error, asked.alarm.threshold)
-    assert sure == (0.95 if verdict == 'missing-effect' else 0.0)
+    assert sure == pytest.approx(share)
     assert (told.error.to_json()['reached_before'], told.complete) == (without, sure > 0.0)
     if verdict == 'missing-effect':
         assert told.summary() == (
             'missing: backlash; held-out error 80.0 -> 90.0 um, noise 10.0 um; '
-            '10.1 um with parameters as likely, 40.0 um with such of Eq. (2) alone'
+            f'{1e6 * reached:.1f} um with parameters as likely, '
+            f'{1e6 * (without or 0.0):.1f} um with such of Eq. (2) alone'
         )
