@@ -12,7 +12,7 @@ from actuator_glue.diagnosis.checks import where
 from actuator_glue.diagnosis.data import SETTLE, Data
 from actuator_glue.diagnosis.fit import base_fit, fit
 from actuator_glue.diagnosis.free_run import Model
-from actuator_glue.diagnosis.impulses import Impulses, beyond, find
+from actuator_glue.diagnosis.impulses import NONE, Impulses, beyond, find
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
@@ -41,30 +41,44 @@ def trimmed(data: Data) -> Array:
 
 
 def without_impulses(
-    data: Data, model: Model, theta: Array
-) -> tuple[Data, tuple[int, ...], list[str]]:
+    data: Data, model: Model, theta: Array, known: Sequence[Impulses]
+) -> tuple[Data, tuple[Impulses, ...]]:
     """Look for impulses in the residual of a model and take them out.
 
+    Args:
+        data: records.
+        model: a structure.
+        theta: its parameters (p,).
+        known: what was taken out of each record beside another model; it is asked for again.
+
     Returns:
-        The data with what the samples around impulses say in their place, how many samples of
-        each record that are, and what was done, for people.
+        The data with what the samples around impulses say in their place, the same object where
+        they are the same, and the impulses of each record.
     """
-    records, counts, notes = [], [], []
-    for i, (record, initial) in enumerate(zip(data.records, data.initials, strict=True)):
-        output = model.simulate(theta[None], record, initial=initial, origin=data.origins[i])[0]
+    records, all_ = [], []
+    rows = zip(data.records, data.initials, data.origins, known, strict=True)
+    for record, initial, origin, before in rows:
+        output = model.simulate(theta[None], record, initial=initial, origin=origin)[0]
+        measured = record.measured.copy()
+        measured[before.samples] += before.sizes
         speed = np.abs(np.gradient(output, record.period))
         # By the reading, too: one that drops out is off where the piston alone is far out.
-        far = np.minimum(*(np.abs(y - np.median(y)) for y in (output, record.measured)))
-        phase = _phase(output, record.measured)
-        found = find(record.measured - output, (speed, far), record.period, phase)
-        counts.append(len(found.samples))
-        if found.count:
-            measured = record.measured.copy()
+        far = np.minimum(*(np.abs(y - np.median(y)) for y in (output, measured)))
+        # A state that is not known is forgotten first: its transient is no impulse.
+        moving = slice(round(SETTLE / record.period) if initial == 'measured' else 0, None)
+        sizes = (speed[moving], far[moving])
+        phase = _phase(output, measured)[moving]
+        found = find((measured - output)[moving], sizes, record.period, phase)
+        found = replace(found, samples=found.samples + moving.start)
+        if np.array_equal(found.samples, before.samples):
+            found = before
+        else:
             measured[found.samples] -= found.sizes
-            notes.append(f'{where(record, i + 1)}: {_told(found, record)}')
             record = replace(record, measured=measured)
         records.append(record)
-    return (replace(data, records=tuple(records)) if notes else data), tuple(counts), notes
+        all_.append(found)
+    same = all(a is b for a, b in zip(records, data.records, strict=True))
+    return (data if same else replace(data, records=tuple(records))), tuple(all_)
 
 
 def _phase(output: Array, measured: Array) -> Array:
@@ -110,6 +124,12 @@ def without_frozen(data: Data, model: Model, theta: Array) -> tuple[Data, list[s
     return (replace(data, records=tuple(records)) if notes else data), notes
 
 
+def told(records: Sequence[Record], impulses: Sequence[Impulses]) -> list[str]:
+    """Say what was taken out of records, for people."""
+    pairs = zip(records, impulses, strict=False)
+    return [f'{where(r, i + 1)}: {_told(n, r)}' for i, (r, n) in enumerate(pairs) if n.count]
+
+
 def _told(found: Impulses, record: Record) -> str:
     up = float(np.mean(found.sizes > 0.0))
     side = ', all to one side' if up in (0.0, 1.0) and found.count > 4 else ''
@@ -141,5 +161,5 @@ def despiked(
     theta = trimmed(whole)
     as_given = replace(Data.whole(records), initials=tuple(initials))
     data, held = without_frozen(as_given, Structure(()), theta)
-    data, _, notes = without_impulses(data, Structure(()), theta)
-    return list(data.records), held + notes, theta
+    data, found = without_impulses(data, Structure(()), theta, [NONE] * len(records))
+    return list(data.records), held + told(data.records, found), theta

@@ -178,7 +178,7 @@ def diagnose(
             *advice.unconverged(float(np.fmax(draws.rhat, told.rhat))),
             *rest.compared(data.records, still, decision.noise),
             *([used.remark()] if used else []),
-            *prepared.notes,
+            *prepared.told,
         ),
         base={p.name: estimates[p.name] for p in BASE},
         structure=decision.final.effects,
@@ -209,7 +209,7 @@ def diagnose(
                 'source': r.source,
                 'rate_hz': whole.rate,
                 'fitted_rate_hz': r.rate,
-                'impulse_samples': impulses,
+                'impulse_samples': len(impulses.samples),
                 'noise_at_rest_m': noise,
             }
             for r, whole, impulses, noise in zip(

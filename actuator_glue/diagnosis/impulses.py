@@ -42,7 +42,7 @@ class Impulses:
     count: int
 
 
-_NONE = Impulses(np.empty(0, dtype=np.intp), np.empty(0), 0)
+NONE = Impulses(np.empty(0, dtype=np.intp), np.empty(0), 0)
 
 
 def _filter(error: Array) -> Array:
@@ -127,14 +127,14 @@ def find(
             reading could be off at some phases only.
     """
     if len(residual) < 40 * _REACH:
-        return _NONE
+        return NONE
     taps = _filter(residual)[::-1]  # `convolve` reverses them
     error = np.asarray(np.convolve(residual, taps, 'same'), dtype=np.float64)
     error[:_REACH] = error[-_REACH:] = 0.0
     noise, whole = _noise(error, period), _noise(residual, period)
     suspect = np.flatnonzero(np.abs(error) > _BEYOND * noise)
     if not len(suspect) or len(suspect) > 2 * _REACH * _MOST * len(residual):
-        return _NONE
+        return NONE
     samples, sizes, starts = [], [], []
     for first, last in _clusters(suspect):
         part = slice(max(0, first - 2 * _REACH), min(len(error), last + 2 * _REACH + 1))
@@ -146,9 +146,9 @@ def find(
         runs = np.flatnonzero(np.diff(found[0], prepend=-2) > 1)
         starts += [part.start + found[0][i] for i in runs]
     if not samples or len(samples) > _MOST * len(residual) or _with_motion(starts, motion):
-        return _NONE
+        return NONE
     if phase is not None and _at_a_phase(phase[starts], phase):
-        return _NONE
+        return NONE
     return Impulses(np.array(samples, dtype=np.intp), np.array(sizes), len(starts))
 
 

@@ -10,6 +10,7 @@ from functools import cached_property
 
 from actuator_glue.diagnosis import (
     chance,
+    cleaned,
     force_ranking,
     hum,
     learning,
@@ -36,9 +37,6 @@ from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.effects import CATALOGUE
 
 Progress = Callable[[str, float], None]
-# Share of the squared error that impulses must carry to have swayed a search: two per cent are a
-# hundredth of its size.
-_SWAYING = 0.02
 
 
 def mean_effects(reserved: bool = False) -> tuple[str, ...]:
@@ -89,18 +87,16 @@ def conclude(
     """Search for what the model lacks and decide; nothing looks at the held-out part.
 
     What friction leaves to chance does not count, unless the samples that count are fixed. Where
-    impulses that could have swayed it show beside what was found, they are taken out and all is
-    done again.
+    impulses that could have swayed it show beside what was found, or what was taken for some shows
+    to be none, they are taken out, or restored, and all is done again.
     """
     tell('base fit', 0.0)
     prepared, search, line = _begun(prepared, settings, each, fixed)
     first = _conclude(prepared, search, line, settings, tell)
     final = first.found.final
-    clean = prepared.without_impulses(final.model, final.fit.theta)
-    if clean is prepared:
-        return first
-    taken, error = prepared.fit.target - clean.fit.target, final.fit.error
-    if taken @ taken < _SWAYING * (error @ error):
+    clean = cleaned.without_impulses(prepared, final)
+    taken = prepared.fit.target - clean.fit.target
+    if clean is prepared or not cleaned.swayed(final.fit, first.scorer, taken):
         return first
     return _conclude(*_begun(clean, settings, each, fixed=True), settings, tell)
 

@@ -13,6 +13,7 @@ from actuator_glue.diagnosis.base_prior import BasePrior
 from actuator_glue.diagnosis.checks import check, refuse_repeats, where
 from actuator_glue.diagnosis.data import SETTLE, Data, Mask
 from actuator_glue.diagnosis.free_run import Model
+from actuator_glue.diagnosis.impulses import NONE, Impulses
 from actuator_glue.diagnosis.moments import Moment
 from actuator_glue.errors import InputError
 from actuator_glue.model.exact import Initial
@@ -38,36 +39,48 @@ class Prepared:
     Attributes:
         fit: what every decision is made on.
         held: what is looked at once, after all decisions.
-        notes: what was done to the records, for people.
-        impulses: per fitting record, how many samples were replaced (see diagnosis/despike.py).
+        notes: what else was done to the records, for people.
         folded: the held-out part are stretches of the fitting records.
+        impulses: what was taken out of each fitting record (see diagnosis/despike.py).
+        held_impulses: and of each other record that is held out.
     """
 
     fit: Data
     held: Data
     notes: tuple[str, ...]
-    impulses: tuple[int, ...]
     folded: bool
+    impulses: tuple[Impulses, ...]
+    held_impulses: tuple[Impulses, ...]
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """What was done to the records, impulses first, for people."""
+        return (
+            *despike.told(self.fit.records, self.impulses),
+            *despike.told(self.held.records, self.held_impulses),
+            *self.notes,
+        )
 
     def without_impulses(self, model: Model, theta: Array) -> Prepared:
-        """Take out what is an impulse beside a model; the same object where nothing is."""
-        fit, counts, notes = despike.without_impulses(self.fit, model, theta)
+        """Take out what is an impulse beside a model; the same object where nothing else is.
+
+        What passed for one beside another model is restored.
+        """
+        fit, found = despike.without_impulses(self.fit, model, theta, self.impulses)
         if self.folded:
-            held = replace(self.held, records=fit.records)
+            held, others = replace(self.held, records=fit.records), self.held_impulses
         else:
-            held, _, told = despike.without_impulses(self.held, model, theta)
-            notes += told
-        if not notes:
+            held, others = despike.without_impulses(self.held, model, theta, self.held_impulses)
+        if fit is self.fit and (self.folded or held is self.held):
             return self
-        both = tuple(a + b for a, b in zip(self.impulses, counts, strict=False))
-        return Prepared(fit, held, (*notes, *self.notes), both, self.folded)
+        return replace(self, fit=fit, held=held, impulses=found, held_impulses=others)
 
     def since(self, moment: Moment) -> Prepared:
         """Leave out what came before a moment; other records held out are taken to be later."""
         fit = moment.split(self.fit)[1]
         held = moment.split(self.held)[1] if self.folded else self.held
         pairs = zip(self.fit.recorded, self.impulses, strict=True)
-        kept = tuple(n for r, n in pairs if any(r is k for k in fit.recorded))
+        kept = tuple(i for r, i in pairs if any(r is k for k in fit.recorded))
         return replace(self, fit=fit, held=held, impulses=kept)
 
 
@@ -212,7 +225,9 @@ def prepare(
             Data(tuple(every[s]), tuple(masks[s]), initials[s], recorded[s], origins[s], prior)
             for s in parts
         )
-        return _mended(Prepared(fit, held, tuple(notes), (0,) * n, False))
+        return _mended(
+            Prepared(fit, held, tuple(notes), False, (NONE,) * n, (NONE,) * len(holdout))
+        )
     notes.append('every fourth block of each record held out')
     both = [
         tuple(m & side(_folds(r)) for m, r in zip(masks, every, strict=True))
@@ -220,7 +235,7 @@ def prepare(
     ]
     fit = Data(tuple(every), both[0], initials, recorded, origins, prior)
     held = replace(fit, masks=both[1])
-    return _mended(Prepared(fit, held, tuple(notes), (0,) * n, True))
+    return _mended(Prepared(fit, held, tuple(notes), True, (NONE,) * n, ()))
 
 
 def _mended(prepared: Prepared) -> Prepared:

@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis import impulses
-from actuator_glue.diagnosis.despike import despiked, trimmed
-from actuator_glue.diagnosis.fit import base_fit
+from actuator_glue.diagnosis import cleaned, impulses
+from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.despike import despiked, trimmed, without_impulses
+from actuator_glue.diagnosis.fit import base_fit, fit
 from actuator_glue.diagnosis.preparation import prepare
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 
@@ -67,7 +69,7 @@ def test_drop_outs_do_not_bend_the_fit() -> None:
     prepared = prepare([given], [])
     bent, found = base_fit(prepare([record], []).fit).theta, base_fit(prepared.fit).theta
     assert found[0] == pytest.approx(bent[0], rel=0.01)
-    assert 10 < prepared.impulses[0] < 60
+    assert 10 < len(prepared.impulses[0].samples) < 60
     assert np.abs(prepared.fit.records[0].measured - x).max() < 50e-6
     assert trimmed(prepared.fit)[0] == pytest.approx(THETA[0], rel=0.02)
 
@@ -162,3 +164,49 @@ def test_too_many_are_no_accidents() -> None:
     noise = NOISE * np.random.default_rng(6).standard_normal(4000)
     noise[::10] += 1e-4
     assert impulses.find(noise, [np.ones(4000)], 1e-3).count == 0
+
+
+def test_what_passed_for_an_impulse_beside_another_model_is_restored(rng_seed: int) -> None:
+    """Of three samples that were taken out one is an impulse beside the right model, too."""
+    record, _ = healthy(rng_seed)
+    spike, lacked = 500, [2000, 2001, 3000]
+    y = record.measured.copy()
+    y[spike] += 60e-6
+    before = impulses.Impulses(
+        np.array([spike, *lacked]), np.array([60e-6, 50e-6, 40e-6, -45e-6]), 3
+    )
+    taken = y.copy()
+    taken[before.samples] -= before.sizes
+    data = Data.whole([replace(record, measured=taken)])
+    clean, (found,) = without_impulses(data, Structure(()), THETA, [before])
+    assert found.samples.tolist() == [spike]
+    np.testing.assert_allclose(clean.records[0].measured[lacked], y[lacked], atol=1e-18)
+    # Asked for once more nothing changes: not a bit of the data.
+    again, same = without_impulses(clean, Structure(()), THETA, [found])
+    assert again is clean and same[0] is found
+
+
+def test_what_an_effect_makes_is_not_left_out_of_its_size(rng_seed: int) -> None:
+    """Damping under steps, sampled 100 times a second: beside Eq. (2) some passes for impulses.
+
+    On two machines of three; beside the effect, refitted, nothing does. None of six machines
+    would show it once in 700 runs.
+    """
+    rng, model, shown = np.random.default_rng(rng_seed), Structure(('viscous-damping',)), 0
+    true = np.array([97.0, 2.43e9, 1.88e6, 0.118, 6900.0])
+    for _ in range(6):
+        level = np.repeat(rng.uniform(-1.0, 1.0, 120), 100)
+        u = np.asarray(12e-3 * np.convolve(level, np.full(5, 0.2), 'same'), dtype=np.float64)
+        records = []
+        for k in (940e3, 0.0):
+            y = model.simulate(true, Record(u, u, 0.01, k)) + 15e-6 * rng.standard_normal(len(u))
+            records.append(Record(u, y, 0.01, k))
+        prepared = prepare(records, [])
+        shown += any(i.count for i in prepared.impulses)
+        found = fit(prepared.fit, model, true)
+        trial = Trial(model, 'viscous-damping', found, np.zeros(1))
+        clean = cleaned.without_impulses(prepared, trial)
+        assert not any(i.count for i in clean.impulses)
+        for record, mended in zip(records, clean.fit.records, strict=True):
+            np.testing.assert_allclose(mended.measured, record.measured, rtol=0.0, atol=1e-15)
+    assert shown

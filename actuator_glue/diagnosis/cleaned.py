@@ -1,0 +1,60 @@
+"""Impulses asked for again beside what was found: what Eq. (2) lacks may pass for some."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_glue.diagnosis.data import Mask
+from actuator_glue.diagnosis.fit import Fit, fit
+from actuator_glue.diagnosis.preparation import Prepared
+from actuator_glue.diagnosis.score import Scorer
+from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.records import Array
+
+_REFITS: Final = 3  # of what was found
+# Share of the squared error that impulses must carry to have swayed a search: two per cent are a
+# hundredth of its size.
+_SWAYING: Final = 0.02
+_MOVED: Final = 1.0  # standard deviations of what was fitted
+
+
+def without_impulses(prepared: Prepared, final: Trial) -> Prepared:
+    """Return records without what is an impulse beside what was found; the same where it is.
+
+    What was taken out beside Eq. (2) bends the fit of an effect that makes it: without all that
+    is suspected, then and now, the structure is refitted before it is asked again.
+    """
+    clean = prepared.without_impulses(final.model, final.fit.theta)
+    for _ in range(_REFITS):
+        if clean is prepared:
+            break
+        rows = zip(clean.fit.masks, prepared.impulses, clean.impulses, strict=True)
+        masks = tuple(_kept(mask, a.samples, b.samples) for mask, a, b in rows)
+        theta = fit(replace(clean.fit, masks=masks), final.model, final.fit.theta).theta
+        before, clean = clean, clean.without_impulses(final.model, theta)
+        if clean is before:
+            break
+    return clean
+
+
+def _kept(mask: Mask, *suspected: NDArray[np.intp]) -> Mask:
+    out = mask.copy()
+    out[np.concatenate(suspected)] = False
+    return out
+
+
+def swayed(found: Fit, scorer: Scorer, taken: Array) -> bool:
+    """Return whether what was taken out, or restored, (N,) [m] matters to what was found.
+
+    By its size, or as it moves what was fitted by a standard deviation in any direction.
+    """
+    if taken @ taken >= _SWAYING * (found.error @ found.error):
+        return True
+    jac, white = scorer.whiten(found.jacobian), scorer.whiten(taken)
+    jac /= np.maximum(np.linalg.norm(jac, axis=1, keepdims=True), 1e-300)
+    along = jac @ white
+    return bool(along @ np.linalg.pinv(jac @ jac.T, hermitian=True) @ along > _MOVED**2)
