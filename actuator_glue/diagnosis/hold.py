@@ -32,45 +32,49 @@ def with_the_right_hold(
     materially more with it, and what is found with it explains more, beyond chance. Held
     commands taken for linear ones are a delay, which is in the catalogue. Where the catalogue
     explains neither, terms are learned with both: what it lacks may look like the other hold,
-    which must explain more beyond chance then, or all that remains with fewer parameters. An
-    answer that leaves nothing and explains less with the other hold is not searched for again: of
-    a large effect that Eq. (2) leaves, either hold may leave more.
+    which must explain more beyond chance then, or all that remains with fewer parameters.
     """
-    if first.decision.verdict == 'none' or not _held(first):
+    other = _linearly(first, settings, each, tell)
+    if other is None:
         return with_learned_terms(first)
-    other = _with_linear_hold(first.prepared)
-    base, before = Search(other.fit, ()).base(), _left(first)
+    described = with_learned_terms(other)
+    if first.decision.verdict != 'unexplained':
+        return described
+    held = with_learned_terms(first)
+    fewer = len(described.found.final.fit.theta) < len(held.found.final.fit.theta)
+    whole = described.decision.verdict != 'unexplained'
+    # A hold is a plainer answer than a term that leads by half a sample as well.
+    least = 0.0 if whole and fewer else settings.nats
+    return described if _gained(held, described) >= least else held
+
+
+def _linearly(
+    first: Conclusion, settings: Thresholds, each: Each, tell: Progress
+) -> Conclusion | None:
+    """Return what is found with the other hold, where that explains more.
+
+    An answer that leaves nothing and explains less with the other hold is not searched for again:
+    of a large effect that Eq. (2) leaves, either hold may leave more.
+    """
+    prepared = first.prepared
+    if first.decision.verdict == 'none' or not any(r.hold == 'zoh' for r in prepared.fit.recorded):
+        return None
+    other = replace(prepared, fit=_linear(prepared.fit), held=_linear(prepared.held))
+    base = Search(other.fit, ()).base()
+    before = first.found.base.mean_square + (first.line.rms**2 if first.line else 0.0)
     if before - base.rms**2 < first.found.material**2:
-        return with_learned_terms(first)
+        return None
     tell('other hold', 0.0)
-    whole = first.decision.verdict == 'missing-effect'
-    held = first if whole else with_learned_terms(first)
-    if held.decision.verdict == 'missing-effect' and _explains_less(held, other, base):
-        return with_learned_terms(first) if whole else held
+    if first.decision.verdict == 'missing-effect' and _explains_less(first, other, base):
+        return None
     second = conclude(other, settings, each, tell, fixed=True)
     if _gained(first, second) < settings.nats:
-        return with_learned_terms(first) if whole else held
+        return None
     note = (
         'the command is taken to run linearly between its samples (as --hold linear): Eq. (2) '
         f'alone then leaves {1e6 * base.rms:.1f} um instead of {1e6 * before**0.5:.1f} um'
     )
-    second = replace(second, prepared=replace(other, notes=(*other.notes, note)))
-    described = with_learned_terms(second)
-    if whole:
-        return described
-    fewer = len(described.found.final.fit.theta) < len(held.found.final.fit.theta)
-    # A hold is a plainer answer than a term that leads by half a sample as well.
-    plainer = fewer and described.decision.verdict != 'unexplained'
-    return described if _gained(held, described) >= (0.0 if plainer else settings.nats) else held
-
-
-def _held(first: Conclusion) -> bool:
-    return any(r.hold == 'zoh' for r in first.prepared.fit.recorded)
-
-
-def _left(first: Conclusion) -> float:
-    """Mean squared error of Eq. (2), hum among it [m^2]."""
-    return first.found.base.mean_square + (first.line.rms**2 if first.line else 0.0)
+    return replace(second, prepared=replace(other, notes=(*other.notes, note)))
 
 
 def _gained(first: Conclusion, second: Conclusion) -> float:
@@ -88,10 +92,6 @@ def _explains_less(first: Conclusion, other: Prepared, base: Fit) -> bool:
     starts[1, : len(base.theta)] = base.theta
     again, scorer = fit(data, found.model, starts), first.scorer
     return evidence(scorer.block_scores(again), scorer.block_scores(found.fit)) < 0.0
-
-
-def _with_linear_hold(prepared: Prepared) -> Prepared:
-    return replace(prepared, fit=_linear(prepared.fit), held=_linear(prepared.held))
 
 
 def _linear(data: Data) -> Data:
