@@ -9,11 +9,14 @@ from __future__ import annotations
 
 import numpy as np
 
+from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.fit import rms
 from actuator_glue.diagnosis.learned_forms import CAUSES
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.posterior import Draws
 from actuator_glue.diagnosis.ranking import removed, weights
 from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
 
 _MOST = 2
@@ -22,17 +25,19 @@ _SEEN = 0.2
 _ALONE = 0.9  # weight among what was tried that is told from the others
 
 
-def with_companions(selection: ModelSelection, final: Trial) -> Trial:
+def with_companions(selection: ModelSelection, final: Trial, least: float | None = None) -> Trial:
     """Return a structure with what else is there beyond chance, at the user's level, and alone.
 
     Args:
         selection: what chose the structure.
         final: a structure that leaves nothing material.
+        least: error that each of them removes [m]; a fifth of what matters if not given.
     """
     search, settings = selection.search, selection.settings
     if final.own is not None:
         return final
-    current, least = final, _SEEN * selection.material
+    current = final
+    least = _SEEN * selection.material if least is None else least
     for _ in range(_MOST):
         others = [n for n in search.others(current) if not _of_one_kind(search, n, final)]
         ranked = search.screened(current, others)[: settings.tried]
@@ -44,6 +49,23 @@ def with_companions(selection: ModelSelection, final: Trial) -> Trial:
             break
         current = trials[0]
     return current
+
+
+def that_matter(selection: ModelSelection, found: Selection) -> Selection | None:
+    """Return an answer with what turns out to matter beside it, or None.
+
+    Structure is told from noise by its spectrum, and may pass for less than what an effect is
+    found to take away: what removes that much is an addition like any other.
+
+    Args:
+        selection: the model selection that ended with `found`.
+        found: what leaves nothing material.
+    """
+    current = found.final
+    larger = with_companions(selection, current, selection.material)
+    if not current.effects or larger is current:
+        return None
+    return selection.concluded(larger, selection.search.trial(()), found.singles)
 
 
 def _of_one_kind(search: Search, name: str, final: Trial) -> bool:
@@ -61,12 +83,28 @@ def reduced(draws: Draws, larger: Trial, final: Trial) -> Draws:
     return draws._replace(points=draws.points[:, columns], unmet=unmet)
 
 
-def sentences(final: Trial, larger: Trial) -> tuple[str, ...]:
-    """Say which effects are held beside, and how little they remove."""
+def sentences(final: Trial, larger: Trial, held: Data, missed: bool) -> tuple[str, ...]:
+    """Say which effects are held beside, and how little they remove.
+
+    Args:
+        final: the structure that is told.
+        larger: with what is there, too.
+        held: the held-out part.
+        missed: whether the held-out part shows more than noise. Then it is said what they leave
+            there: that they do not matter is what the fitting records say.
+    """
     names = [n for n in larger.effects if n not in final.effects]
     if not names:
         return ()
-    return (
+    said = (
         f'{", ".join(names)} may be there, too: beyond chance, but it removes '
-        f'{1e6 * removed(final, larger):.1f} um and does not matter; intervals allow for it',
+        f"{1e6 * removed(final, larger):.1f} um of the fitting records' error, less than what "
+        'matters; intervals allow for it'
     )
+    if missed:
+        left = (
+            1e6 * rms(held.target - held.simulate(t.model, t.fit.theta)[0])
+            for t in (larger, final)
+        )
+        said += '; the held-out part leaves {:.1f} um with it, {:.1f} um without'.format(*left)
+    return (said,)

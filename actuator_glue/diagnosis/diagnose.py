@@ -31,7 +31,13 @@ from actuator_glue.diagnosis.force import check_forces
 from actuator_glue.diagnosis.hold import with_the_right_hold
 from actuator_glue.diagnosis.next_experiment import Experiment, ranked
 from actuator_glue.diagnosis.onset_search import since_onset
-from actuator_glue.diagnosis.pipeline import Conclusion, Progress, conclude, with_learned_terms
+from actuator_glue.diagnosis.pipeline import (
+    Conclusion,
+    Progress,
+    conclude,
+    with_learned_terms,
+    with_what_matters,
+)
 from actuator_glue.diagnosis.preparation import prepare, rest_samples
 from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.diagnosis.search import Each
@@ -88,6 +94,7 @@ def diagnose(
     result = since_onset(always, settings, each, tell)
     if result is not always:
         result = with_learned_terms(result)
+    result = with_what_matters(result)
     prepared, data, scorer = result.prepared, result.data, result.scorer
     found, decision = result.found, result.decision
     stretches = homogeneity.agreement(decision.final, scorer)
@@ -173,7 +180,7 @@ def diagnose(
             *advice.of(decision, found, result.generic, stretches, experiments),
             *advice.contradicted(error, found.material),
             *advice.zeros(error, found.material),
-            *companions.sentences(final, larger),
+            *companions.sentences(final, larger, prepared.held, judged not in verdict.COMPLETE),
             *advice.unidentified(data, estimates),
             *advice.unconverged(float(np.fmax(draws.rhat, told.rhat))),
             *rest.compared(data.records, still, decision.noise),

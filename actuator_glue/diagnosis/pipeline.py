@@ -11,6 +11,7 @@ from functools import cached_property
 from actuator_glue.diagnosis import (
     chance,
     cleaned,
+    companions,
     force_ranking,
     hum,
     learning,
@@ -249,6 +250,14 @@ def with_learned_terms(result: Conclusion) -> Conclusion:
         return result
     selection = _apart(result.selection)
     return _complete(result, selection, together.explained(selection, found)) or result
+
+
+def with_what_matters(result: Conclusion) -> Conclusion:
+    """Add what removes as much as an addition must though the rest seemed to be noise."""
+    if result.decision.verdict != 'missing-effect':
+        return result
+    found = companions.that_matter(result.selection, result.found)
+    return _complete(result, result.selection, found) or result
 
 
 def _conclusion(

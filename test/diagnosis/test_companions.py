@@ -51,8 +51,24 @@ def test_what_does_not_matter_is_held_beside() -> None:
     # Five standard deviations of the estimate: fails by chance once in 10^6.
     low, high = np.quantile(draws.points[:, 4], [0.025, 0.975])
     assert abs(0.5 * (low + high) - DAMPING) < 5.0 * (high - low) / 3.92
-    (sentence,) = companions.sentences(found.final, larger)
+    held = selection.search.data  # what it leaves there is known
+    (sentence,) = companions.sentences(found.final, larger, held, missed=False)
     assert sentence.startswith('specimen-gap may be there, too')
+    assert sentence.endswith('less than what matters; intervals allow for it')
+    (sentence,) = companions.sentences(found.final, larger, held, missed=True)
+    left = 1e6 * larger.fit.rms, 1e6 * found.final.fit.rms
+    assert sentence.endswith('leaves {:.1f} um with it, {:.1f} um without'.format(*left))
+
+
+def test_what_removes_what_matters_is_added() -> None:
+    """Though the rest passed for noise: where 1 um mattered the gap's 1.7 um would."""
+    selection, found = selected(GAP)
+    assert companions.that_matter(selection, found) is None
+    selection.material = 1e-6
+    larger = companions.that_matter(selection, found)
+    assert larger is not None
+    assert larger.final.effects == ('viscous-damping', 'specimen-gap')
+    assert set(larger.rivals) == set(larger.final.effects)
 
 
 def test_nothing_is_held_beside_without_it() -> None:
@@ -62,7 +78,7 @@ def test_nothing_is_held_beside_without_it() -> None:
         selection, found = selected(0.0)
         assert found.final.effects == ('viscous-damping',)
         larger = companions.with_companions(selection, found.final)
-        assert companions.sentences(larger, larger) == ()
+        assert companions.sentences(larger, larger, selection.search.data, True) == ()
         held.append(larger is not found.final)
     assert sum(held) < 2
 
