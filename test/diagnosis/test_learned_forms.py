@@ -10,6 +10,7 @@ from actuator_glue.diagnosis.learned_forms import forms
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.model.effects.effect import Scale
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 
@@ -107,3 +108,16 @@ def test_what_acts_on_the_command_knows_its_rate(name: str) -> None:
     least = min(best, key=lambda trial: trial.fit.rms)
     assert least.added == wanted
     assert least.fit.rms < 1.05 * NOISE
+
+
+@pytest.mark.parametrize('stroke', [2e-5, 5e-2])
+@pytest.mark.parametrize('oil', [1e4, 1e9])
+def test_machines_of_any_size_have_forms(stroke: float, oil: float) -> None:
+    """From 20 um against 10 N/mm to 50 mm against 1 MN/mm.
+
+    Of a stroke of 56 um against 0.5 kN/mm the force to the third power was refused: at the size of
+    the usual machine it did not vanish near its neutral value.
+    """
+    theta = np.array([350.0, 120.0**2 * oil, oil, 0.05])
+    offered = forms(Scale(stroke, 60.0 * stroke, 30.0, 1e-3, 0.1 * oil, theta))
+    assert len({effect.name for effect in offered}) > 60

@@ -23,8 +23,10 @@ _SHARES = (0.01, 0.05, 0.25)
 _SHAPES = 3
 # Sizes tried for it, and samples of the motion they are tried on.
 _LEAST, _SAMPLES = 1e-9, 200
-# How far from neutral an effect must be small, as a share of a parameter's range.
-_NEAR = 1e-9
+# How far from neutral an effect must be small, at one of these shares of its parameters' ranges.
+# Those of a small or weak machine are wide for the usual one, where the third power of a force is
+# 10^14 times as large.
+_NEAR = (1e-9, 1e-18, 1e-27)
 _SMALL = 1e-2
 # A test on which expressions are tried.
 _USUAL = Scale(1e-2, 0.1, 10.0, 1e-3, 1e5, TABLE_2)
@@ -259,15 +261,17 @@ def _check_neutral(effect: Effect) -> None:
     """Refuse an effect that does not vanish as its parameters become neutral."""
     starts = effect.starts
     assert isinstance(starts, _Starts)
-    table = _neutral(effect.parameters)
-    for j, p in enumerate(effect.parameters):
-        step = _NEAR * (p.upper - p.lower)
-        table[2 * j % LANES, j] = min(table[0, j] + step, p.upper)
-        table[(2 * j + 1) % LANES, j] = max(table[0, j] - step, p.lower)
-    share = changed(starts, table, _USUAL)
-    if not (share < _SMALL).all():
-        raise InputError(
-            f'{effect.equation!r} is still there with all parameters close to neutral ('
-            + ', '.join(f'{p.name} = {p.neutral:g}' for p in effect.parameters)
-            + '): at their neutral values Eq. (2) must be left'
-        )
+    for near in _NEAR:
+        table = _neutral(effect.parameters)
+        for j, p in enumerate(effect.parameters):
+            neutral = table[0, j]
+            step = max(near * (p.upper - p.lower), 2.0 * np.spacing(abs(neutral)))
+            table[2 * j % LANES, j] = min(neutral + step, p.upper)
+            table[(2 * j + 1) % LANES, j] = max(neutral - step, p.lower)
+        if (changed(starts, table, _USUAL) < _SMALL).all():
+            return
+    raise InputError(
+        f'{effect.equation!r} is still there with all parameters close to neutral ('
+        + ', '.join(f'{p.name} = {p.neutral:g}' for p in effect.parameters)
+        + '): at their neutral values Eq. (2) must be left'
+    )
