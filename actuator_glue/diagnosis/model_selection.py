@@ -215,7 +215,7 @@ class ModelSelection:
                 trials = self.search.additions(rest, names, below=below)
                 two = pairs.rivals(self.search, name, trials, self.settings.tried, below)
                 rivals[name] = self._rivals(rest, current, name, [*trials, *two])
-                for trial in (*trials, *pairs.ahead(self, name, rivals[name], two)):
+                for trial in (*trials, *pairs.ahead(self, current, name, rivals[name], two)):
                     pressed = ranking.pressed_form(self.search, trial, trial.added, name)
                     if not pressed and self._ahead(trial, best, complete):
                         best = trial

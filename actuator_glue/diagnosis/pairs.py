@@ -55,22 +55,31 @@ def rivals(
 
 
 def ahead(
-    selection: ModelSelection, name: str, row: Sequence[Rival], two: Sequence[Trial]
+    selection: ModelSelection,
+    current: Trial,
+    name: str,
+    row: Sequence[Rival],
+    two: Sequence[Trial],
 ) -> list[Trial]:
-    """Return the pairs beside which the effect is no alternative any more, best first.
+    """Return the pairs that take an effect's place, best first.
 
+    Beside them it is no alternative any more, or they remove as much more as an addition must.
     Both of a pair's effects are significant; it takes a place and adds no parameter, so that
     only together they must be material.
 
     Args:
         selection: what judges.
+        current: the structure with the effect.
         name: the effect.
         row: weights of all its rivals.
         two: pairs refitted in its place.
     """
     known = {r.name: r.probability for r in row}
     least = math.exp(selection.settings.tie_nats) * known[name]
-    better = (t for t in two if known[t.added] > least)
+    cost, material = price(len(selection.search.names)), selection.material
+    better = (
+        t for t in two if known[t.added] > least or selection.better(t, current, material, cost)
+    )
     return [
         t
         for t in sorted(better, key=lambda t: -known[t.added])
