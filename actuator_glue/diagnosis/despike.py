@@ -21,6 +21,12 @@ _DROPPED = 10  # times a reading repeats that may be that of a channel without s
 _TRIMS = 2  # refits without what stood out of the last
 
 
+def _unsettled(record: Record, initial: Initial) -> int:
+    """Samples in which a state that is not known is forgotten: its transient is no impulse."""
+    unknown = initial == 'measured' and record.duration > 2.0 * SETTLE
+    return round(SETTLE / record.period) if unknown else 0
+
+
 def trimmed(data: Data) -> Array:
     """Return parameters of Eq. (2) (4,) that gross errors of the measured channel do not bend.
 
@@ -64,8 +70,7 @@ def without_impulses(
         speed = np.abs(np.gradient(output, record.period))
         # By the reading, too: one that drops out is off where the piston alone is far out.
         far = np.minimum(*(np.abs(y - np.median(y)) for y in (output, measured)))
-        # A state that is not known is forgotten first: its transient is no impulse.
-        moving = slice(round(SETTLE / record.period) if initial == 'measured' else 0, None)
+        moving = slice(_unsettled(record, initial), None)
         sizes = (speed[moving], far[moving])
         phase = _phase(output, measured)[moving]
         found = find((measured - output)[moving], sizes, record.period, phase)
@@ -155,8 +160,7 @@ def despiked(
     slow = [decimate.decimated(r, decimate.factor(r)) for r in records]
     masks = [np.ones(len(r), dtype=np.bool_) for r in slow]
     for record, mask, initial in zip(slow, masks, initials, strict=True):
-        if initial == 'measured' and record.duration > 2.0 * SETTLE:
-            mask[: round(SETTLE / record.period)] = False
+        mask[: _unsettled(record, initial)] = False
     whole = replace(Data.whole(slow), masks=tuple(masks), initials=tuple(initials))
     theta = trimmed(whole)
     as_given = replace(Data.whole(records), initials=tuple(initials))

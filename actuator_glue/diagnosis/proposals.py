@@ -23,6 +23,7 @@ _LEAKAGE = 3  # column of alpha_3, of which records under one stiffness may show
 _GRID = 200
 _REACH = 6.0  # standard deviations
 _LEAST = 1e-6  # of all draws
+_NOTHING = -1e300  # logarithm of the mass of an optimum that diverges
 
 
 def proposed(
@@ -51,7 +52,7 @@ def proposed(
 
 def _together(optima: Sequence[Optimum], widest: Array) -> ScaleMixture:
     """Return the coordinates' normal distributions about all optima, each as likely as it is."""
-    masses = np.array([o.log_mass() for o in optima])
+    masses = np.maximum([o.log_mass() for o in optima], _NOTHING)
     shares = np.exp(masses - np.logaddexp.reduce(masses))
     all_ = [_bounded(o.moves, widest) for o in optima]
     return ScaleMixture(
