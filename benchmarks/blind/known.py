@@ -13,6 +13,7 @@ import os
 import sys
 from collections.abc import Iterable
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
@@ -67,6 +68,7 @@ def intervals(seed: int, generator: str, evaluations: int) -> list[Interval]:
     data = prepare(records, [held]).fit
     found = fit(data, model, true)
     scorer = Scorer.of(data, splits_of(data, found.error))
+    scorer = replace(scorer, data=replace(data, finer=not model.linear))  # as a diagnosis does
     draws = posterior.sample(
         model,
         found,
