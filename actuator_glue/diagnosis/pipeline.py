@@ -96,8 +96,10 @@ def conclude(
     first = _conclude(prepared, search, line, settings, tell)
     final = first.found.final
     clean = cleaned.without_impulses(prepared, final)
+    if clean is prepared:
+        return first
     taken = prepared.fit.target - clean.fit.target
-    if clean is prepared or not cleaned.swayed(final.fit, first.scorer, taken):
+    if not cleaned.swayed(final.fit, first.scorer, taken):
         return first
     return _conclude(*_begun(clean, settings, each, fixed=True), settings, tell)
 

@@ -93,11 +93,10 @@ def certainty(fitted: float, error: HeldOutError, material: float) -> float:
             of it away, names explain at most the share that they, or parameters as likely, do.
         material: smallest error that matters [m].
     """
-    share = error.removable_removed
-    if borne_out(error, material):
-        if not takes_nothing(error):
-            return min(fitted, max(0.0, share)) if misses(error, material) else fitted
-        share = _share_reached(error)
+    if not (takes_nothing(error) or misses(error, material)):
+        return fitted
+    reached = takes_nothing(error) and borne_out(error, material)
+    share = _share_reached(error) if reached else error.removable_removed
     return min(fitted, max(0.0, share))
 
 
