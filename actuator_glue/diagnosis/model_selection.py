@@ -116,11 +116,9 @@ class ModelSelection:
 
         Beside a clock's skew a payload looks like one; with Eq. (2) alone it looked like the skew.
         """
-        new = [n for n in self.search.others(current) if not self._refitted(current, n)]
+        here, names = current.effects, self.search.others(current)
+        new = [n for n in names if self.search.known((*here, n)) is None]
         return self.search.additions(current, self.promising(current, new), valves=False)
-
-    def _refitted(self, current: Trial, name: str) -> bool:
-        return self.search.known((*current.effects, name)) is not None
 
     def promising(self, current: Trial, names: Sequence[str]) -> list[str]:
         """Return the effects that promise most beside the present ones."""
@@ -174,8 +172,7 @@ class ModelSelection:
     def _nearest(self, trials: Sequence[Trial]) -> Trial:
         """Return what leaves the least error out of sample: its residual is nearest to noise.
 
-        By nats what explains nearly all may come last: beside much misfit the noise is that of
-        the few frequencies where little is left.
+        By nats, of the few frequencies where little is left, what explains nearly all may be last.
         """
         scorer = self.search.scorer
         assert scorer is not None
@@ -231,11 +228,15 @@ class ModelSelection:
     def _ahead(self, trial: Trial, best: Trial, complete: bool) -> bool:
         """Whether a structure is better: by nats, which are those of noise.
 
-        Where more remains than that they are of misfit, at the frequencies with the least noise:
-        what has the smaller error on blocks left out is better then, unless the blocks exclude
-        it though all that remains counts as noise.
+        One with more parameters must be beyond a tie, or the simpler one takes its place back.
+        Where more remains than noise nats are of misfit, at the frequencies with the least of it:
+        the smaller error on blocks left out is better then, unless the blocks exclude it though
+        all that remains counts as noise.
         """
         if complete:
+            richer = len(trial.fit.theta) > len(best.fit.theta)
+            if richer and evidence(trial.scores, best.scores) < self.settings.tie_nats:
+                return False
             return bool(trial.scores.sum() > best.scores.sum())
         scorer = self.search.with_misfit(best)
         gain = scorer.block_scores(trial.fit) - scorer.block_scores(best.fit)

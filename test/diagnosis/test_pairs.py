@@ -1,6 +1,7 @@
 """One effect that was found may stand for two of the catalogue together."""
 
 import numpy as np
+import pytest
 
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.model_selection import ModelSelection
@@ -45,15 +46,17 @@ def test_damping_and_a_delay_are_as_likely_as_the_payload_that_does_the_same(
         assert set(found.final.effects) == {'viscous-damping', 'delay'}
 
 
+@pytest.mark.parametrize('known_seed', [None, 413946191])
 def test_two_that_remove_what_matters_take_the_place_of_the_one_that_is_tied(
-    rng_seed: int,
+    known_seed: int | None, rng_seed: int
 ) -> None:
     """A payload leaves 5.5 um of what a delay and damping make, a tenth of what it removes.
 
-    That is as good as the same error, and left nothing material by its spectrum.
+    That is as good as the same error, and left nothing material by its spectrum. With the known
+    seed the payload is ahead of damping by one block alone: each took the other's place in turn.
     """
-    base = np.array([206.0, 6.33e10, 3.97e6, 3.2])
-    found = selected(('delay', 'viscous-damping'), [8.05e-3, 3.6e4], rng_seed, base)
+    base, seed = np.array([206.0, 6.33e10, 3.97e6, 3.2]), known_seed or rng_seed
+    found = selected(('delay', 'viscous-damping'), [8.05e-3, 3.6e4], seed, base)
     assert set(found.final.effects) == {'viscous-damping', 'delay'}
 
 
