@@ -20,7 +20,10 @@ from actuator_glue.diagnosis.fit import rms
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.space import sum_of_squares
+from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array
+
+_P = len(BASE)
 
 # Scales, of the largest: none at all is as likely as all others together.
 _SCALES = np.concatenate([[0.0], 2.0 ** np.arange(-6.0, 1.0)])
@@ -115,6 +118,8 @@ class Discrepancy:
         # The logarithm of next to no leakage has hardly a slope, and its width says nothing of how
         # far it goes: the ridge that it makes with a gain is left as it is.
         flat = (size > 1e-9 / widest) & ((widest * size) ** 2 < noise)
+        # Two of an effect's that only their product tells would be held on a line else.
+        flat[_P:] = False
         size = np.maximum(size, 1e-9 / widest)
         floor = np.where(flat, _FLAT, 1.0 / (widest * size) ** 2)
         jac = jacobian / size[:, None]

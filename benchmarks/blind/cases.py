@@ -7,11 +7,10 @@ import plant
 from case import Case, kinds
 from equivalents import values
 from scipy import signal
-from sizing import NOISE, Array, base_residual, between, finer, sized
+from sizing import FINE, NOISE, Array, base_residual, between, sized
 
 STIFFNESS = (0.0, 250e3, 250e3)
 SAMPLES = int(60 * plant.RATE)
-_FINER = 16  # what the sensor does between samples
 
 # name -> (smallest, largest size, base share): sizes are relative to the scale in `_install`.
 SIZES: dict[str, tuple[float, float]] = {
@@ -144,18 +143,18 @@ def _install(name: str, size: float, e: Array, theta: Array) -> None:
 
 
 def _sense(name: str, size: float, y: Array, rng: np.random.Generator) -> Array:
-    """Apply one sensor effect to the displacement."""
-    t = np.arange(len(y)) / plant.RATE
+    """Apply one sensor effect to the displacement, `FINE` times in each sample."""
+    rate, count = FINE * plant.RATE, len(y) // FINE
+    t = np.arange(len(y)) / rate
     match name:
         case 'backlash':
-            return np.asarray(plant.play(finer(y, _FINER), size)[::_FINER])
+            return np.asarray(plant.play(y, size))
         case 'sensor-lag':
-            lag = _FINER * plant.RATE * size
+            lag = rate * size
             pole = np.exp(-1.0 / lag)
             # Exact for a displacement linear between samples.
             a = lag * (1.0 - pole)
-            late = signal.lfilter([1.0 - a, a - pole], [1.0, -pole], finer(y, _FINER))
-            return np.asarray(late[::_FINER])
+            return np.asarray(signal.lfilter([1.0 - a, a - pole], [1.0, -pole], y))
         case 'bias':
             return y + size
         case 'drift':
@@ -163,23 +162,23 @@ def _sense(name: str, size: float, y: Array, rng: np.random.Generator) -> Array:
         case 'hum':
             return y + np.sqrt(2) * size * np.sin(2 * np.pi * 50.0 * t + rng.uniform(0, 6.28))
         case 'clock-skew':
-            return between(y, plant.RATE * t * (1.0 + size))
+            return between(y, rate * t * (1.0 + size))
         case 'timing-jitter':
-            return between(y, plant.RATE * (t + size * rng.standard_normal(len(t))))
+            return between(y, rate * (t + np.repeat(size * rng.standard_normal(count), FINE)))
         case 'frame-antiresonance':
             w = 2 * np.pi * 6.5
             num = [1.0, 2 * 0.05 * w, w * w]
             den = [1.0, 2 * (0.05 + 0.2 * size) * w * (1 + size), (w * (1 + 0.3 * size)) ** 2]
             num = [c * den[2] / num[2] for c in num]
-            b, a, _ = signal.cont2discrete((num, den), 1 / plant.RATE, 'bilinear')
+            b, a, _ = signal.cont2discrete((num, den), 1 / rate, 'bilinear')
             return np.asarray(signal.lfilter(b.ravel(), a, y))
         case 'sensor-saturation':
             limit = 2e-3 * (1.0 - size)
             return np.asarray(np.clip(y, -limit, limit))
         case 'sensor-dropout':
             out = y.copy()
-            for at in rng.integers(0, len(y), rng.poisson(size * 60.0)):
-                out[at : at + 16] = out[at]
+            for at in FINE * rng.integers(0, count, rng.poisson(size * 60.0)):
+                out[at : at + 16 * FINE] = out[at]
             return out
         case 'sensor-switch':
             # A scale joint: the reading jumps while the piston is beyond 0.7 mm.
@@ -211,7 +210,7 @@ def respond(
         y = plant.respond(command, theta, k, e, substeps, sticks)
         for name, size in effects.items():
             y = _sense(name, size, y, rng)
-        out.append(y)
+        out.append(y[::FINE])
     return out
 
 

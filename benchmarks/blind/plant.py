@@ -10,6 +10,7 @@ import math
 
 import numpy as np
 from numba import njit
+from sizing import FINE
 
 RATE = 256.0
 
@@ -202,21 +203,22 @@ def _friction_step(y, u, t, h, theta, k, e, rates):
 
 @njit(cache=True)
 def respond(command, theta, k, e, substeps, sticks):
-    """Piston displacement at the samples of a held command (n,) [m], from rest.
+    """Piston displacement `FINE` times in each sample of a held command (n,) [m], from rest.
 
-    `sticks` (n,) bool: the piston is held during these samples (random sticking).
+    `substeps` is a multiple of `FINE`; `sticks` (n,) bool: the piston is held during these samples
+    (random sticking).
     """
-    n = command.shape[0]
+    n, every = command.shape[0], substeps // FINE
     h = 1.0 / (RATE * substeps)
     y = np.zeros(8)
     rates = np.zeros((4, 8))
     trial = np.zeros(8)
-    out = np.empty(n)
+    out = np.empty(n * FINE)
     dry = e[COULOMB] > 0.0 or e[STRIBECK] > 0.0
-    previous = 0.0
     for i in range(n):
-        out[i] = y[2]
         for j in range(substeps):
+            if j % every == 0:
+                out[i * FINE + j // every] = y[2]
             t = (i + j / substeps) / RATE
             lag = e[DELAY]
             if e[WOBBLE] != 0.0:
@@ -249,9 +251,8 @@ def respond(command, theta, k, e, substeps, sticks):
                     )
             if sticks[i]:
                 y[2] = before
-        previous = out[i]
-        if not (-1.0 < previous < 1.0):
-            out[i:] = np.nan
+        if not -1.0 < y[2] < 1.0:
+            out[i * FINE :] = np.nan
             break
     return out
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import variant_plant as plant
 from scipy import signal
-from sizing import Array, between, finer
+from sizing import FINE, Array, between
 
 SIZES: dict[str, tuple[float, float]] = {
     'coulomb-friction': (5e-6, 300e-6),
@@ -180,18 +180,18 @@ def _install(name: str, size: float, e: Array, theta: Array, forms: Forms, strok
 def _sense(
     name: str, size: float, y: Array, forms: Forms, stroke: float, rng: np.random.Generator
 ) -> Array:
-    """Apply one sensor effect to the displacement."""
-    t = np.arange(len(y)) / plant.RATE
+    """Apply one sensor effect to the displacement, `FINE` times in each sample."""
+    rate, count = FINE * plant.RATE, len(y) // FINE
+    t = np.arange(len(y)) / rate
     sign = forms.sign
     match name:
         case 'backlash':
-            return np.asarray(plant.play(finer(y, 16), size)[::16])
+            return np.asarray(plant.play(y, size))
         case 'sensor-lag':
             # A conditioner's pole, or an anti-alias filter of second order with its delay.
             order = 2 if forms.form == 2 else 1
             corner = order * 0.71 / (2.0 * np.pi * size) if order == 2 else 0.5 / np.pi / size
-            sos = signal.butter(order, corner, fs=16 * plant.RATE, output='sos')
-            return np.asarray(signal.sosfilt(sos, finer(y, 16))[::16])
+            return np.asarray(signal.sosfilt(signal.butter(order, corner, fs=rate, output='sos'), y))
         case 'bias':
             return y + sign * size
         case 'drift':
@@ -200,14 +200,14 @@ def _sense(
             phase = rng.uniform(0, 6.28)
             return y + np.sqrt(2) * size * np.sin(2 * np.pi * forms.hertz * t + phase)
         case 'clock-skew':
-            return between(y, plant.RATE * t * (1.0 + sign * size))
+            return between(y, rate * t * (1.0 + sign * size))
         case 'timing-jitter':
             late = (
-                rng.standard_normal(len(t)),
-                np.sqrt(3.0) * rng.uniform(-1, 1, len(t)),
-                rng.exponential(1.0, len(t)) - 1.0,
+                rng.standard_normal(count),
+                np.sqrt(3.0) * rng.uniform(-1, 1, count),
+                rng.exponential(1.0, count) - 1.0,
             )[forms.form]
-            return between(y, plant.RATE * (t + size * late))
+            return between(y, rate * (t + np.repeat(size * late, FINE)))
         case 'sensor-quadratic':
             return y + sign * size * (y / stroke) ** 2
         case 'sensor-cubic':
@@ -216,11 +216,11 @@ def _sense(
             # The transducer's frame moves with the actuator's reaction: a mode at 14 Hz.
             w = 2 * np.pi * 14.0
             num, den = [1.0, 0.0, 0.0], [1.0, 2 * 0.08 * w, w * w]
-            b, a, _ = signal.cont2discrete((num, den), 1 / plant.RATE, 'bilinear')
+            b, a, _ = signal.cont2discrete((num, den), 1 / rate, 'bilinear')
             return y + size * np.asarray(signal.lfilter(b.ravel(), a, y))
         case 'sensor-spikes':
             out = y.copy()
-            at = rng.integers(0, len(y), int(0.004 * len(y)))
+            at = FINE * rng.integers(0, count, int(0.004 * count))
             out[at] += size * rng.standard_normal(len(at))
             return out
         case _:
@@ -257,5 +257,5 @@ def respond(
         y = plant.respond(command, theta, k, e, later, 0.0 if r else onset[1])
         for name, size in effects.items():
             y = _sense(name, size, y, forms, stroke, rng)
-        out.append(np.asarray(y))
+        out.append(np.asarray(y[::FINE]))
     return out

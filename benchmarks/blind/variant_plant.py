@@ -17,9 +17,11 @@ import math
 
 import numpy as np
 from numba import njit
+from sizing import FINE
 
 RATE = 256.0
 SUBSTEPS = 128
+_EVERY = SUBSTEPS // FINE
 
 # Names and neutral values; forms (0, 1, 2) choose between ways to write an effect.
 NEUTRAL = {
@@ -157,7 +159,7 @@ def _dry(v, w, limit, form, h):
 
 @njit(cache=True)
 def respond(command, theta, k, first_e, later_e, onset):
-    """Piston displacement at the samples of a held command (n,) [m], from rest.
+    """Piston displacement `FINE` times in each sample of a held command (n,) [m], from rest.
 
     The effects of `first_e` act until `onset` [s], those of `later_e` from then on.
     """
@@ -166,16 +168,17 @@ def respond(command, theta, k, first_e, later_e, onset):
     b1, n0, a2, a3 = theta[0], theta[1], theta[2], theta[3]
     q = q2 = f = x = v = z = w = s = total = 0.0
     felt = uplay = vplay = ulag = urate = frame = frame_v = 0.0
-    out = np.empty(n)
+    out = np.empty(n * FINE)
     for i in range(n):
         e = first_e if i / RATE < onset else later_e
-        out[i] = x + e[FRAME_SEEN] * frame
         dry = e[COULOMB] + e[STRIBECK] + (e[SUPPORT_STICK] if k > 0.0 else 0.0)
         heavy = e[MASS] > 0.0
         g = h if dry > 0.0 and not heavy else 0.5 * h
         leaky = 1.0 + g * a3
         oil = g * a2 / leaky
         for j in range(SUBSTEPS):
+            if j % _EVERY == 0:
+                out[i * FINE + j // _EVERY] = x + e[FRAME_SEEN] * frame
             t = (i + j / SUBSTEPS) / RATE
             lag = e[DELAY] + e[AMPLITUDE_DELAY] * abs(command[i]) / 2e-3
             late = i + j / SUBSTEPS - lag * RATE + 1e-9
@@ -275,7 +278,7 @@ def respond(command, theta, k, first_e, later_e, onset):
                 frame_v /= 1.0 + 2.0 * h * e[FRAME_DAMPING] * e[FRAME_SPEED]
                 frame += h * frame_v
         if not -1.0 < x < 1.0:
-            out[i:] = np.nan
+            out[i * FINE :] = np.nan
             break
     return out
 
