@@ -62,7 +62,7 @@ def _filter(error: Array) -> Array:
     return np.insert(-weights, _REACH, 1.0)
 
 
-def _noise(error: Array, period: float) -> Array:
+def noise_of(error: Array, period: float) -> Array:
     """Return the robust size of a prediction's error at every sample, (n,) [m]."""
     size = min(len(error), max(64, round(_BLOCK / period)))
     count = len(error) // size
@@ -76,7 +76,7 @@ def _noise(error: Array, period: float) -> Array:
 def beyond(residual: Array, period: float) -> NDArray[np.bool_]:
     """Which samples of a residual (n,) [m] stand out of those around them."""
     off = np.abs(residual - np.median(residual))
-    return np.asarray(off > _BEYOND * _noise(residual, period))
+    return np.asarray(off > _BEYOND * noise_of(residual, period))
 
 
 def _clusters(at: NDArray[np.intp]) -> Iterator[tuple[int, int]]:
@@ -131,7 +131,7 @@ def find(
     taps = _filter(residual)[::-1]  # `convolve` reverses them
     error = np.asarray(np.convolve(residual, taps, 'same'), dtype=np.float64)
     error[:_REACH] = error[-_REACH:] = 0.0
-    noise, whole = _noise(error, period), _noise(residual, period)
+    noise, whole = noise_of(error, period), noise_of(residual, period)
     suspect = np.flatnonzero(np.abs(error) > _BEYOND * noise)
     if not len(suspect) or len(suspect) > 2 * _REACH * _MOST * len(residual):
         return NONE

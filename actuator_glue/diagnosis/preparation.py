@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy
 
-from actuator_glue.diagnosis import decimate, despike, frozen
+from actuator_glue.diagnosis import decimate, despike, frozen, glitches
 from actuator_glue.diagnosis.base_prior import BasePrior
 from actuator_glue.diagnosis.checks import check, refuse_repeats, where
 from actuator_glue.diagnosis.data import SETTLE, Data, Mask
@@ -141,7 +141,7 @@ def initial_state(record: Record) -> Initial:
 def clean(
     records: Sequence[Record], holdout: Sequence[Record] = ()
 ) -> tuple[list[Record], list[str]]:
-    """Check records, fill channels that are slower, zero where all show their zero.
+    """Check records, fill channels that are slower, zero them, take glitches out of commands.
 
     Returns:
         The records in the order given, held-out ones last, and what was done, for people.
@@ -155,7 +155,8 @@ def clean(
     refuse_repeats(records, holdout)
     every, notes = _filled(every)
     every, more = zeroed(every)
-    return every, notes + more
+    every, glitches_told = glitches.mended(every, [initial_state(r) for r in every])
+    return every, [*glitches_told, *notes, *more]
 
 
 def _filled(records: Sequence[Record]) -> tuple[list[Record], list[str]]:

@@ -12,8 +12,8 @@ Array = NDArray[np.float64]
 NOISE = 1e-5  # m
 
 
-# What a sensor does between two samples is computed at so many times in each: a held command leaves
-# ripples there, 2 um of 4 mm at 10 Hz, which no curve through the samples shows.
+# What a sensor does between two samples is computed at so many times in each: a held command
+# leaves ripples there, 2 um of 4 mm at 10 Hz, which no curve through the samples shows.
 FINE = 16
 
 

@@ -191,7 +191,8 @@ def _sense(
             # A conditioner's pole, or an anti-alias filter of second order with its delay.
             order = 2 if forms.form == 2 else 1
             corner = order * 0.71 / (2.0 * np.pi * size) if order == 2 else 0.5 / np.pi / size
-            return np.asarray(signal.sosfilt(signal.butter(order, corner, fs=rate, output='sos'), y))
+            sos = signal.butter(order, corner, fs=rate, output='sos')
+            return np.asarray(signal.sosfilt(sos, y))
         case 'bias':
             return y + sign * size
         case 'drift':

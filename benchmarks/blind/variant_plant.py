@@ -268,8 +268,11 @@ def respond(command, theta, k, first_e, later_e, onset):
             w = after
             x += h * guess
             z += h * guess * hard
-            # On from the point that was solved for to the end of the step.
+            # On from the point that was solved for to the end of the step. What pushes a spring
+            # alone is that spring's force: without one, in a gap, it would ring for ever.
             f += (pull - oil * guess - f) * h / g
+            if dry == 0.0 and not heavy and e[VISCOUS] + e[RETURN_DAMPING] == 0.0:
+                f = _specimen(x, z, k, e)[0]
             v = 2.0 * guess - v if heavy else guess
             if e[FRAME] > 0.0:
                 # The cylinder gives way to what it pushes the piston with.

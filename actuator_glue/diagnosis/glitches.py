@@ -1,0 +1,216 @@
+"""Impulses of the recorded command that the actuator was never given.
+
+A disturbance of the recorder, often in both channels at once, is in the recorded command and not
+in the motion. Simulated with it, a model is pushed where the piston never was, for good where the
+valve or the specimen remember. The motion tells: the response to an impulse that was commanded is
+in it in whole, that to one that was only recorded not at all.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from actuator_glue.diagnosis import decimate, despike
+from actuator_glue.diagnosis.checks import where
+from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.impulses import noise_of
+from actuator_glue.diagnosis.noise import split, whiten, whitener
+from actuator_glue.model.exact import Initial
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Array, Record
+
+# Error of the polynomial of fifth order through three samples on either side: at a twelfth of the
+# rate it is 1e-3 of a sine.
+_TAPS = np.array([-1.0, 6.0, -15.0, 20.0, -15.0, 6.0, -1.0]) / 20.0
+_REACH = len(_TAPS) // 2
+_SHORTEST = 240  # samples of a command
+_BEYOND = 6.0  # times what other samples are off
+_LEAST = 1e-3  # of the stroke: what is smaller moves nothing
+_FEW = 3  # samples close to each other: what takes more is a corner or a step of the command
+_MOST = 0.05  # of all samples: what is more frequent is no accident
+_SURE = 3.0  # standard errors
+_HALF = 0.5  # of its response in the motion: commanded or not
+
+
+class Shares(NamedTuple):
+    """How much of a command's impulses is in the measured displacement; standard errors.
+
+    Attributes:
+        moved: of the response to them; 1 where they were commanded.
+        moved_error: its standard error.
+        read: of the impulses themselves, in the same samples; 1 where both channels have them.
+        read_error: its standard error.
+    """
+
+    moved: float
+    moved_error: float
+    read: float
+    read_error: float
+
+
+def impulses(command: Array, period: float) -> tuple[NDArray[np.intp], Array]:
+    """Return the samples of a command that stand out of those around them, and by how much.
+
+    Args:
+        command: (n,) [m].
+        period: time between samples [s].
+
+    Returns:
+        Samples (m,) and sizes (m,) [m]; none where they are too many to be accidents.
+    """
+    nothing = np.empty(0, dtype=np.intp), np.empty(0)
+    if len(command) < _SHORTEST:
+        return nothing
+    error = np.asarray(np.convolve(command, _TAPS, 'same'), dtype=np.float64)
+    error[:_REACH] = error[-_REACH:] = 0.0
+    stroke = float(np.abs(command - np.median(command)).max())
+    limit = np.maximum(_BEYOND * noise_of(error, period), _LEAST * stroke)
+    suspect = np.flatnonzero(np.abs(error) > limit)
+    if not len(suspect) or len(suspect) > (_REACH + 1) * _MOST * len(command):
+        return nothing
+    samples: list[int] = []
+    sizes: list[float] = []
+    for group in np.split(suspect, np.flatnonzero(np.diff(suspect) > 2 * _REACH) + 1):
+        begin = max(0, int(group[0]) - _REACH)
+        part = slice(begin, int(group[-1]) + _REACH + 1)
+        # Beside another one an impulse may not stand out.
+        found = _explained(error[part], limit[part], np.arange(group[0], group[-1] + 1) - begin)
+        if found is not None:
+            samples += [begin + i for i in found[0]]
+            sizes += list(found[1])
+    if len(samples) > _MOST * len(command):
+        return nothing
+    return np.array(samples, dtype=np.intp), np.array(sizes)
+
+
+def _explained(
+    error: Array, limit: Array, places: NDArray[np.intp]
+) -> tuple[tuple[int, ...], Array] | None:
+    """Return the fewest samples (and by how much each is off) that leave nothing that stands out.
+
+    None where a few do not, or where a corner or a step of the command leaves less.
+
+    Args:
+        error: of the polynomials around what stands out (w,) [m].
+        limit: beyond which it does (w,) [m].
+        places: samples that may be off, one after another, (s,).
+    """
+    at = np.arange(len(error) + 2 * _REACH)[:, None] - places - _REACH
+
+    def seen(shape: NDArray[Any]) -> Array:
+        return np.stack([np.convolve(row, _TAPS, 'valid') for row in shape.T.astype(float)], 1)
+
+    def left(shapes: Array) -> tuple[float, Array]:
+        sizes = np.linalg.lstsq(shapes, error, rcond=None)[0]
+        return float(np.max(np.abs(error - shapes @ sizes) / limit)), sizes
+
+    pulses, corners, steps = seen(at == 0), seen(np.abs(at)), seen(at >= 0)
+    given = [shapes[:, [i]] for shapes in (corners, steps) for i in range(len(places))]
+    given += [corners[:, i : i + 2] for i in range(len(places) - 1)]  # one between two samples
+    by_command = min(left(shapes)[0] for shapes in given)
+    for count in range(1, min(_FEW, len(places)) + 1):
+        some = [list(c) for c in itertools.combinations(range(len(places)), count)]
+        found = [left(pulses[:, c]) for c in some]
+        best = int(np.argmin([f[0] for f in found]))
+        if min(found[best][0], by_command) < 1.0:
+            by_pulses = found[best][0] < by_command
+            samples = tuple(int(places[i]) for i in some[best])
+            return (samples, found[best][1]) if by_pulses else None
+    return None
+
+
+def shares(record: Record, mended: Record, theta: Array, initial: Initial) -> Shares | None:
+    """Return how much of a command's impulses moved the piston, and was read beside it.
+
+    Generalised least squares of the residual without them; None where the model diverges or they
+    leave no trace.
+
+    Args:
+        record: as recorded.
+        mended: without the impulses of the command.
+        theta: parameters of Eq. (2) (4,).
+        initial: state that the record starts from.
+    """
+    model, off = Structure(()), record.command - mended.command
+    outputs = [model.simulate(theta, r, initial=initial) for r in (record, mended)]
+    residual = record.measured - outputs[1]
+    if not all(np.isfinite(y).all() for y in outputs):
+        return None
+    taps = whitener(split(residual, record.period).all_of_it())
+    rows = whiten(np.stack([outputs[0] - outputs[1], off]), taps)
+    white = whiten(residual, taps)
+    normal = rows @ rows.T
+    if not np.linalg.cond(normal / np.sqrt(np.outer(*2 * [np.diag(normal)]))) < 1e8:
+        return None
+    found = np.linalg.solve(normal, rows @ white)
+    left = white - found @ rows
+    error = np.sqrt(max(1.0, float(np.mean(left**2))) * np.diag(np.linalg.inv(normal)))
+    return Shares(float(found[0]), float(error[0]), float(found[1]), float(error[1]))
+
+
+def _never_given(found: Shares) -> bool:
+    """Whether the response is not in the motion: surely, or as the reading has the impulses."""
+    moved = found.moved < _HALF
+    sure = found.moved + _SURE * found.moved_error < _HALF
+    return sure or (moved and _in_both(found))
+
+
+def _in_both(found: Shares) -> bool:
+    return found.read - _SURE * found.read_error > _HALF
+
+
+def mended(
+    records: Sequence[Record], initials: Sequence[Initial]
+) -> tuple[list[Record], list[str]]:
+    """Take out of commands what no actuator was given, and out of readings what came with it.
+
+    Args:
+        records: checked records of one actuator.
+        initials: per record, the state it starts from.
+
+    Returns:
+        The records, the same objects where nothing was done, and what was done, for people.
+    """
+    found = [impulses(r.command, r.period) for r in records]
+    if not any(len(samples) for samples, _ in found):
+        return list(records), []
+    clean = [_without(r, *each) for r, each in zip(records, found, strict=True)]
+    slow = [decimate.decimated(r, decimate.factor(r)) for r in clean]
+    whole = replace(Data.whole(slow), initials=tuple(initials))
+    theta, out, notes = despike.trimmed(whole), list(records), []
+    for i, (record, without) in enumerate(zip(records, clean, strict=True)):
+        samples, sizes = found[i]
+        told = shares(record, without, theta, initials[i]) if len(samples) else None
+        if told is None or not _never_given(told):
+            continue
+        note = (
+            f'{where(record, i + 1)}: impulses in {len(samples)} samples of the command (up to '
+            f'{1e6 * float(np.abs(sizes).max()):.0f} um) did not move the piston (share of the '
+            f'response {told.moved:.2f} +- {told.moved_error:.2f}): what the samples around them '
+            'say stands in their place'
+        )
+        out[i] = without
+        if _in_both(told):
+            measured = record.measured.copy()
+            measured[samples] -= told.read * sizes
+            out[i] = replace(without, measured=measured)
+            note += (
+                f'; {told.read:.2f} +- {told.read_error:.2f} of them is in the measured '
+                'displacement of the same samples, and taken out there, too'
+            )
+        notes.append(note)
+    return out, notes
+
+
+def _without(record: Record, samples: NDArray[np.intp], sizes: Array) -> Record:
+    if not len(samples):
+        return record
+    command = record.command.copy()
+    command[samples] -= sizes
+    return replace(record, command=command)

@@ -1,0 +1,102 @@
+"""Impulses of the recorded command that no actuator was given."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from actuator_glue.diagnosis import glitches
+from actuator_glue.diagnosis.preparation import prepare
+from actuator_glue.model import commands
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Array, Record
+
+RATE = 256.0
+THETA = np.array([128.0, 1.01e9, 2.42e5, 0.3])
+NOISE = 1e-5
+
+
+def spikes(rng: np.random.Generator, n: int) -> Array:
+    """One sample in a hundred is off to one side by 20 to 100 um, some beside each other."""
+    return np.where(rng.random(n) < 0.01, rng.uniform(2e-5, 1e-4, n), 0.0)
+
+
+def made(rng: np.random.Generator, given: Array) -> Record:
+    """What a machine makes of a command, read with noise."""
+    u = np.asarray(given)
+    y = Structure(()).simulate(THETA, Record(u, u, 1.0 / RATE, stiffness=250e3))
+    return Record(u, y + NOISE * rng.standard_normal(len(u)), 1.0 / RATE, stiffness=250e3)
+
+
+def sweep(duration: float = 30.0) -> Array:
+    """To 10 Hz, 2 mm."""
+    return commands.sweep(RATE, duration, 0.1, 10.0, 2e-3)
+
+
+@pytest.mark.parametrize('both', [True, False])
+def test_what_was_only_recorded_is_taken_out(both: bool, rng_seed: int) -> None:
+    """In both channels or in the command alone; three samples of one disturbance are too many."""
+    rng = np.random.default_rng(rng_seed)
+    record = made(rng, sweep())
+    off = spikes(rng, len(record))
+    read = record.measured + off if both else record.measured
+    spiky = replace(record, command=record.command + off, measured=read)
+    (out,), notes = glitches.mended([spiky], ['rest'])
+    left = out.command - record.command
+    assert (left != 0.0).sum() < 0.1 * (off != 0.0).sum() or np.sum(left**2) < 0.1 * np.sum(off**2)
+    (note,) = notes
+    assert 'did not move the piston' in note
+    assert ('taken out there, too' in note) == both
+    assert np.sum((out.measured - record.measured) ** 2) < 0.1 * np.sum(off**2)
+
+
+def test_what_was_commanded_stays(rng_seed: int) -> None:
+    """The piston answers impulses that it was given: the very same record."""
+    rng = np.random.default_rng(rng_seed)
+    record = made(rng, sweep() + spikes(rng, len(sweep())))
+    assert len(glitches.impulses(record.command, record.period)[0]) > 20
+    (out,), notes = glitches.mended([record], ['rest'])
+    assert out is record
+    assert not notes
+
+
+@pytest.mark.parametrize('command', ['sweep', 'steps', 'triangle', 'grid', 'noise', 'random'])
+def test_commands_that_are_whole_have_none(command: str, rng_seed: int) -> None:
+    """Corners, steps, a grid of 5 um and noise are no impulses of a few samples."""
+    rng, u = np.random.default_rng(rng_seed), sweep()
+    t = np.arange(len(u)) / RATE
+    match command:
+        case 'steps':
+            u = 1e-3 * np.round(3.0 * np.sin(t))
+        case 'triangle':
+            u = 2e-3 * np.abs(2.0 * (0.7 * t % 1.0) - 1.0)
+        case 'grid':
+            u = 5e-6 * np.round(u / 5e-6)
+        case 'noise':
+            u = u + 1e-5 * rng.standard_normal(len(u))
+        case 'random':
+            f = np.fft.rfftfreq(len(u), 1.0 / RATE)
+            z = rng.standard_normal((2, len(f))).T @ np.array([1.0, 1j])
+            u = np.fft.irfft(np.where((f > 0.2) & (f < 12.0), z, 0.0), len(u))
+            u *= 2e-3 / np.abs(u).max()
+    # Of 7680 Gaussian samples one is beyond six standard deviations once in 60 000 runs.
+    assert not len(glitches.impulses(u, 1.0 / RATE)[0])
+
+
+def test_a_valve_that_remembers_is_not_pushed(rng_seed: int) -> None:
+    """Hysteresis keeps what an impulse did to it: simulated with them it is many um off."""
+    rng, valve = np.random.default_rng(rng_seed), Structure(('valve-hysteresis',))
+    theta, records = np.append(THETA, 25e-6), []
+    for k in (0.0, 250e3):
+        u = sweep(20.0)
+        y = valve.simulate(theta, Record(u, u, 1.0 / RATE, stiffness=k))
+        off = spikes(rng, len(u))
+        y = y + off + NOISE * rng.standard_normal(len(u))
+        records.append(Record(u + off, y, 1.0 / RATE, stiffness=k))
+    prepared = prepare(records[:1], records[1:])
+    assert sum('did not move the piston' in note for note in prepared.told) == 2
+    for raw, clean in zip(records, (*prepared.fit.records, *prepared.held.records), strict=True):
+        before, after = (
+            np.std(r.measured - valve.simulate(theta, r, initial='rest')) for r in (raw, clean)
+        )
+        assert after < 1.1 * NOISE < before
