@@ -43,11 +43,14 @@ def intervals(seed: int, generator: str, evaluations: int) -> list[Interval]:
     from equivalents import OTHERWISE
 
     from actuator_glue.diagnosis import posterior
-    from actuator_glue.diagnosis.discrepancy import beside
+    from actuator_glue.diagnosis.discrepancy import beside, responses
     from actuator_glue.diagnosis.fit import fit
+    from actuator_glue.diagnosis.pipeline import mean_effects
     from actuator_glue.diagnosis.preparation import prepare
-    from actuator_glue.diagnosis.score import Scorer, splits_of
+    from actuator_glue.diagnosis.score import Scorer, pooled, splits_of
+    from actuator_glue.diagnosis.search import Search
     from actuator_glue.diagnosis.space import Space
+    from actuator_glue.diagnosis.thresholds import Thresholds
     from actuator_glue.model.effects import CATALOGUE
     from actuator_glue.model.parameters import NAMES
     from actuator_glue.model.structure import Structure
@@ -67,13 +70,19 @@ def intervals(seed: int, generator: str, evaluations: int) -> list[Interval]:
     *records, held = (Record(u, y, 1.0 / case.rate, stiffness=k) for u, y, k in rows)
     data = prepare(records, [held]).fit
     found = fit(data, model, true)
-    scorer = Scorer.of(data, splits_of(data, found.error))
+    splits = splits_of(data, found.error)
+    scorer = Scorer.of(data, splits)
     scorer = replace(scorer, data=replace(data, finer=not model.linear))  # as a diagnosis does
+    search, limits = Search(data, mean_effects()), Thresholds()
+    search.base()
+    material = max(
+        limits.noise_share * pooled(data, splits)[1], limits.stroke_share * search.scale().stroke
+    )
     draws = posterior.sample(
         model,
         found,
         scorer,
-        beside=beside({}, model.effects, scorer),
+        beside=beside(responses(search, material), model.effects, scorer),
         rng=np.random.default_rng(seed),
         evaluations=evaluations,
         progress=lambda share: None,
