@@ -107,7 +107,7 @@ def _explained(
         return np.stack([np.convolve(row, _TAPS, 'valid') for row in shape.T.astype(float)], 1)
 
     def left(shapes: Array) -> tuple[float, Array]:
-        sizes = np.linalg.lstsq(shapes, error, rcond=None)[0]
+        sizes = np.asarray(np.linalg.lstsq(shapes, error, rcond=None)[0], dtype=np.float64)
         return float(np.max(np.abs(error - shapes @ sizes) / limit)), sizes
 
     pulses, corners, steps = seen(at == 0), seen(np.abs(at)), seen(at >= 0)
