@@ -41,8 +41,7 @@ class ModelSelection:
         self.search.scorer = scorer = Scorer.of(self.search.data, parts)
         left, self.noise = self._apart(fit)
         self.first = self.first or left
-        stroke = self.search.scale().stroke
-        s = self.settings
+        s, stroke = self.settings, self.search.scale().stroke
         self.material = max(s.noise_share * self.noise, s.stroke_share * stroke)
         self.search.scorer = replace(scorer, likely=left < self.material)
 
@@ -280,7 +279,8 @@ class ModelSelection:
                 replace(t, scores=scorer.block_scores(t.fit)) for t in (rest, best, *trials)
             )
         cost = pairs.price(len(self.search.names))
-        return compare(rest, best, name, trials, scorer, self.settings, cost, whole)
+        pressed = [ranking.pressed_form(self.search, t, t.added, name) for t in trials]
+        return compare(rest, best, name, trials, scorer, self.settings, cost, whole, pressed)
 
     def simpler(
         self, current: Trial, rivals: dict[str, tuple[Rival, ...]], complete: bool

@@ -114,14 +114,18 @@ def weights(scores: Array) -> Array:
     return np.asarray((likely / likely.sum(axis=0)).mean(axis=1))
 
 
-def _without_best_blocks(scores: Array) -> Array:
+def _without_best_blocks(scores: Array, richer: Sequence[bool]) -> Array:
     """Return scores (K, B) in which the first is not ahead of another by its best block alone.
 
-    As in `evidence`: what one stretch of a record alone supports is not evidence.
+    Nor is it behind one that is richer. As in `evidence`: what one stretch of a record alone
+    supports is not evidence.
     """
     out, lead = scores.copy(), scores[0] - scores
     rows, best = np.arange(len(scores)), lead.argmax(axis=1)
     out[rows, best] += np.maximum(lead[rows, best], 0.0)
+    for row in np.flatnonzero(richer):
+        worst = lead[row].argmin()
+        out[row, worst] += min(float(lead[row, worst]), 0.0)
     return out
 
 
@@ -134,6 +138,7 @@ def compare(
     settings: Thresholds,
     cost: float = 0.0,
     whole: Sequence[bool] = (),
+    pressed: Sequence[bool] = (),
 ) -> tuple[Rival, ...]:
     """Say how far behind the best each rival is, best first.
 
@@ -146,20 +151,22 @@ def compare(
         settings: thresholds.
         cost: nats that a pair of effects pays for being one of many.
         whole: which of `trials` leave nothing material where the best does: they mend no form.
+        pressed: which are the effect itself but for a parameter at its bound: what they have more
+            of weight is its, for they mend its equation.
     """
     explained = removed(rest, best)
     odds = np.array([math.exp(-cost) if BESIDE in t.added else 1.0 for t in trials])
-    scores = _without_best_blocks(np.stack([t.scores for t in (best, *trials, rest)]))
+    every = (best, *trials, rest)
+    richer = [len(t.fit.theta) > len(best.fit.theta) for t in every]
+    scores = _without_best_blocks(np.stack([t.scores for t in every]), richer)
     scores[1:-1] += np.log(odds)[:, None] / scores.shape[1]
     known = weights(scores)
     excess = [removed(t, best) for t in trials]
     limits = [_limit(t, name, scorer) for t in trials]
     # A richer form that gains nothing is no alternative, unless it holds the effect itself.
     idle = [
-        len(t.fit.theta) > len(best.fit.theta)
-        and best.scores.sum() >= t.scores.sum()
-        and limit is None
-        for t, limit in zip(trials, limits, strict=True)
+        more and best.scores.sum() >= t.scores.sum() and limit is None
+        for t, limit, more in zip(trials, limits, richer[1:-1], strict=True)
     ]
     alike = [math.inf if i else e for i, e in zip(idle, excess, strict=True)]
     tolerance = settings.tie_share * explained
@@ -167,6 +174,10 @@ def compare(
     for pair, weight, chance, end in zip(trials, known[1:-1], odds, ends, strict=True):
         if not end and chance < 1.0 and weight > known[0]:  # not told, but better by the blocks
             known[0] = max(known[0], weight * _near(removed(best, pair), tolerance))
+    for i in np.flatnonzero(pressed):
+        both = known[0] + known[1 + i]
+        known[0] = max(known[0], 0.5 * both)
+        known[1 + i] = both - known[0]
     known = _tolerant(known, alike, tolerance, odds)
     out = [Rival(name, 0.0, 0.0, 0.0, True, float(known[0]))]
     for i, trial in enumerate(trials):

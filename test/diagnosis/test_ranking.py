@@ -19,9 +19,9 @@ from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.records import Array, Record
 
 
-def trial(name: str, rms: float, scores: Array) -> Trial:
-    """A structure of which only name, error and scores matter."""
-    fit = SimpleNamespace(theta=np.zeros(5), z=np.zeros(5))
+def trial(name: str, rms: float, scores: Array, size: int = 5) -> Trial:
+    """A structure of which only name, error, scores and the number of parameters matter."""
+    fit = SimpleNamespace(theta=np.zeros(size), z=np.zeros(size))
     found = SimpleNamespace(added=name, mean_square=rms**2, scores=scores, fit=fit)
     return cast('Trial', found)
 
@@ -110,6 +110,32 @@ def test_one_stretch_alone_excludes_no_rival() -> None:
         told = {r.name: r for r in found}['sensor-lag']
         assert told.nats == pytest.approx(against.sum() - 100.0)
         assert told.tied is (blocks == 1) and least <= told.probability <= most
+
+
+def test_one_stretch_alone_puts_nothing_richer_ahead() -> None:
+    """A hundred nats of one block for more parameters: both names are as likely without it."""
+    level, even = cast('Scorer', None), np.zeros(15)
+    rest, best = trial('', 40e-6, np.full(15, -500.0)), trial('viscous-damping', 10e-6, even)
+    once = np.where(np.arange(15) == 3, 100.0, 0.0)
+    for size, share in ((6, 0.5), (5, 0.0)):
+        payload = trial('payload-inertia', 10e-6, once, size)
+        found = ranking.compare(rest, best, 'viscous-damping', [payload], level, Thresholds())
+        told = {r.name: r.probability for r in found}
+        assert told['viscous-damping'] == pytest.approx(share, abs=0.2)
+
+
+def test_a_richer_form_at_its_bound_takes_no_weight_of_the_name_that_it_mends() -> None:
+    """Ten nats in each block ahead: half of the weight that both have stays the name's."""
+    level, even = cast('Scorer', None), np.zeros(15)
+    rest, best = trial('', 40e-6, np.full(15, -500.0)), trial('coulomb-friction', 10e-6, even)
+    form = trial('delay', 10e-6, np.full(15, 10.0), 6)
+    for pressed, share in ((False, 0.0), (True, 0.5)):
+        found = ranking.compare(
+            rest, best, 'coulomb-friction', [form], level, Thresholds(), pressed=[pressed]
+        )
+        told = {r.name: r.probability for r in found}
+        assert told['coulomb-friction'] == pytest.approx(share, abs=1e-6)
+        assert sum(told.values()) == pytest.approx(1.0)
 
 
 def test_held_out_records_that_contradict_lower_the_certainty() -> None:
