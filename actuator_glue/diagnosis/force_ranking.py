@@ -78,7 +78,7 @@ def _ranked(
     scorer = _scorer(both, best.fit, settings)
     alone, *trials = (replace(t, scores=scorer.block_scores(t.fit)) for t in tried)
     trials.sort(key=lambda t: -float(t.scores.sum()))
-    rivals = compare(alone, trials[0], trials[0].added, trials[1:], scorer, settings)
+    rivals = compare(alone, trials[0], trials[1:], scorer, settings)
     size = newtons_per_metre(both)
     force = slice(search.data.target.size, None)
     errors = {t.added: size * rms(t.fit.error[force]) for t in trials}

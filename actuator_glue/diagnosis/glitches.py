@@ -38,7 +38,7 @@ _SURE = 3.0  # standard errors
 _HALF = 0.5  # of its response in the motion: commanded or not
 
 
-class Shares(NamedTuple):
+class Traces(NamedTuple):
     """How much of a command's impulses is in the measured displacement; standard errors.
 
     Attributes:
@@ -125,7 +125,7 @@ def _explained(
     return None
 
 
-def shares(record: Record, mended: Record, theta: Array, initial: Initial) -> Shares | None:
+def shares(record: Record, mended: Record, theta: Array, initial: Initial) -> Traces | None:
     """Return how much of a command's impulses moved the piston, and was read beside it.
 
     Generalised least squares of the residual without them; None where the model diverges or they
@@ -151,17 +151,17 @@ def shares(record: Record, mended: Record, theta: Array, initial: Initial) -> Sh
     found = np.linalg.solve(normal, rows @ white)
     left = white - found @ rows
     error = np.sqrt(max(1.0, float(np.mean(left**2))) * np.diag(np.linalg.inv(normal)))
-    return Shares(float(found[0]), float(error[0]), float(found[1]), float(error[1]))
+    return Traces(float(found[0]), float(error[0]), float(found[1]), float(error[1]))
 
 
-def _never_given(found: Shares) -> bool:
+def _never_given(found: Traces) -> bool:
     """Whether the response is not in the motion: surely, or as the reading has the impulses."""
     moved = found.moved < _HALF
     sure = found.moved + _SURE * found.moved_error < _HALF
     return sure or (moved and _in_both(found))
 
 
-def _in_both(found: Shares) -> bool:
+def _in_both(found: Traces) -> bool:
     return found.read - _SURE * found.read_error > _HALF
 
 

@@ -6,10 +6,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
 
-from actuator_glue.diagnosis import false_alarms, forecast, pairs, ranking
+from actuator_glue.diagnosis import false_alarms, forecast, pairs, ranking, simplest
 from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.fit import Fit
-from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.ranking import compare, removed, spokesman, standard_error, worth
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.search import Search, by_score
@@ -216,7 +215,7 @@ class ModelSelection:
                     if not pressed and self._ahead(trial, best, complete):
                         best = trial
             if best is current:
-                best = self.simpler(current, rivals, complete)
+                best = simplest.instead(self, current, rivals, complete)
             # The last members stay, so that the rivals told are theirs.
             if best is current or attempt == _SWAPS - 1:
                 break
@@ -280,21 +279,5 @@ class ModelSelection:
             )
         cost = pairs.price(len(self.search.names))
         pressed = [ranking.pressed_form(self.search, t, t.added, name) for t in trials]
-        return compare(rest, best, name, trials, scorer, self.settings, cost, whole, pressed)
-
-    def simpler(
-        self, current: Trial, rivals: dict[str, tuple[Rival, ...]], complete: bool
-    ) -> Trial:
-        """Take a rival that these data cannot tell from a member: simpler, or a name for it."""
-        for name, row in rivals.items():
-            for rival in (r for r in row if len(r.effects) == 1):
-                effects = (*(n for n in current.effects if n != name), rival.name)
-                entries = self.search.entries
-                fewer = len(entries[rival.name].parameters) < len(entries[name].parameters)
-                alike = complete and rival.nats < self.settings.tie_nats
-                alike = alike or ranking.pressed_form(self.search, current, name, rival.name)
-                named = is_learned(entries[name]) and rival.excess < self.material
-                named &= not ranking.stays(self.search, self.settings, name, rival, self.material)
-                if rival.tied and ((named and rival.name != name) or (fewer and alike)):
-                    return self.search.trial(effects, rival.name)
-        return current
+        best = replace(best, added=name)
+        return compare(rest, best, trials, scorer, self.settings, cost, whole, pressed)

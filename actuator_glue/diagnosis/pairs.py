@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuator_glue.diagnosis.finding import BESIDE, Rival
-from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.transducer import FAULTS, FEEDBACK
 from actuator_glue.diagnosis.trial import Trial
@@ -42,7 +41,7 @@ def rivals(
         below: mean squared error that a rival leaves at most [m^2].
     """
     room = len(search.entries[name].parameters)
-    if room < 2 or is_learned(search.entries[name]):
+    if room < 2:
         return []
     wanted = screened(search, name, trials[:most], room, below)[:most]
     # A fault has another size inside of the loop, so that one outside does not promise it.
@@ -80,13 +79,13 @@ def ahead(
     better = (
         t for t in two if known[t.added] > least or selection.better(t, current, material, cost)
     )
-    return [
-        t
-        for t in sorted(better, key=lambda t: -known[t.added])
-        if all(
-            selection.better(t, selection.search.without(t, n), 0.0) for n in t.added.split(BESIDE)
-        )
-    ]
+    return [t for t in sorted(better, key=lambda t: -known[t.added]) if both_worth(selection, t)]
+
+
+def both_worth(selection: ModelSelection, pair: Trial) -> bool:
+    """Whether each of a pair that was added last is significant beside the other."""
+    names = pair.added.split(BESIDE)
+    return all(selection.better(pair, selection.search.without(pair, n), 0.0) for n in names)
 
 
 def whole(selection: ModelSelection, trial: Trial, best: Trial) -> bool:

@@ -132,7 +132,6 @@ def _without_best_blocks(scores: Array, richer: Sequence[bool]) -> Array:
 def compare(
     rest: Trial,
     best: Trial,
-    name: str,
     trials: Sequence[Trial],
     scorer: Scorer,
     settings: Thresholds,
@@ -144,8 +143,7 @@ def compare(
 
     Args:
         rest: the structure without the effect; its weight is that of "none of these".
-        best: the structure with it.
-        name: the effect.
+        best: the structure with it, added last.
         trials: structures with another effect in its place.
         scorer: noise that they were scored with.
         settings: thresholds.
@@ -154,7 +152,7 @@ def compare(
         pressed: which are the effect itself but for a parameter at its bound: what they have more
             of weight is its, for they mend its equation.
     """
-    explained = removed(rest, best)
+    name, explained = best.added, removed(rest, best)
     odds = np.array([math.exp(-cost) if BESIDE in t.added else 1.0 for t in trials])
     every = (best, *trials, rest)
     richer = [len(t.fit.theta) > len(best.fit.theta) for t in every]

@@ -5,12 +5,10 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 from scipy import signal
+from trials import ENTRIES, THETA, trial
 
 from actuator_glue.diagnosis import learning
 from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.finding import Rival
-from actuator_glue.diagnosis.fit import Fit
-from actuator_glue.diagnosis.learned_forms import forms
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.pipeline import mean_effects
 from actuator_glue.diagnosis.ranking import standard_error
@@ -18,15 +16,11 @@ from actuator_glue.diagnosis.score import Scorer, pooled, splits_of
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
-from actuator_glue.model.effects import CATALOGUE, Effect, Scale
+from actuator_glue.model.effects import Effect
 from actuator_glue.model.structure import Structure
-from actuator_glue.records import Array, Record
+from actuator_glue.records import Record
 
 RATE = 128.0
-THETA = np.array([235.0, 5.0e10, 4.23e6, 3.3])
-ENTRIES = dict(CATALOGUE) | {
-    e.name: e for e in forms(Scale(2e-3, 0.1, 60.0, 1 / 256, 250e3, THETA))
-}
 
 
 def stationary(
@@ -84,76 +78,6 @@ def test_a_transducer_may_bend_by_a_tenth_of_a_short_stroke() -> None:
     trial = found.search.polish(found.search.add(found.search.trial(()), 'sensor-curve'))
     assert trial.fit.theta[4] == pytest.approx(75.0, rel=0.02)
     assert trial.fit.rms < 1.05e-5
-
-
-@dataclass
-class Tried:
-    """A search that knows two structures."""
-
-    trials: dict[tuple[str, ...], Trial]
-    entries: dict[str, Effect] = field(default_factory=lambda: dict(CATALOGUE))
-
-    def trial(self, effects: tuple[str, ...], added: str = '') -> Trial:
-        """Return the structure."""
-        return self.trials[effects]
-
-
-@pytest.mark.parametrize(
-    ('force', 'ratio', 'speed', 'name'),
-    [
-        (80.0, 4.0, 0.016, 'coulomb-friction'),
-        (80.0, 1.5, 0.1, 'coulomb-friction'),
-        (80.0, 1.8, 0.005, 'stribeck-friction'),
-        (8.0, 1.8, 0.005, 'stribeck-friction'),
-    ],
-)
-def test_a_richer_form_at_its_bound_mends_the_other(
-    force: float, ratio: float, speed: float, name: str
-) -> None:
-    """Friction that falls by as much as may be, or nowhere, is Coulomb's, 300 nats or not.
-
-    A small force is no bound: below 20 N Stribeck friction was never told.
-    """
-    coulomb, stribeck = ('coulomb-friction',), ('stribeck-friction',)
-    sizes = {coulomb: [100.0], stribeck: [force, ratio, speed]}
-    trials = {
-        n: Trial(
-            Structure(n),
-            n[0],
-            Fit(np.append(THETA, s), np.zeros(3), np.zeros((4 + len(s), 3)), np.zeros(4)),
-            np.zeros(2),
-        )
-        for n, s in sizes.items()
-    }
-    found = ModelSelection(Tried(trials), Thresholds(), lambda stage, share: None)
-    rivals = {stribeck[0]: (Rival(coulomb[0], 300.0, 20.0, 1e-6, True, 0.4),)}
-    assert found.simpler(trials[stribeck], rivals, True).effects == (name,)
-
-
-def trial(names: tuple[str, ...], rms: float) -> Trial:
-    """A structure that leaves an error of this size."""
-    error = rms * np.ones(10)
-    return Trial(Structure(ENTRIES[n] for n in names), '', fit_of(error, names), np.zeros(2))
-
-
-def fit_of(error: Array, names: tuple[str, ...]) -> Fit:
-    """A fit of Eq. (2) and of one size per effect."""
-    size = 4 + len(names)
-    return Fit(np.ones(size), error, np.zeros((size, len(error))), np.zeros(4))
-
-
-def test_a_name_takes_the_place_of_a_description_that_it_is_tied_with() -> None:
-    """Though neither is simpler; not one that leaves materially more, or is not tied."""
-    names = ('learned-valve-e2',), ('flow-asymmetry',)
-    tried = Tried({n: trial(n, 1e-5) for n in names}, ENTRIES)
-    found = ModelSelection(tried, Thresholds(), lambda stage, share: None)
-    found.material = 3e-6
-    own = Rival('learned-valve-e2', 0.0, 0.0, 0.0, True, 0.7)
-    cases = (True, 1e-6, names[1]), (True, 4e-6, names[0]), (False, 1e-6, names[0])
-    for tied, excess, chosen in cases:
-        row = own, Rival('flow-asymmetry', 60.0, 40.0, excess, tied, 0.2)
-        simpler = found.simpler(tried.trials[names[0]], {'learned-valve-e2': row}, True)
-        assert simpler.effects == chosen
 
 
 @dataclass

@@ -89,7 +89,7 @@ def test_an_alternative_has_a_probability() -> None:
     far = trial('specimen-hardening', 32e-6, -against)
     alike = trial('coulomb-friction', 5.2e-6, np.full(15, -20.0))
     level = cast('Scorer', None)  # none of these is a richer form of another
-    found = ranking.compare(rest, best, 'backlash', [far, alike], level, Thresholds())
+    found = ranking.compare(rest, best, [far, alike], level, Thresholds())
     told = {r.name: r for r in found}
     assert told['specimen-hardening'].nats < 2.0 * told['specimen-hardening'].stderr
     assert not told['specimen-hardening'].tied
@@ -106,7 +106,7 @@ def test_one_stretch_alone_excludes_no_rival() -> None:
     for blocks, least, most in ((1, 0.1, 0.3), (2, 0.0, 0.01)):
         against[:blocks] = 100.0
         lag = trial('sensor-lag', 14e-6, -against)
-        found = ranking.compare(rest, best, 'delay', [lag], level, Thresholds())
+        found = ranking.compare(rest, best, [lag], level, Thresholds())
         told = {r.name: r for r in found}['sensor-lag']
         assert told.nats == pytest.approx(against.sum() - 100.0)
         assert told.tied is (blocks == 1) and least <= told.probability <= most
@@ -119,7 +119,7 @@ def test_one_stretch_alone_puts_nothing_richer_ahead() -> None:
     once = np.where(np.arange(15) == 3, 100.0, 0.0)
     for size, share in ((6, 0.5), (5, 0.0)):
         payload = trial('payload-inertia', 10e-6, once, size)
-        found = ranking.compare(rest, best, 'viscous-damping', [payload], level, Thresholds())
+        found = ranking.compare(rest, best, [payload], level, Thresholds())
         told = {r.name: r.probability for r in found}
         assert told['viscous-damping'] == pytest.approx(share, abs=0.2)
 
@@ -130,9 +130,7 @@ def test_a_richer_form_at_its_bound_takes_no_weight_of_the_name_that_it_mends() 
     rest, best = trial('', 40e-6, np.full(15, -500.0)), trial('coulomb-friction', 10e-6, even)
     form = trial('delay', 10e-6, np.full(15, 10.0), 6)
     for pressed, share in ((False, 0.0), (True, 0.5)):
-        found = ranking.compare(
-            rest, best, 'coulomb-friction', [form], level, Thresholds(), pressed=[pressed]
-        )
+        found = ranking.compare(rest, best, [form], level, Thresholds(), pressed=[pressed])
         told = {r.name: r.probability for r in found}
         assert told['coulomb-friction'] == pytest.approx(share, abs=1e-6)
         assert sum(told.values()) == pytest.approx(1.0)
@@ -169,9 +167,7 @@ def test_a_pair_pays_for_being_one_of_many() -> None:
     level, even = cast('Scorer', None), np.zeros(15)
     rest, best = trial('', 40e-6, np.full(15, -500.0)), trial('payload-inertia', 10e-6, even)
     pair = trial('viscous-damping + delay', 10e-6, even)
-    found = ranking.compare(
-        rest, best, 'payload-inertia', [pair], level, Thresholds(), float(np.log(10.0))
-    )
+    found = ranking.compare(rest, best, [pair], level, Thresholds(), float(np.log(10.0)))
     told = {r.name: r for r in found}
     assert told['payload-inertia'].probability == pytest.approx(10 / 11, rel=1e-3)
     assert told['viscous-damping + delay'].probability == pytest.approx(1 / 11, rel=1e-3)
@@ -185,9 +181,7 @@ def test_what_a_pair_is_ahead_of_keeps_its_share_where_their_errors_are_alike() 
     rest, best = trial('', 40e-6, np.full(15, -500.0)), trial('payload-inertia', 10e-6, 0 * ahead)
     for rms, low, high in ((9.99e-6, 0.45, 0.5), (4e-6, 0.0, 1e-6)):
         pair = trial('viscous-damping + delay', rms, ahead)
-        found = ranking.compare(
-            rest, best, 'payload-inertia', [pair], level, Thresholds(), float(np.log(10.0))
-        )
+        found = ranking.compare(rest, best, [pair], level, Thresholds(), float(np.log(10.0)))
         told = {r.name: r.probability for r in found}
         assert low <= told['payload-inertia'] <= high
         assert told['viscous-damping + delay'] == pytest.approx(1 - told['payload-inertia'])
