@@ -9,8 +9,9 @@ in it in whole, that to one that was only recorded not at all.
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,7 +33,8 @@ _REACH = len(_TAPS) // 2
 _SHORTEST = 240  # samples of a command
 _BEYOND = 6.0  # times what other samples are off
 _LEAST = 1e-3  # of the stroke: what is smaller moves nothing
-_FEW = 3  # samples close to each other: what takes more is a corner or a step of the command
+# Samples close to each other, and how many they are among: what takes more is a command's own.
+_FEW, _WIDEST = 3, 14
 _MOST = 0.05  # of all samples: what is more frequent is no accident
 _SURE = 3.0  # standard errors
 _HALF = 0.5  # of its response in the motion: commanded or not
@@ -80,7 +82,8 @@ def impulses(command: Array, period: float) -> tuple[NDArray[np.intp], Array]:
         begin = max(0, int(group[0]) - _REACH)
         part = slice(begin, int(group[-1]) + _REACH + 1)
         # Beside another one an impulse may not stand out.
-        found = _explained(error[part], limit[part], np.arange(group[0], group[-1] + 1) - begin)
+        places = range(int(group[0]) - begin, int(group[-1]) + 1 - begin)
+        found = _explained(error[part], limit[part], places)
         if found is not None:
             samples += [begin + i for i in found[0]]
             sizes += list(found[1])
@@ -89,9 +92,7 @@ def impulses(command: Array, period: float) -> tuple[NDArray[np.intp], Array]:
     return np.array(samples, dtype=np.intp), np.array(sizes)
 
 
-def _explained(
-    error: Array, limit: Array, places: NDArray[np.intp]
-) -> tuple[tuple[int, ...], Array] | None:
+def _explained(error: Array, limit: Array, places: range) -> tuple[tuple[int, ...], Array] | None:
     """Return the fewest samples (and by how much each is off) that leave nothing that stands out.
 
     None where a few do not, or where a corner or a step of the command leaves less.
@@ -99,30 +100,60 @@ def _explained(
     Args:
         error: of the polynomials around what stands out (w,) [m].
         limit: beyond which it does (w,) [m].
-        places: samples that may be off, one after another, (s,).
+        places: samples that may be off.
     """
-    at = np.arange(len(error) + 2 * _REACH)[:, None] - places - _REACH
 
-    def seen(shape: NDArray[Any]) -> Array:
-        return np.stack([np.convolve(row, _TAPS, 'valid') for row in shape.T.astype(float)], 1)
+    def left(basis: Basis) -> float:
+        off = error - basis.shapes @ (basis.inverse @ error)
+        return float(np.max(np.abs(off) / limit))
 
-    def left(shapes: Array) -> tuple[float, Array]:
-        sizes = np.asarray(np.linalg.lstsq(shapes, error, rcond=None)[0], dtype=np.float64)
-        return float(np.max(np.abs(error - shapes @ sizes) / limit)), sizes
-
-    pulses, corners, steps = seen(at == 0), seen(np.abs(at)), seen(at >= 0)
-    given = [shapes[:, [i]] for shapes in (corners, steps) for i in range(len(places))]
-    given += [corners[:, i : i + 2] for i in range(len(places) - 1)]  # one between two samples
-    by_command = min(left(shapes)[0] for shapes in given)
+    if len(places) > _WIDEST:
+        return None
     for count in range(1, min(_FEW, len(places)) + 1):
-        some = [list(c) for c in itertools.combinations(range(len(places)), count)]
-        found = [left(pulses[:, c]) for c in some]
-        best = int(np.argmin([f[0] for f in found]))
-        if min(found[best][0], by_command) < 1.0:
-            by_pulses = found[best][0] < by_command
-            samples = tuple(int(places[i]) for i in some[best])
-            return (samples, found[best][1]) if by_pulses else None
+        pulses = _pulses(len(error), places, count)
+        by_pulses = [left(basis) for basis in pulses]
+        best = int(np.argmin(by_pulses))
+        by_command = min(left(basis) for basis in _commanded(len(error), places))
+        if min(by_pulses[best], by_command) < 1.0:
+            found = pulses[best]
+            sizes = found.inverse @ error
+            return (found.samples, sizes) if by_pulses[best] < by_command else None
     return None
+
+
+class Basis(NamedTuple):
+    """What some samples, or a corner or step, leave of a polynomial through their neighbours.
+
+    Attributes:
+        samples: which they are.
+        shapes: errors of the polynomials (w, m).
+        inverse: least squares (m, w).
+    """
+
+    samples: tuple[int, ...]
+    shapes: Array
+    inverse: Array
+
+
+def _basis(width: int, samples: tuple[int, ...], shape: Callable[[Any], Any]) -> Basis:
+    at = np.arange(-_REACH, width + _REACH)[:, None] - np.array(samples)
+    rows = np.asarray(shape(at), dtype=np.float64).T
+    shapes = np.stack([np.convolve(row, _TAPS, 'valid') for row in rows], axis=1)
+    return Basis(samples, shapes, np.linalg.pinv(shapes))
+
+
+@lru_cache(maxsize=64)
+def _pulses(width: int, places: range, count: int) -> tuple[Basis, ...]:
+    some = itertools.combinations(places, count)
+    return tuple(_basis(width, chosen, lambda at: at == 0) for chosen in some)
+
+
+@lru_cache(maxsize=64)
+def _commanded(width: int, places: range) -> tuple[Basis, ...]:
+    steps = (_basis(width, (i,), lambda at: at >= 0) for i in places)
+    corners = (_basis(width, (i,), np.abs) for i in places)
+    between = (_basis(width, pair, np.abs) for pair in itertools.pairwise(places))
+    return (*steps, *corners, *between)
 
 
 def shares(record: Record, mended: Record, theta: Array, initial: Initial) -> Traces | None:
