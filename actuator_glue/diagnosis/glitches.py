@@ -34,7 +34,7 @@ _SHORTEST = 240  # samples of a command
 _BEYOND = 6.0  # times what other samples are off
 _LEAST = 1e-3  # of the stroke: what is smaller moves nothing
 # Samples close to each other, and how many they are among: what takes more is a command's own.
-_FEW, _WIDEST = 3, 14
+_FEW, _WIDEST = 3, 20
 _MOST = 0.05  # of all samples: what is more frequent is no accident
 _SURE = 3.0  # standard errors
 _HALF = 0.5  # of its response in the motion: commanded or not
@@ -142,13 +142,13 @@ def _basis(width: int, samples: tuple[int, ...], shape: Callable[[Any], Any]) ->
     return Basis(samples, shapes, np.linalg.pinv(shapes))
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=32)
 def _pulses(width: int, places: range, count: int) -> tuple[Basis, ...]:
     some = itertools.combinations(places, count)
     return tuple(_basis(width, chosen, lambda at: at == 0) for chosen in some)
 
 
-@lru_cache(maxsize=64)
+@lru_cache(maxsize=32)
 def _commanded(width: int, places: range) -> tuple[Basis, ...]:
     steps = (_basis(width, (i,), lambda at: at >= 0) for i in places)
     corners = (_basis(width, (i,), np.abs) for i in places)
