@@ -38,6 +38,7 @@ _FEW, _WIDEST = 3, 20
 _MOST = 0.05  # of all samples: what is more frequent is no accident
 _SURE = 3.0  # standard errors
 _HALF = 0.5  # of its response in the motion: commanded or not
+_ALIKE = 1.0 - 1e-8  # squared correlation: response and impulses cannot be told apart
 
 
 class Traces(NamedTuple):
@@ -177,7 +178,8 @@ def shares(record: Record, mended: Record, theta: Array, initial: Initial) -> Tr
     rows = whiten(np.stack([outputs[0] - outputs[1], off]), taps)
     white = whiten(residual, taps)
     normal = rows @ rows.T
-    if not np.linalg.cond(normal / np.sqrt(np.outer(*2 * [np.diag(normal)]))) < 1e8:
+    seen = np.diag(normal)
+    if not ((seen > 0.0).all() and normal[0, 1] ** 2 < _ALIKE * seen[0] * seen[1]):
         return None
     found = np.linalg.solve(normal, rows @ white)
     left = white - found @ rows
