@@ -208,6 +208,8 @@ def respond(command, theta, k, first_e, later_e, onset):
             error = uplay - felt + e[NULL]
             total += h * error
             error += e[INTEGRAL] * (total - 0.5 * h * error)
+            # From where a held command has leapt to as the step begins.
+            vplay = _play(vplay, error + 0.5 * h * (v + frame_v), e[VALVE_PLAY])
             vplay = _play(vplay, error, e[VALVE_PLAY])
             error = vplay
             if e[DEADBAND] > 0.0:

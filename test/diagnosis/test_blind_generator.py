@@ -60,12 +60,10 @@ def test_generators_and_catalogue_agree(name: str, monkeypatch: pytest.MonkeyPat
     known = equivalents.values(sizes, theta, 2e-3)
     model = Structure((equivalents.catalogued(name),))
     full = np.append(theta, [known[n] for n in model.names[4:]])
-    # At the tips of stairs each is 0.05 to 0.1 um off by its own steps.
-    most = 0.25e-6 if name == 'valve-hysteresis' else 0.08e-6
     for seen in outputs:
         for k, reading in zip(stiffnesses, seen, strict=False):
             y = model.simulate(full, Record(command, reading, 1.0 / plant.RATE, k))
-            assert np.sqrt(np.mean((y - reading) ** 2)) < most
+            assert np.sqrt(np.mean((y - reading) ** 2)) < 0.08e-6
 
 
 @pytest.mark.slow

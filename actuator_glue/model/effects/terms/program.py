@@ -7,7 +7,7 @@ depends on it d(value)/d(dx) is computed. What holds during a test is computed o
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Final, NamedTuple
 
@@ -84,6 +84,7 @@ class Program:
         memory: registers that remember.
         switches: per effect its register that says whether it acts, its parameters, and their
             neutral values: an effect all of whose parameters are neutral is not there.
+        turns: whether a valve follows from where its error turns, within the step.
     """
 
     code: tuple[InstructionGroup, ...]
@@ -93,6 +94,7 @@ class Program:
     parameters: Mapping[str, int]
     memory: tuple[int, ...]
     switches: tuple[tuple[int, tuple[str, ...], tuple[float, ...]], ...]
+    turns: bool = False
 
     def __getstate__(self) -> dict[str, object]:
         """Native code is of one process."""
@@ -151,7 +153,8 @@ def compiled(effects: Iterable[Written]) -> Program:
         builder.part(SIGNAL[places[0]], here)
     builder.balance()
     builder.keep()
-    return builder.program()
+    valves = (e.expression for e in written if e.expression.place == 'valve')
+    return replace(builder.program(), turns=any('play' in v.tree.words() for v in valves))
 
 
 class _Builder:
