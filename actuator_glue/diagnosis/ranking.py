@@ -169,9 +169,9 @@ def compare(
     alike = [math.inf if i else e for i, e in zip(idle, excess, strict=True)]
     tolerance = settings.tie_share * explained
     ends = whole or [False] * len(trials)
-    for pair, weight, chance, end in zip(trials, known[1:-1], odds, ends, strict=True):
-        if not end and chance < 1.0 and weight > known[0]:  # not told, but better by the blocks
-            known[0] = max(known[0], weight * _near(removed(best, pair), tolerance))
+    for trial, weight, end in zip(trials, known[1:-1], ends, strict=True):
+        if not end and weight > known[0]:  # not the one that speaks, but better by the blocks
+            known[0] = max(known[0], weight * _near(removed(best, trial), tolerance))
     for i in np.flatnonzero(pressed):
         both = known[0] + known[1 + i]
         known[0] = max(known[0], 0.5 * both)
