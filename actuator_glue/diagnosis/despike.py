@@ -12,7 +12,7 @@ from actuator_glue.diagnosis.checks import where
 from actuator_glue.diagnosis.data import SETTLE, Data
 from actuator_glue.diagnosis.fit import base_fit, fit
 from actuator_glue.diagnosis.free_run import Model
-from actuator_glue.diagnosis.impulses import NONE, Impulses, beyond, find
+from actuator_glue.diagnosis.impulses import NONE, Impulses, beyond, find, in_command
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
@@ -62,10 +62,11 @@ def without_impulses(
         they are the same, and the impulses of each record.
     """
     records, all_ = [], []
-    rows = zip(data.records, data.initials, data.origins, known, strict=True)
-    for record, initial, origin, before in rows:
+    rows = zip(data.records, data.initials, data.origins, data.factors, known, strict=True)
+    for record, initial, origin, count, before in rows:
         output = model.simulate(theta[None], record, initial=initial, origin=origin)[0]
-        measured = record.measured.copy()
+        command, measured = record.command.copy(), record.measured.copy()
+        command[before.samples] += before.shared * before.sizes
         measured[before.samples] += before.sizes
         speed = np.abs(np.gradient(output, record.period))
         # By the reading, too: one that drops out is off where the piston alone is far out.
@@ -78,12 +79,29 @@ def without_impulses(
         if np.array_equal(found.samples, before.samples):
             found = before
         else:
+            # What becomes one of several samples is in sight in none of them.
+            found = replace(found, shared=in_command(command, found) if count == 1 else 0.0)
             measured[found.samples] -= found.sizes
-            record = replace(record, measured=measured)
+            command[found.samples] -= found.shared * found.sizes
+            moved = found.shared or before.shared
+            record = replace(
+                record, measured=measured, command=command if moved else record.command
+            )
         records.append(record)
         all_.append(found)
-    same = all(a is b for a, b in zip(records, data.records, strict=True))
-    return (data if same else replace(data, records=tuple(records))), tuple(all_)
+    return _with(data, records), tuple(all_)
+
+
+def _with(data: Data, records: Sequence[Record]) -> Data:
+    """Return data with other records; the same object where they are the same."""
+    pairs = list(zip(records, data.records, strict=True))
+    if all(a is b for a, b in pairs):
+        return data
+    if all(a.command is b.command for a, b in pairs):
+        return replace(data, records=tuple(records))
+    rows = zip(records, data.recorded, data.factors, strict=True)
+    recorded = tuple(replace(w, command=r.command) if n == 1 else w for r, w, n in rows)
+    return replace(data, records=tuple(records), recorded=recorded, steps=())
 
 
 def _phase(output: Array, measured: Array) -> Array:
@@ -138,10 +156,12 @@ def told(records: Sequence[Record], impulses: Sequence[Impulses]) -> list[str]:
 def _told(found: Impulses, record: Record) -> str:
     up = float(np.mean(found.sizes > 0.0))
     side = ', all to one side' if up in (0.0, 1.0) and found.count > 4 else ''
+    both = f'; {found.shared:.2f} of them in the command, too, and taken out there'
+    both = both if found.shared else ''
     return (
         f'{found.count} impulse{"s" if found.count > 1 else ""} ({len(found.samples)} of '
         f'{len(record)} samples, up to {1e6 * float(np.abs(found.sizes).max()):.0f} um{side}) '
-        'are no motion: what the samples around them say stands in their place'
+        f'are no motion: what the samples around them say stands in their place{both}'
     )
 
 

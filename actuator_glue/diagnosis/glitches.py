@@ -20,16 +20,13 @@ from numpy.typing import NDArray
 from actuator_glue.diagnosis import decimate, despike
 from actuator_glue.diagnosis.checks import where
 from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.impulses import noise_of
+from actuator_glue.diagnosis.impulses import TAPS, noise_of
 from actuator_glue.diagnosis.noise import split, whiten, whitener
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 
-# Error of the polynomial of fifth order through three samples on either side: at a twelfth of the
-# rate it is 1e-3 of a sine.
-_TAPS = np.array([-1.0, 6.0, -15.0, 20.0, -15.0, 6.0, -1.0]) / 20.0
-_REACH = len(_TAPS) // 2
+_REACH = len(TAPS) // 2
 _SHORTEST = 240  # samples of a command
 _BEYOND = 6.0  # times what other samples are off
 _LEAST = 1e-3  # of the stroke: what is smaller moves nothing
@@ -70,7 +67,7 @@ def impulses(command: Array, period: float) -> tuple[NDArray[np.intp], Array]:
     nothing = np.empty(0, dtype=np.intp), np.empty(0)
     if len(command) < _SHORTEST:
         return nothing
-    error = np.asarray(np.convolve(command, _TAPS, 'same'), dtype=np.float64)
+    error = np.asarray(np.convolve(command, TAPS, 'same'), dtype=np.float64)
     error[:_REACH] = error[-_REACH:] = 0.0
     stroke = float(np.abs(command - np.median(command)).max())
     limit = np.maximum(_BEYOND * noise_of(error, period), _LEAST * stroke)
@@ -139,7 +136,7 @@ class Basis(NamedTuple):
 def _basis(width: int, samples: tuple[int, ...], shape: Callable[[Any], Any]) -> Basis:
     at = np.arange(-_REACH, width + _REACH)[:, None] - np.array(samples)
     rows = np.asarray(shape(at), dtype=np.float64).T
-    shapes = np.stack([np.convolve(row, _TAPS, 'valid') for row in rows], axis=1)
+    shapes = np.stack([np.convolve(row, TAPS, 'valid') for row in rows], axis=1)
     return Basis(samples, shapes, np.linalg.pinv(shapes))
 
 
@@ -198,6 +195,15 @@ def _in_both(found: Traces) -> bool:
     return found.read - _SURE * found.read_error > _HALF
 
 
+def without(record: Record, samples: NDArray[np.intp], sizes: Array) -> Record:
+    """Return a record whose command is less by some sizes (m,) [m] at some samples (m,)."""
+    if not len(samples):
+        return record
+    command = record.command.copy()
+    command[samples] -= sizes
+    return replace(record, command=command)
+
+
 def mended(
     records: Sequence[Record], initials: Sequence[Initial]
 ) -> tuple[list[Record], list[str]]:
@@ -213,13 +219,13 @@ def mended(
     found = [impulses(r.command, r.period) for r in records]
     if not any(len(samples) for samples, _ in found):
         return list(records), []
-    clean = [_without(r, *each) for r, each in zip(records, found, strict=True)]
+    clean = [without(r, *each) for r, each in zip(records, found, strict=True)]
     slow = [decimate.decimated(r, decimate.factor(r)) for r in clean]
     whole = replace(Data.whole(slow), initials=tuple(initials))
     theta, out, notes = despike.trimmed(whole), list(records), []
-    for i, (record, without) in enumerate(zip(records, clean, strict=True)):
+    for i, (record, smooth) in enumerate(zip(records, clean, strict=True)):
         samples, sizes = found[i]
-        told = shares(record, without, theta, initials[i]) if len(samples) else None
+        told = shares(record, smooth, theta, initials[i]) if len(samples) else None
         if told is None or not _never_given(told):
             continue
         note = (
@@ -228,22 +234,14 @@ def mended(
             f'response {told.moved:.2f} +- {told.moved_error:.2f}): what the samples around them '
             'say stands in their place'
         )
-        out[i] = without
+        out[i] = smooth
         if _in_both(told):
             measured = record.measured.copy()
             measured[samples] -= told.read * sizes
-            out[i] = replace(without, measured=measured)
+            out[i] = replace(smooth, measured=measured)
             note += (
                 f'; {told.read:.2f} +- {told.read_error:.2f} of them is in the measured '
                 'displacement of the same samples, and taken out there, too'
             )
         notes.append(note)
     return out, notes
-
-
-def _without(record: Record, samples: NDArray[np.intp], sizes: Array) -> Record:
-    if not len(samples):
-        return record
-    command = record.command.copy()
-    command[samples] -= sizes
-    return replace(record, command=command)

@@ -68,7 +68,7 @@ class Prepared:
         """
         fit, found = despike.without_impulses(self.fit, model, theta, self.impulses)
         if self.folded:
-            held, others = replace(self.held, records=fit.records), self.held_impulses
+            held, others = replace(fit, masks=self.held.masks), self.held_impulses
         else:
             held, others = despike.without_impulses(self.held, model, theta, self.held_impulses)
         if fit is self.fit and (self.folded or held is self.held):
