@@ -208,7 +208,7 @@ class ModelSelection:
                     names = self.search.screened(rest, names)[: self.settings.tried]
                 below = ranking.left_by_rivals(rest, current)
                 trials = self.search.additions(rest, names, below=below)
-                two = pairs.rivals(self.search, name, trials, self.settings.tried, below)
+                two = pairs.rivals(self.search, name, trials, self.settings.tried, below, complete)
                 rivals[name] = self._rivals(rest, current, name, [*trials, *two])
                 for trial in (*trials, *pairs.ahead(self, current, name, rivals[name], two)):
                     pressed = ranking.pressed_form(self.search, trial, trial.added, name)

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuator_glue.diagnosis.finding import BESIDE, Rival
+from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.transducer import FAULTS, FEEDBACK
 from actuator_glue.diagnosis.trial import Trial
@@ -29,7 +30,12 @@ def price(count: int) -> float:
 
 
 def rivals(
-    search: Search, name: str, trials: Sequence[Trial], most: int, below: float
+    search: Search,
+    name: str,
+    trials: Sequence[Trial],
+    most: int,
+    below: float,
+    complete: bool = True,
 ) -> list[Trial]:
     """Refit the most promising pairs that have no more parameters than an effect.
 
@@ -39,9 +45,11 @@ def rivals(
         trials: structures with one other effect in its place.
         most: of these that are gone on from, and of pairs that are refitted.
         below: mean squared error that a rival leaves at most [m^2].
+        complete: whether nothing material is left: else no names take a description's place.
     """
     room = len(search.entries[name].parameters)
-    if room < 2:
+    described = is_learned(search.entries[name])
+    if room < 2 or (described and not complete):
         return []
     wanted = screened(search, name, trials[:most], room, below)[:most]
     # A fault has another size inside of the loop, so that one outside does not promise it.

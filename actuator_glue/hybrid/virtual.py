@@ -93,8 +93,8 @@ class VirtualTest:
         self._plants: Plants | None = None
         self._substeps = 1
         if self._curved:
-            turns = self._structure.program.turns
-            base = run.sample_steps(partition.period, turns=turns)
+            times = run.turning(self._structure.program, 'zoh')
+            base = run.sample_steps(partition.period, times)
             values = self._structure.values(self._table)
             soft = float(specimen['stiffness'].min())
             self._substeps = base * int(

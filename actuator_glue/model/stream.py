@@ -73,7 +73,7 @@ class Stream:
         if rng is None and (self._jitter > 0.0 or self._noise > 0.0):
             raise InputError('timing-jitter and sensor noise need a random generator (rng)')
         self._rng = rng
-        base = run.sample_steps(self.period, turns=structure.program.turns)
+        base = run.sample_steps(self.period, run.turning(structure.program, hold))
         finer = run.refinement(self._values, self.stiffness, self.period / base)
         self._substeps = base * int(finer[0])
         self.reset()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,13 +19,13 @@ from actuator_glue.model.effects import (
 )
 from actuator_glue.model.effects.terms import machine
 from actuator_glue.model.effects.terms.program import Program
-from actuator_glue.records import Array, Record
+from actuator_glue.records import Array, Hold, Record
 
 # Sub-steps are at most this long: the error of one effect stays below 0.3 um on a 2 mm sweep.
 MAX_STEP = 1.05e-3  # s
-# Under a held command the error turns in every sample, which a line through the step cuts off:
-# 0.5 um moved beta_1 by three standard deviations of what two records tell.
-_TURNING = 4
+# A line through the step cuts off where the error turns, under a held command in every sample: 0.5
+# um moved beta_1 by three standard deviations of what two records tell.
+_TURNING: Final = {'zoh': 4, 'linear': 2}
 # ... and short against the fastest pole of Eq. (2), up to eight times shorter than MAX_STEP.
 _MAX_POLE_STEP = 0.8
 _MAX_REFINEMENT = 8
@@ -32,15 +33,19 @@ _MAX_REFINEMENT = 8
 _CHUNK = 2048
 
 
-def sample_steps(period: float, *, turns: bool = False) -> int:
+def sample_steps(period: float, times: int = 1) -> int:
     """Return the usual number of sub-steps per sample.
 
     Args:
         period: of the samples [s].
-        turns: whether a valve follows from where its error turns (see Program).
+        times: how many times shorter they are at most, see `turning`.
     """
-    longest = MAX_STEP / _TURNING if turns else MAX_STEP
-    return max(1, int(np.ceil(period / longest - 1e-9)))
+    return max(1, int(np.ceil(period * times / MAX_STEP - 1e-9)))
+
+
+def turning(program: Program, hold: Hold) -> int:
+    """Return how many times shorter sub-steps are where a valve follows from where it turns."""
+    return _TURNING[hold] if program.turns else 1
 
 
 def refinement(values: Mapping[str, Array], stiffness: float, step: float) -> Array:
@@ -126,7 +131,7 @@ def blocks(
         post-steps, or force [N]; the array is overwritten by the next block.
     """
     stiffness = record.known_stiffness()
-    base = rate * sample_steps(record.period, turns=program.turns)
+    base = rate * sample_steps(record.period, turning(program, record.hold))
     factors = refinement(values, stiffness, record.period / base)
     # One sample before the record: at rest the command was zero, else it was held.
     before = record.command[:1] if start != (0.0, 0.0) else np.zeros(1)
