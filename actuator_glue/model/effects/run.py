@@ -25,7 +25,7 @@ from actuator_glue.records import Array, Hold, Record
 MAX_STEP = 1.05e-3  # s
 # A line through the step cuts off where the error turns, under a held command in every sample: 0.5
 # um moved beta_1 by three standard deviations of what two records tell.
-_TURNING: Final = {'zoh': 4, 'linear': 2}
+_TURNING: Final = 4
 # ... and short against the fastest pole of Eq. (2), up to eight times shorter than MAX_STEP.
 _MAX_POLE_STEP = 0.8
 _MAX_REFINEMENT = 8
@@ -45,7 +45,7 @@ def sample_steps(period: float, times: int = 1) -> int:
 
 def turning(program: Program, hold: Hold) -> int:
     """Return how many times shorter sub-steps are where a valve follows from where it turns."""
-    return _TURNING[hold] if program.turns else 1
+    return _TURNING if program.turns and hold == 'zoh' else 1
 
 
 def refinement(values: Mapping[str, Array], stiffness: float, step: float) -> Array:
