@@ -65,8 +65,7 @@ def without_impulses(
     rows = zip(data.records, data.initials, data.origins, data.factors, known, strict=True)
     for record, initial, origin, count, before in rows:
         output = model.simulate(theta[None], record, initial=initial, origin=origin)[0]
-        command, measured = record.command.copy(), record.measured.copy()
-        command[before.samples] += before.shared * before.sizes
+        measured = record.measured.copy()
         measured[before.samples] += before.sizes
         speed = np.abs(np.gradient(output, record.period))
         # By the reading, too: one that drops out is off where the piston alone is far out.
@@ -79,17 +78,25 @@ def without_impulses(
         if np.array_equal(found.samples, before.samples):
             found = before
         else:
+            command = _less(record.command, before, -before.shared)
             # What becomes one of several samples is in sight in none of them.
             found = replace(found, shared=in_command(command, found) if count == 1 else 0.0)
             measured[found.samples] -= found.sizes
-            command[found.samples] -= found.shared * found.sizes
-            moved = found.shared or before.shared
             record = replace(
-                record, measured=measured, command=command if moved else record.command
+                record, measured=measured, command=_less(command, found, found.shared)
             )
         records.append(record)
         all_.append(found)
     return _with(data, records), tuple(all_)
+
+
+def _less(channel: Array, found: Impulses, share: float) -> Array:
+    """Return a channel (n,) without a share of some impulses; the same object without any."""
+    if not share:
+        return channel
+    out = channel.copy()
+    out[found.samples] -= share * found.sizes
+    return out
 
 
 def _with(data: Data, records: Sequence[Record]) -> Data:
@@ -156,8 +163,8 @@ def told(records: Sequence[Record], impulses: Sequence[Impulses]) -> list[str]:
 def _told(found: Impulses, record: Record) -> str:
     up = float(np.mean(found.sizes > 0.0))
     side = ', all to one side' if up in (0.0, 1.0) and found.count > 4 else ''
-    both = f'; {found.shared:.2f} of them in the command, too, and taken out there'
-    both = both if found.shared else ''
+    share = f'; {found.shared:.2f} of them in the command, too, and taken out there'
+    both = share if found.shared else ''
     return (
         f'{found.count} impulse{"s" if found.count > 1 else ""} ({len(found.samples)} of '
         f'{len(record)} samples, up to {1e6 * float(np.abs(found.sizes).max()):.0f} um{side}) '

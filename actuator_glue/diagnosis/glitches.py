@@ -107,11 +107,11 @@ def _explained(error: Array, limit: Array, places: range) -> tuple[tuple[int, ..
 
     if len(places) > _WIDEST:
         return None
+    by_command = min(left(basis) for basis in _commanded(len(error), places))
     for count in range(1, min(_FEW, len(places)) + 1):
         pulses = _pulses(len(error), places, count)
         by_pulses = [left(basis) for basis in pulses]
         best = int(np.argmin(by_pulses))
-        by_command = min(left(basis) for basis in _commanded(len(error), places))
         if min(by_pulses[best], by_command) < 1.0:
             found = pulses[best]
             sizes = found.inverse @ error
