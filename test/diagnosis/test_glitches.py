@@ -89,13 +89,14 @@ def test_commands_that_are_whole_have_none(command: str, rng_seed: int) -> None:
 def test_a_rough_command_shares_what_its_reading_lost(rng_seed: int) -> None:
     """Steps of a slow controller hide impulses in it; those of the reading are in it, too.
 
-    Taken out of the reading alone, to one side, they would be a bias.
+    Taken out of the reading alone, to one side, they would be a bias. The share is off by 0.048
+    (one standard deviation of 2000 runs, the largest 0.16): 0.2 is beyond four of them.
     """
     rng = np.random.default_rng(rng_seed)
     slow = commands.sweep(RATE, 30.0, 2.0, 5.0, 5e-4)[::2]
     record = made(rng, np.repeat(slow, 2))
     assert not len(glitches.impulses(record.command, record.period)[0])
-    off = np.where(rng.random(len(record)) < 0.004, rng.uniform(9e-5, 1.5e-4, len(record)), 0.0)
+    off = np.where(rng.random(len(record)) < 0.01, rng.uniform(9e-5, 1.5e-4, len(record)), 0.0)
     both = replace(record, command=record.command + off, measured=record.measured + off)
     prepared = prepare([both], [record])
     (clean,) = prepared.fit.records
@@ -106,7 +107,8 @@ def test_a_rough_command_shares_what_its_reading_lost(rng_seed: int) -> None:
     for fitted in (clean, prepared.fit.recorded[0], prepared.fit.steps[0]):
         left = fitted.command - record.command
         assert np.mean(left) < 0.4 * np.mean(off)
-        assert np.abs(np.mean(left) - np.mean(clean.measured - record.measured)) < 0.1e-6
+        bias = np.mean(left) - np.mean(clean.measured - record.measured)
+        assert np.abs(bias) < 0.2 * np.mean(off)
     alone = replace(both, command=record.command)
     (other,) = prepare([alone], [record]).impulses
     assert other.shared == 0.0
