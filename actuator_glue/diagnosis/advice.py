@@ -166,7 +166,8 @@ def contradicted(error: HeldOutError, material: float) -> tuple[str, ...]:
     """Say so where the held-out part shows materially more than noise, and what it may be."""
     if not misses(error, material, error.after):
         return ()
-    why = excuse(error, material) or 'it may show what the fitting records do not'
+    found = excuse(error, material)
+    why = found.sentence() if found else 'it may show what the fitting records do not'
     return (
         f'the held-out part leaves {1e6 * error.after:.1f} um where '
         f'{1e6 * error.noise_floor:.1f} um are noise: {why}; add a record '

@@ -34,6 +34,21 @@ def _noise(found: DiagnosisData) -> str:
     return f'{text} ({", ".join(parts)})' if parts else text
 
 
+def _errors(found: DiagnosisData, named: bool) -> str:
+    """Say the held-out error; first the one that the verdict is of, where there are two."""
+    error = found.error
+
+    def change(before: float | None, after: float) -> str:
+        start = f'{1e6 * before:.1f} -> ' if named and before is not None else ''
+        return f'{start}{1e6 * after:.1f} um'
+
+    best = change(error.before, error.after)
+    other = excuse(error, found.alarm.threshold)
+    if other is None:
+        return best
+    return f'{change(other.before, other.after)} {other.how} ({best} {other.otherwise})'
+
+
 def headline(found: DiagnosisData) -> str:
     """Return the verdict in one line, never more than the held-out part bears out."""
     names = ', '.join(_named(e, found) for e in found.effects if e.noise is None)
@@ -42,13 +57,7 @@ def headline(found: DiagnosisData) -> str:
         when = f' since {found.onset.time:.1f} s of {source_name(found.onset.source)}'
         names += when if names else ''
         enough += f'{when}, where its parameters changed'
-    before, after = 1e6 * found.error.before, 1e6 * found.error.after
-    change = f'held-out error {before:.1f} -> {after:.1f} um' if names else (
-        f'held-out error {after:.1f} um'
-    )  # fmt: skip
-    change = f'{change}, {_noise(found)}'
-    if other := excuse(found.error, found.alarm.threshold):
-        change += f'; {other}'
+    change = f'held-out error {_errors(found, bool(names))}, {_noise(found)}'
     if found.verdict == 'undecided':
         asked = f'for {names}, the held-out part does not' if names else 'for nothing'
         return f'undecided: the fitting records ask {asked}; {change}'

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from actuator_glue.diagnosis.thresholds import Thresholds
 
@@ -51,16 +51,36 @@ def borne_out(error: HeldOutError, material: float) -> bool:
     return without is not None and excused(error, material) and misses(error, material, without)
 
 
-def excuse(error: HeldOutError, material: float) -> str:
-    """Say what accounts for all beyond noise, and what is left then; empty where nothing does."""
+class Excuse(NamedTuple):
+    """What accounts for all of a held-out error beyond noise.
+
+    Attributes:
+        before: error without the additions then [m]; None where that is not known.
+        after: error then [m].
+        how: what it is, for people.
+        otherwise: how the error is called that is beyond noise, for people.
+    """
+
+    before: float | None
+    after: float
+    how: str
+    otherwise: str
+
+    def sentence(self) -> str:
+        """Return it for people, without the error that is beyond noise."""
+        return f'{1e6 * self.after:.1f} um {self.how}'
+
+
+def excuse(error: HeldOutError, material: float) -> Excuse | None:
+    """Return what accounts for all beyond noise; None where nothing does."""
     if not excused(error, material):
-        return ''
+        return None
     if error.reached is not None and error.reached <= error.least:
-        found = f'{1e6 * error.reached:.1f} um with parameters as likely'
-        if error.reached_before is None:
-            return found
-        return f'{found}, {1e6 * error.reached_before:.1f} um with such of Eq. (2) alone'
-    return f"{1e6 * error.least:.1f} um without each record's own offset and drift"
+        how = 'with parameters as likely as the best'
+        otherwise = 'with the best: the fitting records leave them open'
+        return Excuse(error.reached_before, error.reached, how, otherwise)
+    how = "without each record's own offset and drift"
+    return Excuse(None, error.least, how, 'with them')
 
 
 def conclude(verdict: Verdict, moved: bool, error: HeldOutError, material: float) -> Verdict:

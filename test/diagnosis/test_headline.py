@@ -173,8 +173,12 @@ def test_what_the_parameters_leave_open_contradicts_nothing() -> None:
     error = replace(error, reached=11e-6)
     assert not misses(error, 5e-6)
     assert '11.0 um with parameters as likely' in contradicted(error, 5e-6)[0]
-    said = headline(replace(diagnosis('none', 15e-6, 15e-6), error=error))
-    assert said.endswith('noise 10.0 um; 11.0 um with parameters as likely')
+    verdict = conclude('none', False, error, 5e-6)
+    said = headline(replace(diagnosis('none', 15e-6, 15e-6), error=error, verdict=verdict))
+    assert said == (
+        'the model is enough: held-out error 11.0 um with parameters as likely as the best '
+        '(15.0 um with the best: the fitting records leave them open), noise 10.0 um'
+    )
     assert not contradicted(error, 12e-6)
 
 
@@ -188,8 +192,12 @@ def test_a_record_with_a_zero_of_its_own_contradicts_nothing() -> None:
     assert said.startswith('a.csv: 15.0 um are left, 10.0 um without')
     error = replace(error, after_without_zero=10.5e-6)
     assert not misses(error, 5e-6)
-    said = headline(replace(diagnosis('none', 15e-6, 15e-6), error=error))
-    assert said.endswith("noise 10.0 um; 10.5 um without each record's own offset and drift")
+    verdict = conclude('none', False, error, 5e-6)
+    said = headline(replace(diagnosis('none', 15e-6, 15e-6), error=error, verdict=verdict))
+    assert said == (
+        "the model is enough: held-out error 10.5 um without each record's own offset and drift "
+        '(15.0 um with them), noise 10.0 um'
+    )
     rows = error.to_json()['records']
     assert [row['after_without_zero'] for row in rows] == [10e-6, 15e-6]
 
@@ -232,8 +240,9 @@ def test_what_likely_parameters_leave_bears_additions_out(
     assert sure == pytest.approx(share)
     assert (told.error.to_json()['reached_before'], told.complete) == (without, sure > 0.0)
     if verdict == 'missing-effect':
+        start = '' if without is None else f'{1e6 * without:.1f} -> '
         assert told.summary() == (
-            'missing: backlash; held-out error 80.0 -> 90.0 um, noise 10.0 um; '
-            f'{1e6 * reached:.1f} um with parameters as likely, '
-            f'{1e6 * (without or 0.0):.1f} um with such of Eq. (2) alone'
+            f'missing: backlash; held-out error {start}{1e6 * reached:.1f} um with parameters as '
+            'likely as the best (80.0 -> 90.0 um with the best: the fitting records leave them '
+            'open), noise 10.0 um'
         )
