@@ -67,7 +67,9 @@ def values(
             case 'drift':
                 out['drift'] = sign * size / _MINUTE
             case 'specimen-hardening':
-                out['hardening'] = (sign * 0.2 if sign < 0 else 1.0) * size / stroke**2
+                # Beside what yields the spring that is left hardens.
+                spring = 1.0 - sizes.get('specimen-yield', 0.0)
+                out['hardening'] = spring * (sign * 0.2 if sign < 0 else 1.0) * size / stroke**2
             case 'pressure-flow':
                 out['inverse_stall_force'] = size / (250e3 * stroke)
             case 'sensor-quadratic':

@@ -133,6 +133,23 @@ def test_frames_agree(form: int, payload: bool, monkeypatch: pytest.MonkeyPatch)
         assert np.sqrt(np.mean((y - seen) ** 2)) < 0.1e-6
 
 
+def test_what_is_left_of_a_spring_hardens(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The catalogue's hardening is of the whole stiffness, the generator's of what is left."""
+    monkeypatch.syspath_prepend(str(BLIND))
+    equivalents, effects, plant = map(
+        import_module, ('equivalents', 'variant_effects', 'variant_plant')
+    )
+    sizes, x, stroke = {'specimen-yield': 0.3, 'specimen-hardening': 0.5}, 1.5e-3, 2e-3
+    forms = effects.Forms(1.0, 0, late=False, hertz=50.0, frame=(14.0, 0.02))
+    theta = np.array([128.0, 1.01e9, 2.42e5, 0.3])
+    spring = np.array(list(plant.NEUTRAL.values()))
+    for name, size in sizes.items():
+        effects._install(name, size, spring, theta, forms, stroke)
+    force, _ = plant._specimen(x, 0.0, 1.0, spring)
+    known = equivalents.values(sizes, theta, stroke)
+    assert force == pytest.approx(0.7 * x + known['hardening'] * x**3)
+
+
 def test_far_machines_are_those_of_their_seed(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of every scale, each moving by about its command, every third one healthy."""
     monkeypatch.syspath_prepend(str(BLIND))
