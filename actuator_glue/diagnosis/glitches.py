@@ -184,11 +184,13 @@ def shares(record: Record, mended: Record, theta: Array, initial: Initial) -> Tr
     return Traces(float(found[0]), float(error[0]), float(found[1]), float(error[1]))
 
 
-def _never_given(found: Traces) -> bool:
-    """Whether the response is not in the motion: surely, or as the reading has the impulses."""
-    moved = found.moved < _HALF
+def never_given(found: Traces) -> bool:
+    """Whether the response is not in the motion: surely, or as the reading has the impulses.
+
+    A share far below none is what the model lacks, and says nothing.
+    """
     sure = found.moved + _SURE * found.moved_error < _HALF
-    return sure or (moved and _in_both(found))
+    return abs(found.moved) < _HALF and (sure or _in_both(found))
 
 
 def _in_both(found: Traces) -> bool:
@@ -226,10 +228,10 @@ def mended(
     for i, (record, smooth) in enumerate(zip(records, clean, strict=True)):
         samples, sizes = found[i]
         told = shares(record, smooth, theta, initials[i]) if len(samples) else None
-        if told is None or not _never_given(told):
+        if told is None or not never_given(told):
             continue
         note = (
-            f'{where(record, i + 1)}: impulses in {len(samples)} samples of the command (up to '
+            f'{where(record, i + 1)}: impulses in the command, {len(samples)} samples (up to '
             f'{1e6 * float(np.abs(sizes).max()):.0f} um) did not move the piston (share of the '
             f'response {told.moved:.2f} +- {told.moved_error:.2f}): what the samples around them '
             'say stands in their place'

@@ -10,8 +10,9 @@ from actuator_glue.model.effects import Effect
 from actuator_glue.model.effects.terms.entry import term
 from actuator_glue.model.parameters import Parameter
 
-# Other shapes of a name of the catalogue.
+# Other shapes of a name of the catalogue; friction that falls with velocity stands for them, too.
 DRY: Final = 'coulomb-friction'
+FALLING: Final = 'stribeck-friction'
 SHAPES: Final = ('learned-force-friction', 'learned-force-presliding')
 # The way over which friction is reached, over the stroke.
 _WAYS: Final = (1e-4, 0.1)

@@ -13,8 +13,9 @@ import math
 from collections.abc import Callable, Sequence
 from functools import partial
 
+from actuator_glue.diagnosis import learned_first
 from actuator_glue.diagnosis.learned_forms import forms
-from actuator_glue.diagnosis.learned_friction import DRY, SHAPES
+from actuator_glue.diagnosis.learned_friction import DRY, FALLING, SHAPES
 from actuator_glue.diagnosis.learned_term import is_learned
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.ranking import MUCH, decisive, least_removed, removed
@@ -123,7 +124,8 @@ def reshaped(selection: ModelSelection, found: Selection) -> Selection | None:
     """
     search, named = selection.search, found.final
     # The name itself, or one that is told as well as it.
-    told = [n for n, row in found.rivals.items() if any(r.tied and r.name == DRY for r in row)]
+    dry = {DRY, FALLING}
+    told = [n for n, row in found.rivals.items() if any(r.tied and r.name in dry for r in row)]
     if not told:
         return None
     _offered(search)
@@ -192,8 +194,13 @@ def _additions(
             least = selection.material
             if start is not best:
                 # In the place of names it must explain the rest, and be more than tied with them:
-                # while something remains a name is worth more than a description.
+                # while something remains a name is worth more than a description. One that says
+                # more than all of them is where to begin.
                 whole = selection.left(trial) < selection.material
+                if not whole and _gain(search, trial, best) > cost:
+                    begun = learned_first.with_names(selection, trial)
+                    if begun is not None and selection.better(begun, best, least, cost):
+                        worth.append(begun)
                 if not whole or not selection.better(trial, start, least, cost):
                     continue
                 tied = selection.settings.tie_share * removed(start, trial)

@@ -122,6 +122,12 @@ class ModelSelection:
         """Return the effects that promise most beside the present ones."""
         return self.search.screened(current, names, beside=True)[: self.settings.tried]
 
+    def next_worth(self, current: Trial) -> Trial | None:
+        """Return a structure with one more name of those that promise most; None without worth."""
+        names = self.promising(current, self.search.others(current))
+        ranked = self.search.additions(current, names, valves=False)
+        return self._first_worth(ranked, current, self.material)
+
     def run(self) -> Selection:
         """Add effects while each is worth it, then check each against its rivals."""
         s = self.settings

@@ -53,6 +53,25 @@ def test_what_was_only_recorded_is_taken_out(both: bool, rng_seed: int) -> None:
     assert np.sum((out.measured - record.measured) ** 2) < most
 
 
+@pytest.mark.parametrize(
+    ('moved', 'error', 'read', 'never'),
+    [
+        (0.02, 0.1, 0.0, True),
+        (0.3, 0.5, 1.0, True),
+        (0.3, 0.5, 0.0, False),
+        (1.0, 0.1, 0.0, False),
+        # What the model lacks, not a share of anything: a machine that drifts.
+        (-425.0, 65.0, 0.0, False),
+        (-425.0, 65.0, 1.0, False),
+    ],
+)
+def test_a_share_is_one_of_a_response(
+    moved: float, error: float, read: float, never: bool
+) -> None:
+    """None of it is in the motion: surely, or as the reading has the impulses."""
+    assert glitches.never_given(glitches.Traces(moved, error, read, 0.05)) is never
+
+
 def test_what_was_commanded_stays(rng_seed: int) -> None:
     """The piston answers impulses that it was given: the very same record."""
     rng = np.random.default_rng(rng_seed)

@@ -26,14 +26,15 @@ def held_out(found: Selection, kind: int) -> float:
 
 
 @pytest.mark.parametrize(
-    ('kind', 'form', 'where', 'share'),
+    ('kind', 'form', 'where', 'share', 'names'),
     [
-        pytest.param(11, 'learned-force-friction', 1e-3, 0.4, id='velocity'),
-        pytest.param(14, 'learned-force-presliding', 5e-6, 0.6, id='way'),
+        pytest.param(11, 'learned-force-friction', 1e-3, 0.4, NAMES, id='velocity'),
+        pytest.param(14, 'learned-force-presliding', 5e-6, 0.6, NAMES, id='way'),
+        pytest.param(11, 'learned-force-friction', 1e-3, 0.4, NAMES[1:], id='told-as-falling'),
     ],
 )
 def test_friction_that_is_reached_late_has_its_shape(
-    kind: int, form: str, where: float, share: float
+    kind: int, form: str, where: float, share: float, names: tuple[str, ...]
 ) -> None:
     """As Coulomb friction it leaves less than what matters here, and more on slow motion.
 
@@ -43,7 +44,7 @@ def test_friction_that_is_reached_late_has_its_shape(
     """
     u = sweep(2e-3, 8.0, 32.0)
     machine = [(k, u, piston(u, 1.0 / RATE, THETA, k, (kind, FRICTION))) for k in (0.0, 250e3)]
-    selection, found = selected_of(NAMES, machine)
+    selection, found = selected_of(names, machine)
     assert found.left < found.material
     shaped = learning.reshaped(selection, found)
     assert shaped is not None
