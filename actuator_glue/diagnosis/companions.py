@@ -21,7 +21,7 @@ from actuator_glue.diagnosis.trial import Trial
 
 _MOST = 2
 # Of what matters: less is made by the steps of simulations, too, beyond chance on long records.
-_SEEN = 0.2
+SEEN = 0.2
 _ALONE = 0.9  # weight among what was tried that is told from the others
 
 
@@ -37,7 +37,7 @@ def with_companions(selection: ModelSelection, final: Trial, least: float | None
     if final.own is not None:
         return final
     current = final
-    least = _SEEN * selection.material if least is None else least
+    least = SEEN * selection.material if least is None else least
     for _ in range(_MOST):
         others = [n for n in search.others(current) if not _of_one_kind(search, n, final)]
         ranked = search.screened(current, others)[: settings.tried]

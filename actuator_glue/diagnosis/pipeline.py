@@ -12,6 +12,7 @@ from actuator_glue.diagnosis import (
     chance,
     cleaned,
     companions,
+    exchange,
     force_ranking,
     hum,
     learning,
@@ -255,11 +256,17 @@ def with_learned_terms(result: Conclusion) -> Conclusion:
 
 
 def with_what_matters(result: Conclusion) -> Conclusion:
-    """Add what removes as much as an addition must though the rest seemed to be noise."""
-    if result.decision.verdict != 'missing-effect':
-        return result
-    found = companions.that_matter(result.selection, result.found)
-    return _complete(result, result.selection, found) or result
+    """Ask for what seemed to be noise beside names that are enough.
+
+    What removes as much as an addition must is added; two names take the place of one where that
+    says surely more.
+    """
+    for ask in (companions.that_matter, exchange.exchanged):
+        if result.decision.verdict != 'missing-effect':
+            return result
+        found = ask(result.selection, result.found)
+        result = _complete(result, result.selection, found) or result
+    return result
 
 
 def _conclusion(
