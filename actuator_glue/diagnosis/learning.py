@@ -120,7 +120,7 @@ def reshaped(selection: ModelSelection, found: Selection) -> Selection | None:
 
     Args:
         selection: the model selection that ended with `found`; its noise stays.
-        found: names that leave nothing material.
+        found: names.
     """
     search, named = selection.search, found.final
     # The name itself, or one that is told as well as it.
@@ -137,6 +137,8 @@ def reshaped(selection: ModelSelection, found: Selection) -> Selection | None:
     for starts, share in ((in_place, _SHAPED), ([named], MUCH)):
         seen = max(share * selection.material, _STEPS * search.scale().stroke)
         below = best.mean_square - 0.5 * seen**2  # or nearly
+        if found.left >= selection.material:
+            below = math.inf  # where names are far off so are rough refits of shapes
         trials = [t for s in starts for t in search.additions(s, SHAPES, below=below)]
         worth = [t for t in trials if removed(best, t) > seen]
         better = max(worth, key=lambda t: _gain(search, t, best), default=best)

@@ -239,13 +239,16 @@ def _wider(search: Search, names: Sequence[str]) -> Search:
 def with_learned_terms(result: Conclusion) -> Conclusion:
     """Describe by learned terms material structure that the catalogue leaves, or names badly.
 
-    Where no term is worth it either, two effects may hide each other.
+    Another shape of a cause that was named comes before further terms. Where no term is worth it
+    either, two effects may hide each other.
     """
     decision, found = result.decision, result.found
     left = decision.verdict == 'unexplained' or decision.left >= found.material
     if not left or found.final.own is not None:
         return result
-    described = learning.learned(result.selection, found)
+    described = learning.reshaped(result.selection, found)
+    if described is None or described.left >= described.material:
+        described = learning.learned(result.selection, described or found) or described
     if described is not None:
         learned = _conclusion(result.prepared, result.selection, described, result.line)
         return replace(learned, appeared=result.appeared)
