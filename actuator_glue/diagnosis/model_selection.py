@@ -232,7 +232,8 @@ class ModelSelection:
     def _ahead(self, trial: Trial, best: Trial, complete: bool) -> bool:
         """Whether a structure is better: by nats, which are those of noise.
 
-        One with more parameters must be beyond a tie, or the simpler one takes its place back.
+        One with more parameters must be beyond a tie, or the simpler one takes its place back. What
+        leaves material structure, and materially more, takes no place of what leaves none.
         Where more remains than noise nats are of misfit, at the frequencies with the least of it:
         the smaller error on blocks left out is better then, unless the blocks exclude it though
         all that remains counts as noise.
@@ -241,7 +242,9 @@ class ModelSelection:
             richer = len(trial.fit.theta) > len(best.fit.theta)
             if richer and evidence(trial.scores, best.scores) < self.settings.tie_nats:
                 return False
-            return bool(trial.scores.sum() > best.scores.sum())
+            if trial.scores.sum() <= best.scores.sum():
+                return False
+            return removed(trial, best) < self.material or self.left(trial) < self.material
         scorer = self.search.with_misfit(best)
         gain = scorer.block_scores(trial.fit) - scorer.block_scores(best.fit)
         excluded = gain.sum() < -_SURE * standard_error(gain)

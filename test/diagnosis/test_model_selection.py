@@ -161,6 +161,20 @@ def test_less_noise_at_high_frequencies_is_no_better_motion() -> None:
     assert not found._ahead(smaller, larger, complete=False)  # the blocks exclude it
 
 
+@pytest.mark.parametrize(('size', 'ahead'), [(2e-6, True), (2e-5, False)])
+def test_what_leaves_structure_takes_no_place_of_what_leaves_none(
+    size: float, ahead: bool
+) -> None:
+    """A hundred nats of noise, beside slow structure that matters or does not."""
+    found = selection(stationary((), [], 3))
+    base, noise = found.search.trial(()), found.search.base().error
+    at = np.arange(len(noise)) / RATE
+    slow = np.sin(2 * np.pi * 0.3 * at) * np.sin(np.pi * at / 80) ** 2
+    left = noise + size / slow.std() * slow
+    other = replace(base, fit=replace(base.fit, error=left), scores=base.scores + 10.0)
+    assert found._ahead(other, base, complete=True) is ahead
+
+
 def test_all_that_remains_may_count_as_noise() -> None:
     """Play of 40 um under a stationary command: what is left has unit variance then."""
     found = selection(stationary(('backlash',), [4e-5], 4))
