@@ -232,8 +232,8 @@ class ModelSelection:
     def _ahead(self, trial: Trial, best: Trial, complete: bool) -> bool:
         """Whether a structure is better: by nats, which are those of noise.
 
-        One with more parameters must be beyond a tie, or the simpler one takes its place back. What
-        leaves material structure, and materially more, takes no place of what leaves none.
+        One with more parameters must be beyond a tie, or the simpler one takes its place back.
+        What leaves material structure, and materially more, takes no place of what leaves none.
         Where more remains than noise nats are of misfit, at the frequencies with the least of it:
         the smaller error on blocks left out is better then, unless the blocks exclude it though
         all that remains counts as noise.

@@ -162,9 +162,7 @@ def test_less_noise_at_high_frequencies_is_no_better_motion() -> None:
 
 
 @pytest.mark.parametrize(('size', 'ahead'), [(2e-6, True), (2e-5, False)])
-def test_what_leaves_structure_takes_no_place_of_what_leaves_none(
-    size: float, ahead: bool
-) -> None:
+def test_what_leaves_structure_takes_no_place_of_a_whole(size: float, ahead: bool) -> None:
     """A hundred nats of noise, beside slow structure that matters or does not."""
     found = selection(stationary((), [], 3))
     base, noise = found.search.trial(()), found.search.base().error
