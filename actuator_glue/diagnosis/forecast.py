@@ -208,7 +208,9 @@ def _weights(products: Array, count: float, own: int, lags: Array) -> Array:
         own: how many of the rows are free: the structure's own.
         lags: of the last rows; those between are features of the present motion, (l,) [s].
     """
-    firm = products[:own, :own] + 1e-9 * np.trace(products[:own, :own]) / own * np.eye(own)
+    # Where a structure does not move at all none of its parameters takes anything up.
+    least = 1e-9 * np.trace(products[:own, :own]) / own or 1.0
+    firm = products[:own, :own] + least * np.eye(own)
     given = scipy.linalg.cho_factor(firm)
     free = products[own:, own:] - products[own:, :own] @ scipy.linalg.cho_solve(
         given, products[:own, own:]

@@ -92,3 +92,13 @@ def test_a_forecast_does_not_see_what_it_forecasts(rng_seed: int) -> None:
         for e in (base.error, error)
     )
     assert np.std((after - before)[block] - added) < 0.01 * added.std()
+
+
+def test_a_structure_that_does_not_move_takes_nothing_up(rng_seed: int) -> None:
+    """A flow limit next to zero, say: no parameter moves the piston, and that is no error."""
+    found = selected((), [], np.random.default_rng(rng_seed))
+    base, data, scorer = found.search.base(), found.search.data, found.search.scorer
+    assert scorer is not None
+    still = replace(base, slopes=np.zeros_like(base.slopes))
+    scores, left = forecast.left_out(data, scorer, base.theta, still)
+    assert np.isfinite(scores).all() and np.isfinite(left).all()
