@@ -13,6 +13,7 @@ from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 
 _STARTS = 4  # starting sizes that survive the screening (the kernel works on 32 at a time)
+_FINITE = 1e6  # m: what goes beyond has diverged
 
 
 def signatures(data: Data, model: Model, thetas: Array, base: Array) -> Array:
@@ -40,7 +41,8 @@ def screen(
     """
     neutral = np.array([p.neutral if p.neutral is not None else 0.0 for p in parameters])
     lower, upper = np.array([p.lower for p in parameters]), np.array([p.upper for p in parameters])
-    alive = np.asarray(np.isfinite(seen).all(axis=1))
+    # What is finite may overflow in products.
+    alive = np.asarray((np.abs(seen) < _FINITE).all(axis=1))
     seen = np.where(alive[:, None], seen, 0.0)
     scales = np.sqrt(np.einsum('pn,pn->p', jacobian, jacobian))
     jac = jacobian[scales > 0] / scales[scales > 0, None]

@@ -281,16 +281,12 @@ def test_the_same_seed_gives_the_same_diagnosis() -> None:
 
 @pytest.mark.slow
 def test_what_the_catalogue_lacks_is_unexplained() -> None:
-    """A reading that freezes at random has no name."""
-    a, b, held = make([], [], 14)
-    rng = np.random.default_rng(15)
-    broken = []
-    for record in (a, b):
-        y = np.array(record.measured)
-        for at in rng.integers(0, len(y) - 20, 40):
-            y[at : at + 12] = y[at]
-        broken.append(Record(record.command, y, 1 / RATE, stiffness=record.stiffness))
-    found = diagnose(broken, held, settings=QUICK)
+    """A reading whose gain wobbles, out of step from record to record, has no name."""
+    rng, wobbling = np.random.default_rng(15), []
+    for record in make([], [], 14):
+        gain = 1.0 + 0.03 * np.sin(0.6 * np.pi * record.time + rng.uniform(0.0, 6.0))
+        wobbling.append(replace(record, measured=gain * record.measured))
+    found = diagnose(wobbling[:2], wobbling[2], settings=QUICK)
     assert found.verdict == 'unexplained'
     assert found.effects == ()
     assert found.remaining['left'] > found.remaining['limit']
