@@ -7,6 +7,8 @@ from others, stays what it is: one of many that may be there (discrepancy.py).
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from actuator_glue.diagnosis.data import Data
@@ -33,22 +35,37 @@ def with_companions(selection: ModelSelection, final: Trial, least: float | None
         final: a structure that leaves nothing material.
         least: error that each of them removes [m]; a fifth of what matters if not given.
     """
-    search, settings = selection.search, selection.settings
+    search = selection.search
     if final.own is not None:
         return final
     current = final
     least = SEEN * selection.material if least is None else least
     for _ in range(_MOST):
         others = [n for n in search.others(current) if not _of_one_kind(search, n, final)]
-        ranked = search.screened(current, others)[: settings.tried]
-        below = current.mean_square - least**2
-        trials = search.additions(current, ranked, valves=False, below=below)
+        trials = beside(selection, current, others, least)
         if not trials or not selection.better(trials[0], current, least):
             break
         if weights(np.stack([t.scores for t in trials]))[0] < _ALONE:
             break
         current = trials[0]
     return current
+
+
+def beside(
+    selection: ModelSelection, current: Trial, names: Sequence[str], least: float
+) -> list[Trial]:
+    """Refit a structure with the effects that promise most; best out-of-sample score first.
+
+    Args:
+        selection: what chose the structure.
+        current: the structure.
+        names: of effects.
+        least: error that one of them must remove [m]: what leaves more is refitted roughly.
+    """
+    search = selection.search
+    ranked = search.screened(current, names)[: selection.settings.tried]
+    below = current.mean_square - least**2
+    return search.additions(current, ranked, valves=False, below=below)
 
 
 def that_matter(selection: ModelSelection, found: Selection) -> Selection | None:

@@ -9,7 +9,7 @@ many parameters and more evidence. Names of more than one parameter have pairs a
 
 from __future__ import annotations
 
-from actuator_glue.diagnosis.companions import SEEN
+from actuator_glue.diagnosis.companions import SEEN, beside
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.pairs import price
 from actuator_glue.diagnosis.score import evidence
@@ -24,46 +24,44 @@ def exchanged(selection: ModelSelection, found: Selection) -> Selection | None:
         selection: the model selection that ended with `found`; its noise stays.
         found: what leaves nothing material.
     """
-    beside = _beside(selection, found.final)
-    if beside is None:
+    with_more = _with_more(selection, found.final)
+    if with_more is None:
         return None
-    best = beside
+    best = with_more
     for name in found.final.effects:
         if len(selection.search.entries[name].parameters) == 1:
-            best = _better(selection, beside, name, best)
-    if best is beside:
+            best = _better(selection, with_more, name, best)
+    if best is with_more:
         return None
     return selection.concluded(best, selection.search.trial(()), found.singles)
 
 
-def _beside(selection: ModelSelection, final: Trial) -> Trial | None:
+def _with_more(selection: ModelSelection, final: Trial) -> Trial | None:
     """Return a structure with what is there beyond chance beside it; None without."""
     if final.own is not None or not final.effects:
         return None
-    search, seen = selection.search, SEEN * selection.material
-    names = search.screened(final, search.others(final))[: selection.settings.tried]
-    below = final.mean_square - seen**2
-    trials = search.additions(final, names, valves=False, below=below)
+    seen = SEEN * selection.material
+    trials = beside(selection, final, selection.search.others(final), seen)
     return next((t for t in trials if selection.better(t, final, seen)), None)
 
 
-def _better(selection: ModelSelection, beside: Trial, name: str, best: Trial) -> Trial:
+def _better(selection: ModelSelection, with_more: Trial, name: str, best: Trial) -> Trial:
     """Return a structure with another name in the place of one, where that says surely more.
 
     Args:
         selection: what judges.
-        beside: the structure with the name and what is there beside it.
+        with_more: the structure with the name and what is there beside it.
         name: of which another may take the place.
         best: of those found so far.
     """
     search = selection.search
-    rest = search.without(beside, name)
-    names = search.screened(rest, search.others(beside))[: selection.settings.tried]
+    rest = search.without(with_more, name)
+    names = search.screened(rest, search.others(with_more))[: selection.settings.tried]
     least = selection.nats + price(len(search.names))
-    for trial in search.additions(rest, names, below=beside.mean_square):
-        if len(trial.fit.theta) > len(beside.fit.theta):
+    for trial in search.additions(rest, names, below=with_more.mean_square):
+        if len(trial.fit.theta) > len(with_more.fit.theta):
             continue
-        ahead = evidence(trial.scores, beside.scores) > least
+        ahead = evidence(trial.scores, with_more.scores) > least
         ahead = ahead and evidence(trial.scores, best.scores) > 0.0
         enough = ahead and selection.left(trial) < selection.material
         # Each of the two must matter beside the other.
