@@ -91,8 +91,9 @@ COMMANDS: dict[str, tuple[str, Callable[[Array], Array]]] = {
 def test_what_acts_on_the_command_knows_its_rate(name: str) -> None:
     """Of all forms at the command the right one leaves least, and next to noise.
 
-    Some four standard deviations of the noise's own rms are allowed, and what the distance of the
-    samples makes of a rate: 1.7 % of the noise at most.
+    Four standard deviations of the noise's own rms are allowed (3.6 %), and what the distance of
+    the samples makes of a rate (1.7 %). Of 460 machines with the delay, which shows least, the
+    right form left 0.97 to 1.047 of the noise, and Eq. (2) 1.091 to 1.36 of what that form left.
     """
     wanted, told = COMMANDS[name]
     rng = np.random.default_rng()
@@ -104,10 +105,10 @@ def test_what_acts_on_the_command_knows_its_rate(name: str) -> None:
         measured = Structure(()).simulate(theta, inside) + NOISE * rng.standard_normal(len(t))
         records.append(Record(_swept(t), measured, 1.0 / RATE, stiffness=k))
     base, best = refitted(records, 'command')
-    assert base > 1.1 * NOISE
     least = min(best, key=lambda trial: trial.fit.rms)
     assert least.added == wanted
-    assert least.fit.rms < 1.05 * NOISE
+    assert least.fit.rms < 1.07 * NOISE
+    assert base > 1.04 * least.fit.rms
 
 
 @pytest.mark.parametrize('stroke', [2e-5, 5e-2])
