@@ -13,11 +13,12 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from actuator_glue.diagnosis import repeated
 from actuator_glue.diagnosis.data import Data, Mask
-from actuator_glue.records import Array
+from actuator_glue.records import Array, Record
 
 _CLEAR = 18.0  # times what a tenth of its neighbours exceed, 40 times the mean of noise:
-# one in 10^6 records of that. Half of them lie between the lines of a sweep that is repeated.
+# one in 10^6 records of that.
 _NEIGHBOURS, _EXCEEDED = 201, 90.0  # bins, percentile
 _LOWEST = 2.0  # Hz
 _PIECE = 1 << 20  # samples
@@ -91,19 +92,33 @@ def _fitted(pieces: Iterable[tuple[Array, Array]], frequency: float) -> Array:
     return np.asarray(np.linalg.solve(normal, along))
 
 
-def _peaks(error: Array, mask: Mask, period: float) -> tuple[Array, Array]:
+def _peaks(error: Array, mask: Mask, record: Record) -> tuple[Array, Array]:
     """Frequencies and power over what few neighbours exceed, zero outside the usable band.
 
     The counted samples (N,) stand at their own times among the others, which are zero: spliced
-    together, a line would change its phase at every seam.
+    together, a line would change its phase at every seam. A command that is repeated moves the
+    piston in lines, one in so many bins: each bin must stand out from those at its place between
+    two of them, too.
     """
     values = np.zeros(len(mask))
     values[mask] = scipy.signal.detrend(error)
+    once = repeated.period(record.command)
+    times = len(values) // once
+    values = values[: times * once]
     spectrum = np.abs(np.fft.rfft(values * np.hanning(len(values)))) ** 2
-    level = scipy.ndimage.percentile_filter(spectrum, _EXCEEDED, _NEIGHBOURS, mode='reflect')
-    f = np.fft.rfftfreq(len(values), period)
-    inside = (f > _LOWEST) & (f < 0.48 / period)
+    level = _level(spectrum)
+    for place in range(times if times > 1 else 0):
+        level[place::times] = np.maximum(level[place::times], _level(spectrum[place::times]))
+    f = np.fft.rfftfreq(len(values), record.period)
+    inside = (f > _LOWEST) & (f < 0.48 / record.period)
     return np.asarray(f), np.asarray(np.where(inside, spectrum / (level + 1e-300), 0.0))
+
+
+def _level(spectrum: Array) -> Array:
+    """What a tenth of the neighbours of each bin exceed."""
+    return np.asarray(
+        scipy.ndimage.percentile_filter(spectrum, _EXCEEDED, _NEIGHBOURS, mode='reflect')
+    )
 
 
 def _of_command(frequency: Array, command: Array, period: float) -> NDArray[np.bool_]:
@@ -147,10 +162,9 @@ def find(data: Data, errors: Array) -> Line | None:
     """
     best = (0.0, 0.0)
     parts = data.split(errors)
-    rows = zip(data.records, data.masks, parts, data.periods, strict=True)
-    for record, mask, error, period in rows:
-        f, ratio = _peaks(error, mask, period)
-        ratio[_of_command(f, record.command, period)] = 0.0
+    for record, mask, error in zip(data.records, data.masks, parts, strict=True):
+        f, ratio = _peaks(error, mask, record)
+        ratio[_of_command(f, record.command, record.period)] = 0.0
         at = int(np.argmax(ratio))
         if ratio[at] > best[0]:
             best = (float(ratio[at]), float(f[at]))

@@ -46,14 +46,21 @@ def test_noise_has_no_line(seed: int) -> None:
 
 
 @pytest.mark.parametrize('amplitude', [0.0, 10e-6])
+@pytest.mark.parametrize('first', [0.6, 1.0])
 @pytest.mark.parametrize('effect', ['coulomb-friction', 'backlash'])
-def test_repeated_sweeps_have_no_hum_of_their_own(effect: str, amplitude: float) -> None:
-    """Their response has lines, as many as sweeps fit into a second; hum is one."""
+def test_repeated_sweeps_have_no_hum_of_their_own(
+    effect: str, first: float, amplitude: float
+) -> None:
+    """Their response has lines, as many as sweeps fit into a second; hum is one.
+
+    Sweeps that grow, or all alike: then one of the friction's lines stood out from what a tenth of
+    all bins exceed by 33 times (hum by 18); from the other lines none does by 4.
+    """
     t = np.arange(int(6 * RATE)) / RATE
     sweep = 2e-3 * np.sin(np.pi * (8.0 / 6.0) * t**2)
-    command = np.concatenate([scale * sweep for scale in np.linspace(0.6, 1.0, 20)])
+    command = np.concatenate([scale * sweep for scale in np.linspace(first, 1.0, 20)])
     structure = Structure((effect,))
-    theta = np.array([*THETA, 500.0 if effect == 'coulomb-friction' else 2e-4])
+    theta = np.array([*THETA, 600.0 if effect == 'coulomb-friction' else 2e-4])
     bare = Record(command, np.zeros(len(command)), 1 / RATE, stiffness=250e3)
     line = amplitude * np.sin(2 * np.pi * 50.03 * bare.time + 1.0)
     noise = 1e-6 * np.random.default_rng(3).standard_normal(len(bare))
