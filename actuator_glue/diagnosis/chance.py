@@ -32,7 +32,9 @@ _APART = 1e-3  # relative: less than records tell of parameters
 _AROUND = 1.0  # s
 _SMALL = 0.2  # of what is material: with all of it single jumps beside a calm second still count
 _SEED = 0
-_HOLDS = 0.25  # of the squared error at most is left by friction that holds the piston
+# Of the squared error at most is left by friction that holds the piston, and by friction that does
+# not fall with velocity where one that does may hold it.
+_HOLDS, _SIMPLE = 0.25, 0.5
 _ROUNDS = 3
 _ITERATIONS, _TOLERANCE = 25, 1e-5
 # s of each record that count still; with fewer, all stay as they are.
@@ -83,10 +85,11 @@ def without(
     for rich in (e for e in entries if e.holds and e.name in search.names):
         search.scorer = Scorer.of(search.data, splits_of(search.data, search.base().error))
         base = search.trial(())
-        simple = search.polish(search.add(base, rich.holds[0] if rich.holds else ''))
+        name = rich.holds[0] if rich.holds else ''
+        simple = search.polish(search.add(base, name, search.each))
         left, noise = pooled(search.data, splits_of(search.data, simple.fit.error))
         size = max(settings.noise_share * noise, settings.stroke_share * search.scale().stroke)
-        if simple.mean_square > _HOLDS * base.mean_square or left < size:
+        if simple.mean_square > _SIMPLE * base.mean_square or left < size:
             continue
         found = _found(search, simple, rich.name, size, fixed)
         if found is None:
@@ -117,16 +120,18 @@ def _found(
     lost = tuple(np.zeros_like(m) for m in data.masks)
     for _ in range(1 if fixed else _ROUNDS):
         if not fixed:
-            before, lost = lost, undetermined(data, model, found.theta, _SMALL * size)
-            if all(np.array_equal(a, b) for a, b in zip(before, lost, strict=True)):
+            now = undetermined(data, model, found.theta, _SMALL * size)
+            if not any((new & ~old).any() for new, old in zip(now, lost, strict=True)):
                 break
+            lost = now
         some = _counted(data, lost)
         if _least(some) < _FITTED:
             return None
         again = fit(some, model, found.theta, iterations=1)
-        found = global_search.refit(some, model, again, _ITERATIONS, _TOLERANCE)
+        found = global_search.refit(some, model, again, _ITERATIONS, _TOLERANCE, search.each)
     determined = np.concatenate([~b[m] for m, b in zip(data.masks, lost, strict=True)])
-    better = rms(simple.fit.error[determined]) ** 2 - found.rms**2 > size**2
+    without, roughly = (rms(t.fit.error[determined]) for t in (search.trial(()), simple))
+    better = roughly**2 - found.rms**2 > size**2 and found.rms**2 <= _HOLDS * without**2
     return (lost, found) if better and (fixed or not determined.all()) else None
 
 

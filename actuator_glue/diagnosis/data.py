@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from actuator_glue.diagnosis.base_prior import BasePrior
 from actuator_glue.diagnosis.decimate import decimated
+from actuator_glue.diagnosis.each import Each
 from actuator_glue.diagnosis.free_run import Model, ObservedChannel, parts
 from actuator_glue.model.effects.run import sample_steps
 from actuator_glue.model.exact import Initial
@@ -152,26 +153,40 @@ class Data:
             )
         return tuple(out)
 
-    def simulate(self, model: Model, theta: Array) -> Array:
+    def simulate(self, model: Model, theta: Array, each: Each = map) -> Array:
         """Simulate all records free-run and return the counted samples (m, N) [m].
+
+        Args:
+            model: what simulates them.
+            theta: parameters, (m, p).
+            each: simulates the records, several at a time if it can.
+        """
+        table = np.atleast_2d(theta)
+        out = np.empty((len(table), self.target.size))
+        tests = self._repeats if isinstance(model, Structure) else self._singles
+        for _ in each(lambda same: self._simulate(model, table, same, out), tests):
+            pass
+        return out
+
+    def _simulate(self, model: Model, table: Array, same: list[int], out: Array) -> None:
+        """Simulate records that one motion answers into their columns of `out` (m, N).
 
         Few parameter sets at a time, for what is not simulated part by part: beyond some 20 MB
         the memory of a simulation goes back to the system each time, and asking for it anew costs
         time; but no fewer than the kernels work on at once.
         """
-        table = np.atleast_2d(theta)
-        out = np.empty((len(table), self.target.size))
-        for same in self._repeats if isinstance(model, Structure) else self._singles:
-            i = same[0]
-            (record, count), initial = self._runs_as(model, i), self.initials[i]
-            origin = self.origins[i]
-            for some in chunks(len(table), len(record), LANES):
-                part = out[some]
-                for which, at, y in parts(model, table[some], record, initial, origin, count):
-                    for j in same:
-                        for run, to in self._overlaps(j, at, at + len(y)):
-                            part[which, to] = y[run].T
-        return out
+        i = same[0]
+        (record, count), initial, origin = (
+            self._runs_as(model, i),
+            self.initials[i],
+            self.origins[i],
+        )
+        for some in chunks(len(table), len(record), LANES):
+            part = out[some]
+            for which, at, y in parts(model, table[some], record, initial, origin, count):
+                for j in same:
+                    for run, to in self._overlaps(j, at, at + len(y)):
+                        part[which, to] = y[run].T
 
     def _overlaps(self, i: int, begin: int, end: int) -> Iterator[tuple[slice, slice]]:
         """Yield where counted samples of a record's stretch lie in it, and in joined vectors."""

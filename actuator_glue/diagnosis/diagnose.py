@@ -26,6 +26,7 @@ from actuator_glue.diagnosis import (
 )
 from actuator_glue.diagnosis.base_prior import BasePrior
 from actuator_glue.diagnosis.detect import alarm_of
+from actuator_glue.diagnosis.each import Each
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.force import check_forces
 from actuator_glue.diagnosis.hold import with_the_right_hold
@@ -40,7 +41,6 @@ from actuator_glue.diagnosis.pipeline import (
 )
 from actuator_glue.diagnosis.preparation import prepare, rest_samples
 from actuator_glue.diagnosis.result import DiagnosisData
-from actuator_glue.diagnosis.search import Each
 from actuator_glue.diagnosis.space import UPPER, Space
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial

@@ -18,6 +18,7 @@ import numpy as np
 import scipy
 
 from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.each import Each
 from actuator_glue.diagnosis.fit import Fit, base_starts, fit
 from actuator_glue.diagnosis.free_run import Model
 from actuator_glue.diagnosis.space import Space, sum_of_squares
@@ -109,7 +110,14 @@ def along_ridge(data: Data, model: Structure, theta: Array) -> Array:
     return fit(data, model, theta, iterations=_STRAIGHT, space=space).theta
 
 
-def refit(data: Data, model: Structure, found: Fit, iterations: int, tolerance: float) -> Fit:
+def refit(
+    data: Data,
+    model: Structure,
+    found: Fit,
+    iterations: int,
+    tolerance: float,
+    each: Each = map,
+) -> Fit:
     """Refit a structure from the best of a population around `found` and typical machines.
 
     Args:
@@ -118,6 +126,7 @@ def refit(data: Data, model: Structure, found: Fit, iterations: int, tolerance: 
         found: its refit so far, one of the population.
         iterations: most Marquardt steps from the best of the population.
         tolerance: as in `fit`.
+        each: simulates the records, several at a time if it can.
 
     Returns:
         The better of `found` and what the population led to.
@@ -128,7 +137,7 @@ def refit(data: Data, model: Structure, found: Fit, iterations: int, tolerance: 
     members = space.z(np.concatenate([found.theta[np.newaxis], *typical]))
 
     def cost(z: Array, /) -> Array:
-        return sum_of_squares(data.target - data.simulate(model, space.theta(z.T)))
+        return sum_of_squares(data.target - data.simulate(model, space.theta(z.T), each))
 
     first = members[np.argsort(cost(members.T), kind='stable')[:_POPULATION]]
     best = scipy.optimize.differential_evolution(

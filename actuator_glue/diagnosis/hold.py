@@ -9,6 +9,7 @@ import numpy as np
 from actuator_glue.diagnosis import hum
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.decimate import decimated
+from actuator_glue.diagnosis.each import Each
 from actuator_glue.diagnosis.fit import Fit, fit
 from actuator_glue.diagnosis.pipeline import (
     Conclusion,
@@ -18,7 +19,7 @@ from actuator_glue.diagnosis.pipeline import (
 )
 from actuator_glue.diagnosis.preparation import Prepared
 from actuator_glue.diagnosis.score import evidence
-from actuator_glue.diagnosis.search import Each, Search
+from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.thresholds import Thresholds
 
 

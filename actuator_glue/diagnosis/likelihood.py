@@ -14,12 +14,12 @@ import numpy as np
 
 from actuator_glue.diagnosis.data import LANES, Data, chunks
 from actuator_glue.diagnosis.discrepancy import Discrepancy, ScaleMixture
+from actuator_glue.diagnosis.each import Each
 from actuator_glue.diagnosis.fit import Fit
 from actuator_glue.diagnosis.fit import fit as fit_to
 from actuator_glue.diagnosis.free_run import Model
 from actuator_glue.diagnosis.identifiable import Straight, Working, derivatives
 from actuator_glue.diagnosis.score import Scorer
-from actuator_glue.diagnosis.search import Each
 from actuator_glue.diagnosis.space import Space
 from actuator_glue.records import Array
 
@@ -65,9 +65,9 @@ class Whitened(Data):
         pairs = zip(self.records, self.masks, strict=True)
         return self.scorer.whiten(np.concatenate([r.measured[mask] for r, mask in pairs]))
 
-    def simulate(self, model: Model, theta: Array) -> Array:
+    def simulate(self, model: Model, theta: Array, each: Each = map) -> Array:
         """As `Data.simulate`, whitened."""
-        return self.scorer.whiten(super().simulate(model, theta))
+        return self.scorer.whiten(super().simulate(model, theta, each))
 
 
 def most_likely(data: Data, model: Model, theta: Array, scorer: Scorer) -> Fit:

@@ -8,10 +8,10 @@ from dataclasses import replace
 
 from actuator_glue.diagnosis import moments
 from actuator_glue.diagnosis.data import SETTLE
+from actuator_glue.diagnosis.each import Each
 from actuator_glue.diagnosis.moments import Moment
 from actuator_glue.diagnosis.onset import Appeared
 from actuator_glue.diagnosis.pipeline import Conclusion, Progress, conclude
-from actuator_glue.diagnosis.search import Each
 from actuator_glue.diagnosis.thresholds import Thresholds
 
 

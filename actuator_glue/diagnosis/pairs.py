@@ -54,11 +54,14 @@ def rivals(
     wanted = screened(search, name, trials[:most], room, below)[:most]
     # A fault has another size inside of the loop, so that one outside does not promise it.
     wanted += [(t, FEEDBACK) for t in trials if t.added in FAULTS and FEEDBACK not in t.effects]
-    out = []
-    for first, other in wanted:
-        pair = search.additions(first, [other], below=below)[0]
-        out.append(replace(pair, added=f'{first.added}{BESIDE}{other}'))
-    return out
+
+    def refitted(pair: tuple[Trial, str]) -> Trial:
+        first, other = pair
+        trial = search.add(first, other)
+        trial = search.polish(trial) if trial.mean_square < below else trial
+        return replace(trial, added=f'{first.added}{BESIDE}{other}')
+
+    return list(search.each(refitted, wanted))
 
 
 def ahead(

@@ -24,6 +24,7 @@ from actuator_glue.diagnosis import (
 )
 from actuator_glue.diagnosis.completeness import Decision, decide
 from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.each import Each
 from actuator_glue.diagnosis.fit import fit
 from actuator_glue.diagnosis.hum import Line
 from actuator_glue.diagnosis.measurement import Measured
@@ -32,7 +33,7 @@ from actuator_glue.diagnosis.onset import Appeared, Onset, dated
 from actuator_glue.diagnosis.preparation import Prepared
 from actuator_glue.diagnosis.regression import Surrogate
 from actuator_glue.diagnosis.score import Scorer
-from actuator_glue.diagnosis.search import Each, Search
+from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial

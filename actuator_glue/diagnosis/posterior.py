@@ -14,12 +14,12 @@ from numpy.typing import NDArray
 
 from actuator_glue.diagnosis import poles, proposals
 from actuator_glue.diagnosis.discrepancy import Discrepancy
+from actuator_glue.diagnosis.each import Each
 from actuator_glue.diagnosis.fit import Fit
 from actuator_glue.diagnosis.free_run import Model
 from actuator_glue.diagnosis.identifiable import Straight, Working, coordinates
 from actuator_glue.diagnosis.likelihood import Likelihood, Optimum, inflation, most_likely
 from actuator_glue.diagnosis.score import Scorer
-from actuator_glue.diagnosis.search import Each
 from actuator_glue.diagnosis.space import Space
 from actuator_glue.inference import importance, posterior
 from actuator_glue.inference.chains import Chains

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from actuator_glue.diagnosis import global_search, poles
 from actuator_glue.diagnosis.data import Data
+from actuator_glue.diagnosis.each import Each
 from actuator_glue.diagnosis.fit import Fit, base_fit, fit, rms
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.screening import screen, signatures
@@ -21,17 +21,6 @@ from actuator_glue.model.effects import CATALOGUE, Effect, Scale, scale
 from actuator_glue.model.parameters import BASE
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
-
-_T = TypeVar('_T')
-_R = TypeVar('_R')
-
-
-class Each(Protocol):
-    """Calls a function with each of some arguments, as `map` does, perhaps several at a time."""
-
-    def __call__(self, function: Callable[[_T], _R], arguments: Iterable[_T], /) -> Iterable[_R]:
-        """Yield results in the order of the arguments."""
-
 
 _COARSE = 8  # iterations of every refit; those in the running go on
 _TOLERANCE = 1e-4
@@ -113,8 +102,8 @@ class Search:
         found = [(key, fit) for key, fit in self._tried.items() if fit.rms**2 <= mean_square]
         return [(self.structure(*effects), fit) for effects, fit in found]
 
-    def add(self, current: Trial, name: str) -> Trial:
-        """Refit `current` with one more effect."""
+    def add(self, current: Trial, name: str, each: Each = map) -> Trial:
+        """Refit `current` with one more effect; with `each` where nothing else is meanwhile."""
         model = self.structure(*current.effects, name)
         key = frozenset(model.effects)
         if key not in self._tried:
@@ -122,7 +111,7 @@ class Search:
             found = fit(part.data, model, starts, iterations=_COARSE, tolerance=_TOLERANCE)
             friction = not current.effects and self.entries[name].group == 'friction'
             if friction and found.rms < _PROMISING * rms(current.fit.error[part.rows]):
-                found = global_search.refit(part.data, model, found, _COARSE, _TOLERANCE)
+                found = global_search.refit(part.data, model, found, _COARSE, _TOLERANCE, each)
             if part is not self._whole:
                 found = fit(
                     self.data, model, found.theta, iterations=_FINISHED, tolerance=_TOLERANCE
