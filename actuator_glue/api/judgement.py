@@ -88,7 +88,10 @@ def remarks(
     if prior is not None:
         told.append(prior.remark())
     if not met:
-        told.append(f'not converged (R-hat above {CONVERGED}); give more evaluations')
+        told.append(
+            f'not converged (R-hat above {CONVERGED}); give more evaluations or, where the search '
+            'for the start ended beside the posterior, another seed'
+        )
     told += [
         f'{p.name} lies at 0, below which it has no meaning: the records tell how large it is at '
         'most'
