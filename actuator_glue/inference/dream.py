@@ -13,20 +13,14 @@ from numpy.typing import ArrayLike
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference.adaptation import empty_counts, tuned
-from actuator_glue.inference.anneal import (
-    Points,
-    Population,
-    anneal,
-    archive_reference,
-    prior_reference,
-    resample,
-)
+from actuator_glue.inference.anneal import resample
 from actuator_glue.inference.archive import Archive
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.compiled import compiled
-from actuator_glue.inference.evaluate import LogDensity, check_values, evaluate
+from actuator_glue.inference.evaluate import LogDensity
 from actuator_glue.inference.moves.move import Tuning, uniforms_per_chain
 from actuator_glue.inference.settings import SamplerSettings
+from actuator_glue.inference.start import population
 from actuator_glue.inference.state import Info, State
 from actuator_glue.inference.steps import ChainState, Path, enter, many, one
 from actuator_glue.inference.transforms.log import Log
@@ -66,7 +60,7 @@ def init(
     """
     settings = settings or SamplerSettings()
     box = Log(lower, upper)
-    start = _points(rng, log_density, box, settings, archive, limit)
+    start = population(rng, log_density, box, settings, archive, limit)
     # Chains start at points spread over the population one temperature above the posterior: R-hat
     # compares chains that began further apart than they must end. Impossible points are no start.
     wide, z = start.before, start.points.z
@@ -91,45 +85,6 @@ def init(
         settings=settings,
         log_density=log_density,
     )
-
-
-def _points(
-    rng: np.random.Generator,
-    log_density: LogDensity,
-    box: Log,
-    settings: SamplerSettings,
-    archive: ArrayLike | None,
-    limit: int | None,
-) -> Population:
-    """The points that become the first archive and the chains' starts."""
-    d = len(box.low)
-    if archive is not None:
-        old = box.forward(_check_archive(np.asarray(archive, np.float64), box))
-        reference = archive_reference(rng, settings.points(d) // 4, old, box)
-    else:
-        reference = prior_reference(rng, settings.points(d), box)
-        if settings.start == 'prior':
-            # As Vrugt (2016): only the chains' own points are evaluated.
-            x, _ = box.inverse(reference.points)
-            values = np.full(len(x), np.nan)
-            values[: settings.chains] = evaluate(log_density, x[: settings.chains])
-            check_values(values, x)
-            counts = empty_counts(settings)
-            points = Points(reference.points, x, values)
-            return Population(points, points, counts, 1.0, settings.chains)
-    return anneal(rng, log_density, box, reference, settings, limit)
-
-
-def _check_archive(archive: Array, box: Log) -> Array:
-    if archive.ndim != 2 or archive.shape[1] != len(box.low) or len(archive) < 2:
-        raise InputError(
-            f'the archive for a warm start has shape {archive.shape}; '
-            f'it must hold at least two points of {len(box.low)} parameters'
-        )
-    inside = ((archive >= box.low) & (archive <= box.low + box.width)).all(axis=1)
-    if inside.sum() < 2:
-        raise InputError('the archive for a warm start lies outside the prior bounds')
-    return archive if inside.all() else archive[inside]
 
 
 def step(rng: np.random.Generator, state: State) -> tuple[State, Info]:

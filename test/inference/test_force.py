@@ -106,20 +106,15 @@ def test_the_force_tells_damping_from_the_actuator(rng_seed: int) -> None:
     There chains do not even meet. The phase of the force is its own: the posterior is as narrow as
     the curvature of both errors says. A gain of 1.1 of the load cell is told, and is no
     stiffness. Bounds of five standard deviations are left by chance once in a million runs. The
-    search for the start ended beside the posterior in one of some 40 runs, which said that they
-    had not converged; with the next seeds the same records have one (7 of 7).
+    search for the start ended beside the posterior in one of 121 runs, before such a start was
+    begun anew.
     """
     record = swept(np.random.default_rng(rng_seed), ('viscous-damping',), [3e4], gain=1.1)
     theta, alone = np.array([*THETA, 3e4]), Data.whole([record])
     without = deviations(alone, theta)
     expected = deviations(with_forces(alone, Structure(('viscous-damping',)), theta), theta)
     assert (expected < 0.1 * without).all()
-    for seed in range(1, 5):
-        found = ag.calibrate(
-            record, effects=['viscous-damping'], evaluations=40_000, use_force=True, seed=seed
-        )
-        if found.converged:
-            break
+    found = ag.calibrate(record, effects=['viscous-damping'], evaluations=40_000, use_force=True)
     damping, oil = found.parameters['damping'], found.parameters['alpha_2']
     assert damping.stddev == pytest.approx(expected[1], rel=0.25)
     assert oil.stddev / oil.mean == pytest.approx(expected[0], rel=0.25)
