@@ -176,11 +176,8 @@ class Data:
         time; but no fewer than the kernels work on at once.
         """
         i = same[0]
-        (record, count), initial, origin = (
-            self._runs_as(model, i),
-            self.initials[i],
-            self.origins[i],
-        )
+        record, count = self._runs_as(model, i)
+        initial, origin = self.initials[i], self.origins[i]
         for some in chunks(len(table), len(record), LANES):
             part = out[some]
             for which, at, y in parts(model, table[some], record, initial, origin, count):
