@@ -56,16 +56,17 @@ def population(
         counts = empty_counts(settings)
         points = Points(reference.points, x, values)
         return Population(points, points, counts, 1.0, settings.chains)
-    spent = 0
+    size, spent = settings.points(d) // (1 if old is None else 4), 0
     for left in reversed(range(_STARTS)):
         if old is None:
-            reference = prior_reference(rng, settings.points(d), box)
+            reference = prior_reference(rng, size, box)
         else:
-            reference = archive_reference(rng, settings.points(d) // 4, old, box)
+            reference = archive_reference(rng, size, old, box)
         most = None if limit is None else limit - spent
         found = anneal(rng, log_density, box, reference, settings, most, last=left == 0)
         spent += found.evaluations
-        if not found.collapsed or (limit is not None and 2 * spent > limit):
+        # Else a shorter run is the beginning of a longer one.
+        if not found.collapsed or (limit is not None and spent + size > limit):
             break
     return found._replace(evaluations=spent)
 
