@@ -187,10 +187,11 @@ def shares(record: Record, mended: Record, theta: Array, initial: Initial) -> Tr
 def never_given(found: Traces) -> bool:
     """Whether the response is not in the motion: surely, or as the reading has the impulses.
 
-    A share far below none is what the model lacks, and says nothing.
+    A share far below none is what the model lacks, and says nothing: less than half as far as from
+    all of it.
     """
     sure = found.moved + _SURE * found.moved_error < _HALF
-    return abs(found.moved) < _HALF and (sure or _in_both(found))
+    return -2.0 * _HALF < found.moved < _HALF and (sure or _in_both(found))
 
 
 def _in_both(found: Traces) -> bool:

@@ -59,6 +59,8 @@ def test_what_was_only_recorded_is_taken_out(both: bool, rng_seed: int) -> None:
         (0.02, 0.1, 0.0, True),
         (0.3, 0.5, 1.0, True),
         (0.3, 0.5, 0.0, False),
+        # Off by what hysteresis takes, nearer to none than to all of it.
+        (-0.85, 0.15, 1.0, True),
         (1.0, 0.1, 0.0, False),
         # What the model lacks, not a share of anything: a machine that drifts.
         (-425.0, 65.0, 0.0, False),
@@ -134,11 +136,14 @@ def test_a_rough_command_shares_what_its_reading_lost(rng_seed: int) -> None:
 
 
 def test_a_valve_that_remembers_is_not_pushed(rng_seed: int) -> None:
-    """Hysteresis keeps what an impulse did to it: simulated with them it is many um off."""
+    """Hysteresis keeps what an impulse did to it: simulated with them it is many um off.
+
+    Of 1000 seeds none failed; with half of the time 3, where the share was 0.5 by chance.
+    """
     rng, valve = np.random.default_rng(rng_seed), Structure(('valve-hysteresis',))
     theta, records = np.append(THETA, 25e-6), []
     for k in (0.0, 250e3):
-        u = sweep(20.0)
+        u = sweep(40.0)
         y = valve.simulate(theta, Record(u, u, 1.0 / RATE, stiffness=k))
         off = spikes(rng, len(u))
         y = y + off + NOISE * rng.standard_normal(len(u))
