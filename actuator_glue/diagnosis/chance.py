@@ -130,7 +130,7 @@ def _found(
         again = fit(some, model, found.theta, iterations=1)
         found = global_search.refit(some, model, again, _ITERATIONS, _TOLERANCE, search.each)
     determined = np.concatenate([~b[m] for m, b in zip(data.masks, lost, strict=True)])
-    base, roughly = (rms(t.fit.error[determined]) for t in (search.trial(()), simple))
+    base, roughly = (rms(f.error[determined]) for f in (search.base(), simple.fit))
     better = roughly**2 - found.rms**2 > size**2 and found.rms**2 <= _HOLDS * base**2
     return (lost, found) if better and (fixed or not determined.all()) else None
 

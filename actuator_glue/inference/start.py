@@ -65,7 +65,7 @@ def population(
         most = None if limit is None else limit - spent
         found = anneal(rng, log_density, box, reference, settings, most, last=left == 0)
         spent += found.evaluations
-        # Else a shorter run is the beginning of a longer one.
+        # A limit ends this only where no other start fits: a shorter run begins as a longer one.
         if not found.collapsed or (limit is not None and spent + size > limit):
             break
     return found._replace(evaluations=spent)
