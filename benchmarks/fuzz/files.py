@@ -13,6 +13,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from nptdms import ChannelObject, TdmsWriter
 from scipy.io import savemat
+from scipy.sparse import csc_array
 
 from actuator_glue.effects import read_effects
 from actuator_glue.errors import InputError
@@ -57,6 +58,14 @@ def csv(path: Path) -> None:
 def mat(path: Path) -> None:
     """Write a MATLAB file of version 7."""
     savemat(path, {'test': COLUMNS, 'matrix': np.zeros((40, 3))}, do_compression=True)
+
+
+def mat_6(path: Path) -> None:
+    """Write a MATLAB file of version 6, where no checksum finds damage, with every class."""
+    cells = np.empty(3, object)
+    cells[:] = ['text', np.arange(3.0), {'a': 1, 'b': 1j * np.arange(4)}]
+    others = {'cells': cells, 'sparse': csc_array(np.eye(9)), 'logical': np.array([True, False])}
+    savemat(path, {'test': COLUMNS, **others}, do_compression=False)
 
 
 def hdf5(path: Path) -> None:
@@ -119,6 +128,7 @@ def read_map(path: Path) -> None:
 FORMATS: dict[str, tuple[str, Callable[[Path], object], Callable[[Path], object]]] = {
     'csv': ('.csv', csv, read_all),
     'mat': ('.mat', mat, read_all),
+    'mat_6': ('.mat', mat_6, read_all),
     'hdf5': ('.h5', hdf5, read_all),
     'tdms': ('.tdms', tdms, read_all),
     'parquet': ('.parquet', parquet, read_all),

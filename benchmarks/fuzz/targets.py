@@ -219,6 +219,7 @@ TARGETS: dict[str, Target] = {
     'map': _file('map', _MAP),
     'effects': _file('effects', _EFFECTS),
     'mat': _file('mat', ('MATLAB 5.0 MAT-file', 'IM', 'MI')),
+    'mat_6': _file('mat_6', ('MATLAB 5.0 MAT-file', 'IM', 'MI')),
     'hdf5': _file('hdf5', ('TREE', 'SNOD', 'HEAP', 'OHDR')),
     'tdms': _file('tdms', ('TDSm', 'TDSh', 'NI_Scale', 'wf_increment')),
     'parquet': _file('parquet', ('PAR1',)),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -15,16 +14,14 @@ from actuator_glue.io.formats import (
     Column,
     FileTable,
     Format,
-    check_size,
     matrix_column,
     matrix_columns,
     reading,
 )
 from actuator_glue.io.formats.hdf5 import OBJECTS, is_hdf5, read_tree
+from actuator_glue.io.matlab_elements import check_elements
 from actuator_glue.io.signature import refuse_foreign
 from actuator_glue.records import Array
-
-_COMPRESSED, _STEP = 15, 1 << 20
 
 
 def _content(path: Path) -> dict[str, Any]:
@@ -33,28 +30,9 @@ def _content(path: Path) -> dict[str, Any]:
 
     refuse_foreign(path, 'a MATLAB .mat file')
     with reading(path, 'a MATLAB .mat file'):
-        _check_inflated(path)
+        check_elements(path)
         content: dict[str, Any] = loadmat(path, squeeze_me=True, struct_as_record=False)
     return content
-
-
-def _check_inflated(path: Path) -> None:
-    """Refuse a version 7 file whose compressed variables are larger than what is read."""
-    total = 0
-    with path.open('rb') as file:
-        order = '<' if file.read(128)[126:128] == b'IM' else '>'
-        while len(head := file.read(8)) == 8:
-            kind, length = np.frombuffer(head, f'{order}u4').tolist()
-            if kind != _COMPRESSED:
-                file.seek(length, 1)
-                continue
-            inflate = zlib.decompressobj()
-            while length > 0 and (data := file.read(min(length, _STEP))):
-                length -= len(data)
-                while data:
-                    total += len(inflate.decompress(data, 16 * _STEP))
-                    check_size(total, path)
-                    data = inflate.unconsumed_tail
 
 
 def _collect(name: str, value: Any, arrays: dict[str, Any], texts: dict[str, str]) -> None:
