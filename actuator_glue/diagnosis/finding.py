@@ -21,7 +21,9 @@ class Rival:
         stderr: standard error of that over the blocks [nats].
         excess: rms error it leaves beyond the best [m].
         tied: these data cannot tell it from the best.
-        probability: its weight among all rivals and none of them.
+        weight: its share among all rivals and none of them, where one that leaves as good as the
+            same error has as much as the best; who speaks for what is tied is decided by it.
+        probability: the same, where it has so much less as such a rival has been right less often.
         limit: where it is a richer form of the best, the parameter that makes it one and the
             limit of its 95 % interval away from the value at which it is the best.
     """
@@ -31,6 +33,7 @@ class Rival:
     stderr: float
     excess: float
     tied: bool
+    weight: float
     probability: float
     limit: tuple[str, float] | None = None
 

@@ -84,7 +84,7 @@ def ahead(
         row: weights of all its rivals.
         two: pairs refitted in its place.
     """
-    known = {r.name: r.probability for r in row}
+    known = {r.name: r.weight for r in row}
     least = math.exp(selection.settings.tie_nats) * known[name]
     cost, material = price(len(selection.search.names)), selection.material
     better = (

@@ -156,7 +156,8 @@ def _attribution(
             stderr = standard_error(best.scores - trial.scores)
             tied = trial is not best and nats < _TIED
             excess = removed(trial, best)
-            rivals.append(Rival(trial.added, nats, stderr, excess, tied, float(weight)))
+            share = float(weight)
+            rivals.append(Rival(trial.added, nats, stderr, excess, tied, share, share))
     gained = evidence(best.scores, start.scores)
     kept = {n: found.rivals[n] for n in start.effects}
     return replace(

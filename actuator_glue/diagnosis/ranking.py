@@ -176,15 +176,24 @@ def compare(
         both = known[0] + known[1 + i]
         known[0] = max(known[0], 0.5 * both)
         known[1 + i] = both - known[0]
+    # Nor is one that holds it and gains nothing more than another name for it.
+    held = [
+        limit is not None and best.scores.sum() >= t.scores.sum()
+        for t, limit in zip(trials, limits, strict=True)
+    ]
+    told = known.copy()
+    told[1:-1][held] = np.minimum(told[1:-1], settings.mistaken * known[0])[held]
+    told = _tolerant(told, alike, tolerance, settings.mistaken * odds)
     known = _tolerant(known, alike, tolerance, odds)
-    out = [Rival(name, 0.0, 0.0, 0.0, True, float(known[0]))]
+    out = [Rival(name, 0.0, 0.0, 0.0, True, float(known[0]), float(told[0]))]
     for i, trial in enumerate(trials):
         near = known[1 + i] > math.exp(-settings.tie_nats) * known[0]
         tied = bool(near and removed(rest, trial) > _SAME * explained and not idle[i])
         nats = max(0.0, evidence(best.scores, trial.scores))
         stderr = standard_error(best.scores - trial.scores)
         limit = limits[i] if near else None
-        out.append(Rival(trial.added, nats, stderr, excess[i], tied, float(known[1 + i]), limit))
+        weight, probability = float(known[1 + i]), float(told[1 + i])
+        out.append(Rival(trial.added, nats, stderr, excess[i], tied, weight, probability, limit))
     return tuple(sorted(out, key=lambda r: (r.nats, r.name != name)))
 
 
@@ -200,7 +209,7 @@ def _tolerant(
     """Let rivals that leave as good as the same error share the best's weight (K + 2,).
 
     The catalogue's equations are not the machine's: differences well below the share at which
-    two effects count as tied are its form's, whatever the nats.
+    two effects count as tied are its form's, whatever the nats. `odds` says what share.
     """
     out = known.copy()
     shared = known[0] * odds * _near(np.array(excess), tolerance)
@@ -223,7 +232,7 @@ def spokesman(name: str, rivals: Sequence[Rival], groups: Mapping[str, str]) -> 
     kinds = {groups[r.name]: [t for t in tied if groups[t.name] == groups[r.name]] for r in tied}
     own = kinds.get(groups.get(name, ''), [])
     for members in kinds.values():
-        heavier = sum(r.probability for r in members) > sum(r.probability for r in own)
+        heavier = sum(r.weight for r in members) > sum(r.weight for r in own)
         if len(members) > len(own) > 0 and heavier:
             return members[0].name
     return name

@@ -34,7 +34,7 @@ def instead(
     for name, row in rivals.items():
         two = [r for r in row if len(r.effects) > 1 and is_learned(selection.search.entries[name])]
         one = [r for r in row if len(r.effects) == 1 and r.name != name]
-        for rival in (*one, *sorted(two, key=lambda r: -r.probability)):
+        for rival in (*one, *sorted(two, key=lambda r: -r.weight)):
             if not (rival.tied and _says_the_same(selection, current, name, rival, complete)):
                 continue
             others = (n for n in current.effects if n != name)

@@ -20,7 +20,7 @@ THETA = np.array([230.0, 1.7e10, 5.3e6, 26.0])
 
 def rival(name: str, tied: bool, probability: float) -> Rival:
     """A rival with its weight."""
-    return Rival(name, 0.0, 0.0, 0.0, tied, probability)
+    return Rival(name, 0.0, 0.0, 0.0, tied, probability, probability)
 
 
 def told(own: Any = None) -> Any:

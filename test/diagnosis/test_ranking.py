@@ -95,7 +95,34 @@ def test_an_alternative_has_a_probability() -> None:
     assert not told['specimen-hardening'].tied
     assert told['specimen-hardening'].probability < 1e-6
     assert told['coulomb-friction'].tied
-    assert told['coulomb-friction'].probability > 0.2
+    assert told['coulomb-friction'].weight > 0.4
+    assert 0.1 < told['coulomb-friction'].probability < 0.2
+
+
+def test_a_rival_that_only_shares_is_told_by_how_often_such_are_right(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Excluded by the blocks, or a richer form that gains nothing: a quarter of the odds.
+
+    Who speaks for what is tied is still decided by equal shares.
+    """
+    even = np.zeros(15)
+    rest, best = trial('', 40e-6, np.full(15, -500.0)), trial('coulomb-friction', 10e-6, even)
+    level = cast('Scorer', None)
+    behind = trial('specimen-yield', 10e-6, np.full(15, -2.0))
+    richer = trial('stribeck-friction', 10e-6, even, 6)
+    ahead = trial('stribeck-friction', 10e-6, np.full(15, 0.01), 6)
+    for other, limit, share in (
+        (behind, None, 0.25),
+        (richer, ('slope', 0.1), 0.25),
+        (ahead, ('slope', 0.1), 1.0),
+    ):
+        monkeypatch.setattr(ranking, '_limit', lambda t, name, scorer, limit=limit: limit)
+        told = ranking.compare(rest, best, [other], level, Thresholds())
+        first, second = (next(r for r in told if r.name == t.added) for t in (best, other))
+        assert second.probability / first.probability == pytest.approx(share, rel=0.2)
+        assert second.weight / first.weight == pytest.approx(1.0, rel=0.2)
+        assert second.tied
 
 
 def test_one_stretch_alone_excludes_no_rival() -> None:
@@ -155,7 +182,7 @@ def test_three_of_a_kind_speak_for_what_is_tied() -> None:
     groups = dict.fromkeys(('delay', 'sensor-lag', 'valve-lag'), 'lag') | {'damping': 'damping'}
     names = ('damping', 'valve-lag', 'delay', 'sensor-lag')
     shares = (0.35, 0.25, 0.2, 0.1)
-    rows = [Rival(n, 0.0, 0.0, 0.0, True, p) for n, p in zip(names, shares, strict=True)]
+    rows = [Rival(n, 0.0, 0.0, 0.0, True, p, p) for n, p in zip(names, shares, strict=True)]
     assert ranking.spokesman('damping', rows, groups) == 'valve-lag'
     assert ranking.spokesman('damping', rows[:2], groups) == 'damping'
     apart = [rows[0], *(replace(r, tied=False) for r in rows[1:])]

@@ -60,7 +60,7 @@ def test_a_richer_form_at_its_bound_mends_the_other(
         for n, s in sizes.items()
     }
     found = ModelSelection(Tried(trials), Thresholds(), lambda stage, share: None)
-    rivals = {stribeck[0]: (Rival(coulomb[0], 300.0, 20.0, 1e-6, True, 0.4),)}
+    rivals = {stribeck[0]: (Rival(coulomb[0], 300.0, 20.0, 1e-6, True, 0.4, 0.4),)}
     assert simplest.instead(found, trials[stribeck], rivals, True).effects == (name,)
 
 
@@ -70,10 +70,10 @@ def test_a_name_takes_the_place_of_a_description_that_it_is_tied_with() -> None:
     tried = Tried({n: trial(n, 1e-5) for n in names}, ENTRIES)
     found = ModelSelection(tried, Thresholds(), lambda stage, share: None)
     found.material = 3e-6
-    own = Rival('learned-valve-e2', 0.0, 0.0, 0.0, True, 0.7)
+    own = Rival('learned-valve-e2', 0.0, 0.0, 0.0, True, 0.7, 0.7)
     cases = (True, 1e-6, names[1]), (True, 4e-6, names[0]), (False, 1e-6, names[0])
     for tied, excess, chosen in cases:
-        row = own, Rival('flow-asymmetry', 60.0, 40.0, excess, tied, 0.2)
+        row = own, Rival('flow-asymmetry', 60.0, 40.0, excess, tied, 0.2, 0.2)
         simpler = simplest.instead(found, tried.trials[names[0]], {'learned-valve-e2': row}, True)
         assert simpler.effects == chosen
 
@@ -83,8 +83,8 @@ def test_two_names_take_the_place_of_a_description_where_each_is_worth_it() -> N
     form, two = 'learned-command-resonance', ('sensor-lag', 'viscous-damping')
     structures = [(form,), two, two[:1], two[1:]]
     row = (
-        Rival(form, 0.0, 0.0, 0.0, True, 0.3),
-        Rival(' + '.join(two), 0.0, 0.0, 0.0, True, 0.4),
+        Rival(form, 0.0, 0.0, 0.0, True, 0.3, 0.3),
+        Rival(' + '.join(two), 0.0, 0.0, 0.0, True, 0.4, 0.4),
     )
     for worth, chosen in ((30.0, two), (3.0, (form,))):
         trials = {n: trial(n, 1e-5 if len(n) > 1 or n == (form,) else 2e-5) for n in structures}

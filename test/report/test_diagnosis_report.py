@@ -192,8 +192,8 @@ def test_first_page_says_what_came_out_and_what_to_do() -> None:
     """Verdict, certainty, errors, response, equation, tests to come; glossary, provenance."""
     sine = Sine(5.0, 1e-3, 0.9, (0.89, 0.91), -20.0, (-21.0, -19.0), 0.0111, (0.011, 0.0112))
     rivals = (
-        Rival('backlash', 0.0, 0.0, 0.0, True, 0.7),
-        Rival('valve-deadband', 3.0, 2.0, 1e-6, True, 0.2),
+        Rival('backlash', 0.0, 0.0, 0.0, True, 0.7, 0.7),
+        Rival('valve-deadband', 3.0, 2.0, 1e-6, True, 0.2, 0.2),
     )
     found = diagnosis(6e-5)
     finding = replace(found.effects[0], rivals=rivals, probability=0.7)
