@@ -115,6 +115,15 @@ def test_hdf5(tmp_path: Path) -> None:
     check(read(tmp_path / 'a.dat'))
 
 
+def test_hdf5_cannot_hold_more_than_its_bytes(tmp_path: Path) -> None:
+    """A few kilobytes that say they have a gigabyte take no memory."""
+    with h5py.File(tmp_path / 'a.h5', 'w') as file:
+        for name in ('time_s', 'command_mm', 'measured_mm'):
+            file.create_dataset(name, shape=(10**8,), dtype='f8', chunks=(1000,))
+    with pytest.raises(InputError, match='says that it has 800 MB'):
+        read(tmp_path / 'a.h5')
+
+
 def test_hdf5_does_not_leave_its_file(tmp_path: Path) -> None:
     """Links to other files, external storage and virtual datasets are passed over."""
     with h5py.File(tmp_path / 'secret.h5', 'w') as file:

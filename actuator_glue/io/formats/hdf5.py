@@ -24,6 +24,7 @@ from actuator_glue.io.formats import (
 from actuator_glue.records import Array
 
 _MAGIC = b'\x89HDF\r\n\x1a\n'
+_PACKED = 1100  # bytes out of one that deflate makes at most (1032), nearly
 _OBJECT = 'MATLAB_object_decode'
 _NAME = 'an HDF5 file'
 _UNITS = ('unit', 'units', 'Unit', 'Units')
@@ -96,6 +97,11 @@ def read_tree(path: Path, *, matlab: bool = False) -> FileTable:
 def _values(dataset: Any, part: str | int, path: Path) -> Array:
     """Return a field of a table, or a column of a vector or matrix."""
     check_size(dataset.size * max(dataset.dtype.itemsize, 8), path)
+    if dataset.nbytes > _PACKED * path.stat().st_size:
+        raise InputError(
+            f'{path}: damaged: {dataset.name} says that it has {dataset.nbytes / 1e6:.3g} MB of '
+            'numbers, more than a file of this size can hold'
+        )
     if isinstance(part, str):
         return np.asarray(dataset.fields(part)[:], dtype=np.float64)
     if len(set(dataset.shape)) == 1 and dataset.ndim == 2 and 'MATLAB_class' in dataset.attrs:
