@@ -158,7 +158,8 @@ def unconverged(rhat: float) -> tuple[str, ...]:
         return ()
     return (
         f'the chains of the posterior have not met (R-hat {rhat:.2f}): sizes that they differ '
-        'about are told as not identified, names and errors do not depend on them',
+        'about are told as not identified, and names of effects that may then be nothing have a '
+        'lower probability; errors do not depend on them',
     )
 
 

@@ -66,7 +66,8 @@ class Finding:
         noise: rms of the noise that an effect of the measurement makes [m], which leaves the
             simulated motion as it is and removes no error; None for all others.
         evidence: out-of-sample log score gained, in nats of effectively independent samples.
-        plausible: its interval excludes the neutral value.
+        plausible: an interval of its sizes excludes the neutral value; where none does, its
+            probability is less.
         agrees_across_windows: its leading parameter is the same in all halves of the records
             that fix it; None where fewer than two do (see diagnosis/homogeneity.py).
         windows: the leading parameter in each of these halves [unit of the parameter].
