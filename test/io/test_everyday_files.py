@@ -1,6 +1,7 @@
 """Files as laboratories have them, each written with the library of its makers."""
 
 import datetime
+import subprocess
 import sys
 import zipfile
 from pathlib import Path
@@ -139,6 +140,20 @@ def test_hdf5_does_not_leave_its_file(tmp_path: Path) -> None:
         file.create_dataset('raw/command_mm', (COUNT,), 'f8', external=outside)
     with pytest.raises(InputError, match='no column for command'):
         read(tmp_path / 'a.h5')
+
+
+def test_a_damaged_tdms_file_is_one_line(tmp_path: Path) -> None:
+    """Its library would warn of a segment that is cut off, and print all bytes of a bad text."""
+    path = tmp_path / 'a.tdms'
+    with TdmsWriter(path) as writer:
+        writer.write_segment([ChannelObject('run', 'time_s', np.arange(300.0))])
+    whole = path.read_bytes()
+    bad_text = whole.replace(b"/'run'", b"/'ru\xff'")
+    command = [sys.executable, '-m', 'actuator_glue.cli.main', 'info', str(path)]
+    for content in (whole + whole[:40], bad_text + bad_text[:40], whole[:40]):
+        path.write_bytes(content)
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert done.stderr.count('\n') == (done.returncode == 2), done.stderr
 
 
 def test_tdms(tmp_path: Path) -> None:

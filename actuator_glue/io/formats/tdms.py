@@ -18,8 +18,9 @@ _NAME = 'a LabVIEW TDMS file'
 
 def _read(path: Path, channels: ChannelMap | None) -> FileTable:
     tdms = library('nptdms', path).TdmsFile
-    # What it warns of (a segment cut off by a killed writer) is nothing a user can act on.
-    logging.getLogger('nptdms').setLevel(logging.ERROR)
+    # What it warns of (a segment cut off by a killed writer) is nothing a user can act on; of text
+    # that is none it prints all bytes. Its loggers have levels and a handler of their own.
+    library('nptdms.log', path).log_manager.set_level(logging.CRITICAL)
     size = path.stat().st_size
     columns: list[Column] = []
     periods: set[float] = set()
