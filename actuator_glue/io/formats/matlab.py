@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -31,7 +32,9 @@ def _content(path: Path) -> dict[str, Any]:
     refuse_foreign(path, 'a MATLAB .mat file')
     with reading(path, 'a MATLAB .mat file'):
         check_elements(path)
-        content: dict[str, Any] = loadmat(path, squeeze_me=True, struct_as_record=False)
+        # A name that stands twice is warned of in the library's words; the last one is taken.
+        with warnings.catch_warnings(action='ignore'):
+            content: dict[str, Any] = loadmat(path, squeeze_me=True, struct_as_record=False)
     return content
 
 
