@@ -28,6 +28,7 @@ _AGREED = 0.5  # mean resultant of phases that agree
 # Error of the polynomial of fifth order through three samples on either side: at a twelfth of the
 # rate it is 1e-3 of a sine.
 TAPS = np.array([-1.0, 6.0, -15.0, 20.0, -15.0, 6.0, -1.0]) / 20.0
+_ABRUPT = 0.25  # of a run's size
 _HALF, _STDERRS = 0.5, 3.0  # of impulses that are surely in both channels
 _MOST = 0.05  # of all samples: what is more frequent is no accident, and stays
 
@@ -142,21 +143,38 @@ def find(
     suspect = np.flatnonzero(np.abs(error) > _BEYOND * noise)
     if not len(suspect) or len(suspect) > 2 * _REACH * _MOST * len(residual):
         return NONE
+    edges = np.abs(np.convolve(residual, TAPS, 'same'))
     samples, sizes, starts = [], [], []
     for first, last in _clusters(suspect):
         part = slice(max(0, first - 2 * _REACH), min(len(error), last + 2 * _REACH + 1))
         found = _explained(error[part], noise[part], taps)
         if found is None or np.abs(found[1]).max() < _BEYOND * whole[part].max():
             continue
+        runs = np.flatnonzero(np.diff(found[0], prepend=-2) > 1)
+        if _is_a_motion(np.split(found[1], runs[1:]), edges[part]):
+            continue
         samples += [part.start + i for i in found[0]]
         sizes += list(found[1])
-        runs = np.flatnonzero(np.diff(found[0], prepend=-2) > 1)
         starts += [part.start + found[0][i] for i in runs]
     if not samples or len(samples) > _MOST * len(residual) or _with_motion(starts, motion):
         return NONE
     if phase is not None and _at_a_phase(phase[starts], phase):
         return NONE
     return Impulses(np.array(samples, dtype=np.intp), np.array(sizes), len(starts))
+
+
+def _is_a_motion(runs: Sequence[Array], edges: Array) -> bool:
+    """Whether a long run of samples comes and goes as a motion does that a model lacks.
+
+    What is wrong for some samples (a drop-out) begins or ends between two of them; a valve that
+    saturates once takes the piston aside and back.
+
+    Args:
+        runs: by how much the samples of each run are off [m].
+        edges: error of the polynomials around them (w,) [m]; of a step half of it.
+    """
+    longest = max(runs, key=len)
+    return len(longest) > _REACH and float(edges.max()) < _ABRUPT * float(np.abs(longest).max())
 
 
 def in_command(command: Array, found: Impulses) -> float:
