@@ -2,11 +2,12 @@
 
 They are not told as missing. But their size is free in the posterior of what is told: a gap that
 leaves 2 um doubles the damping that is found beside it. What is not beyond chance, or not told
-from others, stays what it is: one of many that may be there (discrepancy.py).
+from what is of another kind, stays what it is: one of many that may be there (discrepancy.py).
 """
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 import numpy as np
@@ -20,11 +21,12 @@ from actuator_glue.diagnosis.ranking import removed, weights
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.model.effects import CATALOGUE
 
 _MOST = 2
 # Of what matters: less is made by the steps of simulations, too, beyond chance on long records.
 SEEN = 0.2
-_ALONE = 0.9  # weight among what was tried that is told from the others
+_ALONE = 0.9  # weight among what was tried of a kind that is told from the others
 
 
 def with_companions(selection: ModelSelection, final: Trial, least: float | None = None) -> Trial:
@@ -45,10 +47,20 @@ def with_companions(selection: ModelSelection, final: Trial, least: float | None
         trials = beside(selection, current, others, least)
         if not trials or not selection.better(trials[0], current, least):
             break
-        if weights(np.stack([t.scores for t in trials]))[0] < _ALONE:
+        if _weight_of_its_kind(search, trials) < _ALONE:
             break
         current = trials[0]
     return current
+
+
+def _weight_of_its_kind(search: Search, trials: Sequence[Trial]) -> float:
+    """Return the weight among trials of the first one and what pulls parameters as it does.
+
+    Which lag it is nobody knows; but without any, beta_1 is that of both.
+    """
+    kinds = [search.entries[t.added].group for t in trials]
+    known = weights(np.stack([t.scores for t in trials]))
+    return float(sum(w for w, kind in zip(known, kinds, strict=True) if kind == kinds[0]))
 
 
 def beside(
@@ -113,8 +125,11 @@ def sentences(final: Trial, larger: Trial, held: Data, missed: bool) -> tuple[st
     names = [n for n in larger.effects if n not in final.effects]
     if not names:
         return ()
+    kinds = Counter(e.group for e in CATALOGUE.values())
+    like = any(kinds[e.group] > 1 for e in larger.structure.entries if e.name in names)
     said = (
-        f'{", ".join(names)} may be there, too: beyond chance, but it removes '
+        f'{", ".join(names)}{" (or what is like it)" if like else ""} may be there, too: '
+        'beyond chance, but it removes '
         f"{1e6 * removed(final, larger):.1f} um of the fitting records' error, less than what "
         'matters; intervals allow for it'
     )

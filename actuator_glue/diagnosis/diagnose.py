@@ -164,6 +164,7 @@ def diagnose(
     if prior is not None and known is not None:
         p_value = known.conflict(after.draws).p_value
         used = prior.used(known.components, known.quality, p_value)
+    contradicted = advice.contradicted(error, found.material)
     tell('done', 1.0)
     return DiagnosisData(
         verdict=judged,
@@ -178,9 +179,9 @@ def diagnose(
             *([result.onset.sentence()] if result.onset else []),
             *(term.sentence() for term in learned),
             *advice.of(decision, found, result.generic, stretches, experiments),
-            *advice.contradicted(error, found.material),
+            *contradicted,
             *advice.zeros(error, found.material),
-            *companions.sentences(final, larger, prepared.held, judged not in verdict.COMPLETE),
+            *companions.sentences(final, larger, prepared.held, bool(contradicted)),
             *advice.unidentified(data, estimates),
             *advice.unconverged(float(np.fmax(draws.rhat, told.rhat))),
             *rest.compared(data.records, still, decision.noise),

@@ -60,6 +60,27 @@ def test_what_does_not_matter_is_held_beside() -> None:
     assert sentence.endswith('leaves {:.1f} um with it, {:.1f} um without'.format(*left))
 
 
+def test_one_of_a_kind_stands_for_what_is_like_it() -> None:
+    """Which lag of 1 ms it is nobody knows, but without any beta_1 is a sixth less."""
+    names = ('delay', 'valve-lag', 'sensor-lag', 'viscous-damping', 'bias', 'drift')
+    test = {'stroke': 2e-3, 'hertz': 10.0, 'seconds': 40.0}
+    selection, found = two_sweeps.selected(names, {'sensor-lag': 1e-3}, **test)
+    assert not found.final.effects
+    larger = companions.with_companions(selection, found.final)
+    assert set(larger.effects) & {'delay', 'sensor-lag'}
+    without, beside = (
+        np.quantile(sampled(selection, found, trial).points[:, 0], [0.025, 0.5, 0.975])
+        for trial in (found.final, larger)
+    )
+    true = two_sweeps.THETA[0]
+    # Five standard deviations of the estimate: fails by chance once in 10^6.
+    assert abs(beside[1] - true) < 5.0 * (beside[2] - beside[0]) / 3.92
+    assert without[2] < 0.93 * true
+    held = selection.search.data
+    (sentence,) = companions.sentences(found.final, larger, held, missed=False)
+    assert sentence.startswith(f'{larger.effects[-1]} (or what is like it) may be there, too')
+
+
 def test_what_removes_what_matters_is_added() -> None:
     """Though the rest passed for noise: where 1 um mattered the gap's 1.7 um would."""
     selection, found = selected(GAP)
