@@ -104,11 +104,20 @@ def _of_one_kind(search: Search, name: str, final: Trial) -> bool:
     return name in causes or (holds is not None and holds[0] in causes)
 
 
-def reduced(draws: Draws, larger: Trial, final: Trial) -> Draws:
-    """Return what draws of the larger structure say of the parameters of the other."""
+def reduced(draws: Draws, larger: Trial, final: Trial, known: Sequence[bool]) -> Draws:
+    """Return what draws of the larger structure say of the parameters of the other.
+
+    Args:
+        draws: of the larger structure.
+        larger: it.
+        final: the structure that is told.
+        known: which of its parameters (p,) the records fix without what is held beside. That is
+            too small to fix any: friction that is no more than alike tells no stiffness of oil.
+    """
     theirs = [p.name for p in larger.model.parameters]
     columns = [theirs.index(p.name) for p in final.model.parameters]
-    unmet = tuple(draws.unmet[i] for i in columns) if draws.unmet else ()
+    met = [not draws.unmet[i] for i in columns] if draws.unmet else known
+    unmet = tuple(not (a and b) for a, b in zip(met, known, strict=True))
     return draws._replace(points=draws.points[:, columns], unmet=unmet)
 
 

@@ -140,7 +140,9 @@ def diagnose(
     # Chains that met nowhere give no interval that anything beside, or in place, could widen.
     nowhere = bool(draws.unmet) and all(draws.unmet)
     if larger is not final and not nowhere:
-        told = companions.reduced(sample(larger, settings.evaluations), larger, final)
+        known_alone = posterior.identified(space, draws.points).tolist()
+        told = sample(larger, settings.evaluations)
+        told = companions.reduced(told, larger, final, known_alone)
     mixed = told.points
     if not nowhere:
         mixed = alternatives.mixed(mixed, final, others, lambda t: sample(t).points, rng)

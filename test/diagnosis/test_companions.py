@@ -46,7 +46,10 @@ def test_what_does_not_matter_is_held_beside() -> None:
     assert found.final.effects == ('viscous-damping',)
     larger = companions.with_companions(selection, found.final)
     assert larger.effects == ('viscous-damping', 'specimen-gap')
-    draws = companions.reduced(sampled(selection, found, larger), larger, found.final)
+    draws = companions.reduced(
+        sampled(selection, found, larger), larger, found.final, [True] * 4 + [False]
+    )
+    assert draws.unmet == (False, False, False, False, True)  # what is open stays open
     assert draws.points.shape[1] == 5
     # Five standard deviations of the estimate: fails by chance once in 10^6.
     low, high = np.quantile(draws.points[:, 4], [0.025, 0.975])
