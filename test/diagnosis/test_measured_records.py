@@ -49,6 +49,7 @@ def of_another_day(record: Record, seed: int) -> Record:
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(1200)  # four minutes beside another on two cores
 @pytest.mark.skipif(not MTS.is_dir(), reason=f'measured MTS records are not at {MTS}')
 @pytest.mark.parametrize('fitted', [0, 1, 2])
 def test_mts_is_explained_on_currents_it_was_not_fitted_to(fitted: int) -> None:
