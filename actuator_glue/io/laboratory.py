@@ -88,7 +88,10 @@ def _by_name(path: Path) -> tuple[dict[str, Array], dict[str, str], float]:
     columns = choose(labels, units, str(path), timed=table.period is not None)
     raw = table.values([at for at, _ in columns.values()])
     scales = [scale for _, scale in columns.values()]
-    values = {r: c if s == 1.0 else c * s for r, c, s in zip(columns, raw, scales, strict=True)}
+    with np.errstate(all='ignore'):  # what is not finite is told with its place later
+        values = {
+            r: c if s == 1.0 else c * s for r, c, s in zip(columns, raw, scales, strict=True)
+        }
     notes, period = table.notes, table.period
     del raw, table  # a long file's columns as they were read are not held beside these
     if 'time' in values:
