@@ -29,10 +29,21 @@ _CELL, _STRUCT, _OBJECT, _CHAR, _SPARSE, _FUNCTION, _OPAQUE = 1, 2, 3, 4, 5, 16,
 _NUMERIC = range(_SPARSE, _FUNCTION)
 _SMALL = 256  # bytes of heads, which are kept
 _DEEPEST = 64  # structs in cells in structs; the library keeps a frame of the stack for each
+_MOST = 1_000_000  # elements: what has more is no record, and takes minutes and all memory
 _STEP = 1 << 20
 
 # Returns the next bytes, exactly as many as were asked for.
 _Take = Callable[[int], bytes]
+
+
+@dataclass(slots=True)
+class _Source:
+    """Where the next bytes come from, their order, and how many elements there were."""
+
+    take: _Take
+    order: str
+    path: Path
+    seen: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +65,7 @@ def check_elements(path: Path) -> None:
 
     Raises:
         InputError: cut off, an element of an unknown type, longer than what it is in, nested too
-            deep, or more inflated bytes than are read.
+            deep, too many of them, or more inflated bytes than are read.
         zlib.error: damage in a compressed variable.
         OSError: the file cannot be read.
     """
@@ -65,15 +76,18 @@ def check_elements(path: Path) -> None:
             return
         order = '<' if header[126:] == b'IM' else '>'
         plain = partial(_from_file, file, path)
+        source = _Source(plain, order, path)
         while end - file.tell() >= 8:
             kind, length = _words(plain(8), order)
             if kind == _COMPRESSED:
                 variable = _Inflated(plain, length, path, inflated)
-                _check(variable.take, order, path)
+                source.take = variable.take
+                _check(source)
                 inflated = variable.finish()
             else:
                 file.seek(-8, 1)
-                _check(plain, order, path)
+                source.take = plain
+                _check(source)
 
 
 def _words(data: bytes, order: str) -> tuple[int, int]:
@@ -88,9 +102,13 @@ def _from_file(file: BinaryIO, path: Path, count: int) -> bytes:
     return data
 
 
-def _check(take: _Take, order: str, path: Path, depth: int = 0) -> _Element:
+def _check(source: _Source, depth: int = 0) -> _Element:
     """Walk through one element and what it holds, and return it."""
+    take, order, path = source.take, source.order, source.path
     first, length = _words(take(8), order)
+    source.seen += 1
+    if source.seen > _MOST:
+        raise InputError(f'{path}: more than {_MOST} variables in variables; save vectors')
     short = first >> 16  # up to four bytes, in the head itself
     kind = first & 0xFFFF if short else first
     if short > 4 or kind not in _TYPES:
@@ -104,7 +122,7 @@ def _check(take: _Take, order: str, path: Path, depth: int = 0) -> _Element:
     if kind == _MATRIX:
         parts: list[_Element] = []
         while left >= 8:
-            parts.append(_check(take, order, path, depth + 1))
+            parts.append(_check(source, depth + 1))
             left -= parts[-1].size
         if left < 0 or (parts and not _whole(parts, order)):
             raise InputError(f'{path}: damaged: a variable does not hold what its head says')

@@ -61,6 +61,16 @@ def test_what_no_array_holds_is_refused(tmp_path: Path, says: str, pack: type) -
         load_records(path)
 
 
+def test_too_many_variables_are_refused_soon(tmp_path: Path) -> None:
+    """Kilobytes that inflate to a million and more empty cells."""
+    cell = struct.pack('<II', 14, 0)
+    many = array(CELL, cell * 1_100_000, shape=(1_100_000, 1))
+    (tmp_path / 'a.mat').write_bytes(HEADER + compressed(many))
+    assert (tmp_path / 'a.mat').stat().st_size < 1e5
+    with pytest.raises(InputError, match='more than 1000000 variables'):
+        load_records(tmp_path / 'a.mat')
+
+
 def test_a_variable_without_its_checksum_is_refused(tmp_path: Path) -> None:
     """A compressed variable that was cut off, its length with it."""
     packed = compressed(array(NUMBERS, element(9, np.arange(40.0).tobytes()), shape=(40, 1)))[8:-4]
