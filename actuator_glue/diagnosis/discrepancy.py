@@ -29,6 +29,9 @@ _P = len(BASE)
 _SCALES = np.concatenate([[0.0], 2.0 ** np.arange(-6.0, 1.0)])
 _PRIOR = np.log(np.concatenate([[0.5], np.full(len(_SCALES) - 1, 0.5 / (len(_SCALES) - 1))]))
 _FLAT = 1e-8  # of what the records tell of a parameter alone
+# Standard deviations of noise over all that is known of a parameter: derivatives are rounded, to
+# some 1e-9 of it, and what is less than this is no slope.
+_NONE = 1e-6
 _SAME = 1e-10  # of the largest power: a shape that others make up
 
 
@@ -117,10 +120,10 @@ class Discrepancy:
         size = np.sqrt(np.einsum('pn,pn->p', jacobian, jacobian))
         # The logarithm of next to no leakage has hardly a slope, and its width says nothing of how
         # far it goes: the ridge that it makes with a gain is left as it is.
-        flat = (size > 1e-9 / widest) & ((widest * size) ** 2 < noise)
+        flat = (size > _NONE / widest) & ((widest * size) ** 2 < noise)
         # Two of an effect's that only their product tells would be held on a line else.
         flat[_P:] = False
-        size = np.maximum(size, 1e-9 / widest)
+        size = np.maximum(size, _NONE / widest)
         floor = np.where(flat, _FLAT, 1.0 / (widest * size) ** 2)
         jac = jacobian / size[:, None]
         count, length = self.shapes.shape

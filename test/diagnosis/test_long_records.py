@@ -5,7 +5,7 @@ from typing import Any
 import pytest
 from test_diagnose import make
 
-from actuator_glue.diagnosis import companions, posterior
+from actuator_glue.diagnosis import advice, companions, posterior
 from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.trial import Trial
@@ -19,7 +19,7 @@ def test_chains_that_reach_no_posterior_leave_the_normal_approximation(
 ) -> None:
     """Too few evaluations are no fault of the records: there is an answer all the same."""
     monkeypatch.setattr(posterior, '_SIMULATED', 1)
-    monkeypatch.setattr(posterior, '_FEWEST', 900)
+    monkeypatch.setattr(posterior, '_FEWEST', 500)
     monkeypatch.setattr(importance, 'sample', lambda *args: None)
     found = diagnose(make(['valve-deadband'], [2e-4], 31)[1:2], seed=2)
     assert [e.name for e in found.effects] == ['valve-deadband']
@@ -31,7 +31,8 @@ def test_chains_that_reach_no_posterior_leave_the_normal_approximation(
 def test_chains_of_a_long_record_are_cut(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where they have met nowhere nothing beside, or in place, is drawn: no interval shows it."""
     monkeypatch.setattr(posterior, '_SIMULATED', 1)
-    monkeypatch.setattr(posterior, 'RHAT', 0.9)
+    for module in (posterior, advice):
+        monkeypatch.setattr(module, 'RHAT', 0.9)
     monkeypatch.setattr(importance, 'sample', lambda *args: None)
 
     def larger(selection: ModelSelection, final: Trial, least: float | None = None) -> Trial:
