@@ -169,8 +169,10 @@ def as_good_and_plainer(selection: ModelSelection, found: Selection, named: Sele
 
 def _offered(search: Search) -> list[str]:
     """Let a search know the forms of this test; return the names of those that are no effects."""
-    offered = forms(search.scale(), search.entries)
-    search.entries |= {effect.name: effect for effect in offered}
+    if not search.described:
+        offered = forms(search.scale(), search.entries)
+        search.entries |= {effect.name: effect for effect in offered}
+        search.described = True
     return [n for n, e in search.entries.items() if is_learned(e) and n not in search.names]
 
 

@@ -145,8 +145,7 @@ class ModelSelection:
                 best = self._first_worth(ranked, current, threshold)
             if best is None:
                 break
-            current = best
-            self.renoise(current)
+            current = self._at_its_optimum(best)
             base, singles = self.search.trial(()), self.rescored(singles)
             threshold = self.material
             if self.left(current) < max(threshold, s.left_share * self.first):
@@ -173,6 +172,14 @@ class ModelSelection:
         asked = zip(ranked, (self.material if w else threshold for w in whole), strict=True)
         return next((t for t, least in asked if self.better(t, current, least)), None)
 
+    def _at_its_optimum(self, current: Trial) -> Trial:
+        """Take the noise from a structure; what a rough refit leaves is no other effect's."""
+        self.renoise(current)
+        if self.left(current) >= self.material:
+            current = self.search.finished(current, finely=True)
+            self.renoise(current)
+        return current
+
     def _nearest(self, trials: Sequence[Trial]) -> Trial:
         """Return what leaves the least error out of sample: its residual is nearest to noise.
 
@@ -187,7 +194,8 @@ class ModelSelection:
         current = self.pruned(current)
         for name in current.effects:
             current = self.search.polish(replace(current, added=name))
-        current, rivals = self.spoken(*self.settle(self.search.finished(current)))
+        current = self.search.finished(current, finely=self.left(current) >= self.material)
+        current, rivals = self.spoken(*self.settle(current))
         gains, nats = worth(self.search, current)
         return Selection(
             base, tuple(singles), current, rivals, gains, nats,

@@ -15,6 +15,7 @@ from actuator_glue.diagnosis.each import Each
 from actuator_glue.diagnosis.fit import Fit, base_fit, fit, rms
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.screening import screen, signatures
+from actuator_glue.diagnosis.space import Space
 from actuator_glue.diagnosis.stretches import Part, stretches
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.effects import CATALOGUE, Effect, Scale, scale
@@ -28,6 +29,7 @@ _FINISHED = 2  # iterations on all samples after those on stretches of them
 _PROMISING = 0.95  # of the error at most is left by friction that is looked at twice
 _POLISHED = 4
 _LAST = 60  # iterations at most of a structure that is told
+_FINER = 0.1  # of a usual finite-difference step
 _LONG = 5.0  # times its stretches: there they tell which minimum is the lowest
 
 
@@ -48,6 +50,7 @@ class Search:
         names: effects that act on the mean response.
         each: refits candidates, several at a time if it can (the kernels release the
             interpreter lock).
+        described: whether the entries hold the forms of learned terms.
     """
 
     data: Data
@@ -55,6 +58,7 @@ class Search:
     each: Each = map
     scorer: Scorer | None = None
     entries: dict[str, Effect] = field(default_factory=lambda: dict(CATALOGUE))
+    described: bool = False
     _tried: dict[frozenset[str], Fit] = field(default_factory=dict)
     _signatures: dict[str, tuple[Array, Array]] = field(default_factory=dict)
     _misfit: WeakKeyDictionary[Fit, Scorer] = field(default_factory=WeakKeyDictionary)
@@ -137,10 +141,20 @@ class Search:
             self._polished[key] = wanted
         return self.trial(trial.effects, trial.added)
 
-    def finished(self, trial: Trial) -> Trial:
-        """Go on with a refit until it gains nothing: a pole beside a zero creeps."""
-        key = frozenset(trial.effects)
-        self._tried[key] = fit(self.data, trial.structure, trial.fit.theta, iterations=_LAST)
+    def finished(self, trial: Trial, finely: bool = False) -> Trial:
+        """Go on with a refit until it gains nothing: a pole beside a zero creeps.
+
+        With small steps, too, where something remains (`finely`): over kinks as close as those of
+        friction that sticks and slips differences do not point down.
+        """
+        key, model = frozenset(trial.effects), trial.structure
+        found = fit(self.data, model, trial.fit.theta, iterations=_LAST)
+        if finely:
+            space = Space(model, max(r.duration for r in self.data.records), _FINER)
+            lower = fit(self.data, model, found.theta, iterations=_LAST, space=space)
+            if lower.rms < found.rms:
+                found = fit(self.data, model, lower.theta, iterations=_FINISHED)
+        self._tried[key] = found
         return self.trial(trial.effects, trial.added)
 
     def _stand_in(self, model: Structure) -> Part:

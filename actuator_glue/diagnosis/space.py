@@ -19,9 +19,15 @@ _FAR = 1e6  # of a motion's power: no small step changes it by more
 
 
 class Space:
-    """Working coordinates: logarithms of Eq. (2)'s parameters, an effect's as they are."""
+    """Working coordinates: logarithms of Eq. (2)'s parameters, an effect's as they are.
 
-    def __init__(self, model: Model, duration: float) -> None:
+    Args:
+        model: whose parameters they are.
+        duration: of the longest record [s].
+        part: of the usual finite-difference steps that is taken.
+    """
+
+    def __init__(self, model: Model, duration: float, part: float = 1.0) -> None:
         extra = model.parameters[_P:]
         self.lower = np.concatenate([_LOG_LOWER, [p.lower for p in extra]])
         self.upper = np.concatenate([_LOG_UPPER, [p.upper for p in extra]])
@@ -30,6 +36,7 @@ class Space:
         line = np.array([False] * _P + [p.unit == 'Hz' for p in extra])
         self._steps[line] = 0.02 / duration
         self._even = line | (np.arange(len(line)) < _P)  # the same step everywhere
+        self._part = part
 
     def theta(self, z: Array) -> Array:
         """Physical parameters of working coordinates (..., p)."""
@@ -47,7 +54,7 @@ class Space:
         """Finite-difference steps (..., p): 1 % of an effect's size, so that kinks average out."""
         steps = np.broadcast_to(self._steps, z.shape).copy()
         larger = np.maximum(0.01 * np.abs(z), steps)
-        steps = np.where(self._even, steps, larger)
+        steps = self._part * np.where(self._even, steps, larger)
         # Step inwards at an upper bound.
         return np.where(z + steps > self.upper, -steps, steps)
 
