@@ -19,7 +19,7 @@ from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 
-_SHORTEST = 5.0  # s on either side
+SHORTEST = 5.0  # s on either side
 _STEP = 0.25  # s between the times tried
 _EARLIER = (1.0, 0.75, 0.5, 0.35)
 _LEFT_NOISE = 0.6  # structure before it, of the noise, at most
@@ -39,7 +39,7 @@ class Moment:
     def inside(self, data: Data) -> bool:
         """Whether it is away from both ends of its record: nothing else sets its sides apart."""
         end = data.records[self.record].duration
-        return _SHORTEST < self.time < end - _SHORTEST
+        return SHORTEST < self.time < end - SHORTEST
 
     def split(self, data: Data) -> tuple[Data, Data]:
         """Return what counts before and what counts since, with time to settle in between."""
@@ -67,7 +67,7 @@ def _of(data: Data, masks: list[Mask]) -> Data:
     )
 
 
-def _counted(data: Data) -> float:
+def counted(data: Data) -> float:
     """Time that counts [s]."""
     pairs = zip(data.masks, data.periods, strict=True)
     return float(sum(m.sum() * period for m, period in pairs))
@@ -96,7 +96,7 @@ def changes(data: Data, error: Array, jac: Array) -> Iterator[tuple[Moment, floa
     blocks = np.array([rows[:, a : a + size] @ rows[:, a : a + size].T for a in edges])
     left = np.cumsum(blocks, axis=0)
     counts = np.minimum(np.arange(1, len(edges) + 1) * size, len(error))
-    least = _SHORTEST / min(data.periods)
+    least = SHORTEST / min(data.periods)
     tried = np.flatnonzero((counts > least) & (counts < len(error) - least))
     gains, removed = np.full(len(edges), -np.inf), np.zeros(len(edges))
     for k in tried:
@@ -118,7 +118,7 @@ def _inside(data: Data, counts: NDArray[np.intp], gains: Array) -> list[int]:
     """Return which gain is the largest inside of each record, larger ones first."""
     best = []
     for part, period in zip(data.parts, data.periods, strict=True):
-        least = _SHORTEST / period
+        least = SHORTEST / period
         inside = (counts > part.start + least) & (counts < part.stop - least)
         best.append(int(np.argmax(np.where(inside, gains, -np.inf))))
     return sorted(best, key=lambda k: -gains[k])
@@ -137,23 +137,28 @@ def quiet_before(moment: Moment, data: Data) -> tuple[Data, Fit] | None:
     What grows slowly begins earlier than it is half grown: some of what comes before is left out
     where that helps.
     """
-    if _counted(moment.split(data)[1]) < _SHORTEST:
-        return None
     for share in _EARLIER:
         before = Moment(moment.record, share * moment.time).split(data)[0]
-        if _counted(before) < _SHORTEST:
+        if counted(before) < SHORTEST:
             return None
         base = base_fit(before)
-        left, noise = pooled(before, splits_of(before, base.error))
-        if left <= _LEFT_NOISE * noise:
+        if quiet(before, base.error):
             return before, base
     return None
 
 
+def quiet(before: Data, error: Array) -> bool:
+    """Whether what a fit leaves of the data before a moment is noise."""
+    left, noise = pooled(before, splits_of(before, error))
+    return left <= _LEFT_NOISE * noise
+
+
 def enough_before(
-    before: Data, quiet: Trial, since: Trial, cost: float
+    before: Data, base: Trial | None, since: Trial, cost: float, complete: bool
 ) -> list[tuple[Trial, float]]:
-    """Return what may act before a moment, best first: what was enough, what came since less one.
+    """Return what may act before a moment, best first: Eq. (2), or what came since less one.
+
+    Or all of that with other parameters, where it is complete and leaves only noise there, too.
 
     What the records leave may pass for noise before the moment until it is known what it is.
     What acts all the time has the same parameters on either side: else each side is a fit of its
@@ -161,20 +166,28 @@ def enough_before(
 
     Args:
         before: data before the moment.
-        quiet: what was enough there.
+        base: Eq. (2), where it was enough there; else what leaves more than noise there is not.
         since: what explains the data since then.
         cost: square sum that a further parameter must remove [m^2].
+        complete: whether `since` leaves nothing material.
 
     Returns:
         Each with the rms error that its parameters since then leave more before [m].
     """
-    tried = [(quiet, 0.0)]
-    for gone in since.structure.entries if since.own is None else ():
-        model = Structure(e for e in since.structure.entries if e is not gone)
-        kept = np.delete(since.fit.theta, since.structure.columns(gone.name))
+    tried = [] if base is None else [(base, 0.0)]
+    entries = since.structure.entries if since.own is None else ()
+    for gone in (*entries, None) if complete and entries else entries:
+        model = Structure(e for e in entries if e is not gone)
+        kept = since.fit.theta
+        if gone is not None:
+            kept = np.delete(kept, since.structure.columns(gone.name))
         again = fit(before, model, kept)
-        more = before.target - before.simulate(model, kept)[0]
-        excess = float(np.sqrt(np.maximum(np.mean(more**2) - again.rms**2, 0.0)))
+        if (base is None or gone is None) and not quiet(before, again.error):
+            continue
+        excess = 0.0
+        if gone is not None:
+            more = before.target - before.simulate(model, kept)[0]
+            excess = float(np.sqrt(np.maximum(np.mean(more**2) - again.rms**2, 0.0)))
         tried.append((Trial(model, '', again, np.zeros(0)), excess))
 
     def charged(side: tuple[Trial, float]) -> float:

@@ -7,12 +7,16 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 from actuator_glue.diagnosis import moments
-from actuator_glue.diagnosis.data import SETTLE
+from actuator_glue.diagnosis.data import SETTLE, Data
 from actuator_glue.diagnosis.each import Each
+from actuator_glue.diagnosis.fit import Fit
 from actuator_glue.diagnosis.moments import Moment
 from actuator_glue.diagnosis.onset import Appeared
 from actuator_glue.diagnosis.pipeline import Conclusion, Progress, conclude
 from actuator_glue.diagnosis.thresholds import Thresholds
+
+Quiet = tuple[Data, Fit]
+_OTHERS = 2  # moments at most before which more acts than Eq. (2)
 
 
 def since_onset(first: Conclusion, settings: Thresholds, each: Each, tell: Progress) -> Conclusion:
@@ -37,8 +41,8 @@ def since_onset(first: Conclusion, settings: Thresholds, each: Each, tell: Progr
         return conclude(first.prepared.since(moment), settings, each, tell, fixed=True)
 
     best, least = first, math.inf
-    for moment in _moments(first):
-        told = _since(first, moment, settings, search)
+    for moment, quiet in _asked(first):
+        told = _since(first, moment, quiet, settings, search)
         if told is None:
             continue
         if told.decision.verdict != 'unexplained':
@@ -52,6 +56,7 @@ def since_onset(first: Conclusion, settings: Thresholds, each: Each, tell: Progr
 def _since(
     first: Conclusion,
     moment: Moment,
+    quiet: Quiet | None,
     settings: Thresholds,
     search: Callable[[Moment], Conclusion],
 ) -> Conclusion | None:
@@ -60,21 +65,27 @@ def _since(
     Args:
         first: what was found in all data.
         moment: when something may have appeared.
+        quiet: what comes before it, where Eq. (2) is enough there; else what is found since then
+            must be, less one effect.
         settings: thresholds.
         search: searches the data since a moment.
     """
-    quiet = moments.quiet_before(moment, first.data)
-    if quiet is None:
+    before, since = moment.split(first.data)
+    if moments.counted(since) < moments.SHORTEST:
         return None
     second = search(moment)
-    found, before = second.found, quiet[0]
-    base = replace(first.found.base, fit=quiet[1])
+    found, base = second.found, None
+    if quiet is not None:
+        before, base = quiet[0], replace(first.found.base, fit=quiet[1])
     cost = settings.nats * 2.0 * second.decision.noise**2
-    enough = moments.enough_before(before, base, found.final, cost)
-    sides = before, moment.split(first.data)[1]
+    complete = second.decision.verdict != 'unexplained'
+    enough = moments.enough_before(before, base, found.final, cost, complete)
+    sides = before, since
 
     def told(most: float) -> Conclusion | None:
-        bare = next(trial for trial, excess in enough if excess <= most)
+        bare = next((trial for trial, excess in enough if excess <= most), None)
+        if bare is None:
+            return None
         nats = settings.nats + len(bare.fit.theta)
         rivals = first.found.final, bare, found.final
         if not moments.explains(sides, rivals, nats, found.material):
@@ -88,9 +99,27 @@ def _since(
     if onset.growth == 0.0 and onset.time > moment.time + SETTLE:
         # What came before it bends what is found: the data since then are its own.
         later = Moment(moment.record, onset.time)
-        if other := _since(first, later, settings, search):
+        again = moments.quiet_before(later, first.data)
+        if (again or not quiet) and (other := _since(first, later, again, settings, search)):
             return other
     return told(found.material)
+
+
+def _asked(first: Conclusion) -> Iterator[tuple[Moment, Quiet | None]]:
+    """Yield moments, those before which Eq. (2) is enough first, with what comes before.
+
+    Of the others some inside of their records, where something material is left: each takes a
+    search of its own.
+    """
+    others = []
+    for moment in _moments(first):
+        quiet = moments.quiet_before(moment, first.data)
+        if quiet is not None:
+            yield moment, quiet
+        elif moment.inside(first.data):
+            others.append(moment)
+    if first.decision.left >= first.found.material:
+        yield from ((moment, None) for moment in others[:_OTHERS])
 
 
 def _moments(first: Conclusion) -> Iterator[Moment]:

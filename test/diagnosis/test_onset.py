@@ -29,11 +29,15 @@ COMMAND = 2e-3 * np.sin(2 * np.pi * (0.5 * T + 1.25 * (1.0 - np.cos(2.0 * np.pi 
 
 
 def diagnosed(
-    effect: str, size: float, at: float, growth: float = 0.0, friction: float = 0.0
+    effect: str,
+    size: float,
+    at: float,
+    growth: float = 0.0,
+    always: dict[str, float] | None = None,
 ) -> DiagnosisData:
-    """Diagnose a machine in which an effect appears, at once or slowly, maybe beside friction."""
+    """Diagnose a machine in which an effect appears, at once or slowly, maybe beside others."""
+    always = always or {}
     bare = Record(COMMAND, np.zeros(len(T)), 1 / RATE, stiffness=250e3, source='run.csv')
-    always = {'coulomb-friction': friction} if friction else {}
     off, on = (
         Structure(tuple(some)).simulate(np.array([*THETA, *some.values()]), bare)
         for some in (always, always | {effect: size})
@@ -89,7 +93,7 @@ def test_what_appears_beside_what_acts_all_the_time_is_told_from_it() -> None:
     """
     told = 0
     for at in np.random.default_rng().uniform(13.0, 22.0, 3):
-        found = diagnosed('backlash', 6e-5, float(at), friction=2500.0)
+        found = diagnosed('backlash', 6e-5, float(at), always={'coulomb-friction': 2500.0})
         if found.onset is None:
             continue
         (friction,) = found.onset.before
@@ -100,6 +104,20 @@ def test_what_appears_beside_what_acts_all_the_time_is_told_from_it() -> None:
         assert f'backlash appeared, beside {friction}, ' in found.onset.sentence()
         told += found.error.after < 3.6e-6
     assert told >= 2
+
+
+@pytest.mark.slow
+def test_what_appears_beside_what_eq_2_cannot_take_over() -> None:
+    """Friction on a machine that has had play of its transducer all along."""
+    at = float(np.random.default_rng().uniform(13.0, 22.0))
+    found = diagnosed('coulomb-friction', 4000.0, at, always={'backlash': 6e-5})
+    assert found.onset is not None
+    assert found.onset.lower - 0.05 <= at <= found.onset.upper + 0.05
+    assert found.onset.before == ('backlash',)
+    (friction,) = found.onset.effects
+    assert friction in {'coulomb-friction', 'stribeck-friction'}
+    assert {e.name for e in found.effects} == {friction, 'backlash'}
+    assert found.error.after < 3.6e-6
 
 
 @pytest.mark.parametrize('at', [0.0, 100.0])
