@@ -20,7 +20,7 @@ from actuator_glue.diagnosis.fit import fit as fit_to
 from actuator_glue.diagnosis.free_run import Model
 from actuator_glue.diagnosis.identifiable import Straight, Working, derivatives
 from actuator_glue.diagnosis.score import Scorer
-from actuator_glue.diagnosis.space import Space
+from actuator_glue.diagnosis.space import Space, diverged
 from actuator_glue.records import Array
 
 _STEPS = 8  # from the least-squares fit to the optimum of the likelihood
@@ -142,17 +142,20 @@ class Likelihood:
         pull = math.sqrt(self.noise) * data.prior.pull(self.space.z(theta))
         return np.hstack([found, pull])
 
-    def linearised(self, phi: Array) -> tuple[float, ScaleMixture]:
-        """Log density at coordinates (p,), and how far the parameters were if all were linear."""
+    def _height(self, phi: Array) -> float:
+        """Log density at coordinates (p,), the prior of the coordinates in it."""
         theta, log_prior = self.around.inverse(phi[None])
-        value = float(self(theta)[0] + log_prior[0])
-        if not math.isfinite(value):  # it diverges there: nothing is known
-            no_move = np.zeros((1, len(phi))), np.diag(self.around.widest**2)[None]
-            return value, ScaleMixture(np.ones(1), *no_move)
+        return float(self(theta)[0] + log_prior[0])
+
+    def _moves(self, phi: Array) -> ScaleMixture:
+        """How far the parameters are from coordinates (p,), if all were linear."""
         seen, jac = derivatives(self.around, self.space, phi, self._response)
         white = self._whitened
         error = np.concatenate([white, np.zeros(len(seen) - len(white))]) - seen
-        return value, self.beside.gaussians(jac, error, self.noise, self.around.widest)
+        if diverged(error[: len(white)], white):  # nothing is known
+            no_move = np.zeros((1, len(phi))), np.diag(self.around.widest**2)[None]
+            return ScaleMixture(np.ones(1), *no_move)
+        return self.beside.gaussians(jac, error, self.noise, self.around.widest)
 
     def optimum(self, phi: Array) -> Optimum:
         """Return the optimum next to coordinates.
@@ -163,14 +166,14 @@ class Likelihood:
         Args:
             phi: coordinates to begin at, (p,).
         """
-        value, moves = self.linearised(phi)
-        centre, best, new = phi, value, _inside(self.around, phi, moves.moments()[0])
+        best, moves = self._height(phi), self._moves(phi)
+        centre, new = phi, _inside(self.around, phi, moves.moments()[0])
         for step in range(1, _MOST_STEPS):
-            value, found = self.linearised(new)
+            height = self._height(new)
             # The first move is to a mean, from where there may be next to nothing to gain.
-            if not value > best + (_NATS if step > 1 else -_NATS):
+            if not height > best + (_NATS if step > 1 else -_NATS):
                 break
-            centre, best, moves = new, value, found
+            centre, best, moves = new, height, self._moves(new)
             new = _inside(self.around, centre, moves.moments()[0])
         return Optimum(centre, moves, best)
 
