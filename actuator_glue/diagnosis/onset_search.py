@@ -66,7 +66,7 @@ def _since(
         first: what was found in all data.
         moment: when something may have appeared.
         quiet: what comes before it, where Eq. (2) is enough there; else what is found since then
-            must be, less one effect.
+            must be, less one effect or with other parameters.
         settings: thresholds.
         search: searches the data since a moment.
     """
