@@ -166,7 +166,7 @@ def enough_before(
 
     Args:
         before: data before the moment.
-        base: Eq. (2), where it was enough there; else what leaves more than noise there is not.
+        base: Eq. (2), where it was enough there; None: what leaves more than noise is no answer.
         since: what explains the data since then.
         cost: square sum that a further parameter must remove [m^2].
         complete: whether `since` leaves nothing material.
@@ -176,19 +176,19 @@ def enough_before(
     """
     tried = [] if base is None else [(base, 0.0)]
     entries = since.structure.entries if since.own is None else ()
-    for gone in (*entries, None) if complete and entries else entries:
+    for gone in entries:
         model = Structure(e for e in entries if e is not gone)
-        kept = since.fit.theta
-        if gone is not None:
-            kept = np.delete(kept, since.structure.columns(gone.name))
+        kept = np.delete(since.fit.theta, since.structure.columns(gone.name))
         again = fit(before, model, kept)
-        if (base is None or gone is None) and not quiet(before, again.error):
+        if base is None and not quiet(before, again.error):
             continue
-        excess = 0.0
-        if gone is not None:
-            more = before.target - before.simulate(model, kept)[0]
-            excess = float(np.sqrt(np.maximum(np.mean(more**2) - again.rms**2, 0.0)))
+        more = before.target - before.simulate(model, kept)[0]
+        excess = float(np.sqrt(np.maximum(np.mean(more**2) - again.rms**2, 0.0)))
         tried.append((Trial(model, '', again, np.zeros(0)), excess))
+    if complete and entries:
+        again = fit(before, since.structure, since.fit.theta)
+        if quiet(before, again.error):
+            tried.append((Trial(since.structure, '', again, np.zeros(0)), 0.0))
 
     def charged(side: tuple[Trial, float]) -> float:
         again = side[0].fit
