@@ -50,10 +50,12 @@ def motions(
 
 
 def selected_of(
-    names: tuple[str, ...], tests: Iterable[tuple[float, Array, Array]]
+    names: tuple[str, ...],
+    tests: Iterable[tuple[float, Array, Array]],
+    seed: int | None = None,
 ) -> tuple[ModelSelection, Selection]:
     """What `names` say of stiffness, command and displacement of each test, noise added."""
-    rng = np.random.default_rng()
+    rng = np.random.default_rng(seed)
     records = [
         Record(u, y + NOISE * rng.standard_normal(len(y)), 1 / RATE, stiffness=k)
         for k, u, y in tests
