@@ -28,6 +28,7 @@ _PARETO = 0.5
 _LEAST = 1e-9  # spread of what has none
 _EQUAL = 0.4  # of all draws are shared by the parts of a proposal, however likely they are
 _WIDEST = 700.0  # logarithm of a ratio of weights
+_NOTHING = 1e-300  # above the cut of a tail: its inverse, a few times over, is still a number
 _FEWEST = 5  # weights that a Pareto distribution is fitted to
 
 
@@ -148,7 +149,7 @@ def smoothed(log_weights: Array) -> tuple[Array, float]:
     order = np.argsort(weights)
     count = math.ceil(min(m / 5.0, 3.0 * math.sqrt(m)))
     cut = weights[order[-count - 1]]
-    tail = order[-count:][weights[order[-count:]] > cut]
+    tail = order[-count:][weights[order[-count:]] - cut > _NOTHING]
     shape = math.inf
     if len(tail) >= _FEWEST:
         shape, scale = _pareto(weights[tail] - cut)

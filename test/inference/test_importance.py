@@ -23,13 +23,24 @@ def test_weights_are_smoothed_as_by_arviz(spread: float) -> None:
     assert weights == pytest.approx(np.exp(reference), abs=1e-12)
 
 
-def test_weights_over_thousands_of_decades_overflow_nothing() -> None:
+@pytest.mark.parametrize('spread', [200.0, 400.0, 4000.0])
+def test_weights_over_thousands_of_decades_overflow_nothing(spread: float, rng_seed: int) -> None:
     """One point outweighs all others; a tail that wide has hardly a shape."""
-    log_weights = 4000.0 * np.random.default_rng().standard_normal(1920)
+    rng = np.random.default_rng(rng_seed)
+    for log_weights in spread * rng.standard_normal((200, 1920)):
+        with np.errstate(over='raise'):
+            weights, shape = importance.smoothed(log_weights)
+        assert shape > 1.0
+        assert weights.sum() == pytest.approx(1.0)
+
+
+def test_a_tail_that_reaches_the_least_numbers_overflows_nothing() -> None:
+    """The weight that the tail's width is taken from, a number that has no inverse."""
+    log_weights = np.full(1920, -2000.0)
+    log_weights[:5] = [0.0, -7.0, -114.0, -522.0, -713.8]
     with np.errstate(over='raise'):
-        weights, shape = importance.smoothed(log_weights)
-    assert shape > 1.0
-    assert weights.sum() == pytest.approx(1.0)
+        weights, _ = importance.smoothed(log_weights)
+    assert weights[0] == pytest.approx(1.0, rel=1e-3)
 
 
 START = importance.StudentMixture(np.ones(1), np.zeros((1, 3)), np.eye(3)[None])
