@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 Json = dict[str, Any]
-_EDGES = (0.0, 0.3, 0.6, 0.8, 0.9, 1.0)
+_EDGES = (0.0, 0.3, 0.6, 0.85, 0.95, 1.0)
 # Misses on one machine go together (alpha_1 beta_0 and alpha_2 correlate by 0.83): over 720
 # machines of known structure their number varied 1.7 times as much as that of single misses.
 _TOGETHER = 1.7
