@@ -101,6 +101,11 @@ class Data:
         """Time between samples of each record [s]."""
         return tuple(r.period for r in self.records)
 
+    @property
+    def duration(self) -> float:
+        """Duration of the longest record [s]."""
+        return max(r.duration for r in self.records)
+
     @cached_property
     def factors(self) -> tuple[int, ...]:
         """How many recorded samples became one of each record."""

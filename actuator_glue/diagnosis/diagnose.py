@@ -131,7 +131,7 @@ def diagnose(
     error, coverage, curves = verify(
         data, prepared.held, before, after, decision.noise, seed, result.line, len(found.singles)
     )
-    space = Space(after.model, max(r.duration for r in data.records))
+    space = Space(after.model, data.duration)
     others = alternatives.alternatives(result)
     larger = final
     if decision.verdict in verdict.COMPLETE:
@@ -154,7 +154,7 @@ def diagnose(
         mixed = model_form.widened(mixed, form, space, rng)
     estimates = _estimates(space, replace(after, draws=mixed), told.unmet)
     held_at = _pressed(space, after)
-    plain = Space(before.model, max(r.duration for r in data.records))
+    plain = Space(before.model, data.duration)
     experiments = _experiments(result, [trial for trial, _ in others])
     sizes = result.selection.search.scale()
     decision = replace(

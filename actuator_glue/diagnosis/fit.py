@@ -143,7 +143,7 @@ def fit(
     Returns:
         The best of all starts.
     """
-    space = space or Space(model, max(r.duration for r in data.records))
+    space = space or Space(model, data.duration)
     z = space.z(np.atleast_2d(starts))
     found, ahead = _tried(data, model, space, z[:, None])
     output = found[:, 0]

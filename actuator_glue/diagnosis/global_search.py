@@ -90,9 +90,8 @@ class Shares(Space):
 
 
 def _space(data: Data, model: Model) -> Space:
-    duration = max(r.duration for r in data.records)
     stiffness, *others = {r.known_stiffness() for r in data.records}
-    return Space(model, duration) if others else Shares(model, duration, stiffness)
+    return Space(model, data.duration) if others else Shares(model, data.duration, stiffness)
 
 
 def along_ridge(data: Data, model: Structure, theta: Array) -> Array:

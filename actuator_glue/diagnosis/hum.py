@@ -170,7 +170,6 @@ def find(data: Data, errors: Array) -> Line | None:
             best = (float(ratio[at]), float(f[at]))
     if best[0] < _CLEAR:
         return None
-    duration = max(r.duration for r in data.records)
     frequency = best[1]
 
     def power(hertz: float) -> float:
@@ -178,11 +177,11 @@ def find(data: Data, errors: Array) -> Line | None:
         return float(sum(a @ a for a in found))
 
     for width in (0.5, 0.1, 0.02):
-        tried = frequency + np.linspace(-1, 1, 21) * width / duration * 2
+        tried = frequency + np.linspace(-1, 1, 21) * width / data.duration * 2
         frequency = float(tried[int(np.argmax([power(f) for f in tried]))])
     found = np.stack([amplitudes(e, t, frequency) for e, t in zip(parts, data.times, strict=True)])
     floor = float(np.mean(errors**2)) - 0.5 * float(np.mean(np.sum(found**2, axis=1)))
-    return Line(frequency, found, floor, len(errors), duration)
+    return Line(frequency, found, floor, len(errors), data.duration)
 
 
 def without(data: Data, line: Line) -> Data:

@@ -186,7 +186,7 @@ def sample(
         each: evaluates some draws at a time: `map`, or that of a pool of threads.
     """
     fit = most_likely(scorer.data, model, fit.theta, scorer)
-    space = Space(model, max(r.duration for r in scorer.data.records))
+    space = Space(model, scorer.data.duration)
     around = coordinates(space, model, scorer.data, fit.z)
     phi = around.forward(fit.theta[None])[0]
     noise = inflation(beside.without(fit.error))

@@ -150,7 +150,7 @@ class Search:
         key, model = frozenset(trial.effects), trial.structure
         found = fit(self.data, model, trial.fit.theta, iterations=_LAST)
         if finely:
-            space = Space(model, max(r.duration for r in self.data.records), _FINER)
+            space = Space(model, self.data.duration, _FINER)
             lower = fit(self.data, model, found.theta, iterations=_LAST, space=space)
             if lower.rms < found.rms:
                 found = fit(self.data, model, lower.theta, iterations=_FINISHED)
