@@ -22,6 +22,7 @@ from actuator_glue.diagnosis import (
     reconciled,
     response,
     rest,
+    ridge,
     verdict,
 )
 from actuator_glue.diagnosis.base_prior import BasePrior
@@ -48,7 +49,7 @@ from actuator_glue.diagnosis.verify import Side, traces, verify
 from actuator_glue.inference.at_bound import Pressed, pressed
 from actuator_glue.inference.prior_use import GivenPrior
 from actuator_glue.model.parameters import BASE
-from actuator_glue.records import Record
+from actuator_glue.records import Array, Record
 
 Clock = Callable[[], float]
 
@@ -132,6 +133,7 @@ def diagnose(
         data, prepared.held, before, after, decision.noise, seed, result.line, len(found.singles)
     )
     space = Space(after.model, data.duration)
+    open_ridge = ridge.left_open(space, after.model, scorer, after.theta)
     others = alternatives.alternatives(result)
     larger = final
     if decision.verdict in verdict.COMPLETE:
@@ -140,7 +142,7 @@ def diagnose(
     # Chains that met nowhere give no interval that anything beside, or in place, could widen.
     nowhere = bool(draws.unmet) and all(draws.unmet)
     if larger is not final and not nowhere:
-        known_alone = posterior.identified(space, draws.points).tolist()
+        known_alone = posterior.identified(space, draws.points, open_ridge).tolist()
         told = sample(larger, settings.evaluations)
         told = companions.reduced(told, larger, final, known_alone)
     mixed = told.points
@@ -152,9 +154,11 @@ def diagnose(
         search, left = result.selection.search, decision.left
         form = model_form.open_form(search, final, left, space, scorer)
         mixed = model_form.widened(mixed, form, space, rng)
-    estimates = _estimates(space, replace(after, draws=mixed), told.unmet)
+    estimates = _estimates(space, replace(after, draws=mixed), open_ridge, told.unmet)
     held_at = _pressed(space, after)
     plain = Space(before.model, data.duration)
+    plain_ridge = ridge.left_open(plain, before.model, scorer, before.theta)
+    estimates_before = _estimates(plain, before, plain_ridge)
     experiments = _experiments(result, [trial for trial, _ in others])
     sizes = result.selection.search.scale()
     decision = replace(
@@ -193,7 +197,7 @@ def diagnose(
         base={p.name: estimates[p.name] for p in BASE},
         structure=decision.final.effects,
         learned=learned,
-        base_before={n: e for n, e in _estimates(plain, before).items() if n in estimates},
+        base_before={n: e for n, e in estimates_before.items() if n in estimates},
         responses=tuple(
             response.of(after.model, after.theta, after.draws[:: len(after.draws) // 32], sizes, k)
             for k in sorted({r.known_stiffness() for r in data.records})
@@ -251,13 +255,21 @@ def _pressed(space: Space, side: Side) -> tuple[Pressed, ...]:
     return tuple(out)
 
 
-def _estimates(space: Space, side: Side, unmet: Sequence[bool] = ()) -> dict[str, Estimate]:
-    """Return what is known of each parameter; of one that chains differ about, its bounds."""
+def _estimates(
+    space: Space, side: Side, open_ridge: Array, unmet: Sequence[bool] = ()
+) -> dict[str, Estimate]:
+    """Return what is known of each parameter; of one that chains differ about, its bounds.
+
+    Of one that a ridge (n, p) leaves open, as far as that goes.
+    """
     out = {}
     lower, upper = space.theta(space.lower), space.theta(space.upper)
-    known = posterior.identified(space, side.draws)
+    known = posterior.identified(space, side.draws, open_ridge)
     for i, (parameter, column) in enumerate(zip(side.model.parameters, side.draws.T, strict=True)):
         low, high = np.quantile(column, [0.025, 0.975])
+        if not known[i]:
+            far = open_ridge[:, i]
+            low, high = min(low, far.min()), max(high, far.max())
         if any(unmet[i : i + 1]):
             known[i], low, high = False, lower[i], upper[i]
         out[parameter.name] = Estimate(

@@ -78,18 +78,19 @@ class Draws(NamedTuple):
         }
 
 
-def identified(space: Space, draws: Array) -> NDArray[np.bool_]:
+def identified(space: Space, draws: Array, ridge: Array) -> NDArray[np.bool_]:
     """Which parameters the records fix (p,): draws (m, p) fill less than half of the bounds.
 
     Bounds of Eq. (2)'s parameters are decades wide: a factor of e^2 between the 2.5 and 97.5 %
     quantiles is no knowledge of one. Where alpha_2 is open, draws reach along the ridge that one
-    stiffness leaves only as far as `identifiable.py` lets them: what moves with it is open, too.
+    stiffness leaves only as far as `identifiable.py` lets them: what moves with it is open, too,
+    and what moves along `ridge` (n, p), which does as well, by more than draws spread.
     """
-    z = space.z(draws)
+    z, moved = space.z(draws), np.ptp(space.z(ridge), axis=0)
     low, high = np.quantile(z, [0.025, 0.975], axis=0)
     widest = 0.5 * (space.upper - space.lower)
     widest[:_P] = 2.0
-    known = np.asarray(high - low < widest)
+    known = np.asarray((high - low < widest) & (moved <= high - low))
     if not known[_ALPHA_2]:
         ranks = np.argsort(np.argsort(z, axis=0), axis=0)
         known &= np.abs(np.corrcoef(ranks.T)[_ALPHA_2]) < _MOVES_WITH

@@ -12,9 +12,11 @@ from dataclasses import replace
 
 import numpy as np
 import scipy
+from numpy.typing import NDArray
 
 from actuator_glue.diagnosis.data import LANES, Data
 from actuator_glue.diagnosis.fit import fit, rms
+from actuator_glue.diagnosis.free_run import Model
 from actuator_glue.diagnosis.ranking import standard_error
 from actuator_glue.diagnosis.result import HeldOutError
 from actuator_glue.diagnosis.score import Scorer
@@ -58,20 +60,29 @@ def reached(scorer: Scorer, held: Data, side: Side) -> float | None:
         side: the structure, its best parameters for the fitting part, draws of its posterior.
 
     Returns:
-        None where the fitting part excludes those parameters: they cost more than the 95 %
-        region of a normal posterior does, and more than twice the standard error over its blocks.
+        None where the fitting part excludes those parameters.
     """
     data, model, theta, draws = scorer.data, side.model, side.theta, side.draws
     some = draws[:: max(1, len(draws) // LANES)][:LANES]
     nearest = np.argsort(sum_of_squares(held.target - held.simulate(model, some)))[:_STARTS]
     both = fit(_together(data, held), model, np.vstack([theta, some[nearest]])).theta
-    errors = data.target - data.simulate(model, np.stack([theta, both]))
-    before, after = scorer.whiten(errors)
-    lost = _per_block(after**2 - before**2, scorer.blocks)
-    most = 0.5 * float(scipy.stats.chi2.ppf(0.95, len(theta)))
-    if not lost.sum() <= max(most, _SURE * standard_error(lost)):
+    if not as_likely(scorer, model, theta, both[None])[0]:
         return None
     return rms(held.target - held.simulate(model, both)[0])
+
+
+def as_likely(scorer: Scorer, model: Model, theta: Array, others: Array) -> NDArray[np.bool_]:
+    """Whether the fitting part does not exclude other parameters (m, p) than the best, (p,).
+
+    It does where they cost more than the 95 % region of a normal posterior, and more than twice
+    the standard error over the blocks.
+    """
+    data = scorer.data
+    errors = data.target - data.simulate(model, np.concatenate([theta[None], others]))
+    best, *rest = scorer.whiten(errors)
+    lost = [_per_block(row**2 - best**2, scorer.blocks) for row in rest]
+    most = 0.5 * float(scipy.stats.chi2.ppf(0.95, len(theta)))
+    return np.array([x.sum() <= max(most, _SURE * standard_error(x)) for x in lost])
 
 
 def _per_block(squares: Array, blocks: Sequence[slice]) -> Array:

@@ -5,8 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.posterior import identified
+from actuator_glue.diagnosis.ridge import left_open
+from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.space import Space
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.model import commands
@@ -26,22 +29,76 @@ def test_what_moves_with_an_open_parameter_is_open(spread: float) -> None:
     draws = np.column_stack(
         [134.0 * rest[:, 0], 1e9 * share * rest[:, 1], alpha_2, 0.5 * share * rest[:, 2]]
     )
-    known = identified(Space(Structure(()), 40.0), draws)
+    known = identified(Space(Structure(()), 40.0), draws, draws[:1])
     assert known.tolist() == ([True] * 4 if spread < 0.1 else [True, False, False, False])
 
 
-def test_no_narrow_interval_is_told_along_the_ridge(rng_seed: int) -> None:
-    """A stiff oil column under one light specimen, from sweeps: beta_1 alone is known.
+STIFF_OIL = np.array([219.9, 6.23e10, 4.98e6, 4.74])
+STIFF_BOTH = np.array([89.8, 9.32e9, 1.23e7, 0.321])
 
-    Its 95 % interval is asked at four times its length about its mean: it fails once in 10^4.
-    """
-    theta, rng = np.array([219.9, 6.23e10, 4.98e6, 4.74]), np.random.default_rng(rng_seed)
+
+def swept(theta: np.ndarray, stiffness: float, rng: np.random.Generator) -> list[Record]:
+    """Two sweeps under one stiffness, 10 um of noise."""
     records = []
     for last in (6.0, 9.0):
         command = commands.sweep(RATE, 40.0, 0.1, last, 2e-3)
-        bare = Record(command, np.zeros(len(command)), 1 / RATE, stiffness=250e3)
+        bare = Record(command, np.zeros(len(command)), 1 / RATE, stiffness=stiffness)
         y = Structure(()).simulate(theta, bare) + 1e-5 * rng.standard_normal(len(command))
         records.append(replace(bare, measured=y))
+    return records
+
+
+def walked(records: list[Record], theta: np.ndarray) -> np.ndarray:
+    """What the records leave open beside theta."""
+    data, model = Data.whole(records), Structure(())
+    error = data.target - data.simulate(model, theta[None])[0]
+    return left_open(Space(model, 40.0), model, Scorer.of(data, splits_of(data, error)), theta)
+
+
+@pytest.mark.parametrize('share', [1e-4, 1.0, 10.0])
+def test_the_ridge_is_walked_from_anywhere_to_its_ends(share: float, rng_seed: int) -> None:
+    """From an oil that is soft beside the specimen, too; the motion stays. No false failures."""
+    k = 6.15e6
+    theta, other = STIFF_BOTH.copy(), share * STIFF_BOTH[2]
+    theta[[1, 3]] *= (other + k) / (theta[2] + k)
+    theta[2] = other
+    records = swept(STIFF_BOTH, k, np.random.default_rng(rng_seed))
+    found = walked(records, theta)
+    assert found[:, 2].min() < 1e3 and found[:, 2].max() > 1e9
+    np.testing.assert_allclose(found[:, 0], theta[0], rtol=1e-6)
+    for column in (1, 3):
+        assert found[:, column].min() < STIFF_BOTH[column] < found[:, column].max()
+    motion = Structure(()).simulate(np.vstack([STIFF_BOTH, found]), records[0])
+    assert np.abs(motion[1:] - motion[0]).max() < 1e-8
+
+
+def test_several_stiffnesses_leave_no_ridge(rng_seed: int) -> None:
+    """Nothing but what was given. No false failures."""
+    rng = np.random.default_rng(rng_seed)
+    records = [*swept(STIFF_BOTH, 6.15e6, rng), *swept(STIFF_BOTH, 0.0, rng)]
+    assert walked(records, STIFF_BOTH).tolist() == [STIFF_BOTH.tolist()]
+
+
+def test_draws_in_one_place_of_the_ridge_know_nothing_of_it() -> None:
+    """Where the oil is soft beside the specimen nothing moves with alpha_2."""
+    rng, space = np.random.default_rng(7), Space(Structure(()), 40.0)
+    spread = np.array([1e-3, 1e-3, 0.5, 1e-3])
+    theta = np.array([89.8, 3.10e9, 500.0, 0.107])
+    draws = theta * np.exp(spread * rng.standard_normal((500, 4)))
+    ridge = np.stack([theta, theta * [1.0, 3.0, 2.5e4, 3.0]])
+    assert identified(space, draws, ridge[:1]).tolist() == [True, True, True, True]
+    assert identified(space, draws, ridge).tolist() == [True, False, False, False]
+
+
+@pytest.mark.parametrize(('theta', 'k'), [(STIFF_OIL, 250e3), (STIFF_BOTH, 6.15e6)])
+def test_no_narrow_interval_is_told_along_the_ridge(
+    theta: np.ndarray, k: float, rng_seed: int
+) -> None:
+    """A stiff oil column under a light specimen, or a stiff one: beta_1 alone is known.
+
+    Its 95 % interval is asked at four times its length about its mean: it fails once in 10^4.
+    """
+    records = swept(theta, k, np.random.default_rng(rng_seed))
     found = diagnose(records, seed=rng_seed, settings=Thresholds(evaluations=0))
     assert found.verdict == 'none'
     for value, (name, told) in zip(theta, found.base.items(), strict=True):
