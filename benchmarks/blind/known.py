@@ -47,6 +47,7 @@ def intervals(seed: int, generator: str, evaluations: int) -> list[Interval]:
     from actuator_glue.diagnosis.fit import fit
     from actuator_glue.diagnosis.pipeline import mean_effects
     from actuator_glue.diagnosis.preparation import prepare
+    from actuator_glue.diagnosis.ridge import left_open
     from actuator_glue.diagnosis.score import Scorer, pooled, splits_of
     from actuator_glue.diagnosis.search import Search
     from actuator_glue.diagnosis.space import Space
@@ -87,7 +88,8 @@ def intervals(seed: int, generator: str, evaluations: int) -> list[Interval]:
         evaluations=evaluations,
         progress=lambda share: None,
     ).points
-    known = posterior.identified(Space(model, max(r.duration for r in data.records)), draws)
+    space = Space(model, data.duration)
+    known = posterior.identified(space, draws, left_open(space, model, scorer, found.theta))
     low, high = np.quantile(draws, [0.025, 0.975], axis=0)
     mean, spread = draws.mean(axis=0), draws.std(axis=0)
     out = []
