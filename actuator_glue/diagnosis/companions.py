@@ -29,13 +29,16 @@ SEEN = 0.2
 _ALONE = 0.9  # weight among what was tried of a kind that is told from the others
 
 
-def with_companions(selection: ModelSelection, final: Trial, least: float | None = None) -> Trial:
+def with_companions(
+    selection: ModelSelection, final: Trial, least: float | None = None, *, alone: bool = True
+) -> Trial:
     """Return a structure with what else is there beyond chance, at the user's level, and alone.
 
     Args:
         selection: what chose the structure.
         final: a structure that leaves nothing material.
         least: error that each of them removes [m]; a fifth of what matters if not given.
+        alone: whether each must be told from what is of another kind.
     """
     search = selection.search
     if final.own is not None:
@@ -47,7 +50,7 @@ def with_companions(selection: ModelSelection, final: Trial, least: float | None
         trials = beside(selection, current, others, least)
         if not trials or not selection.better(trials[0], current, least):
             break
-        if _weight_of_its_kind(search, trials) < _ALONE:
+        if alone and _weight_of_its_kind(search, trials) < _ALONE:
             break
         current = trials[0]
     return current
@@ -143,9 +146,34 @@ def sentences(final: Trial, larger: Trial, held: Data, missed: bool) -> tuple[st
         'matters; intervals allow for it'
     )
     if missed:
-        left = (
-            1e6 * rms(held.target - held.simulate(t.model, t.fit.theta)[0])
-            for t in (larger, final)
-        )
+        left = (1e6 * _left(held, t) for t in (larger, final))
         said += '; the held-out part leaves {:.1f} um with it, {:.1f} um without'.format(*left)
     return (said,)
+
+
+def hint(selection: ModelSelection, final: Trial, held: Data) -> tuple[str, ...]:
+    """Say what may explain the held-out part where the fitting records' answer does not.
+
+    Args:
+        selection: what chose the structure.
+        final: what leaves nothing material of the fitting records.
+        held: the held-out part, which shows more than noise.
+
+    Returns:
+        Nothing where what they show beyond chance leaves no less there.
+    """
+    larger = with_companions(selection, final, alone=False)
+    names = [n for n in larger.effects if n not in final.effects]
+    with_it, without = _left(held, larger), _left(held, final)
+    if not names or without - with_it < SEEN * selection.material:
+        return ()
+    return (
+        f'{", ".join(names)} (or what is like it) is not added: beyond chance, but it removes '
+        f"{1e6 * removed(final, larger):.2g} um of the fitting records' error, less than what "
+        f'matters; the held-out part leaves {1e6 * with_it:.2g} um with it, {1e6 * without:.2g} '
+        'um without: fit a record like it',
+    )
+
+
+def _left(held: Data, trial: Trial) -> float:
+    return rms(held.target - held.simulate(trial.model, trial.fit.theta)[0])

@@ -171,6 +171,9 @@ def diagnose(
         p_value = known.conflict(after.draws).p_value
         used = prior.used(known.components, known.quality, p_value)
     contradicted = advice.contradicted(error, found.material)
+    beside = companions.sentences(final, larger, prepared.held, bool(contradicted))
+    if contradicted and not beside and decision.verdict in verdict.COMPLETE:
+        beside = companions.hint(result.selection, final, prepared.held)
     tell('done', 1.0)
     return DiagnosisData(
         verdict=judged,
@@ -187,7 +190,7 @@ def diagnose(
             *advice.of(decision, found, result.generic, stretches, experiments),
             *contradicted,
             *advice.zeros(error, found.material),
-            *companions.sentences(final, larger, prepared.held, bool(contradicted)),
+            *beside,
             *advice.unidentified(data, estimates),
             *advice.unconverged(float(np.fmax(draws.rhat, told.rhat))),
             *rest.compared(data.records, still, decision.noise),

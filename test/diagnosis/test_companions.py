@@ -1,5 +1,6 @@
 """Effects below what matters are not told, but sizes beside them are right."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -7,10 +8,12 @@ import pytest
 import two_sweeps
 
 from actuator_glue.diagnosis import companions, discrepancy, posterior
+from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.posterior import Draws
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.records import Record
 
 NAMES = ('viscous-damping', 'specimen-gap', 'valve-deadband', 'bias', 'delay', 'drift')
 # The gap removes 1.7 um, 0.1 um from one draw of the noise to the next: between the 1 um that
@@ -123,3 +126,27 @@ def test_damping_is_found_on_either_side_of_the_valve() -> None:
         final = selected(0.0)[1].final
         assert final.fit.theta[0] == pytest.approx(two_sweeps.THETA[0], rel=0.1)
         assert final.fit.theta[4] == pytest.approx(DAMPING, rel=0.1)
+
+
+def test_what_the_held_out_part_shows_is_hinted_at(rng_seed: int) -> None:
+    """Damping that is seen but does not matter in small sweeps, of another kind than delays.
+
+    It removes 2.7 um there, and tenfold in a test of ten times the stroke, of which 1.4 to 2.6 um
+    are left. False failures: none in 30 runs (95 % interval 0 to 12 %).
+    """
+    names, small = ('viscous-damping', 'delay', 'bias', 'drift'), 2e-4
+    u, theta = two_sweeps.sweep(small, 10.0, 80.0), two_sweeps.THETA
+    effects, stiffness = {'viscous-damping': 3e4}, (100e3, 400e3)
+    selection, found = two_sweeps.selected_of(
+        names, two_sweeps.motions(effects, theta, u, stiffness), rng_seed
+    )
+    assert not found.final.effects
+    loud = [
+        Record(v, y, 1 / two_sweeps.RATE, stiffness=k)
+        for k, v, y in two_sweeps.motions(effects, theta, 10.0 * u, stiffness)
+    ]
+    (sentence,) = companions.hint(selection, found.final, Data.whole(loud))
+    assert sentence.startswith('viscous-damping (or what is like it) is not added')
+    left = re.findall(r'([\d.]+) um with', sentence)
+    assert float(left[0]) < 0.5 * float(left[1])
+    assert companions.hint(selection, found.final, selection.search.data) == ()
