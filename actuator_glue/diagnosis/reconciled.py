@@ -75,14 +75,16 @@ def as_likely(scorer: Scorer, model: Model, theta: Array, others: Array) -> NDAr
     """Whether the fitting part does not exclude other parameters (m, p) than the best, (p,).
 
     It does where they cost more than the 95 % region of a normal posterior, and more than twice
-    the standard error over the blocks.
+    the standard error over the blocks; a prior of the data counts.
     """
-    data = scorer.data
-    errors = data.target - data.simulate(model, np.concatenate([theta[None], others]))
-    best, *rest = scorer.whiten(errors)
+    data, rows = scorer.data, np.concatenate([theta[None], others])
+    best, *rest = scorer.whiten(data.target - data.simulate(model, rows))
     lost = [_per_block(row**2 - best**2, scorer.blocks) for row in rest]
+    prior = np.zeros(len(rows)) if data.prior is None else data.prior.log_density(rows)
     most = 0.5 * float(scipy.stats.chi2.ppf(0.95, len(theta)))
-    return np.array([x.sum() <= max(most, _SURE * standard_error(x)) for x in lost])
+    limits = np.array([max(most, _SURE * standard_error(x)) for x in lost])
+    cost = np.array([x.sum() for x in lost]) + prior[0] - prior[1:]
+    return np.asarray(cost <= limits)
 
 
 def _per_block(squares: Array, blocks: Sequence[slice]) -> Array:

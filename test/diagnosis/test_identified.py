@@ -5,14 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from actuator_glue.diagnosis.base_prior import BasePrior
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.posterior import identified
 from actuator_glue.diagnosis.ridge import left_open
 from actuator_glue.diagnosis.score import Scorer, splits_of
-from actuator_glue.diagnosis.space import Space
+from actuator_glue.diagnosis.space import UPPER, Space
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.inference.carried import Carried
 from actuator_glue.model import commands
+from actuator_glue.model.parameters import NAMES
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
 
@@ -48,9 +51,9 @@ def swept(theta: np.ndarray, stiffness: float, rng: np.random.Generator) -> list
     return records
 
 
-def walked(records: list[Record], theta: np.ndarray) -> np.ndarray:
-    """What the records leave open beside theta."""
-    data, model = Data.whole(records), Structure(())
+def walked(records: list[Record], theta: np.ndarray, prior: BasePrior | None = None) -> np.ndarray:
+    """What the records, and what was known before, leave open beside theta."""
+    data, model = replace(Data.whole(records), prior=prior), Structure(())
     error = data.target - data.simulate(model, theta[None])[0]
     return left_open(Space(model, 40.0), model, Scorer.of(data, splits_of(data, error)), theta)
 
@@ -70,6 +73,15 @@ def test_the_ridge_is_walked_from_anywhere_to_its_ends(share: float, rng_seed: i
         assert found[:, column].min() < STIFF_BOTH[column] < found[:, column].max()
     motion = Structure(()).simulate(np.vstack([STIFF_BOTH, found]), records[0])
     assert np.abs(motion[1:] - motion[0]).max() < 1e-8
+
+
+def test_what_was_known_before_ends_the_ridge(rng_seed: int) -> None:
+    """A calibration under two stiffnesses, each parameter within 5 %. No false failures."""
+    rng = np.random.default_rng(rng_seed)
+    before = Carried(NAMES, STIFF_BOTH * np.exp(0.05 * rng.standard_normal((400, 4))))
+    records = swept(STIFF_BOTH, 6.15e6, rng)
+    found = walked(records, STIFF_BOTH, BasePrior(before, UPPER))
+    assert found.tolist() == [STIFF_BOTH.tolist()]
 
 
 def test_several_stiffnesses_leave_no_ridge(rng_seed: int) -> None:
