@@ -151,16 +151,6 @@ def test_a_resonance_is_described(kind: str) -> None:
     assert best.fit.theta[6] == pytest.approx(hertz, rel=0.03)
 
 
-def test_what_rings_may_lie_far_above_what_moves_it() -> None:
-    """A test of some 2 Hz and a frame at 14 Hz; never above what is sampled."""
-    for rate, highest in ((RATE, 16.0), (25.0, 10.0)):
-        scale = Scale(STROKE, 4.0 * np.pi * STROKE, 60.0, 1.0 / rate, 250e3, PLANTS[1])
-        (resonance,) = (e for e in forms(scale) if e.name == 'learned-command-resonance')
-        assert resonance.parameters[2].upper == pytest.approx(highest)
-        starts = np.array(resonance.starts(scale))
-        assert starts[:, 2].max() == pytest.approx(highest)
-
-
 def settling(duration: float) -> list[Effect]:
     """The forms that change with time."""
     scale = Scale(STROKE, 0.1, duration, 1.0 / RATE, 250e3, PLANTS[1])
