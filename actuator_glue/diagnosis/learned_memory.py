@@ -37,12 +37,11 @@ _LOST: Final = ('command', 'feedback')  # of the valve it is in the catalogue
 _SETTLING: Final = (('flow', 'q'), ('specimen', 'k*x'), ('sensor', 'y'))
 _SHARE = (-1.0, 2.0)  # at -1 nothing is left
 _WIDTHS = (1e-3, 0.5)  # of the signal's size
-# Of the frequency at which a sine of the test's stroke has its speed, where what rings may lie
-# several times higher; and of the samples'.
-_FREQUENCIES, _SAMPLED = (0.1, 8.0), 0.4
+# Of the frequency at which a sine of the test's stroke has its speed; and of the samples'.
+_FREQUENCIES, _SAMPLED = (0.1, 4.0), 0.4
 _DAMPINGS = (0.005, 0.7)
 # Where it is looked for: its response is narrow.
-_LOOKED, _DAMPED, _SEEN = 12, (0.05, 0.2), 0.02
+_LOOKED, _DAMPED, _SEEN = 10, (0.05, 0.2), 0.02
 _HEIGHT = 2.0  # by which a gain may change at a resonance, and above it
 _TIMES = (0.02, 5.0)  # of the test's duration: in the longest all but 9 % of a drift are linear
 
