@@ -66,6 +66,27 @@ def _weight_of_its_kind(search: Search, trials: Sequence[Trial]) -> float:
     return float(sum(w for w, kind in zip(known, kinds, strict=True) if kind == kinds[0]))
 
 
+def alike(search: Search, final: Trial, larger: Trial) -> list[tuple[Trial, float]]:
+    """Return structures with what is like a companion in its place, and their odds against it.
+
+    Beside the lag of a valve beta_1 is another than beside one of the transducer: what the blocks
+    do not tell apart counts by its weight (alternatives.mixed).
+
+    Args:
+        search: what was refitted.
+        final: the structure that is told.
+        larger: with its companions.
+    """
+    out: list[tuple[Trial, float]] = []
+    for name in [n for n in larger.effects if n not in final.effects]:
+        rest, kind = [n for n in larger.effects if n != name], search.entries[name].group
+        like = [n for n in search.others(larger) if search.entries[n].group == kind]
+        tried = [t for n in like if (t := search.known((*rest, n))) is not None]
+        shares = weights(np.stack([larger.scores, *(t.scores for t in tried)]))
+        out += [(t, float(w / shares[0])) for t, w in zip(tried, shares[1:], strict=True)]
+    return out
+
+
 def beside(
     selection: ModelSelection, current: Trial, names: Sequence[str], least: float
 ) -> list[Trial]:

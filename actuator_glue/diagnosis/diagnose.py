@@ -144,6 +144,9 @@ def diagnose(
     if larger is not final and not nowhere:
         known_alone = posterior.identified(space, draws.points, open_ridge).tolist()
         told = sample(larger, settings.evaluations)
+        if like := companions.alike(result.selection.search, final, larger):
+            points = alternatives.mixed(told.points, larger, like, lambda t: sample(t).points, rng)
+            told = told._replace(points=points)
         told = companions.reduced(told, larger, final, known_alone)
     mixed = told.points
     if not nowhere:
