@@ -78,7 +78,7 @@ def alike(search: Search, final: Trial, larger: Trial) -> list[tuple[Trial, floa
         larger: with its companions.
     """
     out: list[tuple[Trial, float]] = []
-    for name in [n for n in larger.effects if n not in final.effects]:
+    for name in _beside(final, larger):
         rest, kind = [n for n in larger.effects if n != name], search.entries[name].group
         like = [n for n in search.others(larger) if search.entries[n].group == kind]
         tried = [t for n in like if (t := search.known((*rest, n))) is not None]
@@ -155,7 +155,7 @@ def sentences(final: Trial, larger: Trial, held: Data, missed: bool) -> tuple[st
         missed: whether the held-out part shows more than noise. Then it is said what they leave
             there: that they do not matter is what the fitting records say.
     """
-    names = [n for n in larger.effects if n not in final.effects]
+    names = _beside(final, larger)
     if not names:
         return ()
     kinds = Counter(e.group for e in CATALOGUE.values())
@@ -184,7 +184,7 @@ def hint(selection: ModelSelection, final: Trial, held: Data) -> tuple[str, ...]
         Nothing where what they show beyond chance leaves no less there.
     """
     larger = with_companions(selection, final, alone=False)
-    names = [n for n in larger.effects if n not in final.effects]
+    names = _beside(final, larger)
     with_it, without = _left(held, larger), _left(held, final)
     if not names or without - with_it < SEEN * selection.material:
         return ()
@@ -194,6 +194,10 @@ def hint(selection: ModelSelection, final: Trial, held: Data) -> tuple[str, ...]
         f'matters; the held-out part leaves {1e6 * with_it:.2g} um with it, {1e6 * without:.2g} '
         'um without: fit a record like it',
     )
+
+
+def _beside(final: Trial, larger: Trial) -> list[str]:
+    return [n for n in larger.effects if n not in final.effects]
 
 
 def _left(held: Data, trial: Trial) -> float:

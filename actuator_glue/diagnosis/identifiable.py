@@ -82,7 +82,7 @@ class Straight:
     def __init__(self, space: Space, model: Model, data: Data, fit: Array) -> None:
         self._space = space
         stiffness = data.records[0].known_stiffness()
-        middle = 0.5 * max(record.duration for record in data.records)
+        middle = 0.5 * data.duration
         reach = np.full(len(fit), np.inf)
         reach[2] = _HELD_REACH
         if stiffness == 0.0:

@@ -12,7 +12,6 @@ from dataclasses import replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from actuator_glue.diagnosis.data import LANES, Data
 from actuator_glue.diagnosis.fit import fit, rms
@@ -66,25 +65,26 @@ def reached(scorer: Scorer, held: Data, side: Side) -> float | None:
     some = draws[:: max(1, len(draws) // LANES)][:LANES]
     nearest = np.argsort(sum_of_squares(held.target - held.simulate(model, some)))[:_STARTS]
     both = fit(_together(data, held), model, np.vstack([theta, some[nearest]])).theta
-    if not as_likely(scorer, model, theta, both[None])[0]:
+    if not as_likely(scorer, model, theta, both):
         return None
     return rms(held.target - held.simulate(model, both)[0])
 
 
-def as_likely(scorer: Scorer, model: Model, theta: Array, others: Array) -> NDArray[np.bool_]:
-    """Whether the fitting part does not exclude other parameters (m, p) than the best, (p,).
+def as_likely(scorer: Scorer, model: Model, theta: Array, other: Array) -> bool:
+    """Whether the fitting part does not exclude other parameters (p,) than the best, (p,).
 
     It does where they cost more than the 95 % region of a normal posterior, and more than twice
     the standard error over the blocks; a prior of the data counts.
     """
-    data, rows = scorer.data, np.concatenate([theta[None], others])
-    best, *rest = scorer.whiten(data.target - data.simulate(model, rows))
-    lost = [_per_block(row**2 - best**2, scorer.blocks) for row in rest]
-    prior = np.zeros(len(rows)) if data.prior is None else data.prior.log_density(rows)
+    data, rows = scorer.data, np.stack([theta, other])
+    before, after = scorer.whiten(data.target - data.simulate(model, rows))
+    lost = _per_block(after**2 - before**2, scorer.blocks)
     most = 0.5 * float(scipy.stats.chi2.ppf(0.95, len(theta)))
-    limits = np.array([max(most, _SURE * standard_error(x)) for x in lost])
-    cost = np.array([x.sum() for x in lost]) + prior[0] - prior[1:]
-    return np.asarray(cost <= limits)
+    cost = lost.sum()
+    if data.prior is not None:
+        best, there = data.prior.log_density(rows)
+        cost += best - there
+    return bool(cost <= max(most, _SURE * standard_error(lost)))
 
 
 def _per_block(squares: Array, blocks: Sequence[slice]) -> Array:

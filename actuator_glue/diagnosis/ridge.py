@@ -48,7 +48,7 @@ def left_open(space: Space, model: Model, scorer: Scorer, theta: Array) -> Array
             ended = not np.isfinite(log_prior[0])
             if ended or abs(math.log(there[0, _OIL] / here[_OIL])) < _LEAST:
                 break
-            if not as_likely(scorer, model, theta, there)[0]:
+            if not as_likely(scorer, model, theta, there[0]):
                 break
             here = there[0]
             out.append(here)
