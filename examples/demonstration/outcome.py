@@ -210,7 +210,7 @@ class SessionOutcome:
             console.print(f'truth     inside the 95 % interval of the last model: {shares}')
         for name, moved in (self.drift() or {}).items():
             console.print(
-                f'drift     {name} by {moved["true"]:.3g} under the last model, followed by '
+                f'drift     {name} by {moved["true"]:.3g} under the last model, estimated as '
                 f'{moved["followed"]:.3g} +- {moved["stddev"]:.2g}'
             )
         found = self.comparison

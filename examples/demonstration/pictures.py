@@ -103,7 +103,7 @@ def carried(
         axes = panels[f'drift {j}']
         _followed(axes, content, j, truth, under_last=True)
         axes.set(ylabel=style.label(BASE[j].name, BASE[j].unit), xlabel='time [s]')
-        axes.set_title('it drifts while the oil warms, and is followed')
+        axes.set_title('its drift while the oil warms, in the windows of the last model')
     figure.legend(*panels[0].get_legend_handles_labels(), loc='outside lower center', ncols=3)
     figure.suptitle('95 % of each window: from the box, and with what was known before it')
     return style.save(figure, path)
