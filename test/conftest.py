@@ -15,7 +15,7 @@ import numpy as np
 def rng_seed(request: pytest.FixtureRequest) -> int:
     """A seed that differs between runs; ACTUATOR_GLUE_TEST_SEED=N repeats a failed run.
 
-    Tests that use it state how often they fail by chance.
+    Tests that use it state how often they fail by chance, where they can.
     """
     given = os.environ.get('ACTUATOR_GLUE_TEST_SEED')
     seed = int(given) if given else int(np.random.SeedSequence().generate_state(1)[0])

@@ -25,8 +25,8 @@ def test_nothing_is_excused_where_nothing_stalled():
     assert withheld([], [Stall(0, 1)]).tolist() == []
 
 
-def test_as_counted_one_by_one():
-    rng = np.random.default_rng()
+def test_as_counted_one_by_one(rng_seed):
+    rng = np.random.default_rng(rng_seed)
     came = np.cumsum(rng.integers(1, 50, 40))
     done = np.maximum.accumulate(came + rng.integers(1, 80, 40))
     edges = np.unique(rng.integers(0, 1200, 60))

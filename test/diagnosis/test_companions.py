@@ -37,7 +37,7 @@ def sampled(selection: ModelSelection, found: Selection, trial: Trial) -> Draws:
         trial.fit,
         scorer,
         beside=discrepancy.beside(small, trial.effects, scorer),
-        rng=np.random.default_rng(),
+        rng=np.random.default_rng(1),
         evaluations=0,
         progress=lambda share: None,
     )

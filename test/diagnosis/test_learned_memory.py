@@ -69,13 +69,13 @@ def told(search: Search, trial: Trial) -> tuple[str, dict[str, tuple[float, floa
 
 
 @pytest.mark.parametrize('name', KINDS)
-def test_a_machine_is_described_at_its_place(name: str) -> None:
+def test_a_machine_is_described_at_its_place(name: str, rng_seed: int) -> None:
     """Of all forms, screened and refitted as a diagnosis does, the right one leaves the noise.
 
     The noise's own rms varies by 0.9 % (6100 samples), five standard deviations are allowed, and
     of sizes more. Of 107 machines none failed.
     """
-    rng = np.random.default_rng()
+    rng = np.random.default_rng(rng_seed)
     kind, size, sizes = KINDS[name]
     # Where the oil is stiff the specimen hardly matters.
     plants = PLANTS[[0, 2]] if name == 'learned-specimen-settling' else PLANTS
@@ -97,9 +97,9 @@ def test_a_machine_is_described_at_its_place(name: str) -> None:
         assert excited['t'] == (0.0, SECONDS - 1.0 / RATE)
 
 
-def test_lost_motion_has_one_size() -> None:
+def test_lost_motion_has_one_size(rng_seed: int) -> None:
     """A share of the reading that has play is one, and must be worth its parameter."""
-    rng = np.random.default_rng()
+    rng = np.random.default_rng(rng_seed)
     search, _ = searched(sweeps(7, 60e-6, PLANTS[0], rng))
     selection = ModelSelection(search, Thresholds(), lambda *_: None)
     selection.renoise()
@@ -107,9 +107,9 @@ def test_lost_motion_has_one_size() -> None:
     assert _plainer(selection, share).effects == ('learned-feedback-play',)
 
 
-def test_a_reading_that_settles_is_described() -> None:
+def test_a_reading_that_settles_is_described(rng_seed: int) -> None:
     """Gain of the transducer, 10 % with a time constant of 8 s; ten deviations are allowed."""
-    rng = np.random.default_rng()
+    rng = np.random.default_rng(rng_seed)
     records = []
     for record in sweeps(0, 0.0, PLANTS[1], rng):
         measured = record.measured * (1.0 + 0.1 * (1.0 - np.exp(-record.time / 8.0)))
@@ -122,12 +122,12 @@ def test_a_reading_that_settles_is_described() -> None:
 
 
 @pytest.mark.parametrize('kind', ['a frame', 'a notch', 'a peak'])
-def test_a_resonance_is_described(kind: str) -> None:
+def test_a_resonance_is_described(kind: str, rng_seed: int) -> None:
     """Of the transducer, of any frequency that is excited; a loop that is linear has it as well.
 
     Five standard deviations of the noise's rms. Of 32 machines none failed.
     """
-    rng = np.random.default_rng()
+    rng = np.random.default_rng(rng_seed)
     hertz, damping = np.exp(rng.uniform(np.log([1.5, 0.03]), np.log([6.0, 0.2])))
     w, more = 2.0 * np.pi * hertz, rng.uniform(0.04, 0.06)
     below = np.array([1.0, 2.0 * damping * w, w * w])
@@ -167,9 +167,9 @@ def test_what_settles_starts_small_in_tests_of_any_length() -> None:
             assert np.abs(slow[:, 0]).min() < 0.3
 
 
-def test_stretches_know_the_time_of_the_test() -> None:
+def test_stretches_know_the_time_of_the_test(rng_seed: int) -> None:
     """A gain that settles is the same in a stretch of the record as in the whole."""
-    rng = np.random.default_rng()
+    rng = np.random.default_rng(rng_seed)
     t = np.arange(0.0, 150.0, 1.0 / RATE)
     command = STROKE * np.sin(2.0 * np.pi * (1.0 + rng.random()) * t)
     for effect in settling(150.0):

@@ -99,9 +99,11 @@ def test_jitter_is_variance_with_velocity() -> None:
     assert found.nats > 25.0
 
 
-def test_jitter_of_a_long_record_is_found_piece_by_piece(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_jitter_of_a_long_record_is_found_piece_by_piece(
+    monkeypatch: pytest.MonkeyPatch, rng_seed: int
+) -> None:
     """The filter forgets where a piece began: the numbers are those of the whole."""
-    e = SIGMA * np.random.default_rng().standard_normal(len(T)) * (1.0 + T)
+    e = SIGMA * np.random.default_rng(rng_seed).standard_normal(len(T)) * (1.0 + T)
     whole = jitter(data(e), e, Y)
     monkeypatch.setattr(measurement, '_PIECE', 500)
     pieces = jitter(data(e), e, Y)

@@ -57,12 +57,12 @@ def test_a_size_is_as_open_as_its_companions_leave_it() -> None:
     assert not model_form.spread(search, trial(('valve-null',), 0.0), 0.0, space)[4]
 
 
-def test_intervals_are_widened_one_by_one() -> None:
+def test_intervals_are_widened_one_by_one(rng_seed: int) -> None:
     """By the square root of the sum of squares, Eq. (2)'s as logarithms, within the bounds.
 
     Standard deviations of 20 000 draws scatter by 0.5 %.
     """
-    rng = np.random.default_rng()
+    rng = np.random.default_rng(rng_seed)
     space = Space(Structure(('backlash',)), 60.0)
     z = space.z(np.concatenate([THETA, [30e-6]])[None])
     draws = space.theta(z + rng.standard_normal((20_000, 5)) * [0.01, 0.01, 0.01, 0.01, 3e-6])

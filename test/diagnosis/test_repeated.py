@@ -12,11 +12,11 @@ SWEEP = np.sin(np.pi * (8.0 / 12.0) * T**2)
 
 @pytest.mark.parametrize('times', [2, 3, 7.5])
 @pytest.mark.parametrize('sizes', [1.0, 0.5])
-def test_sweeps_are_repeated(times: float, sizes: float) -> None:
+def test_sweeps_are_repeated(times: float, sizes: float, rng_seed: int) -> None:
     """Alike or growing, with a reading's noise on them, the last one cut off or not."""
     size = np.linspace(sizes, 1.0, 8)
     command = np.concatenate([a * SWEEP for a in size])[: int(times * len(T))]
-    command += 0.02 * np.random.default_rng().standard_normal(len(command))
+    command += 0.02 * np.random.default_rng(rng_seed).standard_normal(len(command))
     assert repeated.period(command + 3.0) == len(T)
 
 
@@ -26,9 +26,9 @@ def test_a_sinusoid_repeats_itself_each_period() -> None:
 
 
 @pytest.mark.parametrize('name', ['sweep', 'noise', 'ramp', 'nothing'])
-def test_what_is_not_repeated(name: str) -> None:
+def test_what_is_not_repeated(name: str, rng_seed: int) -> None:
     """One sweep, noise in a band of 2 Hz, one ramp and rest."""
-    rng = np.random.default_rng()
+    rng = np.random.default_rng(rng_seed)
     smooth = np.convolve(rng.standard_normal(len(T)), np.hanning(100), 'same')
     command = {'sweep': SWEEP, 'noise': smooth, 'ramp': T, 'nothing': np.zeros(len(T))}[name]
     assert repeated.period(command) == len(T)
