@@ -9,7 +9,7 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import Channel, ChannelMap, read_channel_map
-from actuator_glue.io.formats import Column, format_of
+from actuator_glue.io.formats import Column, FileTable, format_of
 from actuator_glue.io.time_base import uniform_period
 from actuator_glue.io.units import choose, factor
 from actuator_glue.records import Array, Hold, Record
@@ -48,11 +48,11 @@ def read(
         channels = read_channel_map(channels)
     notes: dict[str, str] = {}
     if channels is not None:
-        values, period = _mapped(path, channels)
+        values, period, start_ns = _mapped(path, channels)
         notes = {'hold': channels.hold or 'zoh', 'actuator': channels.actuator}
         stiffness = channels.stiffness if stiffness is None else stiffness
     else:
-        values, notes, period = _by_name(path)
+        values, notes, period, start_ns = _by_name(path)
         if stiffness is None:
             stiffness = _noted_stiffness(notes, path)
     first = float(values['time'][0]) if 'time' in values else 0.0
@@ -66,7 +66,7 @@ def read(
         force=values.get('force'),
         period=period,
         stiffness=stiffness,
-        start_ns=max(round(first * 1e9), 0),
+        start_ns=max(start_ns + round(first * 1e9), 0),
         hold=chosen,
         actuator=actuator or notes.get('actuator', 'actuator'),
         source=str(path),
@@ -81,8 +81,8 @@ def _noted_stiffness(notes: dict[str, str], path: Path) -> float | None:
         raise InputError(f'{path}: stiffness_N_per_m = {text!r} is not a number') from error
 
 
-def _by_name(path: Path) -> tuple[dict[str, Array], dict[str, str], float]:
-    """Return channels in SI units by the names of their columns, what is noted, the period."""
+def _by_name(path: Path) -> tuple[dict[str, Array], dict[str, str], float, int]:
+    """Return channels in SI units by the names of their columns, notes, period and start [ns]."""
     table = format_of(path).read(path, None)
     labels, units = [c.label for c in table.columns], [c.unit for c in table.columns]
     columns = choose(labels, units, str(path), timed=table.period is not None)
@@ -92,24 +92,25 @@ def _by_name(path: Path) -> tuple[dict[str, Array], dict[str, str], float]:
         values = {
             r: c if s == 1.0 else c * s for r, c, s in zip(columns, raw, scales, strict=True)
         }
-    notes, period = table.notes, table.period
+    notes, period, start_ns = table.notes, table.period, table.start_ns
     del raw, table  # a long file's columns as they were read are not held beside these
     if 'time' in values:
-        return values, notes, uniform_period(values['time'], str(path))
+        return values, notes, uniform_period(values['time'], str(path)), start_ns
     assert period is not None  # or `choose` had missed the times
-    return values, notes, period
+    return values, notes, period, start_ns
 
 
-def _mapped(path: Path, channels: ChannelMap) -> tuple[dict[str, Array], float]:
-    """Return channels in SI units, rest offsets removed, and the period."""
+def _mapped(path: Path, channels: ChannelMap) -> tuple[dict[str, Array], float, int]:
+    """Return channels in SI units, rest offsets removed, the period and the start [ns]."""
     roles = channels.roles()
-    raw, counter = _raw(path, channels, roles)
+    table = format_of(path).read(path, channels)
+    raw, counter = _raw(path, channels, roles, table)
     if counter is not None:
         _check_counter(counter, path)
     values = in_si(raw, channels, str(path))
     if channels.rate is not None:
-        return values, 1.0 / channels.rate
-    return values, uniform_period(values['time'], str(path))
+        return values, 1.0 / channels.rate, table.start_ns
+    return values, uniform_period(values['time'], str(path)), table.start_ns
 
 
 def in_si(raw: dict[str, Array], channels: ChannelMap, source: str) -> dict[str, Array]:
@@ -129,10 +130,9 @@ def in_si(raw: dict[str, Array], channels: ChannelMap, source: str) -> dict[str,
 
 
 def _raw(
-    path: Path, channels: ChannelMap, roles: dict[str, Channel]
+    path: Path, channels: ChannelMap, roles: dict[str, Channel], table: FileTable
 ) -> tuple[dict[str, Array], Array | None]:
     """Return channels as the file has them, and its sample numbers."""
-    table = format_of(path).read(path, channels)
     wanted: dict[str, str | int] = {role: channel.column for role, channel in roles.items()}
     if channels.sample_number is not None:
         wanted['sample_number'] = channels.sample_number

@@ -49,12 +49,14 @@ class FileTable:
         notes: what it says besides: stiffness_N_per_m, hold, actuator.
         values: return the columns at positions from 0, each of shape (n,), unscaled.
         period: time between samples [s] where the file states one.
+        start_ns: time from which its times count [ns], where the file states one; 0 elsewhere.
     """
 
     columns: list[Column]
     notes: dict[str, str]
     values: Callable[[list[int]], list[Array]]
     period: float | None = None
+    start_ns: int = 0
 
 
 @dataclass(frozen=True, slots=True)
