@@ -18,7 +18,7 @@ from actuator_glue.diagnosis.free_run import Model, ObservedChannel, parts
 from actuator_glue.model.effects.run import sample_steps
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
-from actuator_glue.records import Array, Record
+from actuator_glue.records import Array, Hold, Record
 
 SETTLE = 1.0  # s in which an unknown initial state is forgotten
 
@@ -120,6 +120,24 @@ class Data:
             for record, mask, count in zip(self.recorded, self.masks, self.factors, strict=True)
         ]
         return replace(self, records=self.recorded, masks=tuple(masks))
+
+    def with_setup(
+        self, *, stiffness: Sequence[float] | None = None, hold: Hold | None = None
+    ) -> Data:
+        """Return the same samples under another set-up.
+
+        Args:
+            stiffness: specimen stiffness of each record [N/m]; as they are if not given.
+            hold: how the commands run between their samples; as they do if not given.
+        """
+        given = stiffness or [r.known_stiffness() for r in self.records]
+        whole = tuple(
+            replace(r, stiffness=k, hold=hold or r.hold)
+            for r, k in zip(self.recorded, given, strict=True)
+        )
+        rows = zip(whole, self.factors, self.records, strict=True)
+        records = tuple(replace(decimated(r, n), measured=d.measured) for r, n, d in rows)
+        return replace(self, records=records, recorded=whole, steps=())
 
     @cached_property
     def times(self) -> tuple[Array, ...]:

@@ -24,6 +24,7 @@ from actuator_glue.diagnosis import (
     rest,
     ridge,
     verdict,
+    wrong_setup,
 )
 from actuator_glue.diagnosis.base_prior import BasePrior
 from actuator_glue.diagnosis.detect import alarm_of
@@ -36,6 +37,7 @@ from actuator_glue.diagnosis.onset_search import since_onset
 from actuator_glue.diagnosis.pipeline import (
     Conclusion,
     Progress,
+    as_given,
     conclude,
     with_learned_terms,
     with_what_matters,
@@ -89,13 +91,19 @@ def diagnose(
     known = None if prior is None else BasePrior(prior.carried, UPPER)
     if settings.use_force:
         check_forces(records)
-    first = conclude(prepare(records, held, known), settings, each, tell)
-    # What acts all the time comes before what appears.
-    always = with_the_right_hold(first, settings, each, tell)
-    result = since_onset(always, settings, each, tell)
-    if result is not always:
-        result = with_learned_terms(result)
-    result = with_what_matters(result)
+    ready = prepare(records, held, known)
+    other = wrong_setup.find(ready.fit, settings)
+    if other is not None and other.enough:
+        # What a wrong set-up leaves is nothing that the actuator does.
+        result = as_given(ready, settings, each, tell)
+    else:
+        first = conclude(ready, settings, each, tell)
+        # What acts all the time comes before what appears.
+        always = with_the_right_hold(first, settings, each, tell)
+        result = since_onset(always, settings, each, tell)
+        if result is not always:
+            result = with_learned_terms(result)
+        result = with_what_matters(result)
     prepared, data, scorer = result.prepared, result.data, result.scorer
     found, decision = result.found, result.decision
     stretches = homogeneity.agreement(decision.final, scorer)
@@ -153,6 +161,7 @@ def diagnose(
         mixed = alternatives.mixed(mixed, final, others, lambda t: sample(t).points, rng)
     error = reconciled.reached_by_both(error, found.material, scorer, prepared.held, before, after)
     judged = verdict.conclude(decision.verdict, bool(decision.names), error, found.material)
+    setup = result.prepared.setup or (None if judged in verdict.COMPLETE else other)
     if judged not in verdict.COMPLETE:
         search, left = result.selection.search, decision.left
         form = model_form.open_form(search, final, left, space, scorer)
@@ -168,6 +177,7 @@ def diagnose(
         decision, certainty=verdict.certainty(decision.certainty, error, found.material)
     )
     effects = findings.of(decision, found, estimates, stretches)
+    judged = verdict.named(judged, effects)
     learned = learned_term.described(decision.final, data, estimates)
     used = None
     if prior is not None and known is not None:
@@ -211,6 +221,7 @@ def diagnose(
         experiments=experiments,
         onset=result.onset,
         prior=used,
+        setup=setup,
         names=tuple(p.name for p in after.model.parameters),
         posterior=after.draws,
         rhat=draws.rhat,

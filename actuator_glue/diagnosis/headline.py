@@ -50,7 +50,16 @@ def _errors(found: DiagnosisData, named: bool) -> str:
 
 
 def headline(found: DiagnosisData) -> str:
-    """Return the verdict in one line, never more than the held-out part bears out."""
+    """Return the verdict in one line, never more than the held-out part bears out.
+
+    What is wrong with the set-up that was given comes first.
+    """
+    if found.setup is not None:
+        return f'{found.setup.sentence()}; {_verdict(found)}'
+    return _verdict(found)
+
+
+def _verdict(found: DiagnosisData) -> str:
     names = ', '.join(_named(e, found) for e in found.effects if e.noise is None)
     enough = 'the model is enough'
     if found.onset is not None:

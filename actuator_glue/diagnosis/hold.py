@@ -7,8 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from actuator_glue.diagnosis import hum
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.decimate import decimated
 from actuator_glue.diagnosis.each import Each
 from actuator_glue.diagnosis.fit import Fit, fit
 from actuator_glue.diagnosis.pipeline import (
@@ -21,6 +19,7 @@ from actuator_glue.diagnosis.preparation import Prepared
 from actuator_glue.diagnosis.score import evidence
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.wrong_setup import WrongSetup
 
 
 def with_the_right_hold(
@@ -60,7 +59,8 @@ def _linearly(
     prepared = first.prepared
     if first.decision.verdict == 'none' or not any(r.hold == 'zoh' for r in prepared.fit.recorded):
         return None
-    other = replace(prepared, fit=_linear(prepared.fit), held=_linear(prepared.held))
+    fitted, held = (data.with_setup(hold='linear') for data in (prepared.fit, prepared.held))
+    other = replace(prepared, fit=fitted, held=held)
     base = Search(other.fit, ()).base()
     before = first.found.base.mean_square + (first.line.rms**2 if first.line else 0.0)
     if before - base.rms**2 < first.found.material**2:
@@ -71,11 +71,18 @@ def _linearly(
     second = conclude(other, settings, each, tell, fixed=True)
     if _gained(first, second) < settings.nats:
         return None
-    note = (
-        'the command is taken to run linearly between its samples (as --hold linear): Eq. (2) '
-        f'alone then leaves {1e6 * base.rms:.1f} um instead of {1e6 * before**0.5:.1f} um'
+    recorded = other.fit.recorded
+    setup = WrongSetup(
+        sources=tuple(r.source or f'record {i + 1}' for i, r in enumerate(recorded)),
+        stiffness=tuple(r.known_stiffness() for r in recorded),
+        hold=tuple(r.hold for r in recorded),
+        changed=('hold',),
+        error=base.rms,
+        as_given=before**0.5,
+        enough=second.decision.verdict == 'none',
+        taken=True,
     )
-    return replace(second, prepared=replace(other, notes=(*other.notes, note)))
+    return replace(second, prepared=replace(second.prepared, setup=setup))
 
 
 def _gained(first: Conclusion, second: Conclusion) -> float:
@@ -93,16 +100,3 @@ def _explains_less(first: Conclusion, other: Prepared, base: Fit) -> bool:
     starts[1, : len(base.theta)] = base.theta
     again, scorer = fit(data, found.model, starts), first.scorer
     return evidence(scorer.block_scores(again), scorer.block_scores(found.fit)) < 0.0
-
-
-def _linear(data: Data) -> Data:
-    whole = tuple(replace(r, hold='linear') for r in data.recorded)
-    pairs = zip(whole, data.factors, strict=True)
-    records = (decimated(r, n) for r, n in pairs)
-    same = zip(records, data.records, strict=True)
-    return replace(
-        data,
-        records=tuple(replace(r, measured=d.measured) for r, d in same),
-        recorded=whole,
-        steps=(),
-    )

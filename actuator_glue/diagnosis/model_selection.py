@@ -40,8 +40,7 @@ class ModelSelection:
         self.search.scorer = scorer = Scorer.of(self.search.data, parts)
         left, self.noise = self._apart(fit)
         self.first = self.first or left
-        s, stroke = self.settings, self.search.scale().stroke
-        self.material = max(s.noise_share * self.noise, s.stroke_share * stroke)
+        self.material = self.settings.material(self.noise, self.search.scale().stroke)
         self.search.scorer = replace(scorer, likely=left < self.material)
 
     def left(self, trial: Trial) -> float:

@@ -106,6 +106,13 @@ def conclude(
     return _conclude(*_begun(clean, settings, each, fixed=True), settings, tell)
 
 
+def as_given(prepared: Prepared, settings: Thresholds, each: Each, tell: Progress) -> Conclusion:
+    """Say what Eq. (2) leaves, and each effect beside it, without any search."""
+    tell('base fit', 0.0)
+    prepared, search, line = _begun(prepared, settings, each, fixed=True)
+    return _searched(prepared, search, line, replace(settings, most=0), tell)
+
+
 def _begun(
     prepared: Prepared, settings: Thresholds, each: Each, fixed: bool
 ) -> tuple[Prepared, Search, Line | None]:

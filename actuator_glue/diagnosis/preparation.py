@@ -15,6 +15,7 @@ from actuator_glue.diagnosis.data import SETTLE, Data, Mask
 from actuator_glue.diagnosis.free_run import Model
 from actuator_glue.diagnosis.impulses import NONE, Impulses
 from actuator_glue.diagnosis.moments import Moment
+from actuator_glue.diagnosis.wrong_setup import WrongSetup
 from actuator_glue.errors import InputError
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
@@ -43,6 +44,7 @@ class Prepared:
         folded: the held-out part are stretches of the fitting records.
         impulses: what was taken out of each fitting record (see diagnosis/despike.py).
         held_impulses: and of each other record that is held out.
+        setup: what was taken for the records' set-up instead of what was given; None for nothing.
     """
 
     fit: Data
@@ -51,6 +53,7 @@ class Prepared:
     folded: bool
     impulses: tuple[Impulses, ...]
     held_impulses: tuple[Impulses, ...]
+    setup: WrongSetup | None = None
 
     @property
     def told(self) -> tuple[str, ...]:

@@ -44,7 +44,7 @@ def reached_by_both(
     if misses(error, material):
         found = reached(scorer, held, after)
         error = error if found is None else replace(error, reached=found)
-    if len(after.theta) > len(before.theta) and takes_nothing(error):
+    if len(after.theta) > len(before.theta) and takes_nothing(error, material):
         without = reached(scorer, held, before)
         error = replace(error, reached_before=error.before if without is None else without)
     return error

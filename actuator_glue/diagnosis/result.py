@@ -14,6 +14,7 @@ from actuator_glue.diagnosis.next_experiment import Experiment
 from actuator_glue.diagnosis.onset import Onset
 from actuator_glue.diagnosis.response import Response
 from actuator_glue.diagnosis.verdict import COMPLETE
+from actuator_glue.diagnosis.wrong_setup import WrongSetup
 from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.inference.prior_use import PriorUse
 from actuator_glue.json_value import JsonObject, json_fields, json_value
@@ -165,6 +166,7 @@ class DiagnosisData:
         onset: when the effects appeared, where they were not there from the beginning; sizes and
             errors are then those of the data since.
         prior: what was known of Eq. (2)'s parameters before, beside the bounds; None for nothing.
+        setup: another set-up of the records that explains them far better than the one given.
     """
 
     verdict: Verdict
@@ -193,6 +195,7 @@ class DiagnosisData:
     provenance: dict[str, str] = field(default_factory=dict)
     onset: Onset | None = None
     prior: PriorUse | None = None
+    setup: WrongSetup | None = None
     sampler: Json = field(default_factory=dict)
 
     def to_json(self) -> Json:
@@ -222,6 +225,7 @@ class DiagnosisData:
             'learned': [term.to_json() for term in self.learned],
             'onset': self.onset.to_json() if self.onset else None,
             'prior': asdict(self.prior) if self.prior else None,
+            'setup': self.setup.to_json() if self.setup else None,
             'surrogate': self.surrogate,
             'remaining': self.remaining,
             'advice': list(self.advice),

@@ -55,3 +55,12 @@ class Thresholds:
     tried: int = 5
     evaluations: int = 12_000
     use_force: bool = False
+
+    def material(self, noise: float, stroke: float) -> float:
+        """Return the least rms error that matters [m].
+
+        Args:
+            noise: rms of what no structure explains [m].
+            stroke: amplitude of the command [m].
+        """
+        return max(self.noise_share * noise, self.stroke_share * stroke)

@@ -2,27 +2,45 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, NamedTuple
 
 from actuator_glue.diagnosis.thresholds import Thresholds
 
 if TYPE_CHECKING:
+    from actuator_glue.diagnosis.finding import Finding
     from actuator_glue.diagnosis.result import DiagnosisData, HeldOutError, Verdict
 
 COMPLETE = ('none', 'missing-effect')  # verdicts that leave nothing material
 _LATER = Thresholds().later_share  # of what was removed: less is small change
-# Share of the removable error that is printed as 0.0 %.
-_NOTHING = 5e-4
+_FAR = 2.0  # times the noise's mean square: less than half of the held-out error is noise then
+_SOME = 0.5  # of what matters, removed in the held-out part by what was added
+_LIKELY = 0.5  # probability that a name, or one of those tied with it, must have
+
+
+def far(error: HeldOutError, material: float, left: float | None = None) -> bool:
+    """Whether the held-out error is far above the noise: no such answer is complete.
+
+    Whatever would account for it: one stretch that bears all of it, other parameters as likely as
+    the best, a moment since which all is different. `left` is the error asked about, `after` if
+    not given [m].
+    """
+    left = error.after if left is None else left
+    beyond = left**2 - error.noise_floor**2
+    return beyond > max(material**2, (_FAR - 1.0) * error.noise_floor**2)
 
 
 def misses(error: HeldOutError, material: float, left: float | None = None) -> bool:
     """Whether the held-out part shows more than noise: as much as an addition must remove.
 
-    That is `material` [m] and a share of what was removed; not by one stretch of it alone, and
-    whichever of the parameters that the fitting part leaves possible are taken, or zeros of its
-    records: `left` is what is left of the error then [m].
+    That is `material` [m] and a share of what was removed; not by one stretch of it alone, unless
+    it is far more; and whichever of the parameters that the fitting part leaves possible are
+    taken, or zeros of its records: `left` is what is left of the error then [m].
     """
     left, floor = error.least if left is None else left, error.noise_floor
+    if far(error, material, left):
+        return True
     removed = max(0.0, error.before**2 - error.after**2)
     matters = left**2 - floor**2 > max(material**2, _LATER**2 * removed)
     return matters and error.after_ci[0] * left > floor * error.after
@@ -33,9 +51,12 @@ def excused(error: HeldOutError, material: float) -> bool:
     return misses(error, material, error.after) and not misses(error, material)
 
 
-def takes_nothing(error: HeldOutError) -> bool:
-    """Whether the additions, their best sizes taken, remove nothing of the held-out error."""
-    return error.removable_removed < _NOTHING
+def takes_nothing(error: HeldOutError, material: float) -> bool:
+    """Whether the additions, their best sizes taken, remove nothing of the held-out error.
+
+    That is less than half of what matters: `material` [m].
+    """
+    return error.before**2 - error.after**2 < (_SOME * material) ** 2
 
 
 def borne_out(error: HeldOutError, material: float) -> bool:
@@ -45,7 +66,7 @@ def borne_out(error: HeldOutError, material: float) -> bool:
     more so with additions. Then those count that both parts allow: whether they leave nothing
     with the additions, and something without.
     """
-    if not takes_nothing(error):
+    if not takes_nothing(error, material):
         return True
     without = error.reached_before
     return without is not None and excused(error, material) and misses(error, material, without)
@@ -88,8 +109,9 @@ def conclude(verdict: Verdict, moved: bool, error: HeldOutError, material: float
 
     Additions were chosen on the fitting part alone and stay in the model. Where they take nothing
     away in the held-out part, the records contradict each other. Where that part shows materially
-    more than noise, no answer is complete: additions that took error away there beyond chance are
-    a part of it (`unexplained`), without any the records contradict each other.
+    more than noise, or far more with the best parameters, no answer is complete: additions that
+    took error away there beyond chance, or do with parameters as likely, are a part of it
+    (`unexplained`), without any the records contradict each other.
 
     Args:
         verdict: what the fitting part says.
@@ -99,9 +121,31 @@ def conclude(verdict: Verdict, moved: bool, error: HeldOutError, material: float
     """
     if moved and not borne_out(error, material):
         return 'undecided'
-    if verdict == 'unexplained' or not misses(error, material):
+    if verdict == 'unexplained' or not (misses(error, material) or far(error, material)):
         return verdict
-    return 'unexplained' if moved and error.removed_ci[0] > 0.0 else 'undecided'
+    part = error.removed_ci[0] > 0.0 or takes_nothing(error, material)
+    return 'unexplained' if moved and part else 'undecided'
+
+
+def named(verdict: Verdict, effects: Sequence[Finding]) -> Verdict:
+    """Return the verdict where names are weighed: of one that is improbable nothing is complete.
+
+    What removes the error is then something that the names tried describe badly.
+    """
+    if verdict == 'missing-effect' and not all(map(likely, effects)):
+        return 'unexplained'
+    return verdict
+
+
+def likely(effect: Finding) -> bool:
+    """Whether a name is right more probably than not, or one of those that are tied with it.
+
+    What has no probability is a description, or is measured directly.
+    """
+    if math.isnan(effect.probability):
+        return True
+    tied = (r.probability for r in effect.rivals if r.name in effect.alternatives)
+    return effect.probability + sum(tied) >= _LIKELY
 
 
 def certainty(fitted: float, error: HeldOutError, material: float) -> float:
@@ -113,9 +157,10 @@ def certainty(fitted: float, error: HeldOutError, material: float) -> float:
             of it away, names explain at most the share that they, or parameters as likely, do.
         material: smallest error that matters [m].
     """
-    if not (takes_nothing(error) or misses(error, material)):
+    nothing = takes_nothing(error, material)
+    if not (nothing or misses(error, material)):
         return fitted
-    reached = takes_nothing(error) and borne_out(error, material)
+    reached = nothing and borne_out(error, material)
     share = _share_reached(error) if reached else error.removable_removed
     return min(fitted, max(0.0, share))
 
