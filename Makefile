@@ -11,7 +11,7 @@ ROS := . install/setup.bash &&
 .DEFAULT_GOAL := help
 SAFETY_STAMP := .venv/safety
 
-.PHONY: help setup demo test coverage test-slow lint bench soak fuzz audit reproduce study-rths docs clean
+.PHONY: help setup demo test coverage test-slow lint bench soak fuzz audit reproduce study-rths docs news clean
 
 help: ## show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 20
@@ -86,6 +86,10 @@ docs: .venv/docs ## renew generated tables; guides, API, executed notebooks as a
 	@$(BIN)/python scripts/write_effect_table.py
 	@$(BIN)/python -m sphinx -W --keep-going -q -b html docs out/docs
 	@echo 'docs: out/docs/index.html'
+
+# Version and date go unused: `Forthcoming` is what catkin_prepare_release names after the release.
+news: $(VENV_STAMP) ## move the fragments of changelog.d to CHANGELOG.rst
+	@$(BIN)/towncrier build --yes --version forthcoming --date ''
 
 clean: ## remove everything that make has made
 	rm -rf .venv build install log out *.egg-info

@@ -33,6 +33,7 @@ LIBRARIES = {
     'PIL': Names('pillow', 'python3-pil'),
     'aiohttp': Names('aiohttp', 'python3-aiohttp'),
     'arviz': Names('arviz', None),
+    'catkin_pkg': Names('catkin-pkg', 'python3-catkin-pkg-modules'),
     'colcon_core': Names('colcon-core', None),
     'colcon_python_setup_py': Names('colcon-python-setup-py', None),
     'control': Names('control', 'python-control-pip'),
