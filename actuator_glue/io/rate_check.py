@@ -10,6 +10,7 @@ APART = 0.01
 # Rates are compared over so long at least [s]: of less a clock's jitter is told, not its rate.
 LEAST_SECONDS = 2.0
 _LEAST_POINTS = 8
+_LEAST_STEPS = 64
 # More points tell no more, and a day of samples has many.
 _MOST_POINTS = 4096
 
@@ -47,6 +48,27 @@ def rate_by_clock(index: ArrayLike, time: ArrayLike, declared: float) -> float |
     if abs(typical - 1.0) <= APART or scatter > 0.5 * abs(typical - 1.0):
         return None
     return declared / typical if typical > 0.0 else float('inf')
+
+
+def rate_by_steps(time: ArrayLike, declared: float) -> float | None:
+    """Return the sample rate that the steps of times tell, where nothing else counts samples [Hz].
+
+    The mean of the steps next to their median: times may be rounded, and samples missing.
+
+    Args:
+        time: times of samples in any order, shape (n,) [s].
+        declared: sample rate that is declared [Hz].
+
+    Returns:
+        None where the steps agree within `APART`, or there are fewer than 64.
+    """
+    steps = np.diff(np.unique(np.asarray(time, dtype=np.float64)))
+    if len(steps) < _LEAST_STEPS:
+        return None
+    typical = float(np.median(steps))
+    near = steps[np.abs(steps - typical) <= 0.5 * typical]
+    found = 1.0 / float(near.mean())
+    return None if abs(declared / found - 1.0) <= APART else found
 
 
 def disagreement(declared: float, clocks: dict[str, float]) -> str:

@@ -22,6 +22,11 @@ STEP = 0.05
 # Stamps run this much faster or slower than the sender's clock at most, while the map improves.
 SLEW = 1e-3
 FIRST_SLEW = 0.05
+# So much earlier than its first samples tell, a stream has a clock that was set; what is less was
+# held up at its beginning [s].
+HELD_UP = 1.0
+# Of the time since the last sample that was stamped, stamps give way by so much at most.
+GIVE_WAY = 0.5
 # Held up this often in a row, messages are no longer waited for: the clock has been set.
 _PATIENCE = 2
 
@@ -38,7 +43,8 @@ class ClockMap:
         self._origin: tuple[float, int] | None = None
         self._clear()
         self._shift = 0.0
-        self._at = 0.0
+        self._at = self._until = 0.0
+        self._set = False
 
     def _clear(self) -> None:
         self._lowest: deque[tuple[float, float]] = deque(maxlen=KEPT)
@@ -68,11 +74,15 @@ class ClockMap:
             # The first second: the best so far.
             self._line, self._known = (time, delay, 0.0), True
 
-    def stamp_ns(self, sender: float) -> int:
+    def stamp_ns(self, sender: float, until: float | None = None) -> int:
         """Return the receiver's time of a sample [ns]; ask in order.
+
+        Stamps never go back, but where a clock was set.
 
         Args:
             sender: its time by the sender's clock [s].
+            until: that of the last sample whose stamp follows from this one, as in a block that
+                has but one; None where each sample is asked for.
         """
         assert self._origin is not None
         time = sender - self._origin[0]
@@ -80,12 +90,15 @@ class ClockMap:
         wanted = height + slope * (time - at)
         slew = SLEW if len(self._lowest) > 1 else FIRST_SLEW
         most = slew * max(time - self._at, 0.0)
+        least = min(most, GIVE_WAY * max(time - self._until, 0.0))
         change = wanted - self._shift
-        if abs(change) > STEP:
+        if abs(change) > (STEP if self._set else HELD_UP):
             self._shift = wanted
         else:
-            self._shift += min(max(change, -most), most)
+            self._shift += min(max(change, -least), most)
+        self._set = False
         self._at = time
+        self._until = time if until is None else until - self._origin[0]
         return self._origin[1] + round((time + self._shift) * 1e9)
 
     @property
@@ -123,6 +136,7 @@ class ClockMap:
                 if off > 0.0 and self._odd < _PATIENCE:
                     return
                 self.steps += 1
+                self._set = True
                 self._clear()
                 self._known = True
             self._odd = 0

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.errors import InputError
+from actuator_glue.io.rate_check import RateWatch, disagreement, rate_by_steps
 from actuator_glue.records import Array
 from actuator_glue.streams.clock import ClockMap
 from actuator_glue.streams.layout import Layout, Rows
@@ -19,6 +20,10 @@ from actuator_glue.streams.sequence import Run, Sequence
 Order: TypeAlias = Literal['counter', 'time', 'arrival']
 # Arrival in order: times further apart than this are a gap, not jitter [s].
 _JITTER = 0.1
+# Arrivals are held up and caught up: so long stretches, and two of them, tell their rate [s].
+_ARRIVAL_SECONDS, _ARRIVAL_STRETCHES = 5.0, 2
+# Times whose steps are looked at together where they alone tell the order, and over how long [s].
+_STEPS, _STEP_SECONDS = 2048, 3.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -74,11 +79,13 @@ class Reception:
             )
         self._force = 'force' in names
         modulus = layout.modulus if self.order == 'counter' else None
-        self._sequence = Sequence(rate, modulus, restarts=not signed, counts=self.counts)
+        self._sequence = Sequence(
+            rate, modulus, restarts=not signed, shuffled=not in_order, counts=self.counts
+        )
+        self._rates = _Rates(rate, layout, self.order)
         self._arrived = 0
         self._last_time: float | None = None
         self._last_arrival = 0.0
-        self._last_stamp = 0
 
     def warnings(self, modulus: int | None) -> list[str]:
         """Return what cannot be seen in such a stream, for people."""
@@ -88,6 +95,11 @@ class Reception:
             seconds = 0.5 * modulus / self.rate
             return [f'the counter is so small that gaps beyond {seconds:.3g} s are miscounted']
         return []
+
+    @property
+    def rate_fault(self) -> str:
+        """What is said where sender's time or arrivals tell another sample rate, else empty."""
+        return self._rates.fault
 
     def push(self, rows: Rows, now: float) -> list[Samples]:
         """Take rows as they came.
@@ -116,6 +128,8 @@ class Reception:
         columns[:, 2] = 0.0 if rows.force is None else rows.force
         columns[:, 3] = np.nan if rows.time is None else rows.time
         runs: list[Run] = []
+        if self.order == 'time' and rows.time is not None:
+            self._rates.steps(rows.time)
         if self.order == 'counter' and rows.counter is not None:
             counter = rows.counter
         elif self.order == 'time' and rows.time is not None:
@@ -156,16 +170,61 @@ class Reception:
         for place, run in enumerate(runs):
             if run.began:
                 self.clock = ClockMap()
+                self._rates.begin()
             times = run.rows[:, 3]
-            first, last = run.index / self.rate, (run.index + len(run.rows) - 1) / self.rate
+            final = run.index + len(run.rows) - 1
+            first, last, timed = run.index / self.rate, final / self.rate, False
             if not np.isnan(times).any():
-                first, last = float(times[0]), float(times[-1])
+                first, last, timed = float(times[0]), float(times[-1]), True
             if place == len(runs) - 1:
                 self.clock.update(last, arrival_ns)
+                self._rates.push(final, last if timed else None, arrival_ns * 1e-9)
             elif run.began:
                 self.clock.update(first, arrival_ns)
-            stamp = self.clock.stamp_ns(first)
+            stamp = self.clock.stamp_ns(first, last)
             force = run.rows[:, 2] if self._force else None
             command, measured = run.rows[:, 0], run.rows[:, 1]
             found.append(Samples(run.index, stamp, command, measured, force, run.began))
         return found
+
+
+class _Rates:
+    """The declared rate of a stream, held against the sender's time and against arrivals."""
+
+    def __init__(self, rate: float, layout: Layout, order: Order) -> None:
+        self._rate = rate
+        self._by_time = order == 'time'
+        time = layout.fields.get('time')
+        # Within a packet that has one time the others are made of the declared rate.
+        self._every = layout.samples if time in layout.packet else 1
+        self._times: list[float] = []
+        self._found: float | None = None
+        self._sender = RateWatch(rate)
+        self._arrival = RateWatch(rate, seconds=_ARRIVAL_SECONDS, patience=_ARRIVAL_STRETCHES)
+
+    @property
+    def fault(self) -> str:
+        clocks = {
+            "the sender's time": self._found if self._by_time else self._sender.found,
+            'the arrival of the samples': self._arrival.found,
+        }
+        odd = {name: rate for name, rate in clocks.items() if rate is not None}
+        return disagreement(self._rate, odd) if odd else ''
+
+    def begin(self) -> None:
+        self._sender.begin()
+        self._arrival.begin()
+
+    def push(self, index: int, sender: float | None, arrival: float) -> None:
+        if sender is not None and not self._by_time:
+            self._sender.push(index, sender)
+        self._arrival.push(index, arrival)
+
+    def steps(self, times: Array) -> None:
+        """Take times that tell the order: their rounded numbers agree with any rate."""
+        self._times += times[:: self._every].tolist()
+        long = len(self._times) > 64 and self._times[-1] - self._times[0] > _STEP_SECONDS
+        if long or len(self._times) >= _STEPS:
+            found = rate_by_steps(self._times, self._rate / self._every)
+            self._found = None if found is None else found * self._every
+            self._times.clear()

@@ -47,19 +47,30 @@ class Sequence:
         modulus: where the counter begins again by its type; None where it does not.
         restarts: whether the sender may begin to count anew. Where messages are signed it may
             not: a recorded one sent again must not be taken for a new beginning.
+        shuffled: whether samples may come out of order: the first ones then wait a moment for
+            those that ought to come before them.
         counts: gets lost, duplicates, reordered, late, implausible, restarts.
     """
 
     def __init__(
-        self, rate: float, modulus: int | None, *, restarts: bool, counts: Counter[str]
+        self,
+        rate: float,
+        modulus: int | None,
+        *,
+        restarts: bool,
+        counts: Counter[str],
+        shuffled: bool = True,
     ) -> None:
         self._rate = rate
         self._modulus = modulus
         self._restarts = restarts
+        self._shuffled = shuffled
         self.counts = counts
         self._next: int | None = None
         self._base = 0
         self._accepted = 0.0
+        # The first samples, as they came: when, their number, their values.
+        self._opening: list[tuple[float, int, Array]] = []
         # In the order in which they came, with the time of that.
         self._held: dict[int, tuple[float, Array]] = {}
         self._highest = 0
@@ -88,7 +99,7 @@ class Sequence:
 
     def waited(self, now: float) -> list[Run]:
         """Return what has waited long enough for samples that did not come."""
-        if not self._held:
+        if not self._held and not self._opening:
             return []
         out = _Out()
         self._give_up(now, out)
@@ -97,6 +108,7 @@ class Sequence:
     def skip(self, samples: int, now: float) -> list[Run]:
         """Step over samples of which only the time they took is known."""
         out = _Out()
+        self._open(out)
         while self._held:
             self._jump(now, out)
         if self._next is not None:
@@ -115,7 +127,7 @@ class Sequence:
 
     def _wrapped(self, number: int) -> int:
         """Return the whole number nearest to the newest that the counter may stand for."""
-        if self._modulus is None or self._next is None:
+        if self._modulus is None or (self._next is None and not self._opening):
             return number
         half, newest = self._modulus // 2, self._highest + 1
         return newest + (number - newest + half) % self._modulus - half
@@ -127,6 +139,9 @@ class Sequence:
         self._accepted = now
 
     def _take(self, number: int, row: Array, now: float, out: _Out) -> None:
+        if self._next is None and self._shuffled:
+            self._wait(number, row, now, out)
+            return
         if self._next is None:
             self._begin(number, [row], now, out)
             return
@@ -143,11 +158,12 @@ class Sequence:
             out.put(self._next - self._base, row)
             self._advance(1, now)
             self._release(now, out)
-        elif number in self._held or (step < 0 and not self._was_lost(number)):
+        elif number in self._held or (step < 0 and self._was_taken(number)):
             self.counts['duplicates'] += 1
         elif step < 0:
             self.counts['late'] += 1
-            self._lost[(number - self._base) % _REMEMBERED] = _NONE
+            if number >= self._base:
+                self._lost[(number - self._base) % _REMEMBERED] = _NONE
         else:
             if number < self._highest:
                 self.counts['reordered'] += 1
@@ -156,9 +172,31 @@ class Sequence:
             if len(self._held) > HOLD_SAMPLES:
                 self._jump(now, out)
 
-    def _was_lost(self, number: int) -> bool:
+    def _wait(self, number: int, row: Array, now: float, out: _Out) -> None:
+        """Keep one of the first samples until those before it have had time to come."""
+        if not self._opening:
+            self._highest = number - 1
+        number = self._wrapped(number)
+        self._highest = max(self._highest, number)
+        self._opening.append((now, number, row))
+        if len(self._opening) >= _REMEMBERED:
+            self._open(out)
+
+    def _open(self, out: _Out) -> None:
+        """Begin with the lowest number among the first samples, one far off them left out."""
+        waited, self._opening = self._opening, []
+        if not waited:
+            return
+        numbers = sorted(number for _, number, _ in waited)
+        middle = numbers[len(numbers) // 2]
+        near = middle - AHEAD_SECONDS * self._rate
+        self._begin(next(n for n in numbers if n >= near), [], waited[0][0], out)
+        for came, number, row in waited:
+            self._take(number, row, came, out)
+
+    def _was_taken(self, number: int) -> bool:
         index = number - self._base
-        return bool(self._lost[index % _REMEMBERED] == index)
+        return index >= 0 and not bool(self._lost[index % _REMEMBERED] == index)
 
     def _release(self, now: float, out: _Out) -> None:
         """Hand out what waited for the sample before it."""
@@ -168,6 +206,8 @@ class Sequence:
             self._advance(1, now)
 
     def _give_up(self, now: float, out: _Out) -> None:
+        if self._opening and now - self._opening[0][0] > HOLD_SECONDS:
+            self._open(out)
         while self._held and now - next(iter(self._held.values()))[0] > HOLD_SECONDS:
             self._jump(now, out)
 
@@ -205,7 +245,7 @@ class Sequence:
 
     def _begin(self, number: int, rows: list[Array], now: float, out: _Out) -> None:
         self._next = self._base = number
-        self._highest = number
+        self._highest, self._accepted = number - 1, now
         self._lost.fill(_NONE)
         out.begin()
         for row in rows:

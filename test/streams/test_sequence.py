@@ -136,3 +136,30 @@ def test_no_counter_breaks_order_or_fills_memory(numbers, modulus):
     indices = [i for i, _ in wire.found]
     if wire.began <= 1:
         assert indices == sorted(set(indices))
+
+
+@pytest.mark.parametrize('modulus', [None, 256])
+@pytest.mark.parametrize(
+    ('first', 'reordered'),
+    [([5, 3, 4], 2), ([4, 3], 1), ([9, 8, 7, 6, 5, 4, 3], 6), ([3, 4, 5], 0)],
+)
+def test_the_first_samples_are_put_right_as_all_others(modulus, first, reordered):
+    """What comes out of order at the very beginning is neither lost nor told as repeated."""
+    begin = 250 if modulus else 0
+    rest = range(max(first) + 1, 300)
+    wire = Wire(modulus).feed([begin + n for n in (*first, *rest)]).end()
+    assert wire.found == [(i, begin + 3.0 + i) for i in range(297)]
+    assert +wire.counts == Counter(reordered=reordered) + Counter()
+
+
+def test_a_number_far_off_at_the_beginning_begins_nothing():
+    wire = Wire().feed([10**9, *range(100)]).end()
+    assert wire.found == [(i, float(i)) for i in range(100)]
+    assert +wire.counts == Counter(implausible=1)
+
+
+def test_what_is_older_than_the_first_sample_is_late_and_not_repeated():
+    wire = Wire().feed(range(5, 85))
+    wire.feed([4])
+    assert +wire.counts == Counter(late=1)
+    assert wire.found == [(i, 5.0 + i) for i in range(80)]

@@ -1,0 +1,128 @@
+"""Samples in order with their stamps, and a declared rate that clocks contradict."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from streaming import layout
+
+from actuator_glue.streams.layout import PLAIN, Rows
+from actuator_glue.streams.reception import Reception
+
+START = 1_700_000_000 * 10**9
+BARE = layout([{'name': 'command', 'unit': 'm'}, {'name': 'measured', 'unit': 'm'}])
+PACKETS = layout(
+    [{'name': 'command', 'unit': 'm'}, {'name': 'measured', 'unit': 'm'}],
+    packet=[{'name': 'time', 'unit': 's'}],
+    samples=4,
+)
+
+
+def fed(reception, seconds, *, true=1000.0, clock=1.0, block=10, counter=True, time=True, late=()):
+    """Samples of a stream, block by block.
+
+    `true` is its rate, the sender's time runs `clock` times as fast as the receiver's, and `late`
+    is how much later [s] than it was sent each block arrives.
+    """
+    found = []
+    for number, first in enumerate(range(0, int(seconds * true), block)):
+        index = np.arange(first, first + block)
+        values = 1e-3 * np.sin(0.01 * index)
+        now = (first + block) / true + (late[number] if number < len(late) else 0.0)
+        rows = Rows(
+            values,
+            values,
+            None,
+            index if counter else None,
+            clock * index / true if time else None,
+            START + round(now * 1e9),
+        )
+        found += reception.push(rows, now)
+    return found
+
+
+@pytest.mark.parametrize(
+    ('its', 'given', 'in_order'),
+    [
+        (PLAIN, {}, False),
+        (PLAIN, {'time': False}, False),
+        (BARE, {'counter': False}, True),
+        (BARE, {'counter': False, 'time': False}, True),
+    ],
+    ids=['counter and time', 'counter', 'time', 'neither'],
+)
+@pytest.mark.parametrize('true', [500.0, 985.0, 1000.0, 1008.0, 2000.0])
+def test_another_sample_rate_than_declared_is_told(its, given, in_order, true):
+    """By the sender's time within seconds, by the arrivals where there is none."""
+    reception = Reception(its, 1000.0, in_order=in_order)
+    fed(reception, 25.0, true=true, **given)
+    if true in (1000.0, 1008.0):
+        assert reception.rate_fault == ''
+        return
+    assert reception.rate_fault.startswith('the sample rate is said to be 1000 Hz, but by ')
+    assert f'by the arrival of the samples it is {true:.4g} Hz' in reception.rate_fault
+    known = given.get('time', True)
+    assert (f"by the sender's time it is {true:.4g} Hz" in reception.rate_fault) == known
+
+
+@pytest.mark.parametrize('true', [500.0, 1000.0, 2000.0])
+@pytest.mark.parametrize('its', [PLAIN, PACKETS], ids=['each', 'packets of four'])
+def test_times_that_order_samples_tell_their_rate(its, true):
+    """Numbers rounded from the times agree with any rate; the steps of the times do not."""
+    plain = layout(
+        [
+            {'name': 'time', 'unit': 's'},
+            {'name': 'command', 'unit': 'm'},
+            {'name': 'measured', 'unit': 'm'},
+        ]
+    )
+    reception = Reception(plain if its is PLAIN else its, 1000.0)
+    assert reception.order == 'time'
+    fed(reception, 9.0, true=true, block=4, counter=False)
+    told = f"by the sender's time it is {true:.4g} Hz" in reception.rate_fault
+    assert told == (true != 1000.0)
+
+
+def test_a_sender_whose_time_is_in_another_unit_is_told():
+    """Milliseconds that the layout calls seconds."""
+    reception = Reception(PLAIN, 1000.0)
+    fed(reception, 4.0, clock=1000.0)
+    assert "by the sender's time it is 1 Hz" in reception.rate_fault
+
+
+def test_a_rate_that_agrees_again_is_told_no_more():
+    reception = Reception(PLAIN, 1000.0)
+    fed(reception, 4.0, true=500.0)
+    assert reception.rate_fault
+    for first in range(2000, 8000, 10):
+        index = np.arange(first, first + 10)
+        values = np.zeros(10)
+        now = 4.0 + (first - 1990) * 1e-3
+        time = 4.0 + (index - 2000) * 1e-3
+        reception.push(Rows(values, values, None, index, time, START + round(now * 1e9)), now)
+    assert reception.rate_fault == ''
+
+
+def test_arrivals_that_are_held_up_are_no_other_rate(rng_seed):
+    """A receiver that stalls for a second and catches up, and blocks up to 8 ms late."""
+    late = np.random.default_rng(rng_seed).exponential(2e-3, 3000)
+    late[800:900] += np.linspace(1.0, 0.0, 100)
+    reception = Reception(PLAIN, 1000.0)
+    sent = 0.01 * np.arange(3000)
+    fed(reception, 30.0, time=False, late=np.maximum.accumulate(sent + late) - sent)
+    assert reception.rate_fault == ''
+
+
+@pytest.mark.parametrize('block', [1, 10, 25, 100])
+@pytest.mark.parametrize('held', [0.02, 0.3])
+def test_stamps_never_go_back(block, held, rng_seed):
+    """The last of a block is before the first of the next, also where the first were held up."""
+    blocks = 4000 // block
+    late = np.random.default_rng(rng_seed).exponential(2e-4, blocks)
+    late[: max(1, 40 // block)] += held
+    reception = Reception(PLAIN, 1000.0)
+    found = fed(reception, 4.0, block=block, late=late)
+    assert sum(len(s.command) for s in found) > 3900
+    edges = [(s.stamp_ns, s.stamp_ns + (len(s.command) - 1) * 1_000_000) for s in found]
+    for (_, last), (first, _) in pairwise(edges):
+        assert first > last
