@@ -1,6 +1,7 @@
 """The page in a real browser, and who is let to it."""
 
 import asyncio
+import json
 import os
 import threading
 import time
@@ -32,6 +33,7 @@ SHOWN = (
 MINUTES = int(os.environ.get('PAGE_MINUTES', '3'))
 SPELLS = 12
 BAND = (190, 213, 233)  # the band's blue over white
+MEASURED = (18, 50, 79)
 
 
 class Live:
@@ -102,6 +104,44 @@ def test_a_live_page(tmp_path: Path) -> None:
             await page.until(f'document.body.dataset.stop > {stopped}')
             assert all(r.startswith((url, url.replace('http', 'ws'))) for r in page.requests)
             assert len(page.requests) >= 6
+            assert not page.faults
+
+    with Live() as url:
+        asyncio.run(look())
+
+
+@browser
+@pytest.mark.parametrize('width', [390, 768, 1440])
+def test_no_width_makes_the_chart_grow(width: int, tmp_path: Path) -> None:
+    """A phone, a tablet, a desk: the chart keeps its size, all of it is seen, nothing is cut."""
+    sizes = "JSON.stringify([chart.width, chart.root.offsetHeight, $('chart').clientWidth, "
+    sizes += "$('chart').clientHeight, document.documentElement.scrollHeight])"
+
+    async def look() -> None:
+        async with Browser() as page:
+            await page.call(
+                'Emulation.setDeviceMetricsOverride',
+                width=width, height=900, deviceScaleFactor=1, mobile=width < 1000,
+            )  # fmt: skip
+            await page.open(url)
+            await page.until('document.body.dataset.frames > 5')
+            first = await page.value(sizes)
+            frames = int(await page.value('document.body.dataset.frames'))
+            await page.until(f'document.body.dataset.frames > {frames + 20}')
+            assert await page.value(sizes) == first
+            wide, high, box_wide, box_high, _ = json.loads(first)
+            assert (wide, high) == (pytest.approx(box_wide, abs=1), pytest.approx(box_high, abs=2))
+            assert 300 < box_high < 900
+            assert await page.value('document.documentElement.scrollWidth') == width
+            picture = await page.picture()
+            picture.save(tmp_path / f'{width}.png')
+            seen = np.asarray(picture).astype(int)
+            # The measured line lies over the band, whole.
+            assert (np.abs(seen - MEASURED).max(axis=2) < 6).sum() > 300
+            assert blue(np.asarray(picture)) > 1000
+            legend = await page.value("document.querySelector('.u-legend').innerText")
+            for words in ('95 % band, fixed before the data', 'measured', 'command'):
+                assert words in legend
             assert not page.faults
 
     with Live() as url:

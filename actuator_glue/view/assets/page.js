@@ -9,27 +9,46 @@ const line = (label, stroke, width, dash) =>
   ({label, stroke, width, dash, points: {show: false}, spanGaps: false,
     value: (_, v) => v == null ? '' : v.toFixed(4)});
 
+// What is measured is drawn last, so that no band hides it.
+const DRAWN = ['time', 'lower', 'median', 'upper', 'command', 'measured'];
+
+function bandName(head) {
+  const told = head.state.coverage;
+  const level = told && told.level != null ? `${digits(100 * told.level, 3)} % band` : 'band';
+  return told && told.forecast ? `${level}, fixed before the data` : level;
+}
+
 function draw(data) {
   const box = $('chart').getBoundingClientRect();
-  const size = {width: Math.max(box.width, 200), height: Math.max(box.height - 45, 150)};
+  const legend = chart && chart.root.querySelector('.u-legend');
+  const size = {
+    width: Math.max(Math.floor(box.width), 100),
+    height: Math.max(Math.floor(box.height - (legend ? legend.offsetHeight : 60)), 100),
+  };
   shown = data;
   if (!chart) {
     chart = new uPlot({
       ...size,
       scales: {x: {time: false, auto: false, range: () => [last.start, last.stop]}},
       axes: [{label: 'time [s]'}, {label: 'displacement [mm]'}],
-      legend: {live: true},
+      legend: {live: true, markers: {fill: (u, i) => i === 1 ? band : u.series[i].stroke(u, i)}},
+      // The two limits of the band are one thing: one name, shown and hidden together.
+      hooks: {setSeries: [(u, i, to) => { if (i === 1 && to.show != null) u.setSeries(3, {show: to.show}); }]},
       cursor: {drag: {x: false, y: false}},
       series: [
         {label: 'time [s]', value: (_, v) => v == null ? '' : v.toFixed(3)},
+        {...line('band', edge, 0.6), value: (u, v, _, i) =>
+          v == null ? '' : `${v.toFixed(4)} to ${u.data[3][i].toFixed(4)}`},
+        line('median of the forecast', edge, 0.8, [2, 3]), line('upper limit', edge, 0.6),
         line('command', '#9aa5b1', 1, [4, 3]), line('measured', measured, 1.4),
-        line('lower', edge, 0.6), line('median', edge, 0.8, [2, 3]), line('upper', edge, 0.6),
       ],
-      bands: [{series: [5, 3], fill: band}],
+      bands: [{series: [3, 1], fill: band}],
     }, data, $('chart'));
+    draw(data);  // now the legend has a height
   } else {
     if (chart.width !== size.width || chart.height !== size.height) chart.setSize(size);
     chart.setData(data);
+    text(chart.root.querySelectorAll('.u-label')[1], bandName(last));
   }
 }
 
@@ -41,13 +60,17 @@ function take(buffer) {
   last = head;
   const times = Array.from(data[0], (t) => t + head.start);
   // NaN is no gap to uPlot, null is.
-  draw([times, ...data.slice(1).map((row) => Array.from(row, (v) => v === v ? v : null))]);
+  const row = (name) => Array.from(data[head.rows.indexOf(name)], (v) => v === v ? v : null);
+  draw([times, ...DRAWN.slice(1).map(row)]);
   tell(head);
   document.body.dataset.frames = Number(document.body.dataset.frames || 0) + 1;
   document.body.dataset.stop = head.stop;
 }
 
-const text = (id, value) => { if ($(id).textContent !== value) $(id).textContent = value; };
+function text(place, value) {
+  const element = typeof place === 'string' ? $(place) : place;
+  if (element.textContent !== value) element.textContent = value;
+}
 const digits = (v, n) => v == null ? '-' :
   v && (Math.abs(v) < 1e-3 || Math.abs(v) >= 1e5) ? v.toExponential(n - 1) : String(Number(v.toPrecision(n)));
 
