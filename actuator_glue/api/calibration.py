@@ -15,6 +15,7 @@ from actuator_glue.api.calibration_error import fit_error, force_errors
 from actuator_glue.api.calibration_parts import CalibratedRecord, Marginal, RecordForce
 from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.api.calibration_shaping import sampled
+from actuator_glue.api.callbacks import harmless
 from actuator_glue.api.compilation import compilation
 from actuator_glue.api.options import chosen
 from actuator_glue.api.prior import check_prior, given_prior
@@ -154,7 +155,7 @@ def calibrate(
             settle=settle,
             prior=None if given_before is None else given_before.carried,
         )
-        problem, target, chains, remark = sampled(problem, options, near, progress)
+        problem, target, chains, remark = sampled(problem, options, near, harmless(progress))
     seconds = time.perf_counter() - started - sum(compiled)
     if not chains.annealed:
         raise InputError(

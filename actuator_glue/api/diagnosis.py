@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from actuator_glue.api.callbacks import harmless
 from actuator_glue.api.options import chosen
 from actuator_glue.api.prior import given_prior
 from actuator_glue.api.provenance import provenance
@@ -185,7 +186,7 @@ def diagnose(
             held,
             seed=options.seed,
             each=pool.map,
-            progress=progress,
+            progress=harmless(progress),
             settings=Thresholds(false_alarms=options.false_alarms, use_force=options.use_force),
             clock=time.perf_counter,
             prior=given_prior(options.prior, options.drift, options.prior_age),

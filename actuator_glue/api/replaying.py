@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from actuator_glue.api.callbacks import harmless
 from actuator_glue.api.replay_result import (
     Compared,
     Replay,
@@ -88,7 +89,7 @@ def replay(
     under_way.tracking = tracking
     started = time.perf_counter()
     used = _settings(under_way.live, asked)
-    comparison = _estimate(under_way, used, progress or (lambda share: None))
+    comparison = _estimate(under_way, used, harmless(progress) or (lambda share: None))
     if not under_way.windows:
         raise InputError(f'{under_way.source}: not one window could be estimated')
     return Replay(

@@ -24,26 +24,6 @@ from actuator_glue.records import Record
 if TYPE_CHECKING:
     from actuator_glue.api.diagnosis import Diagnosis
 
-# Share of the whole work that is done when a stage begins.
-_STAGES = {
-    'check': 0.0,
-    'base fit': 0.01,
-    'effect 1': 0.05,
-    'effect 2': 0.35,
-    'effect 3': 0.5,
-    'effect 4': 0.6,
-    'effect 5': 0.65,
-    'effect 6': 0.7,
-    'one record': 0.74,
-    'other hold': 0.74,
-    'onset': 0.742,
-    'learned term': 0.745,
-    'posterior before': 0.75,
-    'posterior': 0.78,
-    'held-out': 0.95,
-    'done': 1.0,
-}
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
@@ -97,16 +77,14 @@ def run(args: argparse.Namespace) -> int:
     trim = give_back([*records, *held])
 
     from actuator_glue.api.diagnosis import diagnose
+    from actuator_glue.diagnosis.stages import Overall
 
-    at = 0.0
     with progress('diagnose', 1.0) as done:
+        overall = Overall()
 
         def tell(stage: str, share: float) -> None:
-            nonlocal at
             trim()
-            later = [v for v in _STAGES.values() if v > _STAGES[stage]] or [1.0]
-            at = max(at, _STAGES[stage] + share * (min(later) - _STAGES[stage]))
-            done(at)
+            done(overall(stage, share))
 
         found = diagnose(
             records,

@@ -36,7 +36,6 @@ from actuator_glue.diagnosis.next_experiment import Experiment, ranked
 from actuator_glue.diagnosis.onset_search import since_onset
 from actuator_glue.diagnosis.pipeline import (
     Conclusion,
-    Progress,
     as_given,
     conclude,
     with_learned_terms,
@@ -45,6 +44,7 @@ from actuator_glue.diagnosis.pipeline import (
 from actuator_glue.diagnosis.preparation import prepare, rest_samples
 from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.diagnosis.space import UPPER, Space
+from actuator_glue.diagnosis.stages import Progress, Stage
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.diagnosis.verify import Side, traces, verify
@@ -113,7 +113,7 @@ def diagnose(
     own = decision.final.own is not None
     small = {} if own else discrepancy.responses(result.selection.search, size)
 
-    def sample(trial: Trial, evaluations: int = 0, stage: str = 'posterior') -> posterior.Draws:
+    def sample(trial: Trial, evaluations: int = 0, stage: Stage = 'posterior') -> posterior.Draws:
         finer = trial.own is None and not trial.structure.linear
         return posterior.sample(
             trial.model,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from actuator_glue.diagnosis.verdict import excuse, misses
+from actuator_glue.diagnosis.verdict import LIKELY, excuse, likely, misses
 from actuator_glue.records import source_name
 
 if TYPE_CHECKING:
@@ -19,8 +19,20 @@ def _named(effect: Finding, found: DiagnosisData) -> str:
         term = f'a learned term {effect.name} ({equations[0]})'
         return f'{effect.cause} in another shape, {term}' if effect.cause else term
     where = f' in {", ".join(map(source_name, effect.records))} only' if effect.records else ''
+    if not likely(effect):
+        return (
+            f'something that looks most like {effect.name} ({_share(effect.probability)}){where}'
+        )
+    if effect.probability < LIKELY:
+        shares = {r.name: r.probability for r in effect.rivals}
+        tied = (effect.name, *effect.alternatives)
+        return f'one of {", ".join(f"{n} ({_share(shares[n])})" for n in tied)}{where}'
     others = f' (or {", ".join(effect.alternatives)})' if effect.alternatives else ''
     return effect.name + where + others
+
+
+def _share(probability: float) -> str:
+    return f'{100 * probability:.2g} %'
 
 
 def _noise(found: DiagnosisData) -> str:

@@ -11,13 +11,13 @@ from actuator_glue.diagnosis.each import Each
 from actuator_glue.diagnosis.fit import Fit, fit
 from actuator_glue.diagnosis.pipeline import (
     Conclusion,
-    Progress,
     conclude,
     with_learned_terms,
 )
 from actuator_glue.diagnosis.preparation import Prepared
 from actuator_glue.diagnosis.score import evidence
 from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.stages import Progress
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.wrong_setup import WrongSetup
 

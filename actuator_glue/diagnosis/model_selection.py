@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -13,10 +13,10 @@ from actuator_glue.diagnosis.ranking import compare, removed, spokesman, standar
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.search import Search, by_score
 from actuator_glue.diagnosis.selection import Selection
+from actuator_glue.diagnosis.stages import EFFECTS, Progress
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
 
-Progress = Callable[[str, float], None]
 # Rounds in which members may be swapped for better or simpler ones.
 _SWAPS = 4
 _SURE = 2.0  # standard errors over the blocks: what is less is not told apart
@@ -101,7 +101,7 @@ class ModelSelection:
         """Refit every structure of the beam with its most promising further effects."""
         found: dict[tuple[str, ...], Trial] = {}
         for i, current in enumerate(beam):
-            self.progress(f'effect {stage}', i / len(beam))
+            self.progress(EFFECTS[min(stage, len(EFFECTS)) - 1], i / len(beam))
             names = self.search.others(current)
             tried = self.search.screened(current, names)[: self.settings.tried]
             for trial in self.search.additions(current, tried, valves=False):

@@ -12,7 +12,8 @@ from actuator_glue.diagnosis.each import Each
 from actuator_glue.diagnosis.fit import Fit
 from actuator_glue.diagnosis.moments import Moment
 from actuator_glue.diagnosis.onset import Appeared
-from actuator_glue.diagnosis.pipeline import Conclusion, Progress, conclude
+from actuator_glue.diagnosis.pipeline import Conclusion, conclude
+from actuator_glue.diagnosis.stages import Progress
 from actuator_glue.diagnosis.thresholds import Thresholds
 
 Quiet = tuple[Data, Fit]

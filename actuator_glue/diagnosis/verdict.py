@@ -16,7 +16,7 @@ COMPLETE = ('none', 'missing-effect')  # verdicts that leave nothing material
 _LATER = Thresholds().later_share  # of what was removed: less is small change
 _FAR = 2.0  # times the noise's mean square: less than half of the held-out error is noise then
 _SOME = 0.5  # of what matters, removed in the held-out part by what was added
-_LIKELY = 0.5  # probability that a name, or one of those tied with it, must have
+LIKELY = 0.5  # probability that a name, or one of those tied with it, must have
 
 
 def far(error: HeldOutError, material: float, left: float | None = None) -> bool:
@@ -145,7 +145,7 @@ def likely(effect: Finding) -> bool:
     if math.isnan(effect.probability):
         return True
     tied = (r.probability for r in effect.rivals if r.name in effect.alternatives)
-    return effect.probability + sum(tied) >= _LIKELY
+    return effect.probability + sum(tied) >= LIKELY
 
 
 def certainty(fitted: float, error: HeldOutError, material: float) -> float:

@@ -1,0 +1,73 @@
+"""Progress of a diagnosis: every stage that is told is known, and no label ends an answer."""
+
+import ast
+from pathlib import Path
+from typing import get_args
+
+import pytest
+
+from actuator_glue import diagnosis as package
+from actuator_glue.api.callbacks import harmless
+from actuator_glue.diagnosis.stages import EFFECTS, Overall, Stage
+
+ROOM = Path(package.__file__).parent
+
+
+def told() -> set[str]:
+    """Every text that the code hands on as a stage: `tell(..)`, `progress(..)`, `stage=..`."""
+    found = set()
+    for path in ROOM.rglob('*.py'):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if not isinstance(node, ast.Call):
+                continue
+            name = getattr(node.func, 'attr', getattr(node.func, 'id', ''))
+            first = node.args[:1] if name in ('tell', 'progress') else []
+            named = [k.value for k in node.keywords if k.arg == 'stage']
+            found |= {n.value for n in (*first, *named) if isinstance(n, ast.Constant)}
+    return {text for text in found if isinstance(text, str)}
+
+
+def test_every_stage_that_is_told_is_known() -> None:
+    """And every one that is known is told: the effects' by their number."""
+    assert told() | set(EFFECTS) == set(get_args(Stage)) - {'posterior'}
+
+
+def test_the_share_that_is_done_rises_from_stage_to_stage() -> None:
+    """From nothing to all of it; going back to an earlier stage takes nothing away."""
+    overall = Overall()
+    shares = [overall(stage, 0.0) for stage in get_args(Stage)]
+    assert shares == sorted(set(shares)) and (shares[0], shares[-1]) == (0.0, 1.0)
+    assert Overall()('effect 1', 0.5) == pytest.approx(0.2)
+    overall = Overall()
+    assert [overall('onset', 0.0), overall('effect 1', 0.5)] == [0.741, 0.741]
+
+
+def test_a_stage_that_nobody_knows_is_no_reason_to_fail() -> None:
+    """The share stays about where it was."""
+    overall = Overall()
+    overall('effect 2', 0.0)
+    assert 0.35 <= overall('a new idea', 0.5) <= 0.5
+
+
+def test_a_callback_that_fails_is_told_once() -> None:
+    """It ends no answer, and is not called again; the keyboard's interrupt goes through."""
+    calls = []
+
+    def tell(stage: str, share: float) -> None:
+        calls.append(stage)
+        raise KeyError(stage)
+
+    safe = harmless(tell)
+    assert safe is not None and harmless(None) is None
+    with pytest.warns(RuntimeWarning, match="KeyError.'check'"):
+        safe('check', 0.0)
+    safe('base fit', 0.0)
+    assert calls == ['check']
+
+    def interrupted(share: float) -> None:
+        raise KeyboardInterrupt
+
+    stop = harmless(interrupted)
+    assert stop is not None
+    with pytest.raises(KeyboardInterrupt):
+        stop(0.0)

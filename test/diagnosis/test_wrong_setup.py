@@ -1,0 +1,81 @@
+"""Stiffnesses given to the wrong records, and the wrong hold, are told before all else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from actuator_glue.diagnosis.diagnose import diagnose
+from actuator_glue.diagnosis.preparation import prepare
+from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.wrong_setup import find
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Hold, Record
+
+RATE = 128.0
+THETA = np.array([128.0, 5.0e10, 4.23e6, 3.3])
+T = np.arange(int(24 * RATE)) / RATE
+SWEEP = 2e-3 * np.sin(np.pi * (10.0 / 24.0) * T**2)
+
+
+def machine(
+    *stiffness: float, hold: Hold = 'zoh', effect: str = '', seed: int = 5
+) -> list[Record]:
+    """One test with each specimen, 10 um of noise."""
+    rng = np.random.default_rng(seed)
+    model = Structure([effect] if effect else [])
+    theta = np.append(THETA, 6e-5) if effect else THETA
+    records = []
+    for k in stiffness:
+        silent = Record(SWEEP, SWEEP, 1 / RATE, stiffness=k, hold=hold)
+        noise = 1e-5 * rng.standard_normal(len(T))
+        records.append(replace(silent, measured=model.simulate(theta, silent) + noise))
+    return records
+
+
+def given(records: list[Record], *stiffness: float) -> list[Record]:
+    """The same records with the stiffnesses that a user gives."""
+    return [replace(r, stiffness=k) for r, k in zip(records, stiffness, strict=True)]
+
+
+@pytest.mark.parametrize('truth', [(0.0, 250e3), (0.0, 250e3, 1e6), (0.0, 0.0, 250e3)])
+def test_stiffnesses_of_the_wrong_records_are_put_right(truth: tuple[float, ...]) -> None:
+    """The first record's with the last one's; Eq. (2) alone is enough then."""
+    wrong = [truth[-1], *truth[1:-1], truth[0]]
+    other = find(prepare(given(machine(*truth), *wrong), []).fit, Thresholds())
+    assert other is not None and other.enough
+    assert (other.stiffness, other.changed) == (truth, ('stiffness',))
+    assert other.error == pytest.approx(1e-5, rel=0.1)
+    assert other.as_given > 1.5 * other.error
+
+
+def test_both_may_be_wrong() -> None:
+    """Exchanged stiffnesses of commands that run linearly."""
+    records = machine(0.0, 250e3, hold='linear')
+    wrong = [replace(r, hold='zoh') for r in given(records, 250e3, 0.0)]
+    other = find(prepare(wrong, []).fit, Thresholds())
+    assert other is not None and other.changed == ('stiffness', 'hold')
+    assert set(other.hold) == {'linear'} and other.stiffness == (0.0, 250e3)
+
+
+def test_a_held_command_that_was_given_as_linear_is_told() -> None:
+    """A delay of half a sample is what it looks like otherwise."""
+    wrong = [replace(r, hold='linear') for r in machine(0.0, 250e3)]
+    other = find(prepare(wrong, []).fit, Thresholds())
+    assert other is not None and (other.changed, set(other.hold)) == (('hold',), {'zoh'})
+
+
+@pytest.mark.parametrize('effect', ['', 'backlash'])
+def test_a_set_up_that_is_right_stays(effect: str) -> None:
+    """Of a machine that Eq. (2) describes, and of one with play."""
+    for seed in range(3):
+        records = machine(0.0, 250e3, effect=effect, seed=seed)
+        assert find(prepare(records, []).fit, Thresholds()) is None
+
+
+def test_what_a_wrong_set_up_leaves_is_no_effect_of_the_machine() -> None:
+    """Nothing is searched for; the answer is never that the model is enough."""
+    found = diagnose(given(machine(0.0, 250e3), 250e3, 0.0))
+    assert found.summary().startswith('check the set-ups: with specimen stiffnesses exchanged')
+    assert not found.complete and not found.effects
+    assert found.error.after > 1.5 * found.error.noise_floor
