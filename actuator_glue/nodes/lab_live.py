@@ -31,6 +31,7 @@ FAULTS = {
     'restarts': 'times the sender began to count anew',
     'interruptions': 'times the connection broke: a gap as long as the silence',
     'malformed': 'messages do not fit the layout and were left out',
+    'coarse': 'samples have a float32 counter or time too large to count on, and were left out',
     'not authentic': 'messages have no valid signature and were left out',
     'senders refused': 'messages came from senders that are not allowed',
     'second sender': 'messages came from a second sender while the first still sends',
@@ -167,3 +168,5 @@ class LiveSource:
             if counts[name] > self._told[name]:
                 self._node.complain(name, f'{counts[name] - self._told[name]} {meaning}')
         self._told = counts
+        if self._reception.rate_fault:
+            self._node.complain('sample rate', self._reception.rate_fault)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
@@ -27,6 +28,8 @@ TYPES = {
     'uint32': 'u4',
     'uint64': 'u8',
 }
+# A float32 has no whole number between this one and the next but one.
+FLOAT32_COUNTS = 1 << 24
 
 
 @dataclass(frozen=True, slots=True)
@@ -138,27 +141,57 @@ class Layout:
         bits = 8 * int(TYPES[counter.type][1])
         return step << bits if bits < 64 else None
 
+    def coarse(self, name: str, values: NDArray[Any], rate: float) -> NDArray[np.bool_]:
+        """Return which counters or times tell no sample from the next, shape (n,).
+
+        A float32 counts to 2^24, and its times of hours are apart by more than half a sample.
+
+        Args:
+            name: counter or time.
+            values: as sent, shape (n,).
+            rate: sample rate [Hz].
+        """
+        field = self.fields[name]
+        if 'f4' not in (TYPES[field.type], f'{values.dtype.kind}{values.dtype.itemsize}'):
+            return np.zeros(len(values), dtype=bool)
+        every = self.samples if field in self.packet else 1
+        if name == 'counter':
+            limit = FLOAT32_COUNTS * (every if self.counts == 'packets' else 1)
+            return np.asarray(np.abs(values) >= limit)
+        step = np.spacing(np.abs(values).astype(np.float32)).astype(np.float64)
+        return np.asarray(field.si(step) - field.si(np.zeros(1)) > 0.5 * every / rate)
+
     def rows(
-        self, values: Mapping[str, NDArray[Any]], arrival_ns: int, fresh: bool = False
-    ) -> tuple[Rows, int]:
-        """Return samples in SI units, and how many have no usable counter or time.
+        self,
+        values: Mapping[str, NDArray[Any]],
+        arrival_ns: int,
+        rate: float,
+        fresh: bool = False,
+    ) -> tuple[Rows, Counter[str]]:
+        """Return samples in SI units, and how many are left out, by the reason.
+
+        Reasons: `malformed`, counter or time is no number; `coarse`, what tells their order is a
+        float32 that can tell one sample from the next no more.
 
         Args:
             values: by field, as sent, each of shape (n,).
             arrival_ns: when the last one came [ns].
+            rate: sample rate [Hz].
             fresh: whether a connection begins with them.
         """
-        size = len(values['command'])
-        good = np.ones(size, dtype=bool)
+        good = np.ones(len(values['command']), dtype=bool)
         counter = values.get('counter')
-        if counter is not None and counter.dtype.kind == 'f':
-            good &= np.abs(counter) < 2.0**53  # NaN compares as False
         with np.errstate(all='ignore'):
+            if counter is not None and counter.dtype.kind == 'f':
+                good &= np.abs(counter) < 2.0**53  # NaN compares as False
             si = {n: f.si(values[n]) for n, f in self.fields.items() if n != 'counter'}
-        if 'time' in si:
-            good &= np.abs(si['time']) < 1e11
-        bad = size - int(good.sum())
-        if bad:
+            if 'time' in si:
+                good &= np.abs(si['time']) < 1e11
+            order = next((n for n in ('counter', 'time') if n in self.fields), None)
+            coarse = good & self.coarse(order, values[order], rate) if order else ~good
+        left_out = Counter(malformed=int((~good).sum()), coarse=int((coarse & good).sum()))
+        good &= ~coarse
+        if not good.all():
             si = {name: column[good] for name, column in si.items()}
             counter = None if counter is None else counter[good]
         return Rows(
@@ -169,7 +202,7 @@ class Layout:
             si.get('time'),
             arrival_ns,
             fresh,
-        ), bad
+        ), left_out
 
 
 # What `send` sends and lab_bridge expects where no layout is given.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from decimal import Decimal, InvalidOperation
 from typing import Any
 
 import numpy as np
@@ -63,6 +64,10 @@ class Lines:
     def begin(self) -> None:
         """Forget the names of columns."""
         self._places: dict[str, int] | None = None
+        # Entries of a line; None while columns are known by their number alone, and no line yet.
+        self._width: int | None = None
+        if all(field.column is None for field in self._layout.sample):
+            self._width = sum(field.count for field in self._layout.sample)
         if not self._layout.header:
             try:
                 self._places = places(self._layout, None)
@@ -70,24 +75,41 @@ class Lines:
                 self._places = None  # named columns: the first line must name them
 
     def decoded(self, lines: Sequence[bytes]) -> tuple[dict[str, NDArray[Any]], int]:
-        """Return the values by field, as sent, and how many lines cannot be read."""
-        delimiter, bad = self._layout.delimiter, 0
+        """Return the values by field, as sent, and how many lines cannot be read.
+
+        A line with more or fewer entries than the others is none of them: a decimal comma, or a
+        column that nobody has told of, would put one value in another's place.
+        """
+        bad = 0
         rows: list[list[float]] = []
         for line in lines:
-            entries = line.decode('utf-8', 'replace').split(delimiter)
+            entries = self._entries(line)
             if self._places is None:
+                names = [entry.strip(' "') for entry in entries]
                 try:
-                    self._places = places(self._layout, [e.strip(' "\r') for e in entries])
+                    self._places, self._width = places(self._layout, names), len(names)
                 except LookupError:
                     bad += 1
                 continue
             try:
-                rows.append([float(entries[at]) for at in self._places.values()])
+                if len(entries) != (self._width or len(entries)):
+                    raise ValueError(f'{len(entries)} entries')
+                row = [_number(entries[at], name) for name, at in self._places.items()]
             except (ValueError, IndexError):
                 bad += 1
+                continue
+            self._width = len(entries)
+            rows.append(row)
         table = np.array(rows, dtype=np.float64).reshape(len(rows), len(self._layout.fields))
-        names = self._places or self._layout.fields
-        return dict(zip(names, table.T, strict=False)), bad
+        fields = self._places or self._layout.fields
+        return dict(zip(fields, table.T, strict=False)), bad
+
+    def _entries(self, line: bytes) -> list[str]:
+        """Return the entries of a line; an empty one behind the last delimiter is none."""
+        delimiter = self._layout.delimiter
+        text = line.decode('utf-8', 'replace').rstrip('\r')
+        entries = text.split() if delimiter == ' ' else text.split(delimiter)
+        return entries[:-1] if len(entries) > 1 and not entries[-1].strip() else entries
 
     def encoded(self, values: Mapping[str, Array]) -> list[bytes]:
         """Return one line per sample, without its end; fields in the layout's order."""
@@ -110,3 +132,22 @@ class Lines:
             name = field.column if isinstance(field.column, str) else field.name
             names += [name] * field.count
         return self._layout.delimiter.join(names).encode()
+
+
+def _number(text: str, name: str) -> float:
+    """Return the number that an entry is.
+
+    Raises:
+        ValueError: it is none, or a counter printed with too few digits to count.
+    """
+    if '_' in text:
+        raise ValueError('Python alone reads 1_000 as a number')
+    value = float(text)
+    if name == 'counter' and 'e' in text.lower():
+        try:
+            coarse = int(Decimal(text.strip()).as_tuple().exponent) > 0
+        except (InvalidOperation, ValueError):
+            return value  # infinity, NaN: told as such
+        if coarse:
+            raise ValueError(f'{text} is no count: its last digit is not that of ones')
+    return value

@@ -47,7 +47,7 @@ class Packed:
             head = packets[at]
             if name == 'counter':
                 # A float stays one: whoever reads it looks whether it is a number.
-                wide = head if head.dtype.kind == 'f' else head.astype(np.int64)
+                wide = head.astype(np.float64 if head.dtype.kind == 'f' else np.int64)
                 step = many if self._layout.counts == 'packets' else 1
                 with np.errstate(all='ignore'):
                     found[name] = np.repeat(wide * step, many) + within

@@ -13,7 +13,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.io.rate_check import RateWatch, disagreement, rate_by_steps
 from actuator_glue.records import Array
 from actuator_glue.streams.clock import ClockMap
-from actuator_glue.streams.layout import Layout, Rows
+from actuator_glue.streams.layout import FLOAT32_COUNTS, TYPES, Layout, Rows
 from actuator_glue.streams.sequence import Run, Sequence
 
 # What tells the order of samples: a counter, else their times, else that they arrive in order.
@@ -78,6 +78,8 @@ class Reception:
                 'somebody could be sent again; add a counter'
             )
         self._force = 'force' in names
+        told_by = names.get(self.order)
+        self._float32 = told_by is not None and TYPES[told_by.type] == 'f4'
         modulus = layout.modulus if self.order == 'counter' else None
         self._sequence = Sequence(
             rate, modulus, restarts=not signed, shuffled=not in_order, counts=self.counts
@@ -91,6 +93,12 @@ class Reception:
         """Return what cannot be seen in such a stream, for people."""
         if self.order == 'arrival':
             return ['the layout has neither counter nor time: lost samples cannot be seen']
+        if self._float32:
+            hours = FLOAT32_COUNTS / self.rate / 3600.0
+            return [
+                f'the {self.order} is a float32, which tells samples apart for {hours:.3g} h at '
+                'most; what comes later is left out: send it as uint32, or as float64'
+            ]
         if modulus is not None and modulus < 2.0 * self.rate:
             seconds = 0.5 * modulus / self.rate
             return [f'the counter is so small that gaps beyond {seconds:.3g} s are miscounted']

@@ -90,7 +90,7 @@ def _use_layout(path: Path) -> None:
     layout = parse_layout(parse(path.read_text('utf-8', errors='replace'), 'test'), 'test')
     rate = layout.rate or 1000.0
     packed = Packed(layout, rate)
-    layout.rows(packed.decoded(bytes(packed.size)), 0)
+    layout.rows(packed.decoded(bytes(packed.size)), 0, rate)
     Lines(layout).decoded([b'1,2,3'])
 
 

@@ -140,7 +140,7 @@ def test_no_layout_raises_but_for_its_reason(content):
     # What is taken can be used.
     size = Packed(found, found.rate or 1000.0).size
     values = Packed(found, found.rate or 1000.0).decoded(bytes(size))
-    found.rows(values, 0)
+    found.rows(values, 0, 1000.0)
     if not found.packet and found.samples == 1:
         Lines(found).decoded([b'1,2,3'])
 

@@ -1,6 +1,7 @@
 """Layouts: what a file may say, and that packets carry what was put in."""
 
 import struct
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from actuator_glue.streams.layout import PLAIN, TYPES
 from actuator_glue.streams.layout_file import parse_layout, read_layout
 from actuator_glue.streams.lines import Lines
 from actuator_glue.streams.packed import Packed
+from actuator_glue.streams.reception import Reception
 
 ROOT = Path(__file__).resolve().parents[2]
 BOTH = [{'name': 'command', 'unit': 'mm'}, {'name': 'measured', 'unit': 'mm'}]
@@ -73,8 +75,8 @@ def test_a_packet_as_a_controller_packs_it():
     data += struct.pack('>H4xhhhh', 0, 1, 2, 3, 4)
     packed = Packed(found, 1000.0)
     assert packed.size == 14
-    rows, bad = found.rows(packed.decoded(data), 0)
-    assert not bad and found.modulus == 131_072
+    rows, left_out = found.rows(packed.decoded(data), 0, 1000.0)
+    assert not left_out.total() and found.modulus == 131_072
     assert rows.counter.tolist() == [131_070, 131_071, 0, 1]
     assert np.allclose(rows.command, [1e-3, 3e-3, 1e-5, 3e-5])
     assert np.allclose(rows.measured, [-1e-3, -3e-3, 1.02e-3, 1.04e-3])
@@ -105,8 +107,8 @@ def test_what_is_packed_is_what_is_unpacked(kinds, order, many, head, counts):
     packed = Packed(found, 1000.0)
     packets = packed.encoded(sent)
     assert len(packets) == 3 and all(len(p) == packed.size for p in packets)
-    rows, bad = found.rows(packed.decoded(b''.join(packets)), 0)
-    assert not bad
+    rows, left_out = found.rows(packed.decoded(b''.join(packets)), 0, 1000.0)
+    assert not left_out.total()
     assert np.allclose(rows.command, sent['command'], atol=1e-9)
     assert np.allclose(rows.measured, sent['measured'], atol=1e-9)
     assert rows.counter.tolist() == whole.tolist()
@@ -115,15 +117,15 @@ def test_what_is_packed_is_what_is_unpacked(kinds, order, many, head, counts):
 def test_a_counter_that_is_no_number_is_left_out_and_told():
     found = layout([{'name': 'counter'}, *BOTH])
     table = np.array([[0.0, 1, 1], [np.nan, 2, 2], [1e300, 3, 3], [np.inf, 4, 4], [1.0, 5, 5]])
-    rows, bad = found.rows(Packed(found, 1.0).decoded(table.tobytes()), 0)
-    assert bad == 3 and rows.counter.tolist() == [0, 1]
+    rows, left_out = found.rows(Packed(found, 1.0).decoded(table.tobytes()), 0, 1.0)
+    assert left_out == Counter(malformed=3) and rows.counter.tolist() == [0, 1]
     assert np.allclose(rows.command, [1e-3, 5e-3])
 
 
 def test_lines_by_place_and_by_name():
     by_place = Lines(layout(BOTH, delimiter=';'))
-    values, bad = by_place.decoded([b'1.5;2.5\r', b'x;y', b'3', b'4;5;6', b'\xff;1'])
-    assert bad == 3 and values['command'].tolist() == [1.5, 4.0]
+    values, bad = by_place.decoded([b'1.5;2.5\r', b'x;y', b'3', b'4;5;', b'\xff;1', b'1_0;2'])
+    assert bad == 4 and values['command'].tolist() == [1.5, 4.0]
     named = [{**BOTH[0], 'column': 'u'}, {**BOTH[1], 'column': 'x'}]
     by_name = Lines(layout(named, header=True))
     values, bad = by_name.decoded([b'x,t,u', b'1,2,3'])
@@ -147,3 +149,82 @@ def test_lines_bring_back_every_bit():
     values, bad = lines.decoded(lines.encoded(sent))
     assert not bad
     assert all(np.array_equal(values[name], sent[name]) for name in sent)
+
+
+NUMBERED = [{**BOTH[0], 'column': 2}, {**BOTH[1], 'column': 4}]
+NAMED = [{**BOTH[0], 'column': 'u'}, {**BOTH[1], 'column': 'x'}]
+
+
+@pytest.mark.parametrize(
+    ('its', 'width', 'first'),
+    [
+        (layout(BOTH, delimiter=','), 2, []),
+        (layout([BOTH[0], {'name': 'spare', 'count': 2}, BOTH[1]]), 4, []),
+        (layout(NUMBERED), 4, [b'0,1,0,2']),
+        (layout(NAMED, header=True), 3, [b't,u,x']),
+    ],
+    ids=['by place', 'some stepped over', 'by number', 'by name'],
+)
+@pytest.mark.parametrize('other', [1, -1, 3])
+def test_a_line_with_another_number_of_entries_is_no_sample(its, width, first, other):
+    """A decimal comma or one column more would put a value in another's place."""
+    lines = Lines(its)
+    lines.decoded(first)
+    good = b','.join(b'1.5' for _ in range(width))
+    odd = b','.join(b'9' for _ in range(width + other))
+    values, bad = lines.decoded([good, odd, good, odd])
+    assert bad == 2
+    assert values['command'].tolist() == [1.5, 1.5] == values['measured'].tolist()
+
+
+def test_decimal_commas_between_commas_are_refused():
+    """`17,1,2340,1,2290`: five entries where three are told of."""
+    its = layout([{'name': 'counter', 'type': 'uint32'}, *BOTH])
+    values, bad = Lines(its).decoded([b'17,1,2340,1,2290', b'18,1.2340,1.2290'])
+    assert bad == 1 and values['command'].tolist() == [1.2340]
+
+
+@pytest.mark.parametrize(
+    ('text', 'good'),
+    [(b'16777217', True), (b'1.5e1', True), (b'1.67772E+07', False), (b'1e+06', False)],
+)
+def test_a_counter_printed_with_too_few_digits_counts_nothing(text, good):
+    """`%g` prints every number from 16777150 to 16777249 alike: none of them is a repeated one."""
+    its = layout([{'name': 'counter'}, *BOTH])
+    values, bad = Lines(its).decoded([text + b',1,1'])
+    assert bad == (not good) and len(values['command']) == good
+
+
+@pytest.mark.parametrize('order', ['little', 'big'])
+@pytest.mark.parametrize('where', ['sample', 'packet'])
+def test_a_float32_counts_as_far_as_it_can(order, where):
+    """Beyond 2^24 it gives two samples one number: they are told as what they are."""
+    counter = {'name': 'counter', 'type': 'float32'}
+    its = (
+        layout([counter, *BOTH], byte_order=order)
+        if where == 'sample'
+        else layout(BOTH, packet=[counter], byte_order=order)
+    )
+    numbers = np.arange(2**24 - 3, 2**24 + 3)
+    packed = Packed(its, 1000.0)
+    sent = {'counter': numbers.astype(float), 'command': np.arange(6.0), 'measured': np.zeros(6)}
+    rows, left_out = its.rows(packed.decoded(b''.join(packed.encoded(sent))), 0, 1000.0)
+    assert left_out == Counter(coarse=3, malformed=0)
+    assert rows.counter.tolist() == numbers[:3].tolist()
+    assert rows.command.tolist() == [0.0, 1.0, 2.0]
+    assert (
+        'a float32, which tells samples apart for 4.66 h' in Reception(its, 1e3).warnings(None)[0]
+    )
+
+
+def test_a_float32_time_tells_the_order_as_long_as_it_can():
+    """At 5 h its steps are 2 ms long: at 1 kHz two samples have one time."""
+    its = layout([{'name': 'time', 'type': 'float32', 'unit': 's'}, *BOTH])
+    time = np.array([8000.0, 16000.0, 18000.0])
+    packed = Packed(its, 1000.0)
+    sent = {'time': time, 'command': np.arange(3.0), 'measured': np.zeros(3)}
+    data = packed.decoded(b''.join(packed.encoded(sent)))
+    rows, left_out = its.rows(data, 0, 1000.0)
+    assert left_out['coarse'] == 2 and rows.time.tolist() == [8000.0]
+    rows, left_out = its.rows(data, 0, 100.0)
+    assert not left_out.total() and rows.time.tolist() == time.tolist()

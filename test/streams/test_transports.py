@@ -17,6 +17,7 @@ from actuator_glue.streams.reception import Reception
 from actuator_glue.streams.seal import Seal
 from actuator_glue.streams.transports import source
 
+PLAIN_PAIR = [{'name': 'command', 'unit': 'mm'}, {'name': 'measured', 'unit': 'mm'}]
 SEAL = Seal(b'a key of twenty byte')
 
 
@@ -236,3 +237,38 @@ def test_a_shadow_relays_what_it_does_not_understand():
                 assert client.makefile('rb').read(6) == b'answer'
             assert listener.receive(0.1) == []
         assert listener.counts['malformed'] == 1
+
+
+def test_lines_with_another_number_of_entries_are_counted_and_give_no_sample():
+    """A controller of decimal commas: five entries where the layout has three."""
+    its = layout([{'name': 'counter', 'type': 'uint32'}, *PLAIN_PAIR], rate=500)
+    at = address('tcp')
+    with closing(listen(at, terms(its, 500.0))) as listener:
+        port = int(at.rpartition(':')[2])
+        with closing(socket.create_connection(('127.0.0.1', port))) as peer:
+            lines = [b'%d,1,2340,1,2290\n' % n for n in range(20)]
+            lines += [b'%d,1.5,1.25,7.0\n' % n for n in range(20, 40)]
+            lines += [b'%d,1.5,1.25\n' % n for n in range(40, 60)]
+            peer.sendall(b''.join(lines))
+            found = received(listener, 20, Reception(its, 500.0, in_order=True))
+    index, command, measured, _ = joined(found)
+    assert index.tolist() == list(range(20))
+    assert np.allclose(command, 1.5e-3) and np.allclose(measured, 1.25e-3)
+    assert listener.counts['malformed'] == 40
+
+
+@pytest.mark.parametrize('channels', [1, 3])
+def test_a_stream_of_lsl_with_another_number_of_channels_is_not_heard(channels):
+    """Channels known by their place alone are as many as the layout has."""
+    its = layout(PLAIN_PAIR)
+    at = address('lsl')
+    pylsl = pytest.importorskip('pylsl')
+    with closing(listen(at, terms(its))) as listener:
+        name = at.removeprefix('lsl:')
+        info = pylsl.StreamInfo(name, 'servo', channels, 1000.0, 'double64', f'{name}-sender')
+        outlet = pylsl.StreamOutlet(info)
+        end = time.monotonic() + 20.0
+        while not listener.counts['malformed'] and time.monotonic() < end:
+            outlet.push_sample([1.0] * channels)
+            assert not listener.receive(0.2)
+    assert listener.counts['malformed']

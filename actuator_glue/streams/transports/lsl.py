@@ -54,6 +54,7 @@ class LslListener:
         self.counts: Counter[str] = Counter()
         self._inlet: Any = None
         self._places: dict[str, int] = {}
+        self._kind: type[np.floating[Any]] = np.float64
 
     def receive(self, timeout: float) -> list[Rows]:
         """Return the samples that have arrived; look for the stream while there is none."""
@@ -68,12 +69,13 @@ class LslListener:
             return []
         if not stamps:
             return []
-        columns = np.asarray(table, dtype=np.float64)
+        columns = np.asarray(table, dtype=self._kind)
         self.counts['messages'] += len(stamps)
         values = {name: columns[:, at] for name, at in self._places.items()}
-        rows, bad = self._terms.layout.rows(values, self._terms.now_ns())
-        self.counts['malformed'] += bad
-        if rows.time is None and not bad:
+        terms = self._terms
+        rows, left_out = terms.layout.rows(values, terms.now_ns(), terms.rate)
+        self.counts.update(left_out)
+        if rows.time is None and not left_out.total():
             rows = rows._replace(time=np.asarray(stamps, dtype=np.float64))
         return [rows] if len(rows.command) else []
 
@@ -95,10 +97,15 @@ class LslListener:
             return False
         except Exception:  # gone again, or answering nothing
             return False
-        if max(self._places.values()) >= info.channel_count():
+        listed = [field.count for field in self._terms.layout.sample if field.column is None]
+        # Channels known by their place alone are those of the layout, no more and no less.
+        whole = len(listed) < len(self._terms.layout.sample) or sum(listed) == info.channel_count()
+        if not whole or max(self._places.values()) >= info.channel_count():
             self.counts['malformed'] += 1
             inlet.close_stream()
             return False
+        single = info.channel_format() == self._lsl.cf_float32
+        self._kind = np.float32 if single else np.float64
         self._inlet = inlet
         self.counts['connections'] += 1
         return True

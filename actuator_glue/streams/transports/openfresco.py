@@ -217,9 +217,10 @@ class Shadow:
     def _keep(self, found: dict[str, float], fresh: bool) -> bool:
         """Hand a sample over; return whether the next one is still the first of its client."""
         values = {name: np.array([value]) for name, value in found.items()}
-        rows, bad = self._layout.rows(values, self._terms.now_ns(), fresh)
-        self.counts['malformed'] += bad
-        if bad:
+        terms = self._terms
+        rows, left_out = self._layout.rows(values, terms.now_ns(), terms.rate, fresh)
+        self.counts['malformed'] += left_out.total()
+        if left_out.total():
             return fresh
         self.counts['messages'] += 1
         self.counts['overruns'] += len(self._found) == AT_ONCE

@@ -81,8 +81,9 @@ class TcpListener:
         if 'command' not in values or not len(values['command']):
             return []
         self.counts['messages'] += len(values['command'])
-        rows, bad = self._terms.layout.rows(values, self._terms.now_ns(), self._fresh)
-        self.counts['malformed'] += bad
+        terms = self._terms
+        rows, left_out = terms.layout.rows(values, terms.now_ns(), terms.rate, self._fresh)
+        self.counts.update(left_out)
         self._fresh = False
         return [rows]
 

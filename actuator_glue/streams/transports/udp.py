@@ -55,8 +55,9 @@ class UdpListener:
             return []
         self.counts['messages'] += len(payloads)
         values = self._packed.decoded(b''.join(payloads))
-        rows, bad = self._terms.layout.rows(values, self._terms.now_ns())
-        self.counts['malformed'] += bad
+        terms = self._terms
+        rows, left_out = terms.layout.rows(values, terms.now_ns(), terms.rate)
+        self.counts.update(left_out)
         return [rows] if len(rows.command) else []
 
     def _payload(self, message: bytes, sender: tuple[object, ...], now: float) -> bytes | None:
