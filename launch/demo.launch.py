@@ -79,5 +79,5 @@ def nodes(given):
 
 
 def generate_launch_description():
-    """Return the nodes; the end of the stream ends them all, that of another one is a failure."""
+    """Return the nodes; the stream's end ends them all, estimator and the like are restarted."""
     return description(ARGUMENTS, nodes)

@@ -13,9 +13,11 @@ from typing import Any
 from rclpy.clock import Clock, ClockType, JumpThreshold, TimeJump
 from rclpy.duration import Duration
 from rclpy.lifecycle import LifecycleNode, LifecycleState, TransitionCallbackReturn
+from rclpy.time import Time
 
 from actuator_glue.errors import InputError
 from actuator_glue.nodes import health, partners
+from actuator_glue.nodes.now import begun, now_ns
 from actuator_glue.nodes.parameters import Parameters, Spec
 from actuator_glue.nodes.topics import DIAGNOSTICS, Topic
 from actuator_glue.nodes.transitions import REACHED, answered
@@ -25,6 +27,7 @@ COMMON = (
     Spec('diagnostics_period', 1.0, 'time between reports', 's', 0.1, 60.0, read_only=True),
 )
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
+ERROR = TransitionCallbackReturn.ERROR
 
 
 class SuiteNode(LifecycleNode):
@@ -36,10 +39,19 @@ class SuiteNode(LifecycleNode):
     Args:
         name: node name.
         specs: parameters besides the common ones.
+
+    Attributes:
+        carries: it carries samples or records: without it a test is over.
+        active: it is active.
+        finished: it has ended, by itself or by a service.
+        exit_code: of its process, once it has ended.
     """
+
+    carries = False
 
     def __init__(self, name: str, specs: Sequence[Spec]) -> None:
         super().__init__(name)
+        self.exit_code = 0
         self.health = health.Health(self.get_fully_qualified_name())
         self.active = False
         self.finished = False
@@ -243,7 +255,7 @@ class SuiteNode(LifecycleNode):
             self.get_logger().error(
                 f'cannot {name}: ' + ''.join(traceback.format_exception(error))
             )
-            return TransitionCallbackReturn.ERROR
+            return ERROR
         reached = REACHED.get(name, name)
         self.get_logger().info(reached)
         self._report(reached)
@@ -281,7 +293,13 @@ class SuiteNode(LifecycleNode):
     def _report(self, state: str | None = None) -> None:
         self._check_partners()
         self.do_report()
-        stamp = self.get_clock().now().to_msg()
+        if not begun(self.get_clock()):
+            self.complain(
+                'clock',
+                'use_sim_time is set and nothing has come on /clock yet; until then this is '
+                "stamped with the computer's time",
+            )
+        stamp = Time(nanoseconds=now_ns(self.get_clock())).to_msg()
         message = self.health.message(time.monotonic(), stamp, state or self.state)
         self._diagnostics.publish(message)
 

@@ -1,4 +1,4 @@
-"""What the launch files share: nodes with the suite's parameters, and an end for all of them."""
+"""What the launch files share: nodes with the suite's parameters, and what follows their ends."""
 
 from __future__ import annotations
 
@@ -16,12 +16,20 @@ from launch.event_handlers import OnProcessExit
 from launch.events import Shutdown
 from launch.substitutions import LaunchConfiguration, PathJoinSubstitution
 from launch_ros.actions import Node
+from launch_ros.ros_adapters import get_ros_node
 from launch_ros.substitutions import FindPackageShare
 
+from actuator_glue.nodes.restarts import Restarts
 from launch import LaunchDescription
 
-# Nodes whose end is the end of a test; that of any other is a failure.
+# What carries samples or records ends a launch: a stream when it has ended, all of them when they
+# fail. Any other node is started again, for a test goes on without it.
 STREAMS = ('actuator_sim', 'lab_bridge', 'replay')
+CARRIERS = (*STREAMS, 'recorder')
+# Time until a node is started again [s].
+RESTART_SECONDS = 2.0
+# Exit code of a node that refuses its parameters.
+REFUSED = 2
 # Every launch file has these besides its own.
 COMMON = {
     'params': (
@@ -59,26 +67,42 @@ def node(given: Given, name: str, parameters: Mapping[str, Any], namespace: str 
         namespace=namespace,
         parameters=[given['params'], more],
         output='screen',
+        respawn=name not in CARRIERS,
+        respawn_delay=RESTART_SECONDS,
     )
 
 
-def ends(streams: int, linger: float) -> Callable[[Any, Any], Any]:
-    """Return the rule for a node's end: that of the last stream ends all, any other is a failure.
+def ends(streams: int, linger: float, simulated: bool) -> Callable[[Any, Any], Any]:
+    """Return the rule for a node's end.
+
+    That of the last stream ends all, any other of what carries samples or records is a failure.
+    The other nodes are started again, which /diagnostics tells; only parameters that such a node
+    refuses when it is first started are a failure, too: streams still wait for it then.
 
     Args:
         streams: how many nodes stream.
         linger: time for the last windows [s].
+        simulated: whether /clock has the time.
     """
     left = streams
+    restarts: Restarts | None = None
+    ended_before: set[int] = set()
 
     def ended(event: Any, context: Any) -> Any:
-        nonlocal left
+        nonlocal left, restarts
         if context.is_shutdown:
             return None
-        if event.returncode or event.action.node_executable not in STREAMS:
+        node, code = event.action, event.returncode
+        if node.node_executable not in CARRIERS and (code != REFUSED or id(node) in ended_before):
+            ended_before.add(id(node))
+            if restarts is None:
+                restarts = Restarts(get_ros_node(context), simulated)
+            restarts.ended(node.node_name, code)
+            return None
+        if code or node.node_executable not in STREAMS:
             # launch takes an exception for a failure, ends the other nodes and returns 1.
             raise RuntimeError(
-                f'{event.process_name} ended with exit code {event.returncode}; it says why above'
+                f'{event.process_name} ended with exit code {code}; it says why above'
             )
         left -= 1
         if left:
@@ -104,7 +128,7 @@ def description(
         given = {name: LaunchConfiguration(name).perform(context) for name in everything}
         found = nodes(given)
         streams = sum(n.node_executable in STREAMS for n in found)
-        rule = ends(streams, float(given['linger']))
+        rule = ends(streams, float(given['linger']), truth(given['use_sim_time']))
         return [*found, RegisterEventHandler(OnProcessExit(on_exit=rule))]
 
     declared = [

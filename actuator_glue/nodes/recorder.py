@@ -53,6 +53,8 @@ class Item(NamedTuple):
 class RecorderNode(base.SuiteNode):
     """Takes messages as bytes; a thread of its own writes them, so that no disk delays DDS."""
 
+    carries = True
+
     def __init__(self) -> None:
         self.writer: BagWriter | None = None
         self._bags = 0

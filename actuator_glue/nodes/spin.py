@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import sys
 import time
+import traceback
 from collections.abc import Callable, Sequence
 
 import rclpy
@@ -13,7 +14,7 @@ from rclpy.signals import SignalHandlerOptions
 
 from actuator_glue.errors import InputError
 from actuator_glue.nodes import transport
-from actuator_glue.nodes.base import SUCCESS, SuiteNode
+from actuator_glue.nodes.base import ERROR, SUCCESS, SuiteNode
 from actuator_glue.nodes.executor import Executor
 from actuator_glue.nodes.signals import Stop
 
@@ -27,7 +28,9 @@ def main(make: Callable[[], SuiteNode], args: Sequence[str] | None = None) -> in
 
 
 def together(makes: Sequence[Callable[[], SuiteNode]], args: Sequence[str] | None = None) -> int:
-    """Run nodes in one process until a signal or the end of one of them; return the exit code.
+    """Run nodes in one process until a signal or the end of a test; return the exit code.
+
+    A test ends with the node that carries its samples or its records; any other may go.
 
     Args:
         makes: make the nodes, started in this order and ended in the opposite one.
@@ -47,7 +50,7 @@ def together(makes: Sequence[Callable[[], SuiteNode]], args: Sequence[str] | Non
     executor = Executor()
     for node in nodes:
         executor.add_node(node)
-    stop.wake = nodes[0].wake
+    stop.wake = lambda: nodes[0].wake()
     code = 0 if all(_begin(node, stop) for node in nodes) else 2
     if code:
         stop.set()
@@ -58,27 +61,37 @@ def together(makes: Sequence[Callable[[], SuiteNode]], args: Sequence[str] | Non
     if stop.reason:
         nodes[0].get_logger().info(f'{stop.reason}: ending')
     for node in reversed(nodes):
-        _end(node)
-        executor.remove_node(node)
-        node.destroy_node()
+        code = max(code, _leave(executor, node))
     rclpy.try_shutdown()
     stop.done()
     return code
 
 
 def _begin(node: SuiteNode, stop: Stop) -> bool:
-    """Start a node that is to start by itself; return whether that went well."""
+    """Start a node that is to start by itself; return whether the others may go on.
+
+    What a node refuses ends all before a test begins. An exception that nobody foresaw is logged,
+    and ends the others only where they need the node.
+    """
     if stop.is_set() or not node.parameters['autostart']:
         return True
-    return bool(node.trigger_configure() == SUCCESS and node.trigger_activate() == SUCCESS)
+    for step in node.trigger_configure, node.trigger_activate:
+        found = step()
+        if found != SUCCESS:
+            return found == ERROR and not node.carries
+    return True
 
 
-def _spin(executor: Executor, nodes: Sequence[SuiteNode], stop: Stop) -> None:
+def _spin(executor: Executor, nodes: list[SuiteNode], stop: Stop) -> None:
     end = float('inf')
     while not stop.is_set() and rclpy.ok():
-        if any(node.finished for node in nodes):
-            linger = LINGER if len(nodes) > 1 else 0.0
-            end = min(end, time.monotonic() + linger)
+        for node in [n for n in nodes if n.finished]:
+            if node.carries or len(nodes) == 1:
+                linger = LINGER if len(nodes) > 1 else 0.0
+                end = min(end, time.monotonic() + linger)
+            else:
+                nodes.remove(node)
+                _leave(executor, node)
         if time.monotonic() >= end:
             return
         try:
@@ -88,6 +101,18 @@ def _spin(executor: Executor, nodes: Sequence[SuiteNode], stop: Stop) -> None:
         except Exception as error:
             # E.g. a packet that cannot be decoded, or a transition asked for in a wrong state.
             nodes[0].complain_of_bug(error)
+
+
+def _leave(executor: Executor, node: SuiteNode) -> int:
+    """End a node and return its exit code; whatever it raises, the others come to their end."""
+    try:
+        _end(node)
+        executor.remove_node(node)
+        node.destroy_node()
+    except Exception as error:
+        node.get_logger().error('cannot end: ' + ''.join(traceback.format_exception(error)))
+        return 1
+    return node.exit_code
 
 
 def _end(node: SuiteNode) -> None:

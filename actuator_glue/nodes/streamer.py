@@ -47,6 +47,7 @@ class Streamer(base.SuiteNode):
     """
 
     stamps_now = True
+    carries = True
 
     def __init__(self, name: str, specs: Sequence[Spec]) -> None:
         super().__init__(name, specs)

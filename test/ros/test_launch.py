@@ -1,14 +1,15 @@
-"""The launch files: they name what exists, several actuators run apart, one failure ends all."""
+"""The launch files: they name what exists, several actuators run apart; what an end ends."""
 
+import importlib
 from types import SimpleNamespace
 
 import launching_fake
 import numpy as np
 import pytest
-from launching_fake import LAUNCH, Noted, launched
+from launching_fake import LAUNCH, Launched, Noted, launched
 from ros_nodes import recorded
 
-from actuator_glue.nodes import base, parameter_file, viewer
+from actuator_glue.nodes import base, parameter_file, suite, viewer
 
 KNOWN = parameter_file.NODES | {'viewer': viewer.SPECS}
 FILES = sorted(path.name.partition('.')[0] for path in LAUNCH.glob('*.launch.py'))
@@ -108,10 +109,72 @@ def test_a_node_that_cannot_start_fails_the_launch(start, tmp_path):
         end(launched('demo')[1], 'recorder', code)
 
 
-@pytest.mark.parametrize(('node', 'code'), [('estimator', 0), ('actuator_sim', 2)])
-def test_no_end_but_that_of_a_stream_is_a_success(node, code):
+@pytest.mark.parametrize(
+    ('node', 'code'), [('recorder', 0), ('recorder', -9), ('actuator_sim', 2), ('lab_bridge', -9)]
+)
+def test_what_carries_samples_or_records_ends_all(node, code):
     with pytest.raises(RuntimeError, match=f'{node}-1 ended with exit code {code}'):
         end(launched('demo')[1], node, code)
+
+
+def test_a_parameter_that_is_refused_at_the_first_start_fails_the_launch():
+    """Streams wait for the node still, so that nothing is lost."""
+    with pytest.raises(RuntimeError, match='estimator-1 ended with exit code 2'):
+        end(launched('demo')[1], 'estimator', 2)
+
+
+@pytest.mark.parametrize(('file', 'way'), EVERY)
+def test_all_that_a_test_can_do_without_is_started_again(file, way):
+    nodes, _, _ = launched(file, **way)
+    modules = {n: importlib.import_module(f'actuator_glue.nodes.{n}') for n in suite.NODES}
+    carries = {n: getattr(modules[n], kind).carries for n, kind in suite.NODES.items()}
+    assert {n.executable: n.respawn for n in nodes} == {
+        n.executable: not carries[n.executable] for n in nodes
+    }
+
+
+def all_killed_at_once(start, probe, tmp_path, victims, nodes, rule, **more):
+    """Kill nodes in mid-stream; the others go on, they come back, and the bag is whole."""
+    bag, waiting = tmp_path / 'bag', len(nodes) - 1
+    stream = {'rate': 200.0, 'repeat': True, 'preview': 0.0, 'wait_for': waiting}
+    given = {'recorder': {'bag': str(bag)}, 'actuator_sim': stream, **more}
+    launch = Launched(start, nodes, rule, probe, given)
+    probe.until(lambda: probe.number('recorder', 'messages written') > 100, 250, 'a bag')
+    first = dict(launch.running)
+    for name in victims:
+        first[name].kill()
+        probe.health.pop(name)
+    probe.until(
+        lambda: launch.look() and all(probe.value(n, 'state') == 'active' for n in victims),
+        120,
+        'all are back',
+    )
+    for name in victims:
+        assert f'/{name} ended with exit code -9 and is started again' in probe.faults['launch']
+        assert probe.value('launch', f'/{name}: restarts') == '1'
+    assert launch.ended == victims
+    for name in {'recorder', 'actuator_sim'} | (set(first) - set(victims)):
+        assert launch.running[name] is first[name] and first[name].alive
+    before = probe.number('recorder', 'messages written')
+    probe.until(lambda: probe.number('recorder', 'messages written') > before, 20, 'it goes on')
+    assert first['actuator_sim'].end() == 0 and first['recorder'].end() == 0
+    index = recorded(bag)
+    assert np.array_equal(index, np.arange(len(index)))
+
+
+def test_a_viewer_that_is_killed_comes_back_and_ends_nothing(start, probe, tmp_path):
+    nodes, rule, _ = launched('demo', view='true')
+    nodes = [n for n in nodes if n.executable in ('recorder', 'viewer', 'actuator_sim')]
+    viewer = {'open': False, 'port': 0}
+    all_killed_at_once(start, probe, tmp_path, ['viewer'], nodes, rule, viewer=viewer)
+
+
+@pytest.mark.slow
+def test_all_that_a_test_can_do_without_is_killed_and_comes_back(start, probe, tmp_path):
+    nodes, rule, _ = launched('demo', view='true')
+    victims = ['estimator', 'diagnoser', 'viewer']
+    viewer = {'open': False, 'port': 0}
+    all_killed_at_once(start, probe, tmp_path, victims, nodes, rule, viewer=viewer)
 
 
 @pytest.mark.parametrize('node', ['actuator_sim', 'lab_bridge', 'replay'])

@@ -3,12 +3,15 @@
 import signal
 import subprocess
 import sys
+import threading
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import yaml
 from ros_nodes import QUICK, RATE, recorded
 
+from actuator_glue.nodes import base, spin
 from actuator_glue.nodes.parameter_file import NODES as KNOWN
 from actuator_glue.nodes.suite import NODES, main
 
@@ -64,6 +67,85 @@ def test_a_signal_ends_all_of_them(together, probe, tmp_path):
     process.send_signal(signal.SIGINT)
     assert process.wait(20) == 0
     assert (tmp_path / 'bag' / 'metadata.yaml').exists()
+
+
+def test_one_that_a_test_can_do_without_leaves_the_others(together, probe, tmp_path):
+    bag = tmp_path / 'bag'
+    process = together(
+        'recorder', 'viewer', 'actuator_sim', recorder={'bag': str(bag)}, viewer={'port': 0}
+    )
+    probe.until(lambda: probe.number('viewer', 'messages') > 0, 60)
+    assert probe.transition('viewer', 'shutdown')
+    before = probe.number('recorder', 'messages written')
+    probe.until(lambda: probe.number('recorder', 'messages written') > before + 100, 20)
+    assert probe.value('viewer', 'state') == 'finalized'
+    process.send_signal(signal.SIGINT)
+    assert process.wait(20) == 0, (tmp_path / 'log').read_text()
+    assert (bag / 'metadata.yaml').exists()
+
+
+# A viewer in which everything goes wrong that nobody foresaw.
+BROKEN = """
+import sys
+from actuator_glue.nodes import suite, viewer
+
+class Broken(viewer.ViewerNode):
+    def do_activate(self):
+        super().do_activate()
+        self.create_timer(0.1, lambda: 1 / 0)  # not guarded
+    def do_deactivate(self):
+        1 / 0
+    def destroy_node(self):
+        1 / 0
+
+viewer.ViewerNode = Broken
+sys.exit(suite.main(['recorder', 'viewer', 'actuator_sim', *sys.argv[1:]]))
+"""
+
+
+def test_a_bug_in_one_of_them_leaves_the_records_whole(probe, tmp_path):
+    bag = tmp_path / 'bag'
+    file = tmp_path / 'parameters.yaml'
+    given = {'recorder': {'bag': str(bag)}, 'viewer': {'port': 0}}
+    file.write_text(yaml.safe_dump({n: {'ros__parameters': v} for n, v in given.items()}))
+    with (tmp_path / 'log').open('w') as log:
+        process = subprocess.Popen(
+            [sys.executable, '-c', BROKEN, '--ros-args', '--params-file', str(file)],
+            stdout=log,
+            stderr=subprocess.STDOUT,
+        )
+    try:
+        probe.until(lambda: probe.number('recorder', 'messages written') > 100, 60)
+        process.send_signal(signal.SIGINT)
+        # The end of the broken one is told, in its log and by the exit code.
+        assert process.wait(20) == 1
+    finally:
+        process.kill()
+        process.wait()
+    assert 'ZeroDivisionError' in (tmp_path / 'log').read_text()
+    assert (bag / 'metadata.yaml').exists()
+    index = recorded(bag)
+    assert len(index) and np.array_equal(index, np.arange(index[0], index[0] + len(index)))
+
+
+@pytest.mark.parametrize(
+    ('carries', 'found', 'go_on'),
+    [
+        (False, base.ERROR, True),
+        (True, base.ERROR, False),
+        (False, base.FAILURE, False),
+        (False, base.SUCCESS, True),
+    ],
+)
+def test_who_cannot_start_and_what_follows(carries, found, go_on):
+    """A refusal is told before a test begins; a bug ends what the test can do without, alone."""
+    node = SimpleNamespace(
+        carries=carries,
+        parameters={'autostart': True},
+        trigger_configure=lambda: base.SUCCESS,
+        trigger_activate=lambda: found,
+    )
+    assert spin._begin(node, threading.Event()) is go_on
 
 
 def test_one_that_cannot_start_ends_all_of_them(together, tmp_path):
