@@ -58,9 +58,11 @@ def frame(intake: Intake, wanted: Wanted) -> bytes:
     with intake.lock:
         history = intake.history
         period = history.period or 1.0
-        newest = history.measured_to
+        newest = history.known_to
         stop = newest if wanted.stop is None else min(round(wanted.stop / period), newest)
-        start = stop - max(round(wanted.span / period), 1)
+        span = max(round(wanted.span / period), 1)
+        # What was said long after the last sample still has samples beside it.
+        start = min(stop - span, history.measured_to - max(span // 2, 1))
         curves = history.curves(start, stop, wanted.points)
         content: dict[str, Any] = {
             'title': intake.title,

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 Samples = NDArray[np.float32]
 ROWS = ('command', 'measured', 'lower', 'median', 'upper')
-_EVENTS = 2000  # of a kind that are kept
+_BAND = slice(ROWS.index('lower'), ROWS.index('upper') + 1)
+_EVENTS = 2000  # of a kind that are kept of a live system
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,64 +34,112 @@ class History:
     """Rings of samples by their place in the test, and the last events of each kind.
 
     Memory is taken once. Places count samples since the test began; a stream that begins again
-    goes on at the next place.
+    goes on at the next place, or where a bag says that it did. What is said now belongs to the
+    place that is measured, or to the place at which a bag received it.
 
     Args:
         capacity: samples that are kept.
+        events: how many of a kind are kept; None for all.
     """
 
-    def __init__(self, capacity: int) -> None:
+    def __init__(self, capacity: int, events: int | None = _EVENTS) -> None:
         self.capacity = capacity
         self.period = 0.0
         self.measured_to = 0  # place after the last measured sample
+        self.known_to = 0  # place of the last sample, or of what was said after it
         self.version = 0
+        self._most = events
         self._ring = np.full((len(ROWS), capacity), np.nan, dtype=np.float32)
+        self._since = np.zeros(capacity, dtype=np.int32)  # place at which a band was known
         self._front = 0  # place after the last one written, forecasts included
         self._shift = 0  # place of a running index
         self._next = 0  # running index that follows
         # As text, which takes a fifth of the objects' memory.
-        self._events: dict[str, deque[tuple[int, bytes]]] = {}
+        self._events: dict[tuple[str, str], deque[tuple[int, bytes]]] = {}
 
     @property
     def oldest(self) -> int:
         """First place that is kept."""
         return max(self._front - self.capacity, 0)
 
-    def add_samples(self, index: int, period: float, rows: Mapping[str, Any]) -> None:
-        """Take measured samples [m] from a running index on."""
+    def add_samples(
+        self, index: int, period: float, rows: Mapping[str, Any], place: int | None = None
+    ) -> None:
+        """Take measured samples [m] from a running index on; `place` is that of the first."""
         if period != self.period:
-            self._restart(index, period)
+            self._restart(index, period, told=place is None)
         elif index < self._next or index - self._next > self.capacity:
             self._shift = self.measured_to - index  # a new stream, or one long interrupted
+        if place is not None:
+            self._shift = place - index
         count = len(rows['measured'])
-        self._put(index, {name: rows[name] for name in ('command', 'measured')})
+        places = self._room(index, count)
+        for row, name in enumerate(ROWS[: _BAND.start]):
+            values = np.asarray(rows[name][count - len(places) :], dtype=np.float64)
+            self._ring[row, places % self.capacity] = 1e3 * values
         self._next = index + count
         self.measured_to = self._next + self._shift
+        self.known_to = max(self.known_to, self.measured_to)
         self.version += 1
 
-    def add_band(self, index: int, rows: Mapping[str, Any]) -> None:
-        """Take lower limit, median and upper limit [m] from a running index on."""
+    def add_band(
+        self, index: int, rows: Mapping[str, Any], place: int | None = None, *, again: bool = False
+    ) -> None:
+        """Take lower limit, median and upper limit [m] from a running index on.
+
+        Args:
+            index: of the first sample.
+            rows: what is taken.
+            place: at which it was known.
+            again: told before, and now with its score: what was fixed first stays.
+        """
         if self.period and abs(index + self._shift - self.measured_to) < self.capacity:
-            self._put(index, rows)
+            limits = np.array([rows[name] for name in ROWS[_BAND]], dtype=np.float64)
+            at = self._room(index, limits.shape[1]) % self.capacity
+            limits = 1e3 * limits[:, limits.shape[1] - len(at) :]
+            if again:
+                free = np.isnan(self._ring[_BAND.start, at])
+                at, limits = at[free], limits[:, free]
+            self._ring[_BAND, at] = limits
+            self._since[at] = self.measured_to if place is None else place
             self.version += 1
 
-    def add_event(self, kind: str, content: Mapping[str, Any]) -> None:
-        """Take an event that happens now; kept as long as samples are, and once while it lasts."""
-        events = self._events.setdefault(kind, deque(maxlen=_EVENTS))
+    def add_event(
+        self, kind: str, content: Mapping[str, Any], place: int | None = None, *, of: str = ''
+    ) -> None:
+        """Take an event of a kind, kept as long as samples are, and once while it lasts.
+
+        Args:
+            kind: what it is.
+            content: what JSON can hold.
+            place: at which it was known; None for now.
+            of: whose it is, where several have events of a kind: each has its last one.
+        """
+        events = self._events.setdefault((kind, of), deque(maxlen=self._most))
         text = json.dumps(content).encode()
-        if events and events[-1][1] == text:
+        place = self.measured_to if place is None else place
+        self.known_to = max(self.known_to, place)
+        after = 0  # events that became known later, though they came before
+        while after < len(events) and events[-1 - after][0] > place:
+            after += 1
+        if after < len(events) and events[-1 - after][1] == text:
             return
-        events.append((self.measured_to, text))
+        if after:
+            events.insert(len(events) - after, (place, text))
+        else:
+            events.append((place, text))
         while len(events) > 1 and events[1][0] <= self.oldest:
             events.popleft()
         self.version += 1
 
-    def state(self, place: int) -> dict[str, Mapping[str, Any]]:
-        """Return the last event of each kind before a place."""
-        found: dict[str, Mapping[str, Any]] = {}
-        for kind, events in self._events.items():
+    def state(self, place: int) -> dict[str, Any]:
+        """Return the last event of each kind before a place; by whose it is, where several are."""
+        found: dict[str, Any] = {}
+        for (kind, of), events in self._events.items():
             last = next((text for at, text in reversed(events) if at <= place), None)
-            if last is not None:
+            if last is not None and of:
+                found.setdefault(kind, {})[of] = json.loads(last)
+            elif last is not None:
                 found[kind] = json.loads(last)
         return found
 
@@ -98,11 +147,13 @@ class History:
         """Return what is kept between two places, no more than so many points.
 
         Where samples are many, two points stand for a stretch: its least and its greatest value.
-        A band keeps its outer limits there.
+        A band keeps its outer limits there. A band that became known after `stop` is not there.
         """
+        known = stop
         start, stop = max(start, self.oldest), min(stop, self._front)
         places = np.arange(start, max(stop, start))
         rows = self._ring[:, places % self.capacity]
+        rows[_BAND, self._since[places % self.capacity] > known] = np.nan
         many = -(-len(places) // max(points // 2, 1))
         if many > 2:
             whole = len(places) // many * many
@@ -111,29 +162,29 @@ class History:
             rows = _extremes(rows.reshape(len(ROWS), -1, many))
         return Curves(places * np.float64(self.period), rows)
 
-    def _restart(self, index: int, period: float) -> None:
+    def _restart(self, index: int, period: float, *, told: bool) -> None:
+        """Begin anew; what was said last still holds, and a bag's events have their places."""
         self._ring[:] = np.nan
+        self._since[:] = 0
         self.period, self._shift = period, -index
         self._next = index
         self._front = self.measured_to = 0
-        for kind, events in self._events.items():  # what was said last still holds
-            self._events[kind] = deque([(0, events[-1][1])], maxlen=_EVENTS)
+        for events in self._events.values() if told else ():
+            last = events[-1][1]
+            events.clear()
+            events.append((0, last))
+        self.known_to = max((events[-1][0] for events in self._events.values()), default=0)
 
-    def _put(self, index: int, rows: Mapping[str, Any]) -> None:
+    def _room(self, index: int, count: int) -> NDArray[np.intp]:
+        """Make room for samples from a running index on; return the places of the last of them."""
         start = index + self._shift
-        count = min(len(values) for values in rows.values())
-        skip = max(self.oldest - start, count - self.capacity, -start, 0)
-        places = np.arange(start + skip, start + count)
-        if not len(places):
-            return
         stop = start + count
         if stop > self._front:
             new = np.arange(max(self._front, stop - self.capacity), stop)
             self._ring[:, new % self.capacity] = np.nan
+            self._since[new % self.capacity] = 0
             self._front = stop
-        for name, values in rows.items():
-            part = np.asarray(values[skip:count], dtype=np.float64) * 1e3
-            self._ring[ROWS.index(name), places % self.capacity] = part
+        return np.arange(max(start, self.oldest, 0), stop)
 
 
 def _extremes(rows: Samples) -> Samples:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import math
 import threading
+from array import array
 from collections import deque
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -12,17 +15,19 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.bag_reader import (
+    BagMessage,
     Note,
     as_published,
-    decoded,
     messages,
     refuse,
     summarise,
 )
 from actuator_glue.io.bag_samples import topics_of_actuator
 from actuator_glue.io.messages import deserialize, full_name
-from actuator_glue.sample_block import from_message
+from actuator_glue.sample_block import Block, from_message
+from actuator_glue.setups import known_stiffness
 from actuator_glue.view.history import History
+from actuator_glue.view.timeline import Timeline
 
 _DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
 # Types that are shown, and what takes them.
@@ -38,7 +43,6 @@ TYPES = {
 # Live: a quarter of an hour at 1 kHz, 20 MB. A bag: all of it, up to 1.3 GB.
 LIVE_SAMPLES = 1 << 20
 MOST_SAMPLES = 1 << 26
-_LONGEST_GAP = 1 << 22  # samples that a bag lacks and the page leaves empty, an hour at 1 kHz
 _WINDOWS = 20  # scored windows over which the coverage is told
 _NODES = 64
 
@@ -61,28 +65,38 @@ class Intake:
         self.live = live
         self.lock = threading.Lock()
         self._coverage: deque[tuple[float, int]] = deque(maxlen=_WINDOWS)
-        self._health: dict[str, dict[str, str]] = {}
+        self._nodes: set[str] = set()
+        self._place: int | None = None
 
-    def take(self, kind: str, message: Any) -> None:
-        """Take a message; `kind` is the bare name of its type."""
+    def take(self, kind: str, message: Any, place: int | None = None) -> None:
+        """Take a message.
+
+        Args:
+            kind: bare name of its type.
+            message: the message.
+            place: of its first sample, or at which it was received; None for what comes now.
+        """
         with self.lock:
+            self._place = place
             getattr(self, f'_take_{TYPES[kind]}')(message)
 
+    def _tell(self, kind: str, content: dict[str, Any], of: str = '') -> None:
+        self.history.add_event(kind, content, self._place, of=of)
+
     def _take_samples(self, message: Any) -> None:
-        block = from_message(message)
-        # Shown as it came, NaN and all: a fault is what somebody looks for.
-        if len(block.measured) == len(block) > 0 and block.period > 0.0:
+        block = shown(message)
+        if block is not None:
             rows = {'command': block.command, 'measured': block.measured}
-            self.history.add_samples(block.index, block.period, rows)
+            self.history.add_samples(block.index, block.period, rows, self._place)
 
     def _take_setup(self, setup: Any) -> None:
         content = {
             'actuator': setup.actuator or setup.header.frame_id,
-            'stiffness': _number(setup.specimen_stiffness),
+            'stiffness': known_stiffness(setup.specimen_stiffness),
             'rate': _number(setup.rate),
             'source': setup.source,
         }
-        self.history.add_event('setup', content)
+        self._tell('setup', content)
 
     def _take_posterior(self, posterior: Any) -> None:
         columns = zip(
@@ -103,7 +117,7 @@ class Intake:
             'nrmse': _number(posterior.nrmse),
             'seconds': _number(posterior.seconds),
         }
-        self.history.add_event('posterior', content)
+        self._tell('posterior', content)
 
     def _take_band(self, band: Any) -> None:
         if band.kind != 'total' or not len(band.levels):
@@ -114,7 +128,7 @@ class Intake:
             return
         part = slice(widest * count, (widest + 1) * count)
         rows = {'lower': band.lower[part], 'median': band.median, 'upper': band.upper[part]}
-        self.history.add_band(int(band.index), rows)
+        self.history.add_band(int(band.index), rows, self._place, again=bool(band.scored))
         if not band.scored:
             return
         self._coverage.append((float(band.widest_coverage), count))
@@ -127,7 +141,7 @@ class Intake:
             'width': _number(band.widest_width),
             'forecast': bool(band.forecast),
         }
-        self.history.add_event('coverage', content)
+        self._tell('coverage', content)
 
     def _take_response(self, response: Any) -> None:
         content = {
@@ -136,7 +150,7 @@ class Intake:
             'phase': _number(response.headline_phase),
             'delay': _number(response.headline_delay),
         }
-        self.history.add_event('response', content)
+        self._tell('response', content)
 
     def _take_diagnosis(self, found: Any) -> None:
         content = {
@@ -145,15 +159,25 @@ class Intake:
             'effects': [effect.name for effect in found.effects],
             'advice': list(found.advice),
         }
-        self.history.add_event('diagnosis', content)
+        self._tell('diagnosis', content)
 
     def _take_health(self, array: Any) -> None:
         for status in array.status[:_NODES]:
-            if status.name in self._health or len(self._health) < _NODES:
+            if status.name in self._nodes or len(self._nodes) < _NODES:
+                self._nodes.add(status.name)
                 level = status.level
                 number = level[0] if isinstance(level, bytes) else int(level)
-                self._health[status.name] = {'level': str(number), 'message': status.message}
-        self.history.add_event('health', {name: dict(v) for name, v in self._health.items()})
+                content = {'level': str(number), 'message': status.message}
+                self._tell('health', content, of=status.name)
+
+
+def shown(message: Any) -> Block | None:
+    """Return the block of a SampleBlock, NaN and all: a fault is what somebody looks for.
+
+    None where it holds no samples, or none whose time is known.
+    """
+    block = from_message(message)
+    return block if len(block.measured) == len(block) > 0 and block.period > 0.0 else None
 
 
 def _number(value: Any) -> float | None:
@@ -176,20 +200,40 @@ def read_bag(path: Path | str, namespace: str | None = None, *, note: Note = ref
     """
     names = {_DIAGNOSTICS if n == 'DiagnosticArray' else full_name(n): n for n in TYPES}
     topics = {'/diagnostics', *topics_of_actuator(path, summarise(path), namespace)}
-    samples = following = 0
-    streams = 0  # places that gaps and new streams take
-    kinds = {full_name('SampleBlock')}
-    for block in decoded(path, kinds, topics=topics, note=note):
-        samples += len(block[1].measured)
-        missing = block[1].index - following
-        streams += missing if 0 < missing < _LONGEST_GAP else missing != 0
-        following = block[1].index + len(block[1].measured)
-    if not 0 < samples + streams <= MOST_SAMPLES:
-        raise InputError(f'{path}: {samples} samples; a page shows 1 to {MOST_SAMPLES}')
-    intake = Intake(History(samples + streams), str(path), live=False)
+    timeline, places = _timeline(as_published(messages(
+        path, types={full_name('SampleBlock')}, topics=topics, note=note
+    )))  # fmt: skip
+    if not 0 < timeline.capacity <= MOST_SAMPLES:
+        raise InputError(
+            f'{path}: {timeline.samples} samples; a page shows 1 to {MOST_SAMPLES} with the '
+            'pauses between them'
+        )
+    if timeline.passed:
+        note(
+            f'{path}: the sample rate changes to {1.0 / timeline.period:.6g} Hz; the '
+            f'{timeline.passed} samples before that are not shown'
+        )
+    intake = Intake(History(timeline.capacity, events=None), str(path), live=False)
     for found in as_published(messages(path, types=names, topics=topics, note=lambda _: None)):
+        kind = names[found.type]
         try:
-            intake.take(names[found.type], deserialize(found.type, found.data))
+            content = deserialize(found.type, found.data, found.definition)
+            samples = kind == 'SampleBlock' and shown(content) is not None
+            place = next(places) if samples else timeline.place(found.log_time)
+            intake.take(kind, content, place)
         except InputError as error:
             note(f'{path}: topic {found.topic}: {error}; not shown')
     return intake
+
+
+def _timeline(found: Iterable[BagMessage]) -> tuple[Timeline, Iterator[int]]:
+    """Return when a bag's blocks were there, and the places of their first samples in turn."""
+    timeline, places = Timeline(), array('q')
+    for message in found:
+        # What cannot be decoded is told of where it is to be shown.
+        with suppress(InputError):
+            block = shown(deserialize(message.type, message.data, message.definition))
+            if block is not None:
+                at = timeline.add(block.index, len(block), block.period, message.log_time)
+                places.append(at)
+    return timeline, iter(places)

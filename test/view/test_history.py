@@ -87,7 +87,7 @@ def test_an_hour_takes_no_more_than_a_minute() -> None:
     feed(made, 60_000, 3_540_000)
     assert made.history._ring.nbytes == before
     # What lasts is kept once, what changes as long as the samples that it belongs to.
-    kept = {kind: len(events) for kind, events in made.history._events.items()}
+    kept = {kind: len(events) for (kind, _), events in made.history._events.items()}
     assert kept['health'] == kept['response'] == 1 and 30 < kept['posterior'] < 40
     head, rows = decode(frame(made, Wanted(None, 1.0, 4000)))
     assert (head['newest'], head['oldest']) == (3600.0, pytest.approx(3600.0 - 32.768))

@@ -55,6 +55,8 @@ function draw(data) {
 function take(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
   const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
+  // Frames that were on their way when the page was held.
+  if (wanted.stop !== null && head.stop > wanted.stop + 1e-6) return;
   const data = head.rows.map((_, i) =>
     new Float32Array(buffer, 4 + length + 4 * i * head.count, head.count));
   last = head;
