@@ -12,6 +12,9 @@ from actuator_glue.errors import InputError
 from actuator_glue.records import Hold, check_stiffness
 
 MAX_INDEX = 2**62
+# What a stiffness is in a message in which nobody fills it [N/m]: a message's default can be any
+# number but NaN, and 0 would be a free actuator.
+UNFILLED = -1.0
 # Nobody streams into hundreds of announced set-ups; a publisher gone wild must not fill memory.
 _MOST = 16
 
@@ -60,18 +63,23 @@ class StreamSetup:
         )
 
 
+def known_stiffness(value: float) -> float | None:
+    """Return a stiffness of a message [N/m], None where it is not known: NaN or `UNFILLED`."""
+    return None if np.isnan(value) or value == UNFILLED else float(value)
+
+
 def from_message(message: Any) -> StreamSetup:
     """Return the set-up of a TestSetup.
 
     Raises:
         InputError: negative stiffness, absurd rate, unknown hold.
     """
-    stiffness, rate = float(message.specimen_stiffness), float(message.rate)
+    rate = float(message.rate)
     name = str(message.actuator or message.header.frame_id)
     if not (np.isfinite(rate) and rate > 0.0):
         raise InputError(f'test set-up of {name!r}: rate {rate:g} Hz is not positive')
     return StreamSetup(
-        stiffness=None if np.isnan(stiffness) else stiffness,
+        stiffness=known_stiffness(message.specimen_stiffness),
         period=1.0 / rate,
         actuator=name,
         hold=message.hold,

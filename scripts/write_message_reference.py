@@ -20,10 +20,12 @@ def rows(text: str) -> list[str]:
             kind, assignment = declaration.split(maxsplit=1)
             name, value = (part.strip() for part in assignment.split('='))
             table.append(f'| `{name}` | `{kind}` | | constant {value} |')
-        elif len(words) == 2:
+        elif words:
+            kind, name, *default = words
             unit, meaning = re.match(r'\s*(?:\[([^]]*)\] )?(.*)', comment).groups()
             unit = '' if unit in (None, '-') else unit
-            table.append(f'| `{words[1]}` | `{words[0]}` | {unit} | {meaning} |')
+            meaning += f'; default {default[0]}' if default else ''
+            table.append(f'| `{name}` | `{kind}` | {unit} | {meaning} |')
     return table
 
 

@@ -51,7 +51,7 @@ ARROWS = {
     'report': CORE | {'online', 'diagnosis', 'io'},
     'io': {'records', 'setups', 'sample_block', 'errors', 'json_value', 'interfaces', 'hybrid'},
     'streams': {'records', 'errors', 'io'},
-    'view': {'records', 'sample_block', 'errors', 'io', 'interfaces'},
+    'view': {'records', 'sample_block', 'setups', 'errors', 'io', 'interfaces'},
     'workers': CORE | {'online'},
     'api': EVERYTHING,
     'nodes': EVERYTHING | {'api'},

@@ -23,13 +23,17 @@ WAITING = 2000
 
 
 class BagMessage(NamedTuple):
-    """One serialized message of a bag; times in ns."""
+    """One serialized message of a bag; times in ns.
+
+    `definition` is the ros2msg text that the bag holds of its type.
+    """
 
     topic: str
     type: str
     data: bytes
     log_time: int
     publish_time: int
+    definition: str = ''
 
 
 @dataclass(slots=True)
@@ -142,10 +146,13 @@ def messages(
     """
     for file in bag_files(path, note):
         scan = Scan(file, note)
+        texts: dict[int, str] = {}
         part = BagFile(file.name)
         if summary is not None:
             summary.parts.append(part)
         for schema, channel, message in scan.messages():
+            if schema.id not in texts:
+                texts[schema.id] = schema.data.decode('utf-8', 'replace')
             if summary is not None:
                 if channel.topic not in summary.topics:
                     summary.topics[channel.topic] = BagTopic(
@@ -156,7 +163,7 @@ def messages(
                             channel.metadata.get('offered_qos_profiles', '')
                         ),
                     )
-                    summary.definitions[schema.name] = schema.data.decode('utf-8', 'replace')
+                    summary.definitions[schema.name] = texts[schema.id]
                 summary.topics[channel.topic].count += 1
                 part.add(message.log_time)
             if (types is None or schema.name in types) and (
@@ -168,6 +175,7 @@ def messages(
                     message.data,
                     message.log_time,
                     message.publish_time,
+                    texts[schema.id],
                 )
         if summary is not None and not scan.finished:
             summary.finished = False
@@ -241,7 +249,7 @@ def decoded(
     types = {full_name(name) for name in names}
     for found in as_published(messages(path, types=types, topics=topics, note=note)):
         try:
-            yield found.type, deserialize(found.type, found.data)
+            yield found.type, deserialize(found.type, found.data, found.definition)
         except InputError as error:
             raise InputError(
                 f'{path}: topic {found.topic}: {error}; was it recorded with another version of '

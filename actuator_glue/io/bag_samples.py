@@ -36,7 +36,7 @@ class BagSetup:
 
 def _content(found: BagMessage, where: str) -> Any:
     try:
-        return deserialize(found.type, found.data)
+        return deserialize(found.type, found.data, found.definition)
     except InputError as error:
         raise InputError(
             f'{where}: {error}; was it recorded with another version of the messages?'

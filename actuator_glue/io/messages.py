@@ -9,10 +9,12 @@ import os
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from rosbags.interfaces import Nodetype
 from rosbags.serde import SerdeError
 from rosbags.typesys import Stores, TypesysError, get_types_from_msg, get_typestore
 
@@ -23,6 +25,7 @@ _RULE = '=' * 80
 # rmw implementations align an empty array's missing elements when they reckon a message's size,
 # and send the bytes that are then left over; rosbags itself refuses such messages.
 MAX_SPARE = 64
+_NOTHING: dict[str, Any] = {'string': '', 'bool': False}
 _UNDECODABLE = (
     SerdeError,
     struct.error,
@@ -164,13 +167,34 @@ def serialize(name: str, content: Any) -> bytes:
     return bytes(typestore().serialize_cdr(content, full_name(name)))
 
 
-def deserialize(name: str, data: bytes) -> Any:
+def deserialize(name: str, data: bytes, definition: str = '') -> Any:
     """Return the message that CDR bytes hold.
+
+    Args:
+        name: its type.
+        data: the bytes.
+        definition: ros2msg text that was kept with the bytes. Where it is another version of one
+            of our types, fields that it lacks are not known: NaN, False, 0 or empty.
 
     Raises:
         InputError: the bytes are no message of that type.
     """
-    return _decode(full_name(name), data)[0]
+    name = full_name(name)
+    old = _other_version(name, definition)
+    if old is None:
+        return _decode(name, data)[0]
+    return _as_ours(name, _decode(name, data, old)[0], old)
+
+
+def as_current(name: str, data: bytes, definition: str) -> bytes:
+    """Return CDR bytes as `deserialize` understands them, of the version of the type that we have.
+
+    Raises:
+        InputError: as `deserialize`.
+    """
+    if _other_version(full_name(name), definition) is None:
+        return data
+    return serialize(name, deserialize(name, data, definition))
 
 
 def trimmed(name: str, data: bytes) -> bytes:
@@ -185,20 +209,88 @@ def trimmed(name: str, data: bytes) -> bytes:
     return data if len(data) - used <= 3 else data[:used]
 
 
+@lru_cache(maxsize=64)
+def _other_version(name: str, definition: str) -> Any:
+    """Return the type store of another version of one of our types, None for the one we have.
+
+    A text that cannot be read is no version: what it was kept with is taken as ours.
+    """
+    if not definition or not name.startswith(f'{PACKAGE}/'):
+        return None
+    ours = typestore()
+    try:
+        types = get_types_from_msg(definition, name)
+    except (TypesysError, *_UNDECODABLE):
+        return None
+    types = {kind: fields for kind, fields in types.items() if kind.startswith(f'{PACKAGE}/')}
+    if all(
+        kind in ours.fielddefs and ours.fielddefs[kind][1] == fields[1]
+        for kind, fields in types.items()
+    ):
+        return None
+    store = get_typestore(Stores.ROS2_JAZZY)
+    try:
+        store.register(types)
+        store.get_msgdef(name)
+    except (TypesysError, *_UNDECODABLE):
+        return None
+    return store
+
+
+def _as_ours(name: str, old: Any, version: Any) -> Any:
+    """Return the message of another version as one of ours."""
+    ours = typestore()
+    before = dict(version.fielddefs[name][1])
+    values = {}
+    for field, kind in ours.fielddefs[name][1]:
+        used = _message_of(kind)
+        if before.get(field) != kind:
+            values[field] = _not_known(kind)
+        elif used is None:
+            values[field] = getattr(old, field)
+        elif kind[0] == Nodetype.NAME:
+            values[field] = _as_ours(used, getattr(old, field), version)
+        else:
+            values[field] = [_as_ours(used, one, version) for one in getattr(old, field)]
+    return ours.types[name](**values)
+
+
+def _message_of(kind: Any) -> str | None:
+    """Return which of our types a field holds, one or an array of it; None for none of ours."""
+    inner = kind if kind[0] == Nodetype.NAME else kind[1][0]
+    used = inner[1] if inner[0] == Nodetype.NAME else ''
+    return str(used) if used.startswith(f'{PACKAGE}/') else None
+
+
+def _not_known(kind: Any) -> Any:
+    """Return what stands for a field that a message lacks; ours hold no arrays of fixed length."""
+    if kind[0] == Nodetype.NAME:
+        ours = typestore()
+        fields = ours.fielddefs[kind[1]][1]
+        return ours.types[kind[1]](**{field: _not_known(inner) for field, inner in fields})
+    if kind[0] == Nodetype.BASE:
+        base = kind[1][0]
+        return _NOTHING.get(base, float('nan') if base.startswith('float') else 0)
+    inner, base = kind[1][0][0], kind[1][0][1][0]
+    numbers = inner == Nodetype.BASE and base != 'string'
+    return np.empty(0, dtype=base if base != 'bool' else np.bool_) if numbers else []
+
+
 @cache
-def _definition(name: str) -> Any:
-    """Return rosbags' compiled definition of a type."""
-    return typestore().get_msgdef(name)
+def _definition(name: str, store: Any) -> Any:
+    """Return rosbags' compiled definition of a type of a type store."""
+    return store.get_msgdef(name)
 
 
-def _decode(name: str, data: bytes) -> tuple[Any, int]:
+def _decode(name: str, data: bytes, version: Any = None) -> tuple[Any, int]:
     """Return the message and how many bytes it takes, encapsulation included."""
     if data[:2] not in (b'\x00\x00', b'\x00\x01'):
         raise InputError(f'{len(data)} bytes are not a {name} (not plain CDR)')
+    store = version or typestore()
     try:
-        definition = _definition(name)
+        definition = _definition(name, store)
         decode = definition.deserialize_cdr_le if data[1] else definition.deserialize_cdr_be
-        content, used = decode(data[4:], 0, definition.cls, typestore())
+        content, used = decode(data[4:], 0, definition.cls, store)
     except _UNDECODABLE as error:
         raise InputError(f'{len(data)} bytes are not a {name} ({error})') from error
     spare = len(data) - 4 - used

@@ -275,9 +275,8 @@ class DiagnoserNode(WorkingNode):
             message=outcome.message,
             applied=outcome.applied,
         )
-        if outcome.diagnosis is not None:
-            head = conversion.Head(self.get_clock().now().nanoseconds, outcome.actuator)
-            diagnoser_worker.fill_message(result.diagnosis, head, outcome)
+        head = conversion.Head(self.get_clock().now().nanoseconds, outcome.actuator)
+        diagnoser_worker.fill_message(result.diagnosis, head, outcome)
         if handle.is_cancel_requested:
             handle.canceled()
         elif outcome.diagnosis is not None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -22,6 +21,7 @@ from actuator_glue.nodes.messages import fill
 from actuator_glue.nodes.parameters import Spec
 from actuator_glue.online.conversion import Fields, Head
 from actuator_glue.records import Record
+from actuator_glue.setups import known_stiffness
 from actuator_glue.workers.worker import Tell
 
 SPECS = (
@@ -47,7 +47,7 @@ class Request:
         paths: bags or laboratory files to read, where there are none.
         stiffness: specimen stiffness of each path [N/m]; empty for what they say.
         holdout: path of the held-out record, empty for none.
-        holdout_stiffness: its specimen stiffness [N/m], NaN for what it says.
+        holdout_stiffness: its specimen stiffness [N/m], None for what it says.
         seed: seed of the random numbers.
         apply: the estimator is to go on with the augmented model.
     """
@@ -56,7 +56,7 @@ class Request:
     paths: tuple[str, ...] = ()
     stiffness: tuple[float, ...] = ()
     holdout: str = ''
-    holdout_stiffness: float = math.nan
+    holdout_stiffness: float | None = None
     seed: int = 1
     apply: bool = False
 
@@ -111,7 +111,7 @@ def asked(goal: Any, live: tuple[Record, ...]) -> Request:
         paths=tuple(goal.records),
         stiffness=tuple(goal.stiffness),
         holdout=goal.holdout,
-        holdout_stiffness=float(goal.holdout_stiffness) if goal.holdout else math.nan,
+        holdout_stiffness=known_stiffness(goal.holdout_stiffness),
         seed=int(goal.seed),
         apply=bool(goal.apply),
     )
@@ -124,8 +124,7 @@ def work(request: Request, tell: Tell) -> Outcome:
         if request.paths:
             records = load_records(list(request.paths), stiffness=list(request.stiffness) or None)
         if request.holdout:
-            known = request.holdout_stiffness
-            holdout = load_records(request.holdout, stiffness=None if math.isnan(known) else known)
+            holdout = load_records(request.holdout, stiffness=request.holdout_stiffness)
         found = diagnose(
             records,
             holdout,
@@ -174,15 +173,16 @@ def augmented(diagnosis: Diagnosis) -> Any:
 
 
 def fields(outcome: Outcome) -> Fields:
-    """Return the fields of a Diagnosis message but its header."""
+    """Return the fields of a Diagnosis message but its header; none without a diagnosis."""
     found = outcome.diagnosis
-    assert found is not None
+    if found is None:
+        return {}
     error = found.error
     return {
         'verdict': found.verdict,
         'summary': outcome.message,
         'records': list(outcome.sources),
-        'effects': [_effect(effect) for effect in found.effects],
+        'effects': [effect_message(effect) for effect in found.effects],
         'candidates': [
             Candidate(name=c.name, score=float(c.score), error=float(c.error))
             for c in found.candidates
@@ -205,12 +205,14 @@ def fields(outcome: Outcome) -> Fields:
 
 
 def fill_message(message: Any, head: Head, outcome: Outcome) -> Any:
-    """Return a Diagnosis message with everything set."""
+    """Return a Diagnosis message with everything set, all numbers NaN without a diagnosis."""
     return fill(message, head, fields(outcome))
 
 
-def _effect(effect: Finding) -> Any:
+def effect_message(effect: Finding) -> Any:
+    """Return an Effect message: sizes with 95 % limits, and whether the records fix them."""
     parameters = effect.parameters
+    numbers = ('mean', 'stddev', 'lower', 'upper')
     return Effect(
         name=effect.name,
         alternatives=list(effect.alternatives),
@@ -218,6 +220,6 @@ def _effect(effect: Finding) -> Any:
         place=effect.place,
         parameter_names=list(parameters),
         units=[p.unit for p in parameters.values()],
-        mean=[float(p.mean) for p in parameters.values()],
-        stddev=[float(p.stddev) for p in parameters.values()],
+        identified=[bool(p.identified) for p in parameters.values()],
+        **{n: [float(getattr(p, n)) for p in parameters.values()] for n in numbers},
     )

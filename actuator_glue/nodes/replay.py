@@ -1,4 +1,4 @@
-"""The samples of a bag, published again byte for byte."""
+"""The samples of a bag, published again byte for byte where messages are what they were."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Any
 from rosgraph_msgs.msg import Clock
 
 from actuator_glue.errors import InputError
-from actuator_glue.io.bag_reader import as_published, is_bag, messages
-from actuator_glue.io.messages import deserialize
+from actuator_glue.io.bag_reader import BagMessage, as_published, is_bag, messages
+from actuator_glue.io.messages import as_current, deserialize
 from actuator_glue.nodes import spin, streamer, topics
 from actuator_glue.nodes.pacer import Step
 from actuator_glue.nodes.parameters import Spec
@@ -52,21 +52,22 @@ class ReplayNode(streamer.Streamer):
         setup = type_name(topics.TEST_SETUP.type)
         for found in as_published(messages(self.path, types=tuple(self._outputs), note=note)):
             if first is None and found.type == setup:
-                self._publish(found.type, found.data, found.log_time)
+                self._publish(found)
                 self.introduce()
                 continue
             first = found.log_time if first is None else first
             due = (found.log_time - first) * 1e-9
-            yield Step(due, partial(self._publish, found.type, found.data, found.log_time))
+            yield Step(due, partial(self._publish, found))
 
-    def _publish(self, kind: str, data: bytes, log_time: int) -> None:
+    def _publish(self, found: BagMessage) -> None:
         if self._time is not None:
             message = Clock()
-            message.clock.sec, message.clock.nanosec = divmod(log_time, 1_000_000_000)
+            message.clock.sec, message.clock.nanosec = divmod(found.log_time, 1_000_000_000)
             self._time.publish(message)
-        self._outputs[kind].publish(data)
-        if kind == type_name(topics.SAMPLES.type):
-            self.samples.add(len(deserialize(kind, data).command))
+        data = as_current(found.type, found.data, found.definition)
+        self._outputs[found.type].publish(data)
+        if found.type == type_name(topics.SAMPLES.type):
+            self.samples.add(len(deserialize(found.type, data).command))
 
 
 def main(args: list[str] | None = None) -> int:

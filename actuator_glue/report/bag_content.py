@@ -93,7 +93,7 @@ def read(bag: Path) -> Content:
     records = read_records(bag, gap=gaps.append)
     content = Content(max(records, key=len), sum(len(r) for r in records), gaps)
     for found in messages(bag, types=WANTED):
-        message = deserialize(found.type, found.data)
+        message = deserialize(found.type, found.data, found.definition)
         kind = WANTED[found.type]
         if kind == 'PosteriorMoments':
             content.posteriors.append(message)

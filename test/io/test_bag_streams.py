@@ -137,10 +137,22 @@ def test_bad_samples_in_a_bag_are_one_message(tmp_path: Path, record: Record) ->
         read_records(tmp_path / 'bag')
 
 
+@pytest.mark.parametrize(('sent', 'known'), [(-1.0, None), (np.nan, None), (0.0, 0.0), (7.0, 7.0)])
+def test_a_stiffness_that_nobody_filled_is_not_known(
+    tmp_path: Path, record: Record, sent: float, known: float | None
+) -> None:
+    """-1 is what a message begins with; 0 is said by somebody: no specimen."""
+    with open_bag(tmp_path / 'bag') as writer:
+        writer.write('/test_setup', setup(record, 0, sent), 0)
+        writer.write('/samples', samples(record, 0, 100), 1)
+    (found,) = read_records(tmp_path / 'bag')
+    assert found.stiffness == known
+
+
 @pytest.mark.parametrize(
     ('name', 'value'),
     [
-        ('specimen_stiffness', -1.0),
+        ('specimen_stiffness', -2.0),
         ('specimen_stiffness', np.inf),
         ('specimen_stiffness', 1e15),
         ('hold', 'cubic'),

@@ -9,10 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 import actuator_glue
 from actuator_glue.errors import InputError
 from actuator_glue.io import messages
+from actuator_glue.io.bag_reader import decoded
 from actuator_glue.sample_block import stamp_ns
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -130,3 +132,68 @@ def test_definitions_are_found_wherever_we_are_installed(tmp_path: Path, way: st
         assert 'make setup' in done.stderr
     else:
         assert Path(done.stdout.strip()) == target, done.stderr
+
+
+OLD_EFFECT = 'string name\nfloat64[] mean # [-]\nfloat64[] stddev\nfloat64 size\n'
+OLD_DIAGNOSIS = f"""std_msgs/Header header
+string verdict
+Effect[] effects
+float64 seconds
+{'=' * 80}
+MSG: actuator_glue_msgs/Effect
+{OLD_EFFECT}"""
+
+
+def old_diagnosis() -> bytes:
+    """A message of a version that had other fields."""
+    store = get_typestore(Stores.ROS2_JAZZY)
+    store.register(get_types_from_msg(OLD_DIAGNOSIS, 'actuator_glue_msgs/msg/Diagnosis'))
+    effect = store.types['actuator_glue_msgs/msg/Effect'](
+        name='delay', mean=np.array([4e-3]), stddev=np.array([1e-5]), size=7.0
+    )
+    header = messages.header(1_700_000_000_000_000_001, 'rig')
+    old = store.types['actuator_glue_msgs/msg/Diagnosis'](
+        header=header, verdict='missing-effect', effects=[effect], seconds=2.5
+    )
+    return bytes(store.serialize_cdr(old, 'actuator_glue_msgs/msg/Diagnosis'))
+
+
+def test_another_version_of_a_message_is_read() -> None:
+    """What it has is kept, what it lacks is not known, nested messages too; never 0 or shifted."""
+    data = old_diagnosis()
+    found = messages.deserialize('Diagnosis', data, OLD_DIAGNOSIS)
+    assert stamp_ns(found.header) == 1_700_000_000_000_000_001
+    assert (found.verdict, found.seconds, found.summary) == ('missing-effect', 2.5, '')
+    assert np.isnan(found.error_after) and np.isnan(found.noise_floor)
+    (effect,) = found.effects
+    assert (effect.name, effect.mean.tolist(), effect.stddev.tolist()) == ('delay', [4e-3], [1e-5])
+    assert np.isnan(effect.probability) and not hasattr(effect, 'size')
+    for name in ('lower', 'upper', 'identified', 'units', 'alternatives'):
+        assert len(getattr(effect, name)) == 0
+    # As bytes of our own version, for whoever hands on bytes.
+    current = messages.as_current('Diagnosis', data, OLD_DIAGNOSIS)
+    again = messages.deserialize('Diagnosis', current)
+    assert again.effects[0].mean.tolist() == [4e-3] and again.seconds == 2.5
+    ours = messages.message_type('Diagnosis').definition
+    assert messages.as_current('Diagnosis', current, ours) is current
+
+
+@pytest.mark.parametrize('text', ['', 'no message [', 'Unknown what'])
+def test_a_definition_that_says_nothing_changes_nothing(text: str) -> None:
+    """Bytes of our version beside a text that cannot be read are read as ours."""
+    block = messages.message('CommandPreview', header=messages.header(5, 'a'), period=1e-3,
+                             index=7, command=np.ones(3))  # fmt: skip
+    data = messages.serialize('CommandPreview', block)
+    assert messages.deserialize('CommandPreview', data, text).index == 7
+
+
+def test_bags_of_older_messages_are_read() -> None:
+    """The recorded session was made before effects had limits and posteriors their doubts."""
+    found = list(decoded(ROOT / 'bags' / 'session', ('Diagnosis', 'PosteriorMoments')))
+    (diagnosis,) = [m for name, m in found if name.endswith('Diagnosis')]
+    assert [e.name for e in diagnosis.effects] == ['backlash']
+    assert diagnosis.effects[0].mean[0] == pytest.approx(4.06e-5, rel=0.01)
+    assert len(diagnosis.effects[0].identified) == 0
+    moments = [m for name, m in found if name.endswith('PosteriorMoments')]
+    assert len(moments) == 37 and all(110 < m.beta_1_mean < 136 for m in moments[2:])
+    assert all(np.isnan(m.prior_p_value) and not m.prior_contradicted for m in moments)
