@@ -122,6 +122,10 @@ def test_a_diagnosis_is_kept_and_shown(
     assert 'Tracking of' in page and 'prior from a calibration' in page
     assert found.summary().split(':')[0] in found._repr_html_()
     assert set(found.inference_data.posterior) == set(found.names)
+    told = found.base | {n: p for e in found.effects for n, p in e.parameters.items()}
+    ends = np.quantile(again.posterior, [0.025, 0.975], axis=0).T
+    for name, (low, high) in zip(again.names, ends, strict=True):
+        assert (told[name].lower, told[name].upper) == (low, high)
     with pytest.raises(ag.InputError, match='holds'):
         ag.Calibration.load(tmp_path / 'diagnosis.npz')
 

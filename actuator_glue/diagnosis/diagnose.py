@@ -8,6 +8,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
 from actuator_glue.diagnosis import (
     advice,
@@ -31,6 +32,7 @@ from actuator_glue.diagnosis.detect import alarm_of
 from actuator_glue.diagnosis.each import Each
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.force import check_forces
+from actuator_glue.diagnosis.free_run import Model
 from actuator_glue.diagnosis.hold import with_the_right_hold
 from actuator_glue.diagnosis.next_experiment import Experiment, ranked
 from actuator_glue.diagnosis.onset_search import since_onset
@@ -166,11 +168,14 @@ def diagnose(
         search, left = result.selection.search, decision.left
         form = model_form.open_form(search, final, left, space, scorer)
         mixed = model_form.widened(mixed, form, space, rng)
-    estimates = _estimates(space, replace(after, draws=mixed), open_ridge, told.unmet)
+    mixed, fixed = posterior.opened(space, mixed, open_ridge, told.unmet, rng)
+    estimates = _estimates(space, after.model, mixed, fixed)
     held_at = _pressed(space, after)
     plain = Space(before.model, data.duration)
     plain_ridge = ridge.left_open(plain, before.model, scorer, before.theta)
-    estimates_before = _estimates(plain, before, plain_ridge)
+    estimates_before = _estimates(
+        plain, before.model, *posterior.opened(plain, before.draws, plain_ridge, (), rng)
+    )
     experiments = _experiments(result, [trial for trial, _ in others])
     sizes = result.selection.search.scale()
     decision = replace(
@@ -223,7 +228,8 @@ def diagnose(
         prior=used,
         setup=setup,
         names=tuple(p.name for p in after.model.parameters),
-        posterior=after.draws,
+        posterior=mixed,
+        joint=after.draws,
         rhat=draws.rhat,
         sampler=draws.told(),
         best=after.theta,
@@ -273,24 +279,16 @@ def _pressed(space: Space, side: Side) -> tuple[Pressed, ...]:
 
 
 def _estimates(
-    space: Space, side: Side, open_ridge: Array, unmet: Sequence[bool] = ()
+    space: Space, model: Model, draws: Array, known: NDArray[np.bool_]
 ) -> dict[str, Estimate]:
-    """Return what is known of each parameter; of one that chains differ about, its bounds.
-
-    Of one that a ridge (n, p) leaves open, as far as that goes.
-    """
-    out = {}
+    """Return what draws (m, p) say of each parameter, and whether the records fix it (p,)."""
     lower, upper = space.theta(space.lower), space.theta(space.upper)
-    known = posterior.identified(space, side.draws, open_ridge)
-    for i, (parameter, column) in enumerate(zip(side.model.parameters, side.draws.T, strict=True)):
-        low, high = np.quantile(column, [0.025, 0.975])
-        if not known[i]:
-            far = open_ridge[:, i]
-            low, high = min(low, far.min()), max(high, far.max())
-        if any(unmet[i : i + 1]):
-            known[i], low, high = False, lower[i], upper[i]
-        out[parameter.name] = Estimate(
-            float(column.mean()), float(column.std(ddof=1)), float(low), float(high),
-            parameter.unit, parameter.neutral, bool(known[i]), (float(lower[i]), float(upper[i])),
-        )  # fmt: skip
-    return out
+    ends = np.quantile(draws, [0.025, 0.975], axis=0)
+    return {
+        p.name: Estimate(
+            float(draws[:, i].mean()), float(draws[:, i].std(ddof=1)),
+            float(ends[0, i]), float(ends[1, i]),
+            p.unit, p.neutral, bool(known[i]), (float(lower[i]), float(upper[i])),
+        )
+        for i, p in enumerate(model.parameters)
+    }  # fmt: skip

@@ -6,7 +6,7 @@ Where it is nearly linear importance sampling draws from it, and knows that it d
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -95,6 +95,38 @@ def identified(space: Space, draws: Array, ridge: Array) -> NDArray[np.bool_]:
         ranks = np.argsort(np.argsort(z, axis=0), axis=0)
         known &= np.abs(np.corrcoef(ranks.T)[_ALPHA_2]) < _MOVES_WITH
     return known
+
+
+def opened(
+    space: Space, draws: Array, ridge: Array, unmet: Sequence[bool], rng: np.random.Generator
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Spread draws as far as the records leave each parameter open.
+
+    Evenly in the working coordinates: over the ridge where draws reached less far along it, over
+    the bounds where chains differ. Intervals are quantiles of what is returned.
+
+    Args:
+        space: working coordinates.
+        draws: of all parameters (m, p), physical units.
+        ridge: parameters that do as well (n, p).
+        unmet: of each parameter whether chains have not met in it; empty for none.
+        rng: random numbers.
+
+    Returns:
+        The draws (m, p) and which parameters the records fix (p,).
+    """
+    known = identified(space, draws, ridge)
+    z, far = space.z(draws), space.z(ridge)
+    low, high = np.quantile(z, [0.025, 0.975], axis=0)
+    ends = np.minimum(low, far.min(axis=0)), np.maximum(high, far.max(axis=0))
+    open_along = ~known & ((ends[0] < low) | (ends[1] > high))
+    differ = np.array(unmet, dtype=np.bool_) if unmet else np.zeros(len(known), dtype=np.bool_)
+    ends = np.where(differ, space.lower, ends[0]), np.where(differ, space.upper, ends[1])
+    spread = open_along | differ
+    z[:, spread] = rng.uniform(ends[0][spread], ends[1][spread], (len(z), int(spread.sum())))
+    out = draws.copy()
+    out[:, spread] = space.theta(z)[:, spread]
+    return out, known & ~differ
 
 
 def _loosened(

@@ -6,6 +6,8 @@ import math
 from dataclasses import asdict, dataclass, field
 from typing import Literal, TypeAlias
 
+import numpy as np
+
 from actuator_glue.diagnosis.estimate import Estimate, Json
 from actuator_glue.diagnosis.finding import Candidate, Finding
 from actuator_glue.diagnosis.headline import headline
@@ -148,7 +150,10 @@ class DiagnosisData:
         base: posterior of the base parameters in the augmented model.
         structure: effect names of the augmented model.
         names: parameter names of the columns of `posterior`.
-        posterior: draws of base and effect parameters, shape (m, p).
+        posterior: draws of base and effect parameters over all structures that may be the
+            machine's, shape (m, p): told intervals are their quantiles. What these records leave
+            open is spread as far as it is, one parameter at a time.
+        joint: draws under the structure that is told alone, shape (n, p), to simulate with.
         rhat: largest R-hat of chains; NaN where the draws are not of chains.
         sampler: what drew them (`method`: 'importance', 'dream', 'laplace') and how well.
         best: best-fit parameters, shape (p,).
@@ -197,6 +202,7 @@ class DiagnosisData:
     prior: PriorUse | None = None
     setup: WrongSetup | None = None
     sampler: Json = field(default_factory=dict)
+    joint: Array = field(default_factory=lambda: np.empty((0, 0)))
 
     def to_json(self) -> Json:
         """Return the object of schema `actuator_glue.diagnosis/1` (curves and draws left out)."""

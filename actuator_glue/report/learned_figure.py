@@ -49,7 +49,7 @@ def curve(found: DiagnosisData, term: LearnedTerm) -> tuple[str, Array, Array]:
     """
     signal = SIGNAL[PLACES[term.place]]
     columns = [found.names.index(p) for p in term.parameters]
-    draws = found.posterior[:: max(1, len(found.posterior) // _DRAWS)][:, columns]
+    draws = found.joint[:: max(1, len(found.joint) // _DRAWS)][:, columns]
     over = 't' if 't' in term.excited else signal
     turn = np.linspace(0.0, 2.0 * np.pi * _CYCLES, _CYCLES * _POINTS + 1)
     motion = {}

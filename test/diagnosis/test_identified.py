@@ -8,7 +8,7 @@ import pytest
 from actuator_glue.diagnosis.base_prior import BasePrior
 from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.diagnose import diagnose
-from actuator_glue.diagnosis.posterior import identified
+from actuator_glue.diagnosis.posterior import identified, opened
 from actuator_glue.diagnosis.ridge import left_open
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.space import UPPER, Space
@@ -34,6 +34,27 @@ def test_what_moves_with_an_open_parameter_is_open(spread: float) -> None:
     )
     known = identified(Space(Structure(()), 40.0), draws, draws[:1])
     assert known.tolist() == ([True] * 4 if spread < 0.1 else [True, False, False, False])
+
+
+def test_draws_go_as_far_as_a_parameter_is_open() -> None:
+    """Along a ridge to its ends, over the bounds where chains differ; told are their quantiles."""
+    rng = np.random.default_rng(4)
+    space = Space(Structure(()), 40.0)
+    centre = np.array([134.0, 1e9, 1e5, 0.5])
+    draws = centre * np.exp(0.01 * rng.standard_normal((4000, 4)))
+    ridge = centre * np.array([[1.0, 1.0, 1.0, 1.0], [1.0, 1e3, 1e4, 1.0]])
+    out, known = opened(space, draws, ridge, (False, False, False, True), rng)
+    assert known.tolist() == [True, False, False, False]
+    np.testing.assert_array_equal(out[:, 0], draws[:, 0])
+    low, high = np.log(np.quantile(out, [0.025, 0.975], axis=0))
+    span = np.log([1e3, 1e4])
+    np.testing.assert_allclose((high - low)[1:3], 0.95 * span, rtol=0.03)
+    np.testing.assert_allclose(low[1:3], np.log(centre[1:3]) + 0.025 * span, atol=0.02 * span[1])
+    widest = space.upper[3] - space.lower[3]
+    assert high[3] - low[3] == pytest.approx(0.95 * widest, rel=0.03)
+    same, known = opened(space, draws, draws[:1], (), rng)
+    np.testing.assert_array_equal(same, draws)
+    assert known.all()
 
 
 STIFF_OIL = np.array([219.9, 6.23e10, 4.98e6, 4.74])

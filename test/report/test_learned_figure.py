@@ -42,7 +42,7 @@ def found(*names: str, spread: float = 0.1) -> Any:
     return SimpleNamespace(
         learned=tuple(terms),
         names=('beta_1', *columns),
-        posterior=np.column_stack([np.ones(2000), *draws]),
+        joint=np.column_stack([np.ones(2000), *draws]),
         best=np.array([*TABLE_2, 0.0]),
         traces=tuple(
             SimpleNamespace(stiffness=k, time=T, command=2e-3 * np.sin(2.0 * np.pi * 4.0 * T))
