@@ -207,6 +207,6 @@ def _tracking(found: DiagnosisData, records: Sequence[Record]) -> tuple[RecordTr
     known = [r for r in records if r.source in rates]
     fitted = (decimated(r, round(r.rate / rates[r.source])) for r in known)
     return tuple(
-        record_tracking(found.posterior, found.names, found.model, r, initial_state(r))
+        record_tracking(found.joint, found.names, found.model, r, initial_state(r))
         for r in fitted
     )
