@@ -20,7 +20,8 @@ EVERY = [*SOURCES, *OUTSIDE, *(p for f in OURS for p in (ROOT.parent / f).rglob(
 
 BOTTOM = {'errors', 'records', 'setups', 'sample_block', 'jit', 'normal', 'json_value'}
 CORE = BOTTOM | {'model', 'inference'}
-EVERYTHING = CORE | {
+READY = CORE | {'hygiene'}
+EVERYTHING = READY | {
     'online', 'diagnosis', 'report', 'io', 'interfaces', 'workers', 'effects',
     'hybrid', 'streams', 'view',
 }  # fmt: skip
@@ -46,7 +47,8 @@ ARROWS = {
     'effects': BOTTOM | {'model'},
     'inference': BOTTOM | {'model'},
     'online': CORE,
-    'diagnosis': CORE,
+    'hygiene': CORE,
+    'diagnosis': READY,
     'hybrid': CORE,
     'report': CORE | {'online', 'diagnosis', 'io'},
     'io': {'records', 'setups', 'sample_block', 'errors', 'json_value', 'interfaces', 'hybrid'},
@@ -67,6 +69,7 @@ PURE = (
     'json_value',
     'model',
     'inference',
+    'hygiene',
     'online',
     'diagnosis',
     'hybrid',
@@ -154,11 +157,9 @@ def test_core_is_pure(path: Path) -> None:
 
 
 @pytest.mark.parametrize('path', SOURCES, ids=identifier)
-def test_files_stay_small(path: Path) -> None:
-    """One idea per file, and functions that can be called without counting."""
-    text = path.read_text(encoding='utf-8')
-    assert len(text.splitlines()) <= 300
-    for node in ast.walk(ast.parse(text)):
+def test_functions_can_be_called_without_counting(path: Path) -> None:
+    """Eight parameters at most, but for compiled ones."""
+    for node in ast.walk(ast.parse(path.read_text(encoding='utf-8'))):
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
             how = ' '.join(map(ast.unparse, node.decorator_list))
             given = [*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs]

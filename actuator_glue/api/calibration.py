@@ -20,14 +20,14 @@ from actuator_glue.api.compilation import compilation
 from actuator_glue.api.options import chosen
 from actuator_glue.api.prior import check_prior, given_prior
 from actuator_glue.api.tracking import record_tracking
-from actuator_glue.diagnosis.data import SETTLE
-from actuator_glue.diagnosis.despike import despiked
 from actuator_glue.diagnosis.force import check_forces
-from actuator_glue.diagnosis.preparation import clean, initial_state
 from actuator_glue.errors import InputError
+from actuator_glue.hygiene.clean import clean, initial_state
+from actuator_glue.hygiene.despike import despiked
 from actuator_glue.inference.at_bound import pressed
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.choice import ModelChoice, choose_model
+from actuator_glue.inference.least_squares.data import SETTLE
 from actuator_glue.inference.moments import moments
 from actuator_glue.inference.posterior import Problem
 from actuator_glue.inference.prior_conflict import conflict

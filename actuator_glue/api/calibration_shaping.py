@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.fit import Fit, fit
 from actuator_glue.diagnosis.force import with_forces
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.effective_size import effective_size
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.fit import Fit, fit
 from actuator_glue.inference.posterior import Problem, Target, sample
 from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.model.effects import scale

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuator_glue.api.spread import Spread, spread
-from actuator_glue.diagnosis.data import LANES, chunks
 from actuator_glue.hybrid.actuator import actuator, table_of
 from actuator_glue.hybrid.indicators import TargetMotion
 from actuator_glue.hybrid.stability import tracking
+from actuator_glue.inference.least_squares.data import LANES, chunks
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.online.job import WindowResult

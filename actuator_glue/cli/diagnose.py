@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 from actuator_glue.arguments import Output
 from actuator_glue.cli._effects_file import add_effects_file, load_effects
 from actuator_glue.cli._heap import give_back
-from actuator_glue.cli._output import add_json, note, progress, say, table
+from actuator_glue.cli._output import add_json, beside, note, progress, say, table
 from actuator_glue.cli._prior import add_prior, prior_options
 from actuator_glue.cli._records import add_records, load
 from actuator_glue.io.json_file import write_json
@@ -77,10 +77,10 @@ def run(args: argparse.Namespace) -> int:
     trim = give_back([*records, *held])
 
     from actuator_glue.api.diagnosis import diagnose
-    from actuator_glue.diagnosis.stages import Overall
+    from actuator_glue.diagnosis.stages import ShareDone
 
     with progress('diagnose', 1.0) as done:
-        overall = Overall()
+        overall = ShareDone()
 
         def tell(stage: str, share: float) -> None:
             trim()
@@ -99,15 +99,14 @@ def run(args: argparse.Namespace) -> int:
     command = shlex.join(['actuator-glue', *sys.argv[1:]])
     found = replace(found, provenance={'command': command, **found.provenance})
     _show(found, args)
-    write_json(found.to_json(), args.json)
-    if args.report is not None:
-        found.report(args.report)
-    if args.save_effects is not None:
-        if found.learned:
-            found.save_effects(args.save_effects)
-        else:
-            note(f'{args.save_effects}: not written, for no term was learned')
-    return 0 if found.complete else 1
+    content = found.to_json()
+    failed = beside(args.json, lambda out: write_json(content, out))
+    if found.learned:
+        failed = beside(args.save_effects, found.save_effects) or failed
+    elif args.save_effects is not None:
+        note(f'{args.save_effects}: not written, for no term was learned')
+    failed = beside(args.report, found.report) or failed
+    return failed or (0 if found.complete else 1)
 
 
 def _load(args: argparse.Namespace) -> tuple[list[Record], list[Record]]:

@@ -7,10 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from actuator_glue.diagnosis.completeness import Decision
-from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.estimate import Estimate, Json
 from actuator_glue.diagnosis.homogeneity import Homogeneity
-from actuator_glue.diagnosis.learned_term import is_learned
+from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.next_experiment import Experiment
 from actuator_glue.diagnosis.posterior import RHAT
 from actuator_glue.diagnosis.regression import Surrogate
@@ -18,6 +17,7 @@ from actuator_glue.diagnosis.result import HeldOutError
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.verdict import excuse, misses
 from actuator_glue.inference.at_bound import Pressed
+from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.records import source_name
 

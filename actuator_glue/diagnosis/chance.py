@@ -15,15 +15,15 @@ import numpy as np
 import scipy
 
 from actuator_glue.diagnosis import global_search
-from actuator_glue.diagnosis.checks import where
-from actuator_glue.diagnosis.data import Data, Mask
-from actuator_glue.diagnosis.fit import Fit, fit, rms
-from actuator_glue.diagnosis.free_run import Model, simulated
 from actuator_glue.diagnosis.preparation import Prepared
 from actuator_glue.diagnosis.score import Scorer, pooled, splits_of
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.hygiene.checks import where
+from actuator_glue.inference.least_squares.data import Data, Mask
+from actuator_glue.inference.least_squares.fit import Fit, fit, rms
+from actuator_glue.inference.least_squares.free_run import Model, simulated
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.records import Array
 

@@ -8,11 +8,11 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.diagnosis.data import Mask
-from actuator_glue.diagnosis.fit import Fit, fit
 from actuator_glue.diagnosis.preparation import Prepared
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.inference.least_squares.data import Mask
+from actuator_glue.inference.least_squares.fit import Fit, fit
 from actuator_glue.records import Array
 
 _REFITS: Final = 3  # of what was found

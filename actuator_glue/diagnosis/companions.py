@@ -12,15 +12,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.fit import rms
-from actuator_glue.diagnosis.learned_forms import CAUSES
+from actuator_glue.diagnosis.learned.forms import CAUSES
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.posterior import Draws
 from actuator_glue.diagnosis.ranking import removed, weights
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.fit import rms
 from actuator_glue.model.effects import CATALOGUE
 
 _MOST = 2

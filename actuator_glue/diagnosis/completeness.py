@@ -6,16 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.estimate import Json
-from actuator_glue.diagnosis.learned_term import is_learned
-from actuator_glue.diagnosis.measurement import Measured
+from actuator_glue.diagnosis.learned.term import is_learned
+from actuator_glue.diagnosis.measured.measurement import Measured
 from actuator_glue.diagnosis.regression import Surrogate
 from actuator_glue.diagnosis.result import Verdict
 from actuator_glue.diagnosis.score import splits_of
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.records import Array
 
 

@@ -6,13 +6,13 @@ import numpy as np
 import scipy
 
 from actuator_glue.diagnosis.completeness import Decision
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.each import Each
-from actuator_glue.diagnosis.measurement import Measured
-from actuator_glue.diagnosis.noise import Split, split
+from actuator_glue.diagnosis.measured.measurement import Measured
 from actuator_glue.diagnosis.result import Alarm
 from actuator_glue.diagnosis.score import splits_of
 from actuator_glue.diagnosis.selection import Selection
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.each import Each
+from actuator_glue.inference.noise import Split, split
 from actuator_glue.records import Array
 
 _RESAMPLES = 99

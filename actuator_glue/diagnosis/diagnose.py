@@ -17,23 +17,19 @@ from actuator_glue.diagnosis import (
     discrepancy,
     findings,
     homogeneity,
-    learned_term,
     model_form,
     posterior,
     reconciled,
     response,
-    rest,
     ridge,
     verdict,
     wrong_setup,
 )
-from actuator_glue.diagnosis.base_prior import BasePrior
 from actuator_glue.diagnosis.detect import alarm_of
-from actuator_glue.diagnosis.each import Each
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.force import check_forces
-from actuator_glue.diagnosis.free_run import Model
 from actuator_glue.diagnosis.hold import with_the_right_hold
+from actuator_glue.diagnosis.learned import term as learned_term
 from actuator_glue.diagnosis.next_experiment import Experiment, ranked
 from actuator_glue.diagnosis.onset_search import since_onset
 from actuator_glue.diagnosis.pipeline import (
@@ -43,14 +39,19 @@ from actuator_glue.diagnosis.pipeline import (
     with_learned_terms,
     with_what_matters,
 )
-from actuator_glue.diagnosis.preparation import prepare, rest_samples
+from actuator_glue.diagnosis.preparation import prepare
 from actuator_glue.diagnosis.result import DiagnosisData
-from actuator_glue.diagnosis.space import UPPER, Space
 from actuator_glue.diagnosis.stages import Progress, Stage
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.diagnosis.verify import Side, traces, verify
+from actuator_glue.hygiene import rest
+from actuator_glue.hygiene.clean import rest_samples
 from actuator_glue.inference.at_bound import Pressed, pressed
+from actuator_glue.inference.least_squares.base_prior import BasePrior
+from actuator_glue.inference.least_squares.each import Each
+from actuator_glue.inference.least_squares.free_run import Model
+from actuator_glue.inference.least_squares.space import UPPER, Space
 from actuator_glue.inference.prior_use import GivenPrior
 from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array, Record

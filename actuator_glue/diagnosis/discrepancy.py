@@ -16,10 +16,10 @@ from typing import NamedTuple
 import numpy as np
 
 from actuator_glue.diagnosis import zero
-from actuator_glue.diagnosis.fit import rms
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.search import Search
-from actuator_glue.diagnosis.space import sum_of_squares
+from actuator_glue.inference.least_squares.fit import rms
+from actuator_glue.inference.least_squares.space import sum_of_squares
 from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array
 

@@ -8,13 +8,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from actuator_glue.diagnosis import learned_term, per_record_settings
+from actuator_glue.diagnosis import per_record_settings
 from actuator_glue.diagnosis.completeness import Decision
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.finding import Candidate, Finding, Rival
 from actuator_glue.diagnosis.homogeneity import Homogeneity
-from actuator_glue.diagnosis.learned_forms import CAUSES
-from actuator_glue.diagnosis.measurement import Measured
+from actuator_glue.diagnosis.learned import term as learned_term
+from actuator_glue.diagnosis.learned.forms import CAUSES
+from actuator_glue.diagnosis.measured.measurement import Measured
 from actuator_glue.diagnosis.ranking import standard_error, weights
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial

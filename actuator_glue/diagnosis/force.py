@@ -7,11 +7,11 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from actuator_glue.diagnosis.checks import pull, where
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.decimate import decimated
-from actuator_glue.diagnosis.free_run import Model
 from actuator_glue.errors import InputError
+from actuator_glue.hygiene.checks import pull, where
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.decimate import decimated
+from actuator_glue.inference.least_squares.free_run import Model
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.force_errors import recorded_force, shown
 from actuator_glue.records import Array, Record

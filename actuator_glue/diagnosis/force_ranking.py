@@ -12,9 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.finding import Rival
-from actuator_glue.diagnosis.fit import Fit, fit, rms
 from actuator_glue.diagnosis.force import newtons_per_metre, with_forces
 from actuator_glue.diagnosis.ranking import compare, worth
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
@@ -22,6 +20,8 @@ from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.fit import Fit, fit, rms
 from actuator_glue.model.effects import Effect
 
 _COARSE = 8  # iterations of rough refits

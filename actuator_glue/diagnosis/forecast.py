@@ -19,12 +19,12 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.decimate import motion_bandwidth
-from actuator_glue.diagnosis.fit import Fit
-from actuator_glue.diagnosis.noise import whiten
 from actuator_glue.diagnosis.regression import library
 from actuator_glue.diagnosis.score import Scorer, evidence, splits_of
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.decimate import motion_bandwidth
+from actuator_glue.inference.least_squares.fit import Fit
+from actuator_glue.inference.noise import whiten
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 

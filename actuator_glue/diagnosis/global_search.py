@@ -17,11 +17,11 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.each import Each
-from actuator_glue.diagnosis.fit import Fit, base_starts, fit
-from actuator_glue.diagnosis.free_run import Model
-from actuator_glue.diagnosis.space import Space, sum_of_squares
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.each import Each
+from actuator_glue.inference.least_squares.fit import Fit, base_starts, fit
+from actuator_glue.inference.least_squares.free_run import Model
+from actuator_glue.inference.least_squares.space import Space, sum_of_squares
 from actuator_glue.model.effects import scale
 from actuator_glue.model.parameters import BASE
 from actuator_glue.model.structure import Structure

@@ -6,9 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from actuator_glue.diagnosis import hum
-from actuator_glue.diagnosis.each import Each
-from actuator_glue.diagnosis.fit import Fit, fit
+from actuator_glue.diagnosis.measured import hum
 from actuator_glue.diagnosis.pipeline import (
     Conclusion,
     conclude,
@@ -20,6 +18,8 @@ from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.stages import Progress
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.wrong_setup import WrongSetup
+from actuator_glue.inference.least_squares.each import Each
+from actuator_glue.inference.least_squares.fit import Fit, fit
 
 
 def with_the_right_hold(

@@ -12,9 +12,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.free_run import Model
-from actuator_glue.diagnosis.space import Space, diverged
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.free_run import Model
+from actuator_glue.inference.least_squares.space import Space, diverged
 from actuator_glue.inference.transforms.inverse_response import Ridge
 from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array

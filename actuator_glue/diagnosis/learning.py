@@ -14,9 +14,9 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from actuator_glue.diagnosis import learned_first
-from actuator_glue.diagnosis.learned_forms import forms
-from actuator_glue.diagnosis.learned_friction import DRY, FALLING, SHAPES
-from actuator_glue.diagnosis.learned_term import is_learned
+from actuator_glue.diagnosis.learned.forms import forms
+from actuator_glue.diagnosis.learned.friction import DRY, FALLING, SHAPES
+from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.ranking import MUCH, decisive, least_removed, removed
 from actuator_glue.diagnosis.search import Search

@@ -12,15 +12,15 @@ from typing import NamedTuple
 
 import numpy as np
 
-from actuator_glue.diagnosis.data import LANES, Data, chunks
 from actuator_glue.diagnosis.discrepancy import Discrepancy, ScaleMixture
-from actuator_glue.diagnosis.each import Each
-from actuator_glue.diagnosis.fit import Fit
-from actuator_glue.diagnosis.fit import fit as fit_to
-from actuator_glue.diagnosis.free_run import Model
 from actuator_glue.diagnosis.identifiable import Straight, Working, derivatives
 from actuator_glue.diagnosis.score import Scorer
-from actuator_glue.diagnosis.space import Space, diverged
+from actuator_glue.inference.least_squares.data import LANES, Data, chunks
+from actuator_glue.inference.least_squares.each import Each
+from actuator_glue.inference.least_squares.fit import Fit
+from actuator_glue.inference.least_squares.fit import fit as fit_to
+from actuator_glue.inference.least_squares.free_run import Model
+from actuator_glue.inference.least_squares.space import Space, diverged
 from actuator_glue.records import Array
 
 _STEPS = 8  # from the least-squares fit to the optimum of the likelihood

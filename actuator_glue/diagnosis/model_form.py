@@ -14,8 +14,8 @@ import numpy as np
 from actuator_glue.diagnosis import homogeneity
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.search import Search
-from actuator_glue.diagnosis.space import Space
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.inference.least_squares.space import Space
 from actuator_glue.records import Array
 
 _NORMAL = 1.4826  # standard deviation of a normal over its median absolute deviation

@@ -8,7 +8,6 @@ from functools import cached_property
 
 from actuator_glue.diagnosis import false_alarms, forecast, pairs, ranking, simplest
 from actuator_glue.diagnosis.finding import Rival
-from actuator_glue.diagnosis.fit import Fit
 from actuator_glue.diagnosis.ranking import compare, removed, spokesman, standard_error, worth
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.search import Search, by_score
@@ -16,6 +15,7 @@ from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.stages import EFFECTS, Progress
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.inference.least_squares.fit import Fit
 
 # Rounds in which members may be swapped for better or simpler ones.
 _SWAPS = 4

@@ -6,15 +6,15 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
-from actuator_glue.diagnosis import moments
-from actuator_glue.diagnosis.data import SETTLE, Data
-from actuator_glue.diagnosis.each import Each
-from actuator_glue.diagnosis.fit import Fit
-from actuator_glue.diagnosis.moments import Moment
-from actuator_glue.diagnosis.onset import Appeared
+from actuator_glue.diagnosis.onset import moments
+from actuator_glue.diagnosis.onset.moments import Moment
+from actuator_glue.diagnosis.onset.onset import Appeared
 from actuator_glue.diagnosis.pipeline import Conclusion, conclude
 from actuator_glue.diagnosis.stages import Progress
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.inference.least_squares.data import SETTLE, Data
+from actuator_glue.inference.least_squares.each import Each
+from actuator_glue.inference.least_squares.fit import Fit
 
 Quiet = tuple[Data, Fit]
 _OTHERS = 2  # moments at most before which more acts than Eq. (2)

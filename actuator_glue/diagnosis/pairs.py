@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuator_glue.diagnosis.finding import BESIDE, Rival
-from actuator_glue.diagnosis.learned_term import is_learned
+from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.transducer import FAULTS, FEEDBACK
 from actuator_glue.diagnosis.trial import Trial

@@ -12,15 +12,15 @@ from dataclasses import replace
 
 import numpy as np
 
-from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.finding import Rival
-from actuator_glue.diagnosis.fit import fit
 from actuator_glue.diagnosis.ranking import removed, standard_error, weights
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.fit import fit
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.parameters import Parameter

@@ -14,7 +14,6 @@ from actuator_glue.diagnosis import (
     companions,
     exchange,
     force_ranking,
-    hum,
     learning,
     per_record_settings,
     recorded,
@@ -23,13 +22,11 @@ from actuator_glue.diagnosis import (
     transducer,
 )
 from actuator_glue.diagnosis.completeness import Decision, decide
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.each import Each
-from actuator_glue.diagnosis.fit import fit
-from actuator_glue.diagnosis.hum import Line
-from actuator_glue.diagnosis.measurement import Measured
+from actuator_glue.diagnosis.measured import hum
+from actuator_glue.diagnosis.measured.hum import Line
+from actuator_glue.diagnosis.measured.measurement import Measured
 from actuator_glue.diagnosis.model_selection import ModelSelection
-from actuator_glue.diagnosis.onset import Appeared, Onset, dated
+from actuator_glue.diagnosis.onset.onset import Appeared, Onset, dated
 from actuator_glue.diagnosis.preparation import Prepared
 from actuator_glue.diagnosis.regression import Surrogate
 from actuator_glue.diagnosis.score import Scorer
@@ -38,6 +35,9 @@ from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.stages import Progress
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.each import Each
+from actuator_glue.inference.least_squares.fit import fit
 from actuator_glue.model.effects import CATALOGUE
 
 

@@ -14,16 +14,16 @@ from numpy.typing import NDArray
 
 from actuator_glue.diagnosis import poles, proposals
 from actuator_glue.diagnosis.discrepancy import Discrepancy
-from actuator_glue.diagnosis.each import Each
-from actuator_glue.diagnosis.fit import Fit
-from actuator_glue.diagnosis.free_run import Model
 from actuator_glue.diagnosis.identifiable import Straight, Working, coordinates
 from actuator_glue.diagnosis.likelihood import Likelihood, Optimum, inflation, most_likely
 from actuator_glue.diagnosis.score import Scorer
-from actuator_glue.diagnosis.space import Space
 from actuator_glue.inference import importance, posterior
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.convergence import quick_rhat_and_ess
+from actuator_glue.inference.least_squares.each import Each
+from actuator_glue.inference.least_squares.fit import Fit
+from actuator_glue.inference.least_squares.free_run import Model
+from actuator_glue.inference.least_squares.space import Space
 from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.inference.transforms import Composed, Transform
 from actuator_glue.inference.transforms.laplace import Laplace

@@ -6,29 +6,22 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy
 
-from actuator_glue.diagnosis import decimate, despike, frozen, glitches
-from actuator_glue.diagnosis.base_prior import BasePrior
-from actuator_glue.diagnosis.checks import check, refuse_repeats, where
-from actuator_glue.diagnosis.data import SETTLE, Data, Mask
-from actuator_glue.diagnosis.free_run import Model
-from actuator_glue.diagnosis.impulses import NONE, Impulses
-from actuator_glue.diagnosis.moments import Moment
+from actuator_glue.diagnosis.onset.moments import Moment
 from actuator_glue.diagnosis.wrong_setup import WrongSetup
 from actuator_glue.errors import InputError
-from actuator_glue.model.exact import Initial
+from actuator_glue.hygiene import despike
+from actuator_glue.hygiene.checks import where
+from actuator_glue.hygiene.clean import clean, initial_state
+from actuator_glue.hygiene.impulses import NONE, Impulses
+from actuator_glue.inference.least_squares import decimate
+from actuator_glue.inference.least_squares.base_prior import BasePrior
+from actuator_glue.inference.least_squares.data import SETTLE, Data, Mask
+from actuator_glue.inference.least_squares.free_run import Model
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 
 _SHORTEST = 5.0  # s
-_MOVED = 2e-3  # of its largest excursion: a command within it has not begun
-_HEAD = 0.5  # s that show where it rests and how noisy its channel is
-_SMOOTH = 0.03  # s
-_REST = 1.5  # s of constant command that define the zero of both channels
-# Share of its range that a channel may be away from zero, or move within a moment, at rest.
-_STILL = 0.05
-_MOMENT = 0.02  # s
 _FOLD = 4  # every fourth block is held out where no record is
 _FOLD_LENGTH = 3.0  # s
 
@@ -42,7 +35,7 @@ class Prepared:
         held: what is looked at once, after all decisions.
         notes: what else was done to the records, for people.
         folded: the held-out part are stretches of the fitting records.
-        impulses: what was taken out of each fitting record (see diagnosis/despike.py).
+        impulses: what was taken out of each fitting record (see hygiene/despike.py).
         held_impulses: and of each other record that is held out.
         setup: what was taken for the records' set-up instead of what was given; None for nothing.
     """
@@ -85,97 +78,6 @@ class Prepared:
         pairs = zip(self.fit.recorded, self.impulses, strict=True)
         kept = tuple(i for r, i in pairs if any(r is k for k in fit.recorded))
         return replace(self, fit=fit, held=held, impulses=kept)
-
-
-def rest_samples(record: Record) -> int:
-    """Samples at the beginning in which the command does not move.
-
-    The command is smoothed over a few hundredths of a second: one that was recorded by a noisy
-    channel does not move with every sample.
-    """
-    head = record.command[: max(2, round(_HEAD / record.period))]
-    width = max(1, round(_SMOOTH / record.period))
-    centre = float(np.median(head))
-    noise = 1.4826 * float(np.median(np.abs(head - centre))) / np.sqrt(width)
-    off = np.abs(scipy.ndimage.uniform_filter1d(record.command, width, mode='nearest') - centre)
-    moving = off > max(_MOVED * float(off.max()), 6.0 * noise)
-    return int(np.argmax(moving)) if noise < _MOVED * float(off.max()) else 0
-
-
-def zeroed(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
-    """Remove each channel's rest offset where every record begins at rest.
-
-    The zero of a transducer is a setting of the day, not a property of the actuator; it is
-    removed only where all records show it, so that they stay comparable.
-    """
-    rests = [rest_samples(r) for r in records]
-    if any(rest * r.period < _REST for rest, r in zip(rests, records, strict=True)):
-        return list(records), []
-    out, notes = [], []
-    for i, (rest, record) in enumerate(zip(rests, records, strict=True)):
-        command = float(np.median(record.command[:rest]))
-        measured = float(np.median(record.measured[:rest]))
-        # Most commands begin at zero: no copy of those.
-        still = record.command - command if command else record.command
-        out.append(replace(record, command=still, measured=record.measured - measured))
-        notes.append(
-            f'{where(record, i + 1)}: rest offsets removed, command {1e6 * command:.1f} um, '
-            f'measured {1e6 * measured:.1f} um'
-        )
-    return out, notes
-
-
-def initial_state(record: Record) -> Initial:
-    """Return where a record starts: at rest at zero, or in a state only its samples show.
-
-    The command tells whether it is zero, for the measured displacement has an offset of its own;
-    that neither channel moves tells rest from a zero crossing at speed.
-    """
-    head = slice(0, min(len(record), 1 + max(1, round(_MOMENT / record.period))))
-    stroke = float(np.abs(record.command - np.median(record.command)).max())
-    if float(np.abs(record.command[head]).max()) > _STILL * stroke:
-        return 'measured'
-    for channel in (record.command, record.measured):
-        if abs(float(channel[head][-1] - channel[0])) > _STILL * float(np.ptp(channel)):
-            return 'measured'
-    return 'rest'
-
-
-def clean(
-    records: Sequence[Record], holdout: Sequence[Record] = ()
-) -> tuple[list[Record], list[str]]:
-    """Check records, fill channels that are slower, zero them, take glitches out of commands.
-
-    Returns:
-        The records in the order given, held-out ones last, and what was done, for people.
-
-    Raises:
-        InputError: a record that cannot be fitted, given twice, or fitted and held out.
-    """
-    every = [*records, *holdout]
-    for i, record in enumerate(every):
-        check(record, i + 1)
-    refuse_repeats(records, holdout)
-    every, notes = _filled(every)
-    every, more = zeroed(every)
-    every, glitches_told = glitches.mended(every, [initial_state(r) for r in every])
-    return every, [*glitches_told, *notes, *more]
-
-
-def _filled(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
-    """Fill in channels of displacement that are slower than their recorder: no delay is left."""
-    out, notes = [], []
-    for i, record in enumerate(records):
-        every = frozen.every_which(record.measured)
-        if every > 1:
-            notes.append(
-                f'{where(record, i + 1)}: the measured displacement changes in one sample of '
-                f'{every} only, its channel gives {record.rate / every:.4g} Hz of '
-                f'{record.rate:.4g}; a cubic runs between its changes'
-            )
-            record = replace(record, measured=frozen.filled(record.measured, every))
-        out.append(record)
-    return out, notes
 
 
 def _folds(record: Record) -> Mask:

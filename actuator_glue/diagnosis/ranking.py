@@ -13,9 +13,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from actuator_glue.diagnosis.finding import BESIDE, Rival
-from actuator_glue.diagnosis.learned_forms import CAUSES
-from actuator_glue.diagnosis.learned_friction import SHAPES
-from actuator_glue.diagnosis.learned_term import is_learned
+from actuator_glue.diagnosis.learned.forms import CAUSES
+from actuator_glue.diagnosis.learned.friction import SHAPES
+from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.likelihood import inflation
 from actuator_glue.diagnosis.score import Scorer, evidence
 from actuator_glue.diagnosis.search import Search

@@ -13,15 +13,15 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from actuator_glue.diagnosis.data import LANES, Data
-from actuator_glue.diagnosis.fit import fit, rms
-from actuator_glue.diagnosis.free_run import Model
 from actuator_glue.diagnosis.ranking import standard_error
 from actuator_glue.diagnosis.result import HeldOutError
 from actuator_glue.diagnosis.score import Scorer
-from actuator_glue.diagnosis.space import sum_of_squares
 from actuator_glue.diagnosis.verdict import misses, takes_nothing
 from actuator_glue.diagnosis.verify import Side
+from actuator_glue.inference.least_squares.data import LANES, Data
+from actuator_glue.inference.least_squares.fit import fit, rms
+from actuator_glue.inference.least_squares.free_run import Model
+from actuator_glue.inference.least_squares.space import sum_of_squares
 from actuator_glue.records import Array
 
 _STARTS = 3  # draws that are nearest to the held-out part, beside the best fit

@@ -9,15 +9,16 @@ from dataclasses import replace
 
 import numpy as np
 
-from actuator_glue.diagnosis import decimate, hum, measurement
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.free_run import Model
-from actuator_glue.diagnosis.hum import Line
-from actuator_glue.diagnosis.measurement import Measured
+from actuator_glue.diagnosis.measured import hum, measurement
+from actuator_glue.diagnosis.measured.hum import Line
+from actuator_glue.diagnosis.measured.measurement import Measured
 from actuator_glue.diagnosis.per_record_settings import OneRecord
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.inference.least_squares import decimate
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.free_run import Model
 from actuator_glue.records import Array
 
 

@@ -9,11 +9,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.fit import Fit
-from actuator_glue.diagnosis.noise import whiten
 from actuator_glue.diagnosis.score import Scorer, evidence
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.fit import Fit
+from actuator_glue.inference.noise import whiten
 from actuator_glue.json_value import Json, json_value
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record

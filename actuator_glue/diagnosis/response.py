@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuator_glue.diagnosis.free_run import Model
+from actuator_glue.inference.least_squares.free_run import Model
 from actuator_glue.json_value import Json, json_value
 from actuator_glue.model.effects import Scale
 from actuator_glue.records import Array, Record

@@ -11,9 +11,9 @@ import numpy as np
 from actuator_glue.diagnosis.estimate import Estimate, Json
 from actuator_glue.diagnosis.finding import Candidate, Finding
 from actuator_glue.diagnosis.headline import headline
-from actuator_glue.diagnosis.learned_term import LearnedTerm
+from actuator_glue.diagnosis.learned.term import LearnedTerm
 from actuator_glue.diagnosis.next_experiment import Experiment
-from actuator_glue.diagnosis.onset import Onset
+from actuator_glue.diagnosis.onset.onset import Onset
 from actuator_glue.diagnosis.response import Response
 from actuator_glue.diagnosis.verdict import COMPLETE
 from actuator_glue.diagnosis.wrong_setup import WrongSetup

@@ -13,11 +13,11 @@ import math
 
 import numpy as np
 
-from actuator_glue.diagnosis.free_run import Model
 from actuator_glue.diagnosis.identifiable import Straight, coordinates
 from actuator_glue.diagnosis.reconciled import as_likely
 from actuator_glue.diagnosis.score import Scorer
-from actuator_glue.diagnosis.space import Space
+from actuator_glue.inference.least_squares.free_run import Model
+from actuator_glue.inference.least_squares.space import Space
 from actuator_glue.model.identifiable import EDGE
 from actuator_glue.records import Array
 

@@ -16,10 +16,10 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.fit import Fit
-from actuator_glue.diagnosis.noise import Split, split, whiten, whitener
-from actuator_glue.diagnosis.stretches import Part
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.fit import Fit
+from actuator_glue.inference.least_squares.stretches import Part
+from actuator_glue.inference.noise import Split, split, whiten, whitener
 from actuator_glue.records import Array
 
 BLOCK = 2.0  # s

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.free_run import Model
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.free_run import Model
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array

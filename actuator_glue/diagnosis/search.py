@@ -10,14 +10,14 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from actuator_glue.diagnosis import global_search, poles
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.each import Each
-from actuator_glue.diagnosis.fit import Fit, base_fit, fit, rms
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.screening import screen, signatures
-from actuator_glue.diagnosis.space import Space
-from actuator_glue.diagnosis.stretches import Part, stretches
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.each import Each
+from actuator_glue.inference.least_squares.fit import Fit, base_fit, fit, rms
+from actuator_glue.inference.least_squares.space import Space
+from actuator_glue.inference.least_squares.stretches import Part, stretches
 from actuator_glue.model.effects import CATALOGUE, Effect, Scale, scale
 from actuator_glue.model.parameters import BASE
 from actuator_glue.model.structure import Structure

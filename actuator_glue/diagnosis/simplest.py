@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from actuator_glue.diagnosis import pairs, ranking
 from actuator_glue.diagnosis.finding import Rival
-from actuator_glue.diagnosis.learned_term import is_learned
+from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.trial import Trial
 
 if TYPE_CHECKING:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
-from actuator_glue.diagnosis.data import LANES, Data, chunks
-from actuator_glue.diagnosis.fit import rms
-from actuator_glue.diagnosis.free_run import Model
+from actuator_glue.inference.least_squares.data import LANES, Data, chunks
+from actuator_glue.inference.least_squares.fit import rms
+from actuator_glue.inference.least_squares.free_run import Model
 from actuator_glue.records import Array
 
 _DRAWS = 100  # of parameters, for the bands

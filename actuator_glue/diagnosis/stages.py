@@ -27,8 +27,13 @@ Stage: TypeAlias = Literal[
 Progress: TypeAlias = Callable[[Stage, float], None]
 
 EFFECTS: tuple[Stage, ...] = (
-    'effect 1', 'effect 2', 'effect 3', 'effect 4', 'effect 5', 'effect 6',
-)  # fmt: skip
+    'effect 1',
+    'effect 2',
+    'effect 3',
+    'effect 4',
+    'effect 5',
+    'effect 6',
+)
 # Roughly: which searches follow the first is not known before its end.
 _BEFORE: dict[Stage, float] = {
     'check': 0.0,
@@ -51,7 +56,7 @@ _BEFORE: dict[Stage, float] = {
 }
 
 
-class Overall:
+class ShareDone:
     """The share of a diagnosis that is done, which never falls; a label is no reason to fail."""
 
     def __init__(self) -> None:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from actuator_glue.diagnosis.fit import Fit
-from actuator_glue.diagnosis.free_run import Model
+from actuator_glue.inference.least_squares.fit import Fit
+from actuator_glue.inference.least_squares.free_run import Model
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 

@@ -7,14 +7,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.diagnosis import hum, zero
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.fit import rms
-from actuator_glue.diagnosis.free_run import Model
-from actuator_glue.diagnosis.hum import Line
+from actuator_glue.diagnosis import zero
+from actuator_glue.diagnosis.measured import hum
+from actuator_glue.diagnosis.measured.hum import Line
 from actuator_glue.diagnosis.result import HeldOutError, Trace
 from actuator_glue.diagnosis.score import BLOCK, pooled, splits_of
 from actuator_glue.diagnosis.spread import spread
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.fit import rms
+from actuator_glue.inference.least_squares.free_run import Model
 from actuator_glue.records import Array
 
 _RESAMPLES = 1000

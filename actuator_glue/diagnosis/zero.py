@@ -10,7 +10,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from actuator_glue.diagnosis.data import Data
+from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.records import Array
 
 

@@ -44,14 +44,14 @@ def intervals(seed: int, generator: str, evaluations: int) -> list[Interval]:
 
     from actuator_glue.diagnosis import posterior
     from actuator_glue.diagnosis.discrepancy import beside, responses
-    from actuator_glue.diagnosis.fit import fit
     from actuator_glue.diagnosis.pipeline import mean_effects
     from actuator_glue.diagnosis.preparation import prepare
     from actuator_glue.diagnosis.ridge import left_open
     from actuator_glue.diagnosis.score import Scorer, pooled, splits_of
     from actuator_glue.diagnosis.search import Search
-    from actuator_glue.diagnosis.space import Space
     from actuator_glue.diagnosis.thresholds import Thresholds
+    from actuator_glue.inference.least_squares.fit import fit
+    from actuator_glue.inference.least_squares.space import Space
     from actuator_glue.model.effects import CATALOGUE
     from actuator_glue.model.parameters import NAMES
     from actuator_glue.model.structure import Structure

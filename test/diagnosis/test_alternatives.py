@@ -9,7 +9,7 @@ import pytest
 from actuator_glue.diagnosis import alternatives, posterior
 from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.identifiable import Working
-from actuator_glue.diagnosis.space import Space
+from actuator_glue.inference.least_squares.space import Space
 from actuator_glue.model import commands
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record

@@ -7,13 +7,13 @@ import pytest
 from scipy.stats import multivariate_normal
 from test_diagnose import QUICK, THETA, make
 
-from actuator_glue.diagnosis.base_prior import BasePrior
-from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.diagnose import diagnose
-from actuator_glue.diagnosis.fit import fit
-from actuator_glue.diagnosis.space import UPPER, sum_of_squares
 from actuator_glue.errors import InputError
 from actuator_glue.inference.carried import Carried
+from actuator_glue.inference.least_squares.base_prior import BasePrior
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.fit import fit
+from actuator_glue.inference.least_squares.space import UPPER, sum_of_squares
 from actuator_glue.inference.prior_use import GivenPrior
 from actuator_glue.model.parameters import NAMES
 from actuator_glue.model.structure import Structure

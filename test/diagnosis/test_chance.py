@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from actuator_glue.diagnosis import chance
-from actuator_glue.diagnosis import data as of_data
-from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.global_search import Shares
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.inference.least_squares import data as of_data
+from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model import commands
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record

@@ -8,11 +8,11 @@ import pytest
 import two_sweeps
 
 from actuator_glue.diagnosis import alternatives, companions, discrepancy, posterior
-from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.posterior import Draws
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.records import Record
 
 NAMES = ('viscous-damping', 'specimen-gap', 'valve-deadband', 'bias', 'delay', 'drift')

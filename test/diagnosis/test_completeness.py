@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from actuator_glue.diagnosis import completeness
-from actuator_glue.diagnosis.learned_forms import forms
+from actuator_glue.diagnosis.learned.forms import forms
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.model.effects import CATALOGUE, Effect, Scale
 from actuator_glue.model.parameters import TABLE_2

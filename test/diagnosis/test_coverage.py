@@ -5,11 +5,11 @@ import pytest
 from scipy import signal
 
 from actuator_glue.diagnosis import discrepancy, posterior
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.fit import fit
 from actuator_glue.diagnosis.pipeline import mean_effects
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.search import Search
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.fit import fit
 from actuator_glue.model import commands
 from actuator_glue.model.parameters import TABLE_2
 from actuator_glue.model.structure import Structure

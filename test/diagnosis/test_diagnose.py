@@ -10,7 +10,7 @@ import pytest
 
 from actuator_glue.diagnosis import learning
 from actuator_glue.diagnosis.diagnose import diagnose
-from actuator_glue.diagnosis.learned_forms import forms
+from actuator_glue.diagnosis.learned.forms import forms
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.errors import InputError
 from actuator_glue.model.effects import CATALOGUE, Effect, Scale

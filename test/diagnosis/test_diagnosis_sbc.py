@@ -14,12 +14,12 @@ import numpy as np
 import pytest
 
 from actuator_glue.diagnosis import posterior
-from actuator_glue.diagnosis import space as working
-from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.discrepancy import _PRIOR, _SCALES, beside
-from actuator_glue.diagnosis.fit import fit
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.inference.least_squares import space as working
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.fit import fit
 from actuator_glue.model import commands
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record

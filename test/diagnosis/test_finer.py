@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis import data as module
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.decimate import means
-from actuator_glue.diagnosis.fit import fit
 from actuator_glue.diagnosis.preparation import prepare
+from actuator_glue.inference.least_squares import data as module
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.decimate import means
+from actuator_glue.inference.least_squares.fit import fit
 from actuator_glue.model import commands
 from actuator_glue.model.effects.run import sample_steps
 from actuator_glue.model.structure import Structure

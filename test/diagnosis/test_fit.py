@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis import fit as module
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.fit import fit
 from actuator_glue.diagnosis.identifiable import Working, derivatives
-from actuator_glue.diagnosis.space import Space, jacobian
+from actuator_glue.inference.least_squares import fit as module
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.fit import fit
+from actuator_glue.inference.least_squares.space import Space, jacobian
 from actuator_glue.model import commands
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.model.structure import Structure

@@ -7,11 +7,11 @@ import pytest
 from scipy import signal
 
 from actuator_glue.diagnosis import forecast
-from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.decimate import means
-from actuator_glue.diagnosis.free_run import _decimated, parts
 from actuator_glue.diagnosis.preparation import prepare
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.decimate import means
+from actuator_glue.inference.least_squares.free_run import _decimated, parts
 from actuator_glue.model import commands
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis import frozen
-from actuator_glue.diagnosis.despike import despiked
-from actuator_glue.diagnosis.fit import base_fit
 from actuator_glue.diagnosis.preparation import prepare
+from actuator_glue.hygiene import frozen
+from actuator_glue.hygiene.despike import despiked
+from actuator_glue.inference.least_squares.fit import base_fit
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from actuator_glue.diagnosis import global_search
-from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.diagnose import diagnose
-from actuator_glue.diagnosis.fit import Fit, fit
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.fit import Fit, fit
 from actuator_glue.model import commands
 from actuator_glue.model.effects import scale
 from actuator_glue.model.structure import Structure

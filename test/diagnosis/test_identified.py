@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis.base_prior import BasePrior
-from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.posterior import identified, opened
 from actuator_glue.diagnosis.ridge import left_open
 from actuator_glue.diagnosis.score import Scorer, splits_of
-from actuator_glue.diagnosis.space import UPPER, Space
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.inference.carried import Carried
+from actuator_glue.inference.least_squares.base_prior import BasePrior
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.space import UPPER, Space
 from actuator_glue.model import commands
 from actuator_glue.model.parameters import NAMES
 from actuator_glue.model.structure import Structure

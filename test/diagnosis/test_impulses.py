@@ -5,12 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis import cleaned, impulses
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.despike import despiked, trimmed, without_impulses
-from actuator_glue.diagnosis.fit import base_fit, fit
+from actuator_glue.diagnosis import cleaned
 from actuator_glue.diagnosis.preparation import prepare
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.hygiene import impulses
+from actuator_glue.hygiene.despike import despiked, trimmed, without_impulses
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.fit import base_fit, fit
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 

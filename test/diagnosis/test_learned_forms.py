@@ -5,11 +5,11 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.learned_forms import forms
+from actuator_glue.diagnosis.learned.forms import forms
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.effects.effect import Scale
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record

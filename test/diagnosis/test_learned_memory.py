@@ -5,17 +5,17 @@ import pytest
 from scipy import signal
 from smooth_machines import piston
 
-from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.estimate import Estimate
-from actuator_glue.diagnosis.learned_forms import forms
-from actuator_glue.diagnosis.learned_term import described
+from actuator_glue.diagnosis.learned.forms import forms
+from actuator_glue.diagnosis.learned.term import described
 from actuator_glue.diagnosis.learning import _plainer
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.search import Search
-from actuator_glue.diagnosis.stretches import stretches
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.stretches import stretches
 from actuator_glue.model.effects import Effect, Scale
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record

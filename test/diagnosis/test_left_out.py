@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.fit import Fit, fit
-from actuator_glue.diagnosis.free_run import Model
 from actuator_glue.diagnosis.likelihood import most_likely
 from actuator_glue.diagnosis.score import Scorer, splits_of
-from actuator_glue.diagnosis.space import sum_of_squares
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.fit import Fit, fit
+from actuator_glue.inference.least_squares.free_run import Model
+from actuator_glue.inference.least_squares.space import sum_of_squares
 from actuator_glue.model import commands
 from actuator_glue.model.parameters import TABLE_2
 from actuator_glue.model.structure import Structure

@@ -3,9 +3,15 @@
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis import hum, measurement
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.measurement import find, grid, jitter, quantisation, staircase
+from actuator_glue.diagnosis.measured import hum, measurement
+from actuator_glue.diagnosis.measured.measurement import (
+    find,
+    grid,
+    jitter,
+    quantisation,
+    staircase,
+)
+from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.records import Record
 
 RATE = 256.0

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from actuator_glue.diagnosis import model_form
-from actuator_glue.diagnosis.space import Space
+from actuator_glue.inference.least_squares.space import Space
 from actuator_glue.model.structure import Structure
 
 THETA = np.array([230.0, 1.7e10, 5.3e6, 26.0])

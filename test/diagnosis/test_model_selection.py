@@ -8,7 +8,6 @@ from scipy import signal
 from trials import ENTRIES, THETA, trial
 
 from actuator_glue.diagnosis import learning
-from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.pipeline import mean_effects
 from actuator_glue.diagnosis.ranking import standard_error
@@ -16,6 +15,7 @@ from actuator_glue.diagnosis.score import Scorer, pooled, splits_of
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.effects import Effect
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record

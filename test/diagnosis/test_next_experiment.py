@@ -5,10 +5,10 @@ import pytest
 from scipy import signal
 
 from actuator_glue.diagnosis import response
-from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.next_experiment import ranked
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.search import Search
+from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model import commands
 from actuator_glue.model.effects import scale
 from actuator_glue.model.linear import coefficients

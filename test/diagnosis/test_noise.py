@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from actuator_glue.diagnosis.noise import split, whiten, whitener
+from actuator_glue.inference.noise import split, whiten, whitener
 
 RATE = 256.0
 N = 15360

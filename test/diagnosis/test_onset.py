@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.diagnose import diagnose
-from actuator_glue.diagnosis.fit import base_fit, fit
-from actuator_glue.diagnosis.moments import Moment
-from actuator_glue.diagnosis.onset import Appeared, dated
+from actuator_glue.diagnosis.onset.moments import Moment
+from actuator_glue.diagnosis.onset.onset import Appeared, dated
 from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.fit import base_fit, fit
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
 

@@ -7,11 +7,11 @@ import pytest
 import two_sweeps
 
 from actuator_glue.diagnosis import poles, posterior
-from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.discrepancy import beside
-from actuator_glue.diagnosis.fit import fit
 from actuator_glue.diagnosis.score import Scorer, splits_of
-from actuator_glue.diagnosis.space import Space
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.fit import fit
+from actuator_glue.inference.least_squares.space import Space
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record

@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis.checks import check
-from actuator_glue.diagnosis.preparation import initial_state, prepare
+from actuator_glue.diagnosis.preparation import prepare
 from actuator_glue.errors import InputError
+from actuator_glue.hygiene.checks import check
+from actuator_glue.hygiene.clean import initial_state
 from actuator_glue.records import Record
 
 T = np.arange(0, 20, 1 / 256)

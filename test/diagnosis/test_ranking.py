@@ -9,13 +9,13 @@ import pytest
 from scipy import stats
 
 from actuator_glue.diagnosis import false_alarms, ranking, verdict
-from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.ranking import standard_error, weights
 from actuator_glue.diagnosis.result import HeldOutError
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.records import Array, Record
 
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from actuator_glue.diagnosis import discrepancy, posterior, reconciled
-from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.verify import Side
+from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
 

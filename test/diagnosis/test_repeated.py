@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis import repeated
+from actuator_glue.diagnosis.measured import repeated
 
 RATE = 200.0
 T = np.arange(int(12 * RATE)) / RATE

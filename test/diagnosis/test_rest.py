@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from actuator_glue.diagnosis.diagnose import diagnose
-from actuator_glue.diagnosis.preparation import initial_state, rest_samples
-from actuator_glue.diagnosis.rest import compared, noise_at_rest
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.hygiene.clean import initial_state, rest_samples
+from actuator_glue.hygiene.rest import compared, noise_at_rest
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
 

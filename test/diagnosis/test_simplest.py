@@ -8,10 +8,10 @@ from trials import ENTRIES, THETA, trial
 
 from actuator_glue.diagnosis import simplest
 from actuator_glue.diagnosis.finding import Rival
-from actuator_glue.diagnosis.fit import Fit
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.model.effects import CATALOGUE, Effect
 from actuator_glue.model.structure import Structure
 

@@ -8,7 +8,7 @@ import pytest
 
 from actuator_glue import diagnosis as package
 from actuator_glue.api.callbacks import harmless
-from actuator_glue.diagnosis.stages import EFFECTS, Overall, Stage
+from actuator_glue.diagnosis.stages import EFFECTS, ShareDone, Stage
 
 ROOM = Path(package.__file__).parent
 
@@ -34,17 +34,17 @@ def test_every_stage_that_is_told_is_known() -> None:
 
 def test_the_share_that_is_done_rises_from_stage_to_stage() -> None:
     """From nothing to all of it; going back to an earlier stage takes nothing away."""
-    overall = Overall()
+    overall = ShareDone()
     shares = [overall(stage, 0.0) for stage in get_args(Stage)]
     assert shares == sorted(set(shares)) and (shares[0], shares[-1]) == (0.0, 1.0)
-    assert Overall()('effect 1', 0.5) == pytest.approx(0.2)
-    overall = Overall()
+    assert ShareDone()('effect 1', 0.5) == pytest.approx(0.2)
+    overall = ShareDone()
     assert [overall('onset', 0.0), overall('effect 1', 0.5)] == [0.741, 0.741]
 
 
 def test_a_stage_that_nobody_knows_is_no_reason_to_fail() -> None:
     """The share stays about where it was."""
-    overall = Overall()
+    overall = ShareDone()
     overall('effect 2', 0.0)
     assert 0.35 <= overall('a new idea', 0.5) <= 0.5
 

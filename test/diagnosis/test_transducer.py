@@ -5,13 +5,13 @@ import pytest
 from scipy.interpolate import CubicSpline
 from smooth_machines import piston
 
-from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.transducer import in_the_loop
+from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.records import Array, Record
 
 NOISE, STROKE, RATE, SECONDS = 1e-5, 2e-3, 256.0, 16.0

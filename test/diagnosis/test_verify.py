@@ -7,8 +7,8 @@ import pytest
 from scipy import signal
 
 from actuator_glue.diagnosis import verify, zero
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.fit import rms
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.fit import rms
 from actuator_glue.model.parameters import TABLE_2
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from actuator_glue.diagnosis.fit import Fit
-from actuator_glue.diagnosis.learned_forms import forms
+from actuator_glue.diagnosis.learned.forms import forms
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.model.effects import CATALOGUE, Scale
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array

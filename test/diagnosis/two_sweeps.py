@@ -6,11 +6,11 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 import actuator_glue as ag
-from actuator_glue.diagnosis.data import Data
 from actuator_glue.diagnosis.force import with_forces
-from actuator_glue.diagnosis.space import Space, jacobian
 from actuator_glue.errors import InputError
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.space import Space, jacobian
 from actuator_glue.model.force_errors import ForceErrors, shown
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record

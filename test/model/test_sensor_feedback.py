@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from effect_records import RATE, U, record
 
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.fit import fit
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.fit import fit
 from actuator_glue.model.effects.terms.entry import term
 from actuator_glue.model.parameters import TABLE_2, Parameter
 from actuator_glue.model.stream import Stream

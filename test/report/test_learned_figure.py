@@ -6,8 +6,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis.learned_forms import forms
-from actuator_glue.diagnosis.learned_term import LearnedTerm
+from actuator_glue.diagnosis.learned.forms import forms
+from actuator_glue.diagnosis.learned.term import LearnedTerm
 from actuator_glue.model.effects import Scale
 from actuator_glue.model.effects.terms.definition import mapping
 from actuator_glue.model.parameters import TABLE_2

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.diagnosis.data import SETTLE, Data
+from actuator_glue.inference.least_squares.data import SETTLE, Data
 from actuator_glue.model.exact import Initial
 
 _LENGTH = 5.0  # s of a stretch, its settling not counted

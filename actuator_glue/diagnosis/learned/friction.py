@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Final
 
-from actuator_glue.diagnosis.learned_sizes import LARGEST, LEARNED, signal_size
+from actuator_glue.diagnosis.learned.sizes import LARGEST, LEARNED, signal_size
 from actuator_glue.model.effects import Effect
 from actuator_glue.model.effects.terms.entry import term
 from actuator_glue.model.parameters import Parameter

@@ -7,12 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from actuator_glue.diagnosis import decimate, frozen
-from actuator_glue.diagnosis.checks import where
-from actuator_glue.diagnosis.data import SETTLE, Data
-from actuator_glue.diagnosis.fit import base_fit, fit
-from actuator_glue.diagnosis.free_run import Model
-from actuator_glue.diagnosis.impulses import NONE, Impulses, beyond, find, in_command
+from actuator_glue.hygiene import frozen
+from actuator_glue.hygiene.checks import where
+from actuator_glue.hygiene.impulses import NONE, Impulses, beyond, find, in_command
+from actuator_glue.inference.least_squares import decimate
+from actuator_glue.inference.least_squares.data import SETTLE, Data
+from actuator_glue.inference.least_squares.fit import base_fit, fit
+from actuator_glue.inference.least_squares.free_run import Model
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record

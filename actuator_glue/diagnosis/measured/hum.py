@@ -13,8 +13,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from actuator_glue.diagnosis import repeated
-from actuator_glue.diagnosis.data import Data, Mask
+from actuator_glue.diagnosis.measured import repeated
+from actuator_glue.inference.least_squares.data import Data, Mask
 from actuator_glue.records import Array, Record
 
 _CLEAR = 18.0  # times what a tenth of its neighbours exceed, 40 times the mean of noise:

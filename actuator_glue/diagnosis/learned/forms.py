@@ -14,8 +14,9 @@ from typing import Final
 
 import numpy as np
 
-from actuator_glue.diagnosis import learned_friction, learned_memory
-from actuator_glue.diagnosis.learned_sizes import (
+from actuator_glue.diagnosis.learned import friction as learned_friction
+from actuator_glue.diagnosis.learned import memory as learned_memory
+from actuator_glue.diagnosis.learned.sizes import (
     DIMENSIONS,
     LARGEST,
     LEARNED,

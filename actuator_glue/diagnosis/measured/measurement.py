@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.hum import Line
+from actuator_glue.diagnosis.measured.hum import Line
+from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.records import Array, Record
 
 _ROUNDING = 1e-6  # of a step: values are written with so many digits

@@ -12,9 +12,14 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.diagnosis.data import LANES, Data
-from actuator_glue.diagnosis.free_run import Model
-from actuator_glue.diagnosis.space import Space, jacobian, sum_of_squares, with_jacobian
+from actuator_glue.inference.least_squares.data import LANES, Data
+from actuator_glue.inference.least_squares.free_run import Model
+from actuator_glue.inference.least_squares.space import (
+    Space,
+    jacobian,
+    sum_of_squares,
+    with_jacobian,
+)
 from actuator_glue.model.parameters import BASE
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.free_run import Model
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.least_squares.free_run import Model
 from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array
 

@@ -19,7 +19,7 @@ from typing import Final
 
 import numpy as np
 
-from actuator_glue.diagnosis.learned_sizes import LEARNED
+from actuator_glue.diagnosis.learned.sizes import LEARNED
 from actuator_glue.model.effects import Effect
 from actuator_glue.model.effects.terms.entry import starting_from, term
 from actuator_glue.model.effects.terms.expression import SIGNAL

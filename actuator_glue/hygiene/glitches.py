@@ -17,11 +17,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.diagnosis import decimate, despike
-from actuator_glue.diagnosis.checks import where
-from actuator_glue.diagnosis.data import Data
-from actuator_glue.diagnosis.impulses import TAPS, noise_of
-from actuator_glue.diagnosis.noise import split, whiten, whitener
+from actuator_glue.hygiene import despike
+from actuator_glue.hygiene.checks import where
+from actuator_glue.hygiene.impulses import TAPS, noise_of
+from actuator_glue.inference.least_squares import decimate
+from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.inference.noise import split, whiten, whitener
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record

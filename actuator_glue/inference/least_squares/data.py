@@ -11,10 +11,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.diagnosis.base_prior import BasePrior
-from actuator_glue.diagnosis.decimate import decimated
-from actuator_glue.diagnosis.each import Each
-from actuator_glue.diagnosis.free_run import Model, ObservedChannel, parts
+from actuator_glue.inference.least_squares.base_prior import BasePrior
+from actuator_glue.inference.least_squares.decimate import decimated
+from actuator_glue.inference.least_squares.each import Each
+from actuator_glue.inference.least_squares.free_run import Model, ObservedChannel, parts
 from actuator_glue.model.effects.run import sample_steps
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure

@@ -8,7 +8,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.diagnosis.decimate import window
+from actuator_glue.inference.least_squares.decimate import window
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.model.structure import Structure

@@ -12,10 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.diagnosis.data import SETTLE, Data, Mask
-from actuator_glue.diagnosis.fit import Fit, base_fit, fit
 from actuator_glue.diagnosis.score import pooled, splits_of
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.inference.least_squares.data import SETTLE, Data, Mask
+from actuator_glue.inference.least_squares.fit import Fit, base_fit, fit
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 

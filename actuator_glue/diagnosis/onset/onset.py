@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.signal
 
-from actuator_glue.diagnosis.data import Data, Mask
 from actuator_glue.diagnosis.estimate import Json
-from actuator_glue.diagnosis.moments import Moment
+from actuator_glue.diagnosis.onset.moments import Moment
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.inference.least_squares.data import Data, Mask
 from actuator_glue.model.linear import systems
 from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from actuator_glue.diagnosis.checks import where
-from actuator_glue.diagnosis.data import SETTLE
+from actuator_glue.hygiene.checks import where
+from actuator_glue.inference.least_squares.data import SETTLE
 from actuator_glue.model.exact import Initial
 from actuator_glue.records import Record
 

@@ -1,0 +1,1 @@
+"""Terms that are learned from records: their forms, sizes and descriptions."""

@@ -1,0 +1,1 @@
+"""Effects of the measurement, which leave no mean response."""

@@ -1,0 +1,1 @@
+"""Effects that begin in the middle of a record: when, and how."""

@@ -1,0 +1,1 @@
+"""Records with counted samples, simulated free-run and refitted by least squares."""
