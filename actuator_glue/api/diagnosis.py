@@ -16,13 +16,13 @@ from actuator_glue.api.provenance import provenance
 from actuator_glue.api.result import Result
 from actuator_glue.api.tracking import RecordTracking, record_tracking, tables
 from actuator_glue.diagnosis import diagnose as core
-from actuator_glue.diagnosis.decimate import decimated
 from actuator_glue.diagnosis.estimate import Json
-from actuator_glue.diagnosis.preparation import clean, initial_state
 from actuator_glue.diagnosis.result import SCHEMA, DiagnosisData
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.effects import save_effects
 from actuator_glue.errors import InputError
+from actuator_glue.hygiene.clean import clean, initial_state
+from actuator_glue.inference.least_squares.decimate import decimated
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.records import Record
 
