@@ -49,6 +49,7 @@ LIBRARIES = {
     'numba': Names('numba', 'python3-numba'),
     'numpy': Names('numpy', 'python3-numpy'),
     'openpyxl': Names('openpyxl', 'python3-openpyxl'),
+    'pandas': Names('pandas', 'python3-pandas'),
     'pyarrow': Names('pyarrow', None),
     'pylsl': Names('pylsl', None),
     'pytest': Names('pytest', 'python3-pytest'),

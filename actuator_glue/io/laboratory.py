@@ -10,6 +10,7 @@ import numpy as np
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import Channel, ChannelMap, read_channel_map
 from actuator_glue.io.formats import Column, FileTable, format_of
+from actuator_glue.io.signature import refuse_pipe
 from actuator_glue.io.time_base import uniform_period
 from actuator_glue.io.units import choose, factor
 from actuator_glue.records import Array, Hold, Record
@@ -42,6 +43,7 @@ def read(
     path = Path(path)
     if not path.exists():
         raise InputError(f'{path}: there is no such file')
+    refuse_pipe(path)
     if path.is_dir():
         raise InputError(f'{path}: this is a folder, and no bag in MCAP format')
     if isinstance(channels, (str, Path)):
@@ -87,6 +89,7 @@ def _by_name(path: Path) -> tuple[dict[str, Array], dict[str, str], float, int]:
     labels, units = [c.label for c in table.columns], [c.unit for c in table.columns]
     columns = choose(labels, units, str(path), timed=table.period is not None)
     raw = table.values([at for at, _ in columns.values()])
+    _check_numbers(raw, {role: at for role, (at, _) in columns.items()}, table, path)
     scales = [scale for _, scale in columns.values()]
     with np.errstate(all='ignore'):  # what is not finite is told with its place later
         values = {
@@ -138,13 +141,36 @@ def _raw(
         wanted['sample_number'] = channels.sample_number
     at = [position(c, table.columns, f'{path}: {role}') for role, c in wanted.items()]
     try:
-        raw = dict(zip(wanted, table.values(at), strict=True))
+        found = table.values(at)
     except IndexError as error:
         raise InputError(
             f'{path}: there are {len(table.columns)} columns, the channel map asks for number '
             f'{max(at) + 1}'
         ) from error
+    _check_numbers(found, dict(zip(wanted, at, strict=True)), table, path)
+    raw = dict(zip(wanted, found, strict=True))
     return raw, raw.get('sample_number')
+
+
+def _check_numbers(
+    raw: list[Array], positions: dict[str, int], table: FileTable, path: Path
+) -> None:
+    """Refuse what is no number where the file can show the place.
+
+    Raises:
+        InputError: a needed channel lacks a number.
+    """
+    if table.entry is None:
+        return
+    for column, (role, at) in zip(raw, positions.items(), strict=True):
+        bad = ~np.isfinite(column)
+        if bad.any():
+            row = int(bad.argmax())
+            raise InputError(
+                f'{path}: {role} is NaN or infinite, or no number, in {int(bad.sum())} of '
+                f'{len(bad)} samples, first in {table.entry(row, at)}; cut or repair the record '
+                'there'
+            )
 
 
 def position(column: str | int, columns: list[Column], where: str) -> int:

@@ -13,6 +13,7 @@ from actuator_glue.io.bag_reader import is_bag
 from actuator_glue.io.bag_topics import TopicSeries, topic_series
 from actuator_glue.io.channel_map import Channel, ChannelMap
 from actuator_glue.io.formats import Column, format_of, formats
+from actuator_glue.io.signature import refuse_pipe
 from actuator_glue.io.text_layout import text_layout
 from actuator_glue.records import Array
 
@@ -91,6 +92,7 @@ def look(path: Path | str) -> FileLook:
         InputError: it cannot be read, or holds no column of numbers.
     """
     path = Path(path)
+    refuse_pipe(path)
     if is_bag(path):
         columns = [c for topic in topic_series(path).values() for c in _of_topic(topic)]
         found = FileLook(path, columns, {}, None, 'bag')

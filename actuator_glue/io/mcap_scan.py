@@ -21,6 +21,7 @@ from mcap.reader import make_reader
 from mcap.records import Channel, Chunk, Message, Schema
 
 from actuator_glue.errors import InputError
+from actuator_glue.io.signature import refuse_pipe
 
 _MAGIC = b'\x89MCAP0\r\n'
 _HEAD = struct.Struct('<BQ')
@@ -58,8 +59,9 @@ class Scan:
             follow: the file is still being written: yield what is whole since the last call.
 
         Raises:
-            InputError: the file cannot be opened or is no MCAP file.
+            InputError: the file cannot be opened, is no MCAP file, or is a pipe.
         """
+        refuse_pipe(self.path)
         try:
             size = self.path.stat().st_size
             with self.path.open('rb') as file:

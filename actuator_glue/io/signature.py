@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 from pathlib import Path
+from typing import Literal, TextIO
 
 from actuator_glue.errors import InputError
 
@@ -50,12 +51,29 @@ _MARKS = (
 )
 
 
+def refuse_pipe(path: Path) -> None:
+    """Refuse what can be read only once: a pipe, a terminal, a device.
+
+    A file is opened more than once: to see what it is, then for what it holds. Of a pipe the
+    second look would begin in the middle.
+
+    Raises:
+        InputError: it is there, but neither a file nor a folder.
+    """
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise InputError(
+            f'{path}: this is a pipe or a device, which can be read only once; save what comes '
+            'out of it as a file, and give that'
+        )
+
+
 def beginning(path: Path) -> bytes:
     """Return the first bytes of a file.
 
     Raises:
-        InputError: it cannot be read.
+        InputError: it cannot be read, or is a pipe.
     """
+    refuse_pipe(path)
     try:
         with path.open('rb') as file:
             return file.read(_LOOK)
@@ -102,6 +120,27 @@ def text_encoding(path: Path) -> str:
     except UnicodeDecodeError:
         return 'cp1252'  # of which a few bytes are no character: those are told where they are
     return 'utf-8-sig'
+
+
+def open_text(path: Path, errors: Literal['strict', 'replace'] = 'strict') -> TextIO:
+    """Return a text file that is open for reading, its lines ending with a line feed.
+
+    Lines that end CR CR LF are what Python's csv module writes on Windows into a file whose line
+    ends are translated again: one line end, not two.
+
+    Args:
+        path: the file.
+        errors: 'replace' where bytes that are no character of its coding may be there.
+
+    Raises:
+        InputError: the file cannot be read, or is no text.
+    """
+    encoding = text_encoding(path)
+    doubled = '\r\r\n' in beginning(path).decode(encoding, 'replace')
+    try:
+        return path.open(encoding=encoding, errors=errors, newline='\n' if doubled else None)
+    except OSError as error:
+        raise InputError(f'{path}: cannot be read ({error.strerror or error})') from error
 
 
 def _known(start: bytes) -> tuple[str, str]:

@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
-from itertools import islice
+from itertools import islice, zip_longest
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from actuator_glue.errors import InputError
-from actuator_glue.io.formats.delimited import DELIMITERS, delimiter_of, fields_of
-from actuator_glue.io.signature import text_encoding
+from actuator_glue.io.formats.delimited import DELIMITERS, fields_of, is_number, read_head
+from actuator_glue.io.signature import open_text
 from actuator_glue.io.units import units_line
 
 _LOOK = 300  # lines in which the samples must begin
 _ROWS = 5  # rows of one shape that are samples
+
+
+class _Rows(NamedTuple):
+    """Rows of numbers as one delimiter parts them."""
+
+    first: int
+    delimiter: str | None
+    numbers: list[int]
+    width: int
 
 
 def text_layout(path: Path) -> tuple[dict[str, Any], list[int]]:
@@ -21,39 +30,40 @@ def text_layout(path: Path) -> tuple[dict[str, Any], list[int]]:
     Raises:
         InputError: no text, or no rows of at least two numbers near its beginning.
     """
-    with path.open(encoding=text_encoding(path), errors='replace') as file:
+    with open_text(path, errors='replace') as file:
         lines = [line.rstrip('\r\n') for line in islice(file, _LOOK)]
-    while lines and not lines[-1].strip():
-        lines.pop()
-    best: tuple[int, int, str | None, list[int]] | None = None
-    for delimiter in (*DELIMITERS, None):
-        rows = [_numbers(line, delimiter) for line in lines]
-        for first, numbers in enumerate(rows):
-            following = rows[first : first + _ROWS]
-            if len(numbers) >= 2 and len(following) >= 2 and all(r == numbers for r in following):
-                if best is None or len(numbers) > len(best[3]):
-                    best = (first, -len(numbers), delimiter, numbers)
-                break
-    if best is None:
+    found = [rows for d in (*DELIMITERS, None) if (rows := _first_rows(lines, d)) is not None]
+    if not found:
         raise InputError(f'{path}: no rows of at least two numbers in the first {_LOOK} lines')
-    first, _, delimiter, numbers = best
-    entries: dict[str, Any] = {'header_lines': first}
-    above = [fields_of(line, delimiter) for line in lines[max(first - 2, 0) : first]]
+    # A wrong delimiter leaves entries that are no numbers.
+    best = max(found, key=lambda rows: 2 * len(rows.numbers) - rows.width)
+    entries: dict[str, Any] = {'header_lines': best.first}
+    above = [
+        fields_of(line, best.delimiter) for line in lines[max(best.first - 2, 0) : best.first]
+    ]
     if len(above) == 2 and len(above[0]) >= 2 and units_line(above[1]):
-        entries['header_lines'] = first - 1  # a line of units is found by itself
-    if delimiter is not None and delimiter != delimiter_of(lines[first]):
-        entries['delimiter'] = delimiter
-    return entries, numbers
+        entries['header_lines'] = best.first - 1  # a line of units is found by itself
+    read = read_head(path, entries['header_lines'])
+    if best.delimiter is not None and best.delimiter != read.delimiter:
+        entries['delimiter'] = best.delimiter
+    return entries, best.numbers
 
 
-def _numbers(line: str, delimiter: str | None) -> list[int]:
-    """Return the positions of the numbers in a line."""
-    return [i for i, text in enumerate(fields_of(line, delimiter)) if _is_number(text)]
+def _first_rows(lines: list[str], delimiter: str | None) -> _Rows | None:
+    """Return the first rows that have numbers at two positions at least.
 
-
-def _is_number(text: str) -> bool:
-    try:
-        float(text.replace(',', '.', 1))
-    except ValueError:
-        return False
-    return True
+    A position that is empty in some of them, and a number in others, is a column of numbers.
+    """
+    table = [(i, fields_of(line, delimiter)) for i, line in enumerate(lines) if line.strip()]
+    for at, (first, _) in enumerate(table[:-1]):
+        rows = [row for _, row in table[at : at + _ROWS]]
+        columns = list(zip_longest(*rows, fillvalue=''))
+        always = [i for i, column in enumerate(columns) if all(map(is_number, column))]
+        sometimes = [
+            i
+            for i, column in enumerate(columns)
+            if any(map(is_number, column)) and all(is_number(e) or not e for e in column)
+        ]
+        if len(always) >= 2:
+            return _Rows(first, delimiter, sometimes, len(columns))
+    return None

@@ -50,6 +50,8 @@ class FileTable:
         values: return the columns at positions from 0, each of shape (n,), unscaled.
         period: time between samples [s] where the file states one.
         start_ns: time from which its times count [ns], where the file states one; 0 elsewhere.
+        entry: where a sample, from 0, of a column at a position is, and what is written there,
+            for messages; None in files that no person reads.
     """
 
     columns: list[Column]
@@ -57,6 +59,7 @@ class FileTable:
     values: Callable[[list[int]], list[Array]]
     period: float | None = None
     start_ns: int = 0
+    entry: Callable[[int, int], str] | None = None
 
 
 @dataclass(frozen=True, slots=True)

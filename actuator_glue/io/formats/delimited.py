@@ -3,51 +3,77 @@
 from __future__ import annotations
 
 import csv
-import warnings
-from collections.abc import Mapping
+import re
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
+from typing import Literal, TextIO
 
 import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
 from actuator_glue.io.formats import Column, FileTable, Format
-from actuator_glue.io.signature import text_encoding
-from actuator_glue.io.units import EXAMPLE, recognise, units_line
+from actuator_glue.io.signature import open_text
+from actuator_glue.io.units import EXAMPLE, units_line
 from actuator_glue.records import Array
 
-_ROWS = 10_000  # rows formatted at a time
+_ROWS = 10_000  # rows read or written at a time
+_LOOK = 100  # rows that tell how a text is laid out
 # A comma may be the decimal sign where there is another delimiter, so it comes last.
 DELIMITERS = (';', '\t', ',')
+_NOTHING = ' \r\n\x1a'  # all that a line without entries may hold; DOS ends a file with the last
+_NUMBER = re.compile(
+    r'[+-]?(?:(?:\d+\.?\d*|\.\d+)(?:e[+-]?\d+)?|nan|inf(?:inity)?)', re.ASCII | re.IGNORECASE
+)
+# Digits in groups of three, as thousands are written; a decimal fraction may look like it.
+_GROUPED = re.compile(r'[+-]?[1-9]\d{0,2}(?:[.,]\d{3})+', re.ASCII)
+_WORD = re.compile(r'"((?:[^"]|"")*)"|(\S+)')
+_QUOTED_FIRST = re.compile(r'\s*"[^"]*"\s*[;,\s]\s*[^"\s]')
+_SPREADSHEET = re.compile(r'"?sep=(.)"?', re.IGNORECASE)  # a first line that says the delimiter
+# Names of columns that go up by themselves: a running number below one may be its own.
+_GOES_UP = re.compile(
+    r'time|zeit|sample|index|count|number|row|step|^(nr|no|id|t|i|n|#)\b', re.IGNORECASE
+)
+# Names of columns of text behind the numbers, which are often left out.
+_REMARKS = re.compile(r'event|comment|remark|note|marker|message|kommentar|bemerkung', re.I)
+Decimal = Literal['.', ',']
 
 
 @dataclass(frozen=True, slots=True)
 class TextHead:
-    """What the lines before the samples say.
+    """What the lines before the samples say, and how the samples are laid out.
 
     Attributes:
-        names: column names; empty where there are none.
+        names: one for each entry of a row, empty for a running number that has none; nothing
+            where the line of names does not fit the rows, or there is none.
         units: of the columns, where a line below the names holds them.
         lines: lines before the first sample.
         delimiter: text between columns, None for blanks.
         notes: `# name = value` lines.
-        decimal: decimal sign of the first sample.
-        encoding: how the text is coded.
+        decimal: decimal sign of the samples.
+        width: entries of a row.
+        least: entries that a row has at least; the last ones may be remarks, and left out.
+        named: entries of the line of names, whether it fits or not.
     """
 
     names: list[str]
+    units: list[str]
     lines: int
     delimiter: str | None
     notes: dict[str, str]
-    decimal: str
-    encoding: str = 'utf-8-sig'
-    units: tuple[str, ...] = ()
+    decimal: Decimal
+    width: int
+    least: int
+    named: int
 
 
 def read_head(
-    path: Path, header_lines: int | None = None, delimiter: str | None = None
+    path: Path,
+    header_lines: int | None = None,
+    delimiter: str | None = None,
+    decimal: Decimal | None = None,
 ) -> TextHead:
     """Return the head of a file.
 
@@ -56,136 +82,359 @@ def read_head(
         header_lines: lines before the first sample, the last naming the columns; None where
             `#` lines and one line of names are all there is.
         delimiter: text between columns, found by itself where None.
+        decimal: decimal sign, found by itself where None.
 
     Raises:
         InputError: the file cannot be read, is no text or is empty.
     """
-    encoding = text_encoding(path)
-    try:
-        with path.open(encoding=encoding, errors='replace') as file:
-            top = [line.rstrip('\r\n') for line in islice(file, (header_lines or 100) + 2)]
-    except OSError as error:
-        raise InputError(f'{path}: cannot be read ({error.strerror})') from error
+    with open_text(path, errors='replace') as file:
+        top = [line.rstrip('\r\n') for line in islice(file, (header_lines or _LOOK) + _LOOK)]
     if not any(line.strip() for line in top):
         raise InputError(f'{path}: the file is empty')
     notes: dict[str, str] = {}
     if header_lines is None:
-        header_lines = 0
-        while header_lines < len(top) and top[header_lines].lstrip().startswith('#'):
-            name, sign, value = top[header_lines].lstrip('# ').partition('=')
-            if sign:
-                notes[name.strip()] = value.strip()
-            header_lines += 1
-        header_lines += 1
-    if len(top) < header_lines:
+        if (said := _SPREADSHEET.fullmatch(top[0].strip())) is not None:
+            delimiter = delimiter or said[1]
+        header_lines, line, notes = _find_names(path, top, int(said is not None))
+    elif len(top) < header_lines:
         raise InputError(f'{path}: {len(top)} lines, but {header_lines} header lines expected')
-    line = top[header_lines - 1] if header_lines else ''
+    else:
+        line = top[header_lines - 1].removeprefix('# ') if header_lines else ''
     units: list[str] = []
-    if header_lines and len(top) > header_lines:
-        parting = delimiter or delimiter_of(top[header_lines])
-        units = units_line(fields_of(top[header_lines], parting))
+    if line and len(top) > header_lines:
+        below = top[header_lines]
+        units = units_line(fields_of(below, delimiter or _best_delimiter(line, below)))
     header_lines += bool(units)
-    sample = top[header_lines] if len(top) > header_lines else line
+    rows = [text for text in top[header_lines:] if text.strip(_NOTHING)] or [line]
     if delimiter is None:
-        delimiter = delimiter_of(sample)
-    # With both signs in a line the comma can only part thousands, which nobody can read safely.
-    comma = any(',' in field for field in fields_of(sample, delimiter))
-    decimal = ',' if comma and '.' not in sample else '.'
+        delimiter = _best_delimiter(line, rows[0])
+    table = [fields_of(row, delimiter) for row in rows]
+    widths = {len(row) for row in table}
+    names = _names(line, delimiter, widths)
+    width = max(widths)
+    if len(names) in widths or all(map(_REMARKS.search, names[width:] or [''])):
+        width = len(names)
+    aligned = names if len(names) == width else _aligned(names, table, rows)
+    least = _least_width(aligned, table, width)
+    if aligned and not aligned[0] and len(units) == width - 1:
+        units = ['', *units]
+    units = [*units, *[''] * (width - len(units))][:width]
+    sign = decimal or _decimal([entry for row in table for entry in row])
+    return TextHead(aligned, units, header_lines, delimiter, notes, sign, width, least, len(names))
+
+
+def _find_names(path: Path, top: list[str], first: int) -> tuple[int, str, dict[str, str]]:
+    """Return the lines before samples or a line of units, the line of names, and the notes."""
+    notes: dict[str, str] = {}
+    line, at = '', first
+    while at < len(top) and top[at].lstrip().startswith('#'):
+        comment = top[at].lstrip('# ')
+        name, sign, value = comment.partition('=')
+        if sign:
+            notes[name.strip()] = value.strip()
+        else:
+            line = comment
+        at += 1
+    if at == len(top):
+        return at, line, notes
+    entries = fields_of(top[at], _best_delimiter('', top[at]))
+    if len(entries) < 2 or not all(map(is_number, entries)):
+        return at + 1, top[at], notes
+    if entries in ([str(i + start) for i in range(len(entries))] for start in (0, 1)):
+        raise InputError(
+            f'{path}: line {at + 1} may be a sample or the numbers of the columns; say which in '
+            f'a channel map, with `header_lines: {at}` or `header_lines: {at + 1}`'
+        )
+    # Numbers are no names but the first sample; numpy.savetxt puts names behind a `#`.
+    return at, line, notes
+
+
+def _best_delimiter(names: str, row: str) -> str | None:
+    """Return what parts a row, None for blanks: as many names as entries, and most numbers."""
+
+    def fit(delimiter: str | None) -> tuple[bool, int]:
+        entries = fields_of(row, delimiter)
+        missing = len(entries) - len(fields_of(names, delimiter))
+        return len(entries) > 1 and missing in (0, 1), 2 * sum(map(is_number, entries)) - len(
+            entries
+        )
+
+    return max((*DELIMITERS, None), key=fit)
+
+
+def _names(line: str, delimiter: str | None, widths: set[int]) -> list[str]:
     names = fields_of(line, delimiter)
-    return TextHead(names, header_lines, delimiter, notes, decimal, encoding, tuple(units))
+    # What numpy.savetxt is told to write behind its `#` need not be parted as its rows are.
+    own = fields_of(line, next((d for d in DELIMITERS if d in line), None))
+    names = own if len(own) in widths else names
+    while len(names) > max(widths) and not names[-1]:
+        names = names[:-1]
+    return names
 
 
-def delimiter_of(line: str) -> str | None:
-    """Return the delimiter of a line, None for blanks."""
-    return next((d for d in DELIMITERS if d in line), None)
+def _aligned(names: list[str], table: list[list[str]], rows: list[str]) -> list[str]:
+    """Return one name for each entry of a row, of which there is one more; nothing if unclear.
+
+    That one is a running number without a name in front, as R and pandas write it, or it is
+    nothing behind a delimiter that ends each row.
+    """
+    if not names or any(len(row) != len(names) + 1 for row in table):
+        return []
+    counts = len(table) > 1 and all(row[0].isdecimal() for row in table)
+    if counts:
+        first = int(table[0][0])
+        counts = all(int(row[0]) == first + i for i, row in enumerate(table))
+    own = _GOES_UP.search(names[0]) is not None
+    if (own or not counts) and not any(row[-1] for row in table):
+        return [*names, '']
+    # Where the first name may be that of the running number, only quotes tell.
+    if counts and (not own or all(map(_QUOTED_FIRST.match, rows))):
+        return ['', *names]
+    return []
+
+
+def _least_width(names: list[str], table: list[list[str]], width: int) -> int:
+    """Return how many entries a row has at least: columns of remarks at its end may be left out.
+
+    Where a number is left out nothing tells which one it was.
+    """
+    least = width
+    while least > 2:
+        entries = [row[least - 1] for row in table if len(row) >= least]
+        remarks = any(entries) and not any(map(is_number, entries))
+        if not remarks and not (names and not any(entries) and _REMARKS.search(names[least - 1])):
+            break
+        least -= 1
+    return least
+
+
+def _decimal(entries: list[str]) -> Decimal:
+    commas = [e for e in entries if ',' in e and is_number(e)]
+    points = [e for e in entries if '.' in e and is_number(e)]
+    if not commas or (points and all(map(_GROUPED.fullmatch, commas))):
+        return '.'
+    return ',' if all(map(_GROUPED.fullmatch, points)) else '.'
+
+
+def is_number(entry: str) -> bool:
+    """Return whether an entry is a number, whatever its decimal sign."""
+    return _NUMBER.fullmatch(entry.strip().replace(',', '.', 1)) is not None
 
 
 def fields_of(line: str, delimiter: str | None) -> list[str]:
     """Return the entries of a line without the quotes about them."""
-    if not line.strip():
+    if not line.strip(_NOTHING):
         return []
     if delimiter is None:
-        return [entry.strip('"') for entry in line.split()]
-    if len(delimiter) != 1:  # csv takes one character
+        words = _WORD.finditer(line) if '"' in line else ()
+        return [m[1] if m[2] is None else m[2] for m in words] or line.split()
+    if '"' not in line or len(delimiter) != 1:  # csv takes one character
         return [entry.strip().strip('"') for entry in line.split(delimiter)]
-    (entries,) = csv.reader([line], delimiter=delimiter, skipinitialspace=delimiter != ' ')
+    blanks = delimiter != ' '
+    try:
+        (entries,) = csv.reader([line], delimiter=delimiter, skipinitialspace=blanks, strict=True)
+    except csv.Error:  # a quote that does not end would take what follows for one entry
+        return [line]
     return [entry.strip() for entry in entries]
 
 
-def read_columns(
-    path: Path, head: TextHead, positions: list[int], decimal: str | None = None
-) -> Array:
-    """Return columns of numbers, shape (n, number of columns).
+def read_columns(path: Path, head: TextHead, positions: list[int]) -> list[Array]:
+    """Return columns of numbers, each of shape (n,); what is no number there is NaN.
 
     Args:
         path: the file.
         head: its head.
         positions: columns wanted, from 0.
-        decimal: decimal sign, the head's where None.
 
     Raises:
-        InputError: a value is no number, a row is short, or there is no row.
+        InputError: a row has another number of entries than the first, there is no row, or no
+            such column.
     """
-    convert = None
-    if (decimal or head.decimal) == ',':
-
-        def convert(text: str) -> float:
-            return float(text.replace(',', '.'))
-
+    if max(positions) >= head.width:
+        raise InputError(
+            f'{path}: cannot read the samples: rows have {head.width} entries, column '
+            f'{max(positions) + 1} is asked for'
+        )
+    parts: list[list[Array]] = [[] for _ in positions]
     try:
-        with warnings.catch_warnings():
-            # numpy warns of a file without samples; that is told below.
-            warnings.simplefilter('ignore', UserWarning)
-            columns: Array = np.loadtxt(
-                path,
-                delimiter=head.delimiter,
-                skiprows=head.lines,
-                usecols=positions,
-                ndmin=2,
-                encoding=head.encoding,
-                converters=convert,
-                quotechar='"',
-            )
+        with open_text(path) as file:
+            rows = _rows(file, head)
+            while block := list(islice(rows, _ROWS)):
+                for part, column in zip(parts, _block(path, block, head, positions), strict=True):
+                    part.append(column)
     except UnicodeDecodeError as error:
         raise InputError(
-            f'{path}: not plain text in {head.encoding} (byte {error.start}); save it as UTF-8'
+            f'{path}: not plain text in {error.encoding} (byte {error.start}); save it as UTF-8'
         ) from error
-    except (ValueError, IndexError) as error:
-        detail = ' '.join(str(error).split()).removesuffix('.')
-        raise InputError(
-            f'{path}: cannot read the samples: {detail} (rows are counted after the '
-            f'{head.lines} header lines)'
-        ) from error
-    if not len(columns):
+    if not parts[0]:
         raise InputError(f'{path}: no samples after the {head.lines} header lines')
+    columns = []
+    for part in parts:  # one after the other: of a long file not everything is there twice
+        columns.append(np.concatenate(part))
+        part.clear()
     return columns
+
+
+def _rows(file: TextIO, head: TextHead) -> Iterator[tuple[int, str]]:
+    """Yield line numbers from 1 and rows: no empty lines, at the end no rows of empty entries."""
+    empty = _NOTHING + ('\t' if head.delimiter is None else '')
+    parted = empty + (head.delimiter or '') + '"'
+    held: list[tuple[int, str]] = []
+    for number, line in enumerate(islice(file, head.lines, None), head.lines + 1):
+        if line.strip(parted):
+            if held:
+                yield from held
+                held.clear()
+            yield number, line
+        elif line.strip(empty):
+            held.append((number, line))
+
+
+def _block(
+    path: Path, block: list[tuple[int, str]], head: TextHead, positions: list[int]
+) -> list[Array]:
+    """Return some columns of some rows.
+
+    Raises:
+        InputError: a row has more or fewer entries than the first of the file.
+    """
+    delimiter, lines = head.delimiter, [line for _, line in block]
+    plain = head.decimal == '.' and (delimiter is None or len(delimiter) == 1)
+    if plain and not any('"' in line for line in lines):
+        _check_widths(
+            path,
+            head,
+            block,
+            [len(line.split()) for line in lines]
+            if delimiter is None
+            else [line.count(delimiter) + 1 for line in lines],
+        )
+        try:
+            table: Array = np.loadtxt(
+                lines, delimiter=delimiter, usecols=positions, ndmin=2, comments=None
+            )
+        except ValueError:
+            pass  # an entry is no number: it is found below
+        else:
+            return [np.array(column) for column in table.T]
+    rows = [fields_of(line, delimiter) for line in lines]
+    _check_widths(path, head, block, [len(row) for row in rows])
+    return [
+        _numbers([row[at] if at < len(row) else '' for row in rows], head.decimal)
+        for at in positions
+    ]
+
+
+def _check_widths(
+    path: Path, head: TextHead, block: list[tuple[int, str]], widths: list[int]
+) -> None:
+    if head.least <= min(widths) and max(widths) <= head.width:
+        return
+    for width, (number, line) in zip(widths, block, strict=True):
+        if head.least <= width <= head.width:
+            continue
+        remarks = fields_of(line, head.delimiter)[head.least :]
+        if head.least < head.width and width > head.width and not any(map(is_number, remarks)):
+            continue  # several remarks with the delimiter between them
+        raise InputError(
+            f'{path}: cannot read the samples: line {number} has {width} entries, other rows '
+            f'have {head.width}: a column would be shifted, or the file is cut off there; mend or '
+            f'remove that line ({line.strip()[:60]!r})'
+        )
+
+
+def _numbers(entries: list[str], decimal: Decimal) -> Array:
+    """Return numbers, NaN for what is none."""
+    text = '\n'.join(entries)
+    if decimal == ',':  # a point is nothing there: least of all is it left out
+        text = text.replace('.', '?').replace(',', '.')
+    entries = text.split('\n')
+    if text.isascii() and '_' not in text:  # `float` takes more than files mean
+        try:
+            return np.array(list(map(float, entries)))
+        except ValueError:
+            pass
+    return np.array(
+        [float(e) if _NUMBER.fullmatch(e.strip()) is not None else np.nan for e in entries]
+    )
+
+
+def _entry(path: Path, head: TextHead, row: int, position: int) -> str:
+    """Return where the file has an entry, and what it is, for messages."""
+    with open_text(path, errors='replace') as file:
+        number, line = next(islice(_rows(file, head), row, None))
+    entries = [*fields_of(line, head.delimiter), *[''] * head.width]
+    said = f'line {number}: {entries[position]!r}'
+    if head.decimal == ',' and is_number(entries[position]):
+        return f'{said}, a point where the comma is the decimal sign: save it without thousands'
+    return said
+
+
+def _refuse_groups(path: Path, head: TextHead, at: list[int], columns: list[Array]) -> None:
+    """Refuse a column whose numbers may be thousands or have a fraction: 1.234 between 56 and 78.
+
+    Raises:
+        InputError: nothing in the whole column tells which.
+    """
+    for position, values in zip(at, columns, strict=True):
+        whole = values == np.rint(values)
+        broken = np.abs(values[~whole & np.isfinite(values)])
+        milli = 1e3 * broken
+        if (
+            not len(broken)
+            or not whole.any()
+            or broken.min() < 1.0
+            or broken.max() >= 1000.0
+            or np.abs(milli - np.rint(milli)).max() > 1e-6
+        ):
+            continue
+        with open_text(path) as file:
+            rows = [fields_of(line, head.delimiter) for _, line in _rows(file, head)]
+        entries = [row[position] for row in rows if len(row) > position]
+        signed = [e for e in entries if head.decimal in e]
+        if len(signed) < len(entries) and all(map(_GROUPED.fullmatch, signed)):
+            raise InputError(
+                f'{path}: column {position + 1}: {signed[0]!r} may be '
+                f'{signed[0].replace(head.decimal, "")} or a fraction, and nothing in the column '
+                'tells which; save the numbers without thousands separators, or say `decimal` in '
+                'a channel map'
+            )
 
 
 def _read(path: Path, channels: ChannelMap | None) -> FileTable:
     if channels is None:
-        head, decimal = read_head(path), None
-        if not any(recognise(name) for name in head.names) and _numeric(head.names):
+        head = read_head(path)
+        if not head.named:
             raise InputError(
                 f'{path}: the first line must name the columns with their units, as in '
                 f'{EXAMPLE}; or describe the file with --channels MAP.yaml'
             )
+        by_name = True
     else:
-        head = read_head(path, channels.header_lines, channels.delimiter)
-        decimal = channels.decimal
-    units = [*head.units, *[''] * len(head.names)]
+        head = read_head(path, channels.header_lines, channels.delimiter, channels.decimal)
+        wanted = [channel.column for channel in channels.roles().values()]
+        by_name = any(isinstance(column, str) for column in (*wanted, channels.sample_number))
+    if by_name and head.named and not head.names:
+        raise InputError(
+            f'{path}: cannot read the samples: {head.named} names, but {head.width} entries in '
+            'the first row; give each column a name, or describe the file with --channels '
+            'MAP.yaml, which `actuator-glue map` proposes'
+        )
+    stated = channels is not None and channels.decimal is not None
+
+    def values(at: list[int]) -> list[Array]:
+        columns = read_columns(path, head, at)
+        if not stated:
+            _refuse_groups(path, head, at, columns)
+        return columns
+
+    names = head.names or [''] * head.width
     return FileTable(
-        [Column(name, name, unit) for name, unit in zip(head.names, units, strict=False)],
+        [Column(name, name, unit) for name, unit in zip(names, head.units, strict=True)],
         head.notes,
-        lambda at: list(read_columns(path, head, at, decimal).T),
+        values,
+        entry=lambda row, at: _entry(path, head, row, at),
     )
-
-
-def _numeric(names: list[str]) -> bool:
-    try:
-        [float(name) for name in names]
-    except ValueError:
-        return False
-    return True
 
 
 def _write(path: Path, columns: Mapping[str, Array], notes: Mapping[str, str | float]) -> None:

@@ -1,0 +1,250 @@
+"""Delimited text: no column is ever shifted, no number ever another one than was written."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from actuator_glue.errors import InputError
+from actuator_glue.io.channel_map import parse_channel_map, read_channel_map
+from actuator_glue.io.laboratory import read
+from actuator_glue.io.load import load_records
+from actuator_glue.io.look import look
+
+COUNT = 60
+TIME = np.arange(COUNT) * 1e-3
+COMMAND = np.round(7 * np.sin(90 * TIME), 4)  # mm
+MEASURED = np.round(6 * np.sin(90 * TIME - 0.5), 4)  # mm
+FORCE = np.round(2461.3 * np.cos(90 * TIME))  # N
+NAMES = ('time_s', 'command_mm', 'measured_mm', 'force_N')
+COLUMNS = (TIME, COMMAND, MEASURED, FORCE)
+ROWS = [
+    [f'{t:.3f}', f'{c:.4f}', f'{m:.4f}', f'{f:.0f}'] for t, c, m, f in zip(*COLUMNS, strict=True)
+]
+
+# What pandas takes for missing (its documentation of `na_values`).
+PANDAS = ['', '#N/A', '#N/A N/A', '#NA', '-1.#IND', '-1.#QNAN', '-NaN', '-nan', '1.#IND']
+PANDAS += ['1.#QNAN', '<NA>', 'N/A', 'NA', 'NULL', 'NaN', 'None', 'n/a', 'nan', 'null']
+MSVC = ['-1.#IND00', '1.#QNAN', '1.#QNAN0', '1.#SNAN', '1.#INF', '-1.#INF00', '1.#J', '1.#R']
+OTHERS = ['nan(ind)', '-nan(ind)', 'nan(snan)', 'inf', '-Infinity', '#DIV/0!', '-', 'OL']
+
+
+def table(
+    path: Path, rows: list[list[str]], names: tuple[str, ...] = NAMES, by: str = ','
+) -> Path:
+    """Write names and rows with a delimiter, and no quotes."""
+    path.write_text('\n'.join(by.join(row) for row in [list(names), *rows]) + '\n')
+    return path
+
+
+def check(path: Path, *, force: bool = True) -> None:
+    """Compare a record with what was written."""
+    record = read(path)
+    np.testing.assert_allclose(record.command, COMMAND * 1e-3, atol=1e-12)
+    np.testing.assert_allclose(record.measured, MEASURED * 1e-3, atol=1e-12)
+    assert record.period == 1e-3
+    if force:
+        assert record.force is not None
+        np.testing.assert_allclose(record.force, FORCE)
+
+
+@st.composite
+def written(draw: st.DrawFn) -> tuple[str, str, str, list[str]]:
+    """Return a text, its delimiter, its decimal sign and the names in its first line."""
+    delimiter = draw(st.sampled_from([',', ';', '\t', ' ']))
+    decimal = draw(st.sampled_from(['.', ',']))
+    width = draw(st.integers(3, 5))
+    digits = draw(st.integers(0, 4))
+    numbered = draw(st.booleans())
+    rng = np.random.default_rng(draw(st.integers(0, 2**32 - 1)))
+    rows = [
+        [f'{i * 1e-3:.3f}', *(f'{v:.{digits}f}' for v in 30 * rng.standard_normal(width - 1))]
+        for i in range(20)
+    ]
+    rows = [[v.replace('.', decimal) for v in row] for row in rows]
+    names = ['time_s', 'command_mm', 'measured_mm', 'force_N', 'spare'][:width]
+    if draw(st.booleans()):
+        names[-1] = f'has{delimiter}it'
+    missing = draw(st.sampled_from([*PANDAS, '-1.#IND00', 'OL', '1_0', '1e999']))
+    if draw(st.integers(0, 3)) == 0:
+        rows[draw(st.integers(0, 19))][draw(st.integers(0, width - 1))] = missing
+    if numbered:
+        rows = [[str(i), *row] for i, row in enumerate(rows, draw(st.integers(0, 1)))]
+    change = draw(st.sampled_from(['none', 'none', 'less', 'more']))
+    names = {'none': names, 'less': names[:-1], 'more': [*names, 'other']}[change]
+    quotes = draw(st.sampled_from(['none', 'all', 'first', 'names']))
+
+    def line(entries: list[str], first: bool) -> str:
+        told = {'all': len(entries), 'first': 1, 'names': len(entries) * first, 'none': 0}[quotes]
+        return delimiter.join(
+            f'"{e}"' if i < told or delimiter in e else e for i, e in enumerate(entries)
+        )
+
+    lines = [line(names, True), *(line(row, False) for row in rows)]
+    return '\n'.join(lines) + '\n', delimiter, decimal, names
+
+
+@settings(
+    max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(case=written(), by_map=st.booleans())
+def test_text_is_read_as_pandas_does_or_refused(
+    tmp_path: Path, case: tuple[str, str, str, list[str]], by_map: bool
+) -> None:
+    """Delimiter, quotes, decimal sign, a missing value, a running number, a name more or less."""
+    text, delimiter, decimal, names = case
+    path = tmp_path / 'a.txt'
+    path.write_text(text, encoding='utf-8', newline='')
+    described = parse_channel_map(
+        {
+            'time': {'column': 'time_s', 'unit': 's'},
+            'command': {'column': 'command_mm', 'unit': 'mm'},
+            'measured': {'column': names[min(2, len(names) - 1)], 'unit': 'mm'},
+        },
+        'map',
+    )
+    try:
+        record = read(path, channels=described if by_map else None)
+    except InputError:
+        return
+    frame = pd.read_csv(path, sep=delimiter, decimal=decimal)
+    for role, column in (('command', 1), ('measured', min(2, len(names) - 1))):
+        wanted = frame[names[column]].to_numpy(dtype=float) * 1e-3
+        np.testing.assert_array_equal(getattr(record, role), wanted, err_msg=text)
+    steps = np.diff(frame['time_s'].to_numpy(dtype=float))
+    assert record.period == pytest.approx(steps.mean(), rel=1e-9)
+
+
+@pytest.mark.parametrize('numbered', [False, True])
+@pytest.mark.parametrize('quote', ['', '"'])
+@pytest.mark.parametrize(
+    ('by', 'decimal'),
+    [(';', ','), (';', '.'), ('\t', ','), ('\t', '.'), (',', '.'), (' ', ','), (' ', '.')],
+)
+def test_every_usual_table_is_read(
+    tmp_path: Path, by: str, decimal: str, quote: str, numbered: bool
+) -> None:
+    """Delimiters with either decimal sign, quotes about the names and the running numbers."""
+    rows = [[v.replace('.', decimal) for v in row] for row in ROWS]
+    if numbered:
+        rows = [[f'"{i}"', *row] for i, row in enumerate(rows, 1)]
+    names = tuple(f'{quote}{name}{quote}' for name in NAMES)
+    check(table(tmp_path / 'a.txt', rows, names, by))
+
+
+def test_one_name_fewer_is_no_guess(tmp_path: Path) -> None:
+    """A last column without a name, numbers in front that a name may mean, two names fewer."""
+    for names, rows in (
+        (NAMES, [[*row, '7'] for row in ROWS]),
+        (NAMES, [[str(i), *row] for i, row in enumerate(ROWS)]),
+        (('sample', *NAMES), [['5', str(i), *row] for i, row in enumerate(ROWS)]),
+        (NAMES, [[str(i), str(i), *row] for i, row in enumerate(ROWS)]),
+        ((*NAMES, 'spare'), ROWS),
+    ):
+        with pytest.raises(InputError, match=r'names, but \d entries'):
+            read(table(tmp_path / 'a.csv', rows, names))
+    check(table(tmp_path / 'a.csv', [[*row, ''] for row in ROWS]))  # a delimiter ends each row
+    check(table(tmp_path / 'a.csv', ROWS, (*NAMES, '')))
+    check(table(tmp_path / 'a.csv', ROWS, (*NAMES, 'Comment')))
+
+
+@pytest.mark.parametrize(
+    ('row', 'words'),
+    [
+        (['0.020', '1', '2', '3', '4'], 'line 22 has 5 entries'),
+        (['0.020', '1', '2'], 'line 22 has 3 entries'),
+        (['# stopped'], 'line 22 has 1 entries'),
+        (['0.020', '1', '2', '"3'], 'line 22 has 1 entries'),
+    ],
+)
+def test_a_row_of_another_width_is_refused(tmp_path: Path, row: list[str], words: str) -> None:
+    """More, fewer, a remark, a quote that does not end: the line is told."""
+    path = table(tmp_path / 'a.csv', [*ROWS[:20], row, *ROWS[21:]])
+    with pytest.raises(InputError, match=words):
+        read(path)
+
+
+@pytest.mark.parametrize('missing', [*PANDAS, *MSVC, *OTHERS])
+def test_what_is_no_number_is_refused_where_it_is_needed(tmp_path: Path, missing: str) -> None:
+    """Every spelling: told with its line in a needed column, passed over in another one."""
+    rows = [[*row, row[3]] for row in ROWS]
+    names = (*NAMES, 'spare')
+    for column in range(4):
+        odd = [*rows[40]]
+        odd[column] = missing
+        path = table(tmp_path / 'a.csv', [*rows[:40], odd, *rows[41:]], names)
+        with pytest.raises(InputError, match=r'in 1 of 60 samples, first in line 42: ') as caught:
+            read(path)
+        assert repr(missing) in str(caught.value)
+    odd = [*rows[40][:4], missing]
+    path = table(tmp_path / 'a.csv', [*rows[:40], odd, *rows[41:]], names)
+    check(path)
+    values = look(path).columns[4].values
+    assert not np.isfinite(values[40])
+    np.testing.assert_array_equal(np.delete(values, 40), np.delete(FORCE, 40))
+
+
+@pytest.mark.parametrize('decimal', [',', '.'])
+def test_thousands_are_never_taken_for_fractions(tmp_path: Path, decimal: str) -> None:
+    """-2.397 where the comma is decimal; 1,234 and 996 where nothing says what the comma is."""
+    other = {',': '.', '.': ','}[decimal]
+    grouped = [f'{f:,.0f}'.replace(',', other) for f in FORCE]
+    rows = [
+        [*(entry.replace('.', decimal) for entry in row[:3]), force]
+        for row, force in zip(ROWS, grouped, strict=True)
+    ]
+    with pytest.raises(InputError, match=r'force .* line 2: .2.461'):
+        read(table(tmp_path / 'a.csv', rows, by=';'))
+    whole = [
+        [str(i), row[1].replace('.', ''), row[2].replace('.', ''), force]
+        for i, (row, force) in enumerate(zip(ROWS, grouped, strict=True))
+    ]
+    names = ('time_ms', 'command_um', 'measured_um', 'force_N')
+    with pytest.raises(InputError, match='2461 or a fraction'):
+        read(table(tmp_path / 'a.csv', whole, names, ';'))
+
+
+def test_line_ends_doubled_by_windows(tmp_path: Path) -> None:
+    """CR CR LF is one line end; so is each of the others."""
+    text = table(tmp_path / 'a.csv', ROWS).read_text()
+    for end in ('\r\r\n', '\r\n', '\r', '\n\n'):
+        (tmp_path / 'a.csv').write_bytes(text.replace('\n', end).encode('utf-16'))
+        check(tmp_path / 'a.csv')
+        assert len(look(tmp_path / 'a.csv').columns) == 4
+
+
+@pytest.mark.parametrize('by', [',', ' ', ';'])
+def test_names_that_numpy_wrote(tmp_path: Path, by: str) -> None:
+    """The first line of numpy.savetxt is `# a,b,c`; the first row of numbers is a sample."""
+    path = tmp_path / 'a.txt'
+    np.savetxt(path, np.column_stack(COLUMNS), delimiter=by, header=by.join(NAMES))
+    check(path)
+    np.savetxt(path, np.column_stack(COLUMNS), delimiter=by, header='Test 7\n' + ', '.join(NAMES))
+    check(path)
+    np.savetxt(path, np.column_stack(COLUMNS), delimiter=by)
+    described = {r: {'column': i, 'unit': u} for i, (r, u) in
+                 enumerate([('time', 's'), ('command', 'mm'), ('measured', 'mm')], 1)}  # fmt: skip
+    assert len(read(path, channels=parse_channel_map(described, 'map'))) == COUNT
+    with pytest.raises(InputError, match='first line must name the columns'):
+        read(path)
+
+
+def test_a_first_line_of_a_spreadsheet_says_the_delimiter(tmp_path: Path) -> None:
+    """`sep=;` is no name."""
+    path = table(tmp_path / 'a.csv', ROWS, by='|')
+    path.write_text('sep=|\n' + path.read_text())
+    check(path)
+
+
+def test_a_pipe_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    """It is opened twice: what it is, what it holds; as a record, a map, a bag."""
+    for name in ('a.csv', 'a.mcap', 'a.mat', 'a.h5', 'a.tdms', 'a.xlsx', 'a.parquet'):
+        path = tmp_path / name
+        os.mkfifo(path)
+        for use in (load_records, look, read_channel_map):
+            with pytest.raises(InputError, match='pipe or a device'):
+                use(path)
