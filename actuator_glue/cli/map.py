@@ -126,7 +126,9 @@ def _write(path: Path, text: str) -> None:
 
 def _row(column: ColumnLook, found: FileLook) -> tuple[str, ...]:
     low, high = column.range()
-    name = str(column.name) if isinstance(column.name, str) else f'{column.name} {column.label}'
+    name = str(column.name)
+    if not name.endswith(column.label):
+        name = f'{name} {column.label}'
     number = [f'{low:.6g}', f'{high:.6g}']
     return (name.strip(), column.unit, str(len(column.values)), *number, _remark(column))
 

@@ -57,6 +57,12 @@ def recognise(name: str) -> tuple[str, str] | None:
     return match['role'].lower(), match['unit'] or ''
 
 
+def bare(name: str) -> str:
+    """Return what a column is by its name, without the unit; the name where it is no role."""
+    recognised = recognise(name)
+    return recognised[0] if recognised else name
+
+
 def units_line(entries: list[str]) -> list[str]:
     """Return the units that a line below the names holds; nothing where it is no such line.
 

@@ -151,20 +151,29 @@ def check_size(size: int, path: Path) -> None:
 def matrix_columns(name: str, shape: tuple[int, ...], unit: str = '') -> list[Column]:
     """Return the columns of a vector or matrix, as MATLAB calls them: `NAME(:,2)`, from 1.
 
-    The longer side of a matrix is time. Of anything else nothing is returned.
+    The longer side of a matrix is time; sides of one are none, as of 1x1xN. Of anything else, and
+    of what is empty, nothing is returned.
     """
     label = name.replace('/', '.').rpartition('.')[2]
-    if len(shape) == 1 or (len(shape) == 2 and min(shape) == 1):
-        return [Column(name, label, unit)]
-    if len(shape) != 2 or not all(shape) or min(shape) > MOST_COLUMNS:
+    sides = _sides(shape)
+    if not all(shape) or len(sides) > 2 or (len(sides) == 2 and min(sides) > MOST_COLUMNS):
         return []
-    pattern = '({},:)' if shape[0] < shape[1] else '(:,{})'
-    places = [pattern.format(i + 1) for i in range(min(shape))]
+    if len(sides) < 2:
+        return [Column(name, label, unit)]
+    pattern = '({},:)' if sides[0] < sides[1] else '(:,{})'
+    places = [pattern.format(i + 1) for i in range(min(sides))]
     return [Column(name + place, label + place, unit) for place in places]
 
 
 def matrix_column(matrix: Any, number: int) -> Any:
     """Return column `number` from 0 of what `matrix_columns` named: array or HDF5 dataset."""
-    if len(matrix.shape) == 1:
-        return matrix[:]
-    return matrix[number, :] if matrix.shape[0] < matrix.shape[1] else matrix[:, number]
+    sides = _sides(matrix.shape)
+    if len(sides) < 2:
+        return matrix[...].reshape(-1)
+    if len(matrix.shape) > 2:
+        matrix = matrix[...].reshape(sides)
+    return matrix[number, :] if sides[0] < sides[1] else matrix[:, number]
+
+
+def _sides(shape: tuple[int, ...]) -> tuple[int, ...]:
+    return tuple(length for length in shape if length != 1)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +26,11 @@ from actuator_glue.records import Array
 
 _MAGIC = b'\x89HDF\r\n\x1a\n'
 _PACKED = 1100  # bytes out of one that deflate makes at most (1032), nearly
-_OBJECT = 'MATLAB_object_decode'
+_CLASS, _EMPTY, _OBJECT = 'MATLAB_class', 'MATLAB_empty', 'MATLAB_object_decode'
+_DEEPEST, _MOST_STRUCTS = 64, 100_000  # structs in structs, and in all
+# Fields of a struct that hold samples, and those beside them that hold their name.
+_FIELDS = ('data', 'values', 'value')
+_NAMES = ('name', 'label')
 _NAME = 'an HDF5 file'
 _UNITS = ('unit', 'units', 'Unit', 'Units')
 _NOTES = ('stiffness_N_per_m', 'hold', 'actuator')
@@ -56,42 +61,103 @@ def read_tree(path: Path, *, matlab: bool = False) -> FileTable:
         InputError: h5py is missing, the file is damaged or holds no numbers.
     """
     h5py = library('h5py', path)
-    columns: list[Column] = []
-    places: list[tuple[str, str | int]] = []
-    notes: dict[str, str] = {}
-
-    def take(name: str, dataset: Any) -> None:
-        # Links to other files are never followed, external storage is never opened.
-        if not isinstance(dataset, h5py.Dataset) or name.startswith('#') or not dataset.shape:
-            return
-        if dataset.is_virtual or dataset.external or len(columns) > MOST_COLUMNS:
-            return
-        shown = name.replace('/', '.') if matlab else name
-        label = shown.replace('/', '.').rpartition('.')[2]
-        if label in _NOTES and dataset.size <= 1000:
-            notes[label] = _text(dataset)
-        if dataset.dtype.names and dataset.ndim == 1:  # a table: one column per field
-            fields = [f for f in dataset.dtype.names if dataset.dtype[f].kind in 'fiu']
-            columns.extend(Column(f'{shown}.{f}', f) for f in fields)
-            places.extend((name, f) for f in fields)
-        elif dataset.dtype.kind in 'fiu' and not (_is_text(dataset) or _OBJECT in dataset.attrs):
-            shape = dataset.shape[::-1] if matlab else dataset.shape
-            found = matrix_columns(shown, shape, _unit(dataset))
-            columns.extend(found)
-            places.extend((name, i) for i in range(len(found)))
+    tree = _Tree(matlab)
 
     def values(wanted: list[int]) -> list[Array]:
         with reading(path, _NAME), h5py.File(path, 'r') as file:
-            chosen = [places[at] for at in wanted]
+            chosen = [tree.places[at] for at in wanted]
             return [_values(file[name], part, path) for name, part in chosen]
 
     with reading(path, _NAME), h5py.File(path, 'r') as file:
-        notes |= {n: _plain(file.attrs[n]) for n in _NOTES if n in file.attrs}
-        file.visititems(take)
-    if not columns:
+        tree.notes |= {n: _plain(file.attrs[n]) for n in _NOTES if n in file.attrs}
+        file.visititems(tree.visit)
+    if not tree.columns:
         hint = f'; {OBJECTS}' if matlab else ''
         raise InputError(f'{path}: no numeric vector or matrix in this file{hint}')
-    return FileTable(columns, notes, values)
+    return FileTable(named_by_structs(tree.columns, tree.texts), tree.notes, values)
+
+
+class _Tree:
+    """What a file holds, as its datasets are come by.
+
+    Attributes:
+        columns: names of the columns of numbers.
+        places: of each, its dataset and which column or field of that.
+        notes: what the file says besides.
+        texts: small texts by their names in full.
+    """
+
+    def __init__(self, matlab: bool) -> None:
+        self._matlab = matlab
+        self.columns: list[Column] = []
+        self.places: list[tuple[str, str | int]] = []
+        self.notes: dict[str, str] = {}
+        self.texts: dict[str, str] = {}
+        self._seen = 0
+
+    def visit(self, name: str, found: Any) -> None:
+        """Take what lies under a name; MATLAB's own group `#refs#` is left out."""
+        if not name.startswith('#') and hasattr(found, 'shape'):
+            self._take(name, found, name.replace('/', '.') if self._matlab else name, 0)
+
+    def _take(self, place: str, dataset: Any, shown: str, depth: int) -> None:
+        # Links to other files are never followed, external storage is never opened.
+        if dataset.is_virtual or dataset.external or len(self.columns) > MOST_COLUMNS:
+            return
+        if not dataset.shape or _EMPTY in dataset.attrs:
+            return  # what MATLAB stores of [] is its shape
+        if dataset.size <= 1000:
+            self._note(dataset, shown)
+        fields = dataset.dtype.names
+        if self._matlab and 'ref' in (dataset.dtype.metadata or {}):
+            few = dataset.size <= MOST_COLUMNS and depth < _DEEPEST
+            if few and _CLASS not in dataset.attrs:  # cells are left alone
+                self._take_structs(dataset, shown, depth + 1)
+        elif fields and dataset.ndim == 1:  # a table: one column per field
+            fields = [f for f in fields if dataset.dtype[f].kind in 'fiu']
+            self.columns += [Column(f'{shown}.{f}', f) for f in fields]
+            self.places += [(place, f) for f in fields]
+        elif dataset.dtype.kind in 'fiu' and not (_is_text(dataset) or _OBJECT in dataset.attrs):
+            shape = dataset.shape[::-1] if self._matlab else dataset.shape
+            found = matrix_columns(shown, shape, _unit(dataset))
+            self.columns += found
+            self.places += [(place, i) for i in range(len(found))]
+
+    def _note(self, dataset: Any, shown: str) -> None:
+        label = shown.replace('/', '.').rpartition('.')[2]
+        if label in _NOTES:
+            self.notes[label] = _text(dataset)
+        if _is_text(dataset):
+            self.texts[shown] = _text(dataset)
+
+    def _take_structs(self, dataset: Any, shown: str, depth: int) -> None:
+        """Take a field of an array of structs: a reference for each, in MATLAB's order."""
+        structs, _, field = shown.rpartition('.')
+        self._seen += dataset.size
+        if self._seen > _MOST_STRUCTS:
+            raise InputError(f'{dataset.file.filename}: more than {_MOST_STRUCTS} structs')
+        for i, reference in enumerate(dataset[()].flat, start=1):
+            if not reference:
+                continue
+            target: Any = dataset.file[reference]
+            called = f'{structs}({i}).{field}'
+            if hasattr(target, 'shape'):
+                self._take(target.name, target, called, depth)
+                continue
+            for name, within in _datasets(target):
+                self._take(within.name, within, f'{called}.{name}', depth)
+
+
+def _datasets(group: Any) -> list[tuple[str, Any]]:
+    """Return the datasets in a group and its groups, with MATLAB's names from the group on."""
+    found: list[tuple[str, Any]] = []
+
+    def keep(name: str, within: Any) -> None:
+        if hasattr(within, 'shape') and len(found) < MOST_COLUMNS:
+            found.append((name.replace('/', '.'), within))
+
+    group.visititems(keep)
+    return found
 
 
 def _values(dataset: Any, part: str | int, path: Path) -> Array:
@@ -104,13 +170,67 @@ def _values(dataset: Any, part: str | int, path: Path) -> Array:
         )
     if isinstance(part, str):
         return np.asarray(dataset.fields(part)[:], dtype=np.float64)
-    if len(set(dataset.shape)) == 1 and dataset.ndim == 2 and 'MATLAB_class' in dataset.attrs:
-        return np.asarray(dataset[part, :], dtype=np.float64)  # a square, turned in the file
-    return np.asarray(matrix_column(dataset, part), dtype=np.float64)
+    if len(set(dataset.shape)) == 1 and dataset.ndim == 2 and _CLASS in dataset.attrs:
+        return _unpacked(dataset[part, :], dataset.attrs)  # a square, turned in the file
+    return _unpacked(matrix_column(dataset, part), dataset.attrs)
+
+
+def named_by_structs(columns: list[Column], texts: dict[str, str]) -> list[Column]:
+    """Return columns with the names and units that lie beside them, as in `Y(1).Name`.
+
+    Args:
+        columns: of the structs' vectors, e.g. `Y(1).Data`.
+        texts: all texts of the file by their names in full.
+    """
+    told = {name.lower(): text.strip() for name, text in texts.items()}
+    out = []
+    for column in columns:
+        struct, _, field = column.name.rpartition('.')
+        if struct and field.lower() in _FIELDS:
+            label = next(filter(None, (told.get(f'{struct}.{n}'.lower()) for n in _NAMES)), '')
+            unit = next(filter(None, (told.get(f'{struct}.{n}'.lower()) for n in _UNITS)), '')
+            column = replace(column, label=label or column.label, unit=column.unit or unit)
+        out.append(column)
+    return out
+
+
+def _unpacked(values: Any, attributes: Any) -> Array:
+    """Return numbers as netCDF packs them (CF conventions, section 8.1); what is missing is NaN.
+
+    Raises:
+        ValueError: a factor or a fill value that is no number.
+    """
+    if _plain(attributes.get('_Unsigned', '')).lower() == 'true' and values.dtype.kind == 'i':
+        values = values.view(values.dtype.str.replace('i', 'u'))
+    missing = np.zeros(values.shape, dtype=bool)
+    for name in ('_FillValue', 'missing_value'):
+        for mark in np.ravel(attributes.get(name, ())):
+            missing |= values == np.asarray(mark).astype(values.dtype)
+    lowest, highest = _valid(attributes, values.dtype)
+    missing |= (values < lowest) | (values > highest)
+    unpacked = np.asarray(values, dtype=np.float64)
+    scale, offset = (attributes.get(name) for name in ('scale_factor', 'add_offset'))
+    if scale is not None:
+        unpacked = unpacked * float(np.ravel(scale)[0])
+    if offset is not None:
+        unpacked = unpacked + float(np.ravel(offset)[0])
+    return np.where(missing, np.nan, unpacked) if missing.any() else unpacked
+
+
+def _valid(attributes: Any, kind: np.dtype[Any]) -> tuple[float, float]:
+    """Return the least and the greatest packed value that is no missing one."""
+    least, most = -np.inf, np.inf
+    if 'valid_range' in attributes:
+        least, most = (float(v) for v in np.asarray(attributes['valid_range']).astype(kind))
+    if 'valid_min' in attributes:
+        least = float(np.ravel(attributes['valid_min']).astype(kind)[0])
+    if 'valid_max' in attributes:
+        most = float(np.ravel(attributes['valid_max']).astype(kind)[0])
+    return least, most
 
 
 def _is_text(dataset: Any) -> bool:
-    return bool(_plain(dataset.attrs.get('MATLAB_class', '')) == 'char')
+    return bool(_plain(dataset.attrs.get(_CLASS, '')) == 'char')
 
 
 def _text(dataset: Any) -> str:

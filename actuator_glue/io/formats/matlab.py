@@ -19,7 +19,7 @@ from actuator_glue.io.formats import (
     matrix_columns,
     reading,
 )
-from actuator_glue.io.formats.hdf5 import OBJECTS, is_hdf5, read_tree
+from actuator_glue.io.formats.hdf5 import OBJECTS, is_hdf5, named_by_structs, read_tree
 from actuator_glue.io.matlab_elements import check_elements
 from actuator_glue.io.signature import refuse_foreign
 from actuator_glue.records import Array
@@ -45,7 +45,8 @@ def _collect(name: str, value: Any, arrays: dict[str, Any], texts: dict[str, str
     elif isinstance(value, str):
         texts[name] = value
     elif isinstance(value, np.ndarray) and value.dtype == object:
-        for i, entry in enumerate(value.flat, start=1):
+        # MATLAB counts down the columns.
+        for i, entry in enumerate(value.ravel(order='F'), start=1):
             if hasattr(entry, '_fieldnames'):  # an array of structs; cells are left alone
                 _collect(f'{name}({i})', entry, arrays, texts)
     else:
@@ -79,7 +80,7 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
         chosen = [places[at] for at in wanted]
         return [matrix_column(arrays[n], i).astype(np.float64, copy=False) for n, i in chosen]
 
-    return FileTable(columns, notes, values)
+    return FileTable(named_by_structs(columns, texts), notes, values)
 
 
 def _write(path: Path, columns: Mapping[str, Array], notes: Mapping[str, str | float]) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
 from actuator_glue.io.formats import Column, FileTable, Format, check_size, library, reading
+from actuator_glue.io.units import bare
 from actuator_glue.records import Array
 
 _NAME = 'a Parquet file'
@@ -39,32 +40,42 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
             table = file.read(columns=names, use_threads=False)
             return [_numbers(table.column(name)) for name in names]
 
-    return FileTable([Column(f.name, f.name, _unit(f)) for f in fields], notes, values)
+    return FileTable([_column(f) for f in fields], notes, values)
 
 
 def _is_number(kind: Any) -> bool:
     import pyarrow.types as types
 
-    return bool(types.is_floating(kind) or types.is_integer(kind) or types.is_timestamp(kind))
+    return bool(
+        types.is_floating(kind) or types.is_integer(kind) or types.is_decimal(kind)
+    ) or _is_time(kind)
 
 
-def _unit(field: Any) -> str:
+def _is_time(kind: Any) -> bool:
     import pyarrow.types as types
 
-    if types.is_timestamp(field.type):
-        return 's'
+    return bool(types.is_timestamp(kind) or types.is_duration(kind) or types.is_time(kind))
+
+
+def _column(field: Any) -> Column:
+    if _is_time(field.type):
+        # Its type says its unit, whatever `time_ns` may say.
+        return Column(field.name, bare(field.name), 's')
     found = (field.metadata or {}).get(b'unit', b'')
-    return str(found.decode('utf-8', 'replace'))
+    return Column(field.name, field.name, str(found.decode('utf-8', 'replace')))
 
 
 def _numbers(column: Any) -> Array:
     """Return a column as numbers, times as seconds; what is missing is NaN."""
     import pyarrow as pa
 
-    if pa.types.is_timestamp(column.type):
-        nanoseconds = column.cast(pa.timestamp('ns')).cast(pa.int64())
-        return np.asarray(nanoseconds.to_numpy(), dtype=np.float64) * 1e-9
-    return np.asarray(column.cast(pa.float64()).to_numpy(), dtype=np.float64)
+    kind = column.type
+    if not _is_time(kind):
+        # Whole numbers beyond 2^53 are rounded: those of nanoseconds to a quarter of a thousand.
+        return np.asarray(column.cast(pa.float64(), safe=False).to_numpy(), dtype=np.float64)
+    ticks = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9}[kind.unit]
+    whole = pa.int32() if kind.bit_width == 32 else pa.int64()
+    return np.asarray(column.cast(whole).to_numpy(), dtype=np.float64) * ticks
 
 
 def _write(path: Path, columns: Mapping[str, Array], notes: Mapping[str, str | float]) -> None:

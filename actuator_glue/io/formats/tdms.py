@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,25 @@ import numpy as np
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
 from actuator_glue.io.formats import Column, FileTable, Format, check_size, library, reading
+from actuator_glue.io.units import bare, recognise
 from actuator_glue.records import Array
 
 _NAME = 'a LabVIEW TDMS file'
+# Starts that differ by a whole number of samples but for this share of one are one clock's.
+_SAME = 0.02
+# LabVIEW's time zero, of a waveform that nobody has given a start.
+_UNKNOWN = np.datetime64('1904-01-01T00:00:00', 'us')
+
+
+@dataclass(frozen=True, slots=True)
+class _Clock:
+    """When the samples of a waveform were taken; `start_ns` is None where nobody says."""
+
+    name: str
+    period: float
+    offset: float
+    start_ns: int | None
+    length: int
 
 
 def _read(path: Path, channels: ChannelMap | None) -> FileTable:
@@ -23,7 +40,8 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
     library('nptdms.log', path).log_manager.set_level(logging.CRITICAL)
     size = path.stat().st_size
     columns: list[Column] = []
-    periods: set[float] = set()
+    clocks: list[_Clock] = []
+    stamps: set[int] = set()
     with reading(path, _NAME), tdms.open(path) as file:
         notes = {str(name): str(value) for name, value in file.properties.items()}
         for group in file.groups():
@@ -35,20 +53,119 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
                     raise InputError(
                         f'{path}: damaged: {channel.path} claims {len(channel)} values'
                     )
+                name, label = f'{group.name}/{channel.name}', channel.name
                 unit = str(channel.properties.get('unit_string', ''))
-                columns.append(Column(f'{group.name}/{channel.name}', channel.name, unit))
-                periods.add(float(channel.properties.get('wf_increment', 0.0)))
+                if np.dtype(channel.dtype).kind == 'M':
+                    # Its type says its unit, whatever `time_ns` may say.
+                    label, unit = bare(label), 's'
+                    stamps.add(len(columns))
+                columns.append(Column(name, label, unit))
+                clocks.append(_clock(channel))
+    if not columns:
+        raise InputError(f'{path}: no channel of numbers in this TDMS file')
+    asked = _asked(columns, channels)
+    cuts, period, start_ns = _common(clocks, asked, path)
+    if any(i in stamps for i in asked):
+        start_ns = 0  # such times count from no other
 
     def values(wanted: list[int]) -> list[Array]:
         with reading(path, _NAME), tdms.open(path) as file:
             found = {f'{g.name}/{c.name}': c for g in file.groups() for c in g.channels()}
-            return [_values(found[columns[at].name], path) for at in wanted]
+            read = [_values(found[columns[at].name], path) for at in wanted]
+        return [column[cuts.get(at, slice(None))] for at, column in zip(wanted, read, strict=True)]
 
-    if not columns:
-        raise InputError(f'{path}: no channel of numbers in this TDMS file')
-    # Channels of waveforms have no times of their own but a common increment.
-    period = periods.pop() if len(periods) == 1 else 0.0
-    return FileTable(columns, notes, values, period if period > 0.0 else None)
+    return FileTable(columns, notes, values, period, start_ns)
+
+
+def _clock(channel: Any) -> _Clock:
+    """Return the times of a channel, as LabVIEW's waveforms have them."""
+    properties = channel.properties
+    period = float(properties.get('wf_increment', 0.0))
+    start = properties.get('wf_start_time')
+    known = isinstance(start, np.datetime64) and start != _UNKNOWN and not np.isnat(start)
+    return _Clock(
+        channel.name,
+        period if period > 0.0 else 0.0,
+        float(
+            np.nan_to_num(float(properties.get('wf_start_offset', 0.0)), posinf=0.0, neginf=0.0)
+        ),
+        int(start.astype('datetime64[ns]').astype(np.int64)) if known else None,
+        len(channel),
+    )
+
+
+def _asked(columns: list[Column], channels: ChannelMap | None) -> list[int]:
+    """Return the positions of the columns that a map names, or that are called by their role."""
+    if channels is None:
+        return [i for i, column in enumerate(columns) if recognise(column.label)]
+    names = {channel.column for channel in channels.roles().values()}
+    return [i for i, c in enumerate(columns) if {c.name, c.label, i + 1} & names]
+
+
+def _common(
+    clocks: list[_Clock], asked: list[int], path: Path
+) -> tuple[dict[int, slice], float | None, int]:
+    """Return which samples of each waveform were taken together, their period and start [ns].
+
+    Raises:
+        InputError: columns that are asked for have other rates, or starts between the samples of
+            others, or were not taken at one time.
+    """
+    waveforms = [i for i, clock in enumerate(clocks) if clock.period]
+    group = [i for i in asked if i in waveforms]
+    if not group:
+        # Nobody has said which are wanted: those that most have in common.
+        periods = [clocks[i].period for i in waveforms]
+        usual = max(set(periods), key=periods.count, default=0.0)
+        group = [i for i in waveforms if clocks[i].period == usual]
+    if not group:
+        return {}, None, 0
+    first = clocks[group[0]]
+    starts = [clock.start_ns for clock in clocks if clock.start_ns is not None]
+    zero = min(starts, default=0)
+
+    def ahead(clock: _Clock) -> float:
+        """Seconds from the file's first start to that of a waveform."""
+        own = zero if clock.start_ns is None else clock.start_ns
+        return (own - zero) * 1e-9 + clock.offset
+
+    latest = max(ahead(clocks[i]) for i in group)
+    cuts: dict[int, slice] = {}
+    faults = []
+    for i in group:
+        clock = clocks[i]
+        if clock.period != first.period:
+            faults.append(
+                f'{first.name} has a sample every {first.period:g} s and {clock.name} one every '
+                f'{clock.period:g} s'
+            )
+            continue
+        late = (latest - ahead(clock)) / first.period
+        begin = round(late)
+        if abs(late - begin) > _SAME:
+            faults.append(
+                f'{clock.name} begins {latest - ahead(clock):.6g} s before another channel, which '
+                'is no whole number of samples'
+            )
+        if begin >= clock.length - 1:
+            faults.append(f'{clock.name} ends before another channel begins')
+        cuts[i] = slice(begin, None)
+    moved = any(cut.start for cut in cuts.values())
+    others = [clocks[i].name for i in asked if i not in group]
+    if moved and others:
+        faults.append(
+            f'{others[0]} has no start of its own, but those of the other channels differ'
+        )
+    if faults and asked:
+        raise InputError(
+            f'{path}: {faults[0]}; bring the channels to common times and save them again'
+        )
+    if faults:
+        return {}, None, 0
+    if moved:
+        stop = min(clocks[i].length - cut.start for i, cut in cuts.items())
+        cuts = {i: slice(cut.start, cut.start + stop) for i, cut in cuts.items()}
+    return cuts, first.period, max(zero + round(latest * 1e9), 0)
 
 
 def _is_number(channel: Any) -> bool:
