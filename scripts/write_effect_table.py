@@ -1,4 +1,4 @@
-"""Renew the table of docs/effects.md from the effect catalogue (`make docs`)."""
+"""Renew the table of docs/effects_catalogue.md from the effect catalogue (`make docs`)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.parameters import Parameter
 
-PAGE = Path(__file__).resolve().parent.parent / 'docs' / 'effects.md'
+PAGE = Path(__file__).resolve().parent.parent / 'docs' / 'effects_catalogue.md'
 BEGIN, END = '<!-- catalogue: begin (make docs) -->', '<!-- catalogue: end -->'
 
 

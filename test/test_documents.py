@@ -26,6 +26,10 @@ NOTEBOOKS = sorted((ROOT / 'examples' / 'notebooks').glob('*.ipynb'))
 FENCE = re.compile(r'^```(\S*)\n(.*?)^```', re.MULTILINE | re.DOTALL)
 LINK = re.compile(r'\]\(([^)\s]+)\)')
 
+WORDS = 2500  # of a page that somebody is to read
+# Pages of tables that a script writes, and why they are longer.
+LONGER = {'messages.md': 'a table for each message, looked up by its name'}
+
 # Commands of documents that no test runs as they stand, and why.
 NOT_RUN = {
     r'make\b': 'targets of the Makefile: continuous integration runs them',
@@ -97,6 +101,14 @@ def anchors(page: Path) -> set[str]:
     text = FENCE.sub('', page.read_text('utf-8'))
     titles = re.findall(r'^#+ (.+)$', text, re.MULTILINE)
     return {re.sub(r'[^\w\- ]', '', t.lower()).replace(' ', '-') for t in titles}
+
+
+@pytest.mark.parametrize('page', PAGES, ids=name)
+def test_a_page_is_read_in_a_quarter_of_an_hour(page: Path) -> None:
+    """What is longer is two pages; a table that a script writes is looked up, not read."""
+    text = page.read_text('utf-8')
+    assert (len(text.split()) > WORDS) == (page.name in LONGER), f'{page.name} is too long'
+    assert page.name not in LONGER or '<!-- Everything below is written by scripts/' in text
 
 
 @pytest.mark.parametrize('page', PAGES, ids=name)

@@ -43,7 +43,7 @@ def parser() -> argparse.ArgumentParser:
         '--page',
         type=Path,
         metavar='FILE.md',
-        help='also write table and picture into this page (docs/rths.md)',
+        help='also write table and picture into this page (docs/rths_study.md)',
     )
     return found
 

@@ -13,7 +13,7 @@ from actuator_glue.model.effects import CATALOGUE, scale
 from actuator_glue.model.parameters import NAMES, TABLE_2
 from actuator_glue.records import Record
 
-PAGE = Path(actuator_glue.__file__).resolve().parent.parent / 'docs' / 'effects.md'
+PAGE = Path(actuator_glue.__file__).resolve().parent.parent / 'docs' / 'effects_catalogue.md'
 
 
 PLACES = {
@@ -83,7 +83,7 @@ def test_entries_are_complete() -> None:
 
 
 def test_page_is_in_step() -> None:
-    """docs/effects.md holds the catalogue's table; `make docs` renews it."""
+    """docs/effects_catalogue.md holds the catalogue's table; `make docs` renews it."""
     script = runpy.run_path(str(PAGE.parent.parent / 'scripts' / 'write_effect_table.py'))
     markdown, renewed = script['markdown'], script['renewed']
     page = PAGE.read_text(encoding='utf-8')
