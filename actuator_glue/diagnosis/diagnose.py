@@ -164,6 +164,9 @@ def diagnose(
         mixed = alternatives.mixed(mixed, final, others, lambda t: sample(t).points, rng)
     error = reconciled.reached_by_both(error, found.material, scorer, prepared.held, before, after)
     judged = verdict.conclude(decision.verdict, bool(decision.names), error, found.material)
+    if other is not None and any(map(learned_term.is_learned, final.structure.entries)):
+        # A description of what another set-up explains with none describes the set-up.
+        judged = 'undecided' if judged in verdict.COMPLETE else judged
     setup = result.prepared.setup or (None if judged in verdict.COMPLETE else other)
     if judged not in verdict.COMPLETE:
         search, left = result.selection.search, decision.left
