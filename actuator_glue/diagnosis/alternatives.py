@@ -1,4 +1,4 @@
-"""What names that cannot be told apart leave open in the other parameters.
+"""Intervals of parameters where effects cannot be told apart.
 
 A lag of the transducer and one of the valve fit the same motion beside other values of beta_1.
 Where a name has alternatives, an interval under that name alone says too much: those of Eq. (2)'s
@@ -20,7 +20,7 @@ _ROUND = 1e-3  # odds below it move no interval
 
 
 def alternatives(result: Conclusion) -> list[tuple[Trial, float]]:
-    """Return the structures with a tied name for one that is told, and their odds against it."""
+    """Return structures with a tied effect in place of the told one, and their odds."""
     final, search = result.decision.final, result.selection.search
     out: list[tuple[Trial, float]] = []
     for name in result.decision.names if final.own is None else ():
@@ -40,7 +40,7 @@ def mixed(
     sample: Callable[[Trial], Array],
     rng: np.random.Generator,
 ) -> Array:
-    """Draws (m, p) over all structures that may be the machine's, of what they have in common.
+    """Return draws (m, p) of the shared parameters over all plausible structures.
 
     The size of an effect that an alternative lacks is that which it has where its name is right.
 

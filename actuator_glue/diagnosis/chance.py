@@ -69,7 +69,7 @@ def undetermined(data: Data, model: Model, theta: Array, size: float) -> tuple[M
 def without(
     prepared: Prepared, search: Search, settings: Thresholds, fixed: bool
 ) -> tuple[Prepared, Search]:
-    """Take out what friction leaves to chance, where friction explains most, but not all.
+    """Exclude samples that friction leaves to chance, where it explains most but not all.
 
     Args:
         prepared: records.
@@ -141,7 +141,7 @@ def _counted(data: Data, lost: tuple[Mask, ...]) -> Data:
 
 
 def _least(data: Data) -> float:
-    """Time that counts of the record of which least does [s]."""
+    """Counted time of the record that has least of it [s]."""
     return min(float(m.sum()) * period for m, period in zip(data.masks, data.periods, strict=True))
 
 

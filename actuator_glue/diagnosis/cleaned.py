@@ -1,4 +1,4 @@
-"""Impulses asked for again beside what was found: what Eq. (2) lacks may pass for some."""
+"""Impulses judged against the final model: what Eq. (2) lacks may look like some."""
 
 from __future__ import annotations
 
@@ -23,10 +23,11 @@ _MOVED: Final = 1.0  # standard deviations of what was fitted
 
 
 def without_impulses(prepared: Prepared, final: Trial) -> Prepared:
-    """Return records without what is an impulse beside what was found; the same where it is.
+    """Remove impulses judged against the final model; the same object if nothing changes.
 
-    What was taken out beside Eq. (2) bends the fit of an effect that makes it: without all that
-    is suspected, then and now, the structure is refitted before it is asked again.
+    Judged against Eq. (2), an effect may look like an impulse, and once its samples are removed
+    its fit is biased. So the structure is refitted without any suspected sample, and all are
+    judged again.
     """
     clean = prepared.without_impulses(final.model, final.fit.theta)
     for _ in range(_REFITS):

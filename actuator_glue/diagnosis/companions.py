@@ -32,13 +32,13 @@ _ALONE = 0.9  # weight among what was tried of a kind that is told from the othe
 def with_companions(
     selection: ModelSelection, final: Trial, least: float | None = None, *, alone: bool = True
 ) -> Trial:
-    """Return a structure with what else is there beyond chance, at the user's level, and alone.
+    """Add effects that are significant at the user's level but too small to be told.
 
     Args:
         selection: what chose the structure.
         final: a structure that leaves nothing material.
         least: error that each of them removes [m]; a fifth of what matters if not given.
-        alone: whether each must be told from what is of another kind.
+        alone: whether each must be distinguishable from effects of other groups.
     """
     search = selection.search
     if final.own is not None:
@@ -57,9 +57,9 @@ def with_companions(
 
 
 def _weight_of_its_kind(search: Search, trials: Sequence[Trial]) -> float:
-    """Return the weight among trials of the first one and what pulls parameters as it does.
+    """Return the weight of the best effect's group among trials.
 
-    Which lag it is nobody knows; but without any, beta_1 is that of both.
+    Which of two lags it is may stay open; without either, beta_1 would be wrong.
     """
     kinds = [search.entries[t.added].group for t in trials]
     known = weights(np.stack([t.scores for t in trials]))
@@ -67,10 +67,10 @@ def _weight_of_its_kind(search: Search, trials: Sequence[Trial]) -> float:
 
 
 def alike(search: Search, final: Trial, larger: Trial) -> list[tuple[Trial, float]]:
-    """Return structures with what is like a companion in its place, and their odds against it.
+    """Return structures with an indistinguishable effect for a companion, and their odds.
 
-    Beside the lag of a valve beta_1 is another than beside one of the transducer: what the blocks
-    do not tell apart counts by its weight (alternatives.mixed).
+    Intervals average over indistinguishable effects (alternatives.mixed): beta_1 differs between
+    the lag of a valve and one of the transducer.
 
     Args:
         search: what was refitted.
@@ -105,7 +105,7 @@ def beside(
 
 
 def that_matter(selection: ModelSelection, found: Selection) -> Selection | None:
-    """Return an answer with what turns out to matter beside it, or None.
+    """Return a selection with further effects that turn out to matter, or None.
 
     Structure is told from noise by its spectrum, and may pass for less than what an effect is
     found to take away: what removes that much is an addition like any other.
@@ -129,14 +129,14 @@ def _of_one_kind(search: Search, name: str, final: Trial) -> bool:
 
 
 def reduced(draws: Draws, larger: Trial, final: Trial, known: Sequence[bool]) -> Draws:
-    """Return what draws of the larger structure say of the parameters of the other.
+    """Return the final structure's parameters in draws of the larger one.
 
     Args:
         draws: of the larger structure.
         larger: it.
         final: the structure that is told.
-        known: which of its parameters (p,) the records fix without what is held beside. That is
-            too small to fix any: friction that is no more than alike tells no stiffness of oil.
+        known: which of its parameters (p,) the records fix without the companions, which are too
+            small to fix any.
     """
     theirs = [p.name for p in larger.model.parameters]
     columns = [theirs.index(p.name) for p in final.model.parameters]

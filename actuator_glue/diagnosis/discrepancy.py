@@ -1,4 +1,4 @@
-"""What may be there below what matters: a discrepancy made of the catalogue's own shapes.
+"""Effects too small to matter, as a random discrepancy with the catalogue's responses.
 
 An effect that is too small to be added still pulls the parameters: 20 N of friction do not matter
 in the error and are many standard deviations of alpha_3. So the likelihood of a posterior holds,
@@ -36,7 +36,7 @@ _SAME = 1e-10  # of the largest power: a shape that others make up
 
 
 class ScaleMixture(NamedTuple):
-    """Normal distributions of a move of parameters, one for each scale of what is beside them.
+    """Normal distributions of a shift of parameters, one for each scale of the discrepancy.
 
     Attributes:
         weights: of the scales (s,), sum 1.
@@ -80,7 +80,7 @@ class Discrepancy:
         return cls(shapes, powers)
 
     def without(self, error: Array) -> Array:
-        """Return what no shape takes up of a whitened error (N,)."""
+        """Return a whitened error (N,) less its projection on the shapes."""
         return np.asarray(error - (self.shapes @ error) @ self.shapes)
 
     def log_likelihood(self, errors: Array, noise: float) -> Array:
@@ -109,7 +109,7 @@ class Discrepancy:
     def gaussians(
         self, jacobian: Array, error: Array, noise: float, widest: Array
     ) -> ScaleMixture:
-        """Return what parameters move by from where they stand, were all linear.
+        """Return the distribution of shifts of the parameters, were all linear.
 
         Args:
             jacobian: whitened derivatives of the simulation (p, N).

@@ -1,4 +1,4 @@
-"""Two names in the place of one that seems enough.
+"""Two effects in place of one that seems enough.
 
 A gain that drifts may leave what passes for noise where a slow valve and a clock that runs fast
 are the machine's: each of them alone is worse than the wrong name. What is there beside that name
@@ -18,7 +18,7 @@ from actuator_glue.diagnosis.trial import Trial
 
 
 def exchanged(selection: ModelSelection, found: Selection) -> Selection | None:
-    """Return an answer with two names in the place of one, or None.
+    """Return a selection with two effects in place of one, or None.
 
     Args:
         selection: the model selection that ended with `found`; its noise stays.
@@ -37,7 +37,7 @@ def exchanged(selection: ModelSelection, found: Selection) -> Selection | None:
 
 
 def _with_more(selection: ModelSelection, final: Trial) -> Trial | None:
-    """Return a structure with what is there beyond chance beside it; None without."""
+    """Return the structure with its best significant but immaterial effect added, if any."""
     if final.own is not None or not final.effects:
         return None
     seen = SEEN * selection.material

@@ -200,7 +200,7 @@ def _products(past: _Past, scorer: Scorer, fit: Fit) -> tuple[list[str], Array]:
 
 
 def _weights(products: Array, count: float, own: int, lags: Array) -> Array:
-    """Return the most likely weights of rows, (r - 1,), under the most likely expectations.
+    """Return weights of rows, (r - 1,), under the prior of largest marginal likelihood.
 
     Args:
         products: of rows and, last, the residual with each other, (r, r).

@@ -1,4 +1,4 @@
-"""Refit where friction holds the piston: a population looks around before Gauss and Newton do.
+"""Refit where friction holds the piston: a global search before Gauss-Newton steps.
 
 Whether a stroke breaks free or not changes the error at once. Between one and the other it has
 many minima, and the fit of Eq. (2), which takes friction for a slow actuator, is a start far from

@@ -25,7 +25,7 @@ from actuator_glue.inference.least_squares.fit import Fit, fit
 def with_the_right_hold(
     first: Conclusion, settings: Thresholds, each: Each, tell: Progress
 ) -> Conclusion:
-    """Ask whether the command ran linearly between its samples; terms are learned with the answer.
+    """Decide whether the command was held or ran linearly; learn terms with that hold.
 
     The wrong hold is a lead of half a sample: no effect of the catalogue, but something will be
     found for it (a gain that drifts, say). The other hold is taken where Eq. (2) alone explains

@@ -1,4 +1,4 @@
-"""Names beside a description that says more than all names did.
+"""Effects added to a learned term that explains more than all effects did.
 
 What the catalogue does not hold may be the largest effect there is. Names are then chosen for
 what they make up of it, and a name that is true is not found beside them: a lag beside a gain that
@@ -14,7 +14,7 @@ from actuator_glue.diagnosis.trial import Trial
 
 
 def with_names(selection: ModelSelection, term: Trial) -> Trial | None:
-    """Add names to a structure that was found by description, while each is worth it.
+    """Add effects to a structure with a learned term while each is worth it.
 
     Args:
         selection: what judges; its noise stays.

@@ -33,7 +33,7 @@ _SHAPED, _STEPS = 0.1, 3e-4
 
 
 def ways(found: Selection) -> list[Way]:
-    """Return what is asked where names leave nothing material, in this order.
+    """Return the searches to make where effects leave nothing material, in order.
 
     Structure of which they leave much may pass for noise until a form explains it; of long
     records that is not asked, as it would take half as long as all the rest.
@@ -48,7 +48,7 @@ def ways(found: Selection) -> list[Way]:
 def learned(
     selection: ModelSelection, found: Selection, complete: bool = False
 ) -> Selection | None:
-    """Go on from a selection with learned terms.
+    """Add learned terms to a selection.
 
     Args:
         selection: the model selection that ended with `found`.
@@ -81,7 +81,7 @@ def learned(
 
 
 def instead(selection: ModelSelection, found: Selection) -> Selection | None:
-    """Return one term that explains all that names do, better for its parameters.
+    """Return one term in place of all effects, where it is better for its parameters.
 
     Lost motion of the command moves the piston nearly as play and a lag of the transducer do: two
     names of one cause; or as a dead band of the valve, a wrong one. The term pays for having been
@@ -112,7 +112,7 @@ def instead(selection: ModelSelection, found: Selection) -> Selection | None:
 
 
 def reshaped(selection: ModelSelection, found: Selection) -> Selection | None:
-    """Return an answer whose cause has another shape, where the records show that beyond chance.
+    """Return an answer with another shape of its cause, if the records show that.
 
     Friction that is reached over 1 mm/s leaves less than what matters as friction that is there
     at once; but what that shifts, damping and speed of the valve, is wrong by much on records of

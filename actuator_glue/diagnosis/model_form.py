@@ -1,4 +1,4 @@
-"""How far a parameter depends on what stands beside it, where no structure tried is the machine.
+"""How far a parameter depends on the other effects, where no structure is the machine.
 
 A posterior says what is known under one structure. Where that leaves material structure it is not
 the machine's, and the same parameter stands elsewhere beside companions that leave little more:
@@ -22,7 +22,7 @@ _NORMAL = 1.4826  # standard deviation of a normal over its median absolute devi
 
 
 def open_form(search: Search, final: Trial, left: float, space: Space, scorer: Scorer) -> Array:
-    """Return by how much each parameter is open for want of the right equations (p,).
+    """Return the standard deviation of parameters that wrong equations leave (p,).
 
     Standard deviations in working coordinates: that over structures (see `spread`) and that
     between stretches, together. Structures are not compared with one that has an effect in one
@@ -33,7 +33,7 @@ def open_form(search: Search, final: Trial, left: float, space: Space, scorer: S
 
 
 def spread(search: Search, final: Trial, left: float, space: Space) -> Array:
-    """Return by how much structures as good differ in each parameter (p,).
+    """Return the spread of each parameter over equally good structures (p,).
 
     In working coordinates, and robustly: a companion that makes the same motion takes a parameter
     anywhere, and is one of many.

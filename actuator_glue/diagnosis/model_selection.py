@@ -109,7 +109,7 @@ class ModelSelection:
         return sorted(found.values(), key=by_score)
 
     def overlooked(self, current: Trial) -> list[Trial]:
-        """Refit a structure with effects whose motion beside its members is another than alone.
+        """Refit a structure with effects that only show beside its members.
 
         Beside a clock's skew a payload looks like one; with Eq. (2) alone it looked like the skew.
         """
@@ -189,7 +189,7 @@ class ModelSelection:
         return min(trials, key=lambda t: scorer.left_out_error(t.fit))
 
     def concluded(self, current: Trial, base: Trial, singles: Sequence[Trial]) -> Selection:
-        """Check each member against none and against its rivals, and say what it is worth."""
+        """Compare each member with its absence and its rivals, and note its evidence."""
         current = self.pruned(current)
         for name in current.effects:
             current = self.search.polish(replace(current, added=name))
@@ -202,7 +202,7 @@ class ModelSelection:
         )  # fmt: skip
 
     def pruned(self, current: Trial) -> Trial:
-        """Take members away that are not worth their parameters beside the others."""
+        """Remove members that are not worth their parameters."""
         for name in current.effects if len(current.effects) > 1 else ():
             rest = self.search.without(current, name)
             if not self.better(current, rest, self.least(current, rest)):
@@ -240,7 +240,7 @@ class ModelSelection:
         """Whether a structure is better: by nats, which are those of noise.
 
         One with more parameters must be beyond a tie, or the simpler one takes its place back.
-        What leaves material structure, and materially more, takes no place of what leaves none.
+        A material residual never replaces an immaterial one.
         Where more remains than noise nats are of misfit, at the frequencies with the least of it:
         the smaller error on blocks left out is better then, unless the blocks exclude it though
         all that remains counts as noise.
@@ -260,7 +260,7 @@ class ModelSelection:
     def spoken(
         self, current: Trial, rivals: dict[str, tuple[Rival, ...]]
     ) -> tuple[Trial, dict[str, tuple[Rival, ...]]]:
-        """Let the kind that most of the weight agrees on speak for what is tied."""
+        """Name one of the tied effects: of the group that has most of the weight."""
         groups = {name: effect.group for name, effect in self.search.entries.items()}
         for name, row in list(rivals.items()):
             other = spokesman(name, row, groups)

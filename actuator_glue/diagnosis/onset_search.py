@@ -1,4 +1,4 @@
-"""Whether what is missing was not there from the beginning, and what it is then."""
+"""Effects that start mid-record: when, and which they are."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _OTHERS = 2  # moments at most before which more acts than Eq. (2)
 
 
 def since_onset(first: Conclusion, settings: Thresholds, each: Each, tell: Progress) -> Conclusion:
-    """Ask whether what is missing was not there from the beginning.
+    """Detect effects that start mid-record.
 
     Taken where Eq. (2), or what acts all the time, up to a moment, and what is found in the data
     since then, leave materially less than effects that act all the time.

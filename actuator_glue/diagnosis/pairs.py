@@ -1,4 +1,4 @@
-"""Two effects together that may be what one was found for.
+"""Pairs of effects as rivals of a single one.
 
 A payload that brings damping of its own moves as a damper and a lag do together. No single effect
 in its place does so, and a search that goes on from the payload never comes to the two. A pair

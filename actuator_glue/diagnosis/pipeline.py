@@ -186,7 +186,7 @@ def _apart(selection: ModelSelection) -> ModelSelection:
 
 
 def _line_left(data: Data, final: Trial) -> Line | None:
-    """Return the line beside what was found: that beside Eq. (2) may be the effect's response."""
+    """Return the hum in the final residual: in Eq. (2)'s it may be an effect's response."""
     return hum.find(data, fit(data, final.model, final.fit.theta).error)
 
 
@@ -266,7 +266,7 @@ def with_learned_terms(result: Conclusion) -> Conclusion:
 
 
 def with_what_matters(result: Conclusion) -> Conclusion:
-    """Ask for what seemed to be noise beside names that are enough.
+    """Look for effects that passed for noise beside an answer that seems complete.
 
     What removes as much as an addition must is added; two names take the place of one where that
     says surely more.

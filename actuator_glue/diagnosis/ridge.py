@@ -1,4 +1,4 @@
-"""What one specimen stiffness k leaves open: other parameters that do as well.
+"""The ridge that one specimen stiffness k leaves: other parameters that fit as well.
 
 Then the response has alpha_1 beta_0/(alpha_2 + k) and alpha_3/(alpha_2 + k) in it, and of the
 oil's stiffness alone nothing (of forces their share of it). Draws reach along that ridge only as

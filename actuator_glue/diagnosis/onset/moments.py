@@ -156,7 +156,7 @@ def quiet(before: Data, error: Array) -> bool:
 def enough_before(
     before: Data, base: Trial | None, since: Trial, cost: float, complete: bool
 ) -> list[tuple[Trial, float]]:
-    """Return what may act before a moment, best first: Eq. (2), or what came since less one.
+    """Return models that may hold before a moment, best first: Eq. (2), or one effect less.
 
     Or all of that with other parameters, where it is complete and leaves only noise there, too.
 
