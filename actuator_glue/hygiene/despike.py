@@ -23,7 +23,7 @@ _TRIMS = 2  # refits without what stood out of the last
 
 
 def _unsettled(record: Record, initial: Initial) -> int:
-    """Samples in which a state that is not known is forgotten: its transient is no impulse."""
+    """Samples skipped while the initial state decays: its transient is no impulse."""
     unknown = initial == 'measured' and record.duration > 2.0 * SETTLE
     return round(SETTLE / record.period) if unknown else 0
 
@@ -56,11 +56,11 @@ def without_impulses(
         data: records.
         model: a structure.
         theta: its parameters (p,).
-        known: what was taken out of each record beside another model; it is asked for again.
+        known: impulses that were found with another model; they are judged again.
 
     Returns:
-        The data with what the samples around impulses say in their place, the same object where
-        they are the same, and the impulses of each record.
+        The data with impulses replaced by interpolation (the same object where there are none),
+        and the impulses of each record.
     """
     records, all_ = [], []
     rows = zip(data.records, data.initials, data.origins, data.factors, known, strict=True)
@@ -92,7 +92,7 @@ def without_impulses(
 
 
 def _less(channel: Array, found: Impulses, share: float) -> Array:
-    """Return a channel (n,) without a share of some impulses; the same object without any."""
+    """Return a channel (n,) less a share of some impulses; the same object if there are none."""
     if not share:
         return channel
     out = channel.copy()
@@ -156,7 +156,7 @@ def without_frozen(data: Data, model: Model, theta: Array) -> tuple[Data, list[s
 
 
 def told(records: Sequence[Record], impulses: Sequence[Impulses]) -> list[str]:
-    """Say what was taken out of records, for people."""
+    """Return sentences on what was taken out of records."""
     pairs = zip(records, impulses, strict=False)
     return [f'{where(r, i + 1)}: {_told(n, r)}' for i, (r, n) in enumerate(pairs) if n.count]
 

@@ -63,7 +63,7 @@ def while_moving(repeated: Frozen, record: Record, output: Array) -> Frozen:
 def bridged(record: Record, found: Frozen, output: Array, samples_each: int = 1) -> Array:
     """Return the measured channel (n,) [m] with the motion of a model in place of repeats.
 
-    What the model misses on both sides is joined by a line.
+    The error of the model on both sides is interpolated by a line and added.
 
     Args:
         record: one sample for `samples_each` of the record that was searched (means of twice as
@@ -84,7 +84,7 @@ def bridged(record: Record, found: Frozen, output: Array, samples_each: int = 1)
 
 
 def every_which(values: Array) -> int:
-    """Return every which sample a channel (n,) changes; 1 where it may change at every one."""
+    """Return after how many samples a channel (n,) changes; 1 if it may change at each."""
     moved = values[1:] != values[:-1]
     if 1.5 * np.count_nonzero(moved) > len(values) + 2:  # half of the changes follow another
         return 1

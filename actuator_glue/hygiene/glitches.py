@@ -186,7 +186,7 @@ def shares(record: Record, mended: Record, theta: Array, initial: Initial) -> Tr
 
 
 def never_given(found: Traces) -> bool:
-    """Whether the response is not in the motion: surely, or as the reading has the impulses.
+    """Whether the piston did not respond: surely, or probably where the reading has them too.
 
     A share far below none is what the model lacks, and says nothing: less than half as far as from
     all of it.

@@ -129,10 +129,11 @@ def find(
 
     Args:
         residual: of a model that was fitted, (n,) [m].
-        motion: sizes of what accidents do not know of, (n,) each: how fast the piston is, say.
+        motion: quantities that an accident cannot depend on, (n,) each: the speed of the piston,
+        say.
         period: time between samples [s].
-        phase: of the motion's cycle (n,) [rad], which they do not know of either; NaN where a
-            reading could be off at some phases only.
+        phase: of the motion's cycle (n,) [rad], on which an accident cannot depend either; NaN
+            where a reading could be off at some phases only.
     """
     if len(residual) < 40 * _REACH:
         return NONE
@@ -201,7 +202,7 @@ def in_command(command: Array, found: Impulses) -> float:
 
 
 def _with_motion(starts: list[int], motion: Sequence[Array]) -> bool:
-    """Whether impulses come when the piston is fast or far out: accidents do not know of that."""
+    """Whether impulses depend on the speed or place of the piston, as no accident does."""
     ranks = [scipy.stats.rankdata(size)[starts].mean() / len(size) for size in motion]
     return bool((max(ranks) - 0.5) * np.sqrt(12.0 * len(starts)) > _SURE)
 

@@ -38,7 +38,7 @@ def noise_at_rest(record: Record, samples: int, initial: Initial = 'rest') -> fl
 def compared(
     records: Sequence[Record], at_rest: Sequence[float | None], moving: float
 ) -> tuple[str, ...]:
-    """Say where the noise at rest is not that in motion.
+    """Return sentences on records whose noise at rest is not that in motion.
 
     Args:
         records: as fitted.

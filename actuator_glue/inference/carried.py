@@ -60,7 +60,7 @@ class Carried:
 
     @cached_property
     def key(self) -> bytes:
-        """Digest by which equal draws are known as such."""
+        """Digest that is the same for equal draws."""
         words = repr((self.names, self.components)).encode()
         return hashlib.blake2b(words + self.draws.tobytes(), digest_size=16).digest()
 

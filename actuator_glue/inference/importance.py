@@ -138,7 +138,7 @@ def sample(
 def smoothed(log_weights: Array) -> tuple[Array, float]:
     """Pareto-smoothed weights (m,) of sum 1, and the shape k of their tail.
 
-    Infinite where too few weights differ from nothing to tell. As Vehtari et al. (2024), and as
+    k is infinite where too few weights differ from zero. As Vehtari et al. (2024), and as
     arviz's `psislw`, whose import takes longer than a short diagnosis.
     """
     m = len(log_weights)

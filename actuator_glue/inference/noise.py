@@ -61,7 +61,7 @@ class Split:
         return np.asarray(np.exp(log_density))
 
     def all_of_it(self) -> Split:
-        """Return the same with all structure counted as noise."""
+        """Return the split with all structure counted as noise."""
         frequency, psd, excess = self.slow
         return replace(
             self,

@@ -76,9 +76,11 @@ class Problem:
         shaping_factor: G of Eq. (4).
         initial: state at each record's first sample.
         settle: uncounted start of each record [s].
-        first_index: samples of the test before the records: what drifts did so from there.
+        first_index: samples of the test before the records: drifts count from the start of the
+        test.
         near: parameters (p,) near the best fit, where known; they save time and change nothing.
-        shown: parameters (m, p) of an earlier posterior of this model, whose bends are taken off.
+        shown: parameters (m, p) of an earlier posterior of this model, which straighten the
+        coordinates.
         prior: draws of what is known of the parameters; None: no more than the box.
         force: G of the measured force; None where it is no evidence.
     """

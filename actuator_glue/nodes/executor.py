@@ -1,4 +1,4 @@
-"""rclpy's executor, without what it does again and again for nothing."""
+"""rclpy's executor, without its repeated work for events that hardly ever come."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ _EVENTS = 1.0
 class Executor(SingleThreadedExecutor):
     """Waits for events of the middleware now and then, for all else always.
 
-    There are two per publisher and subscription. To put them into what is waited for takes longer
-    than to carry a block of samples, and it is done anew for every block.
+    There are two per publisher and subscription. Adding them to the wait set takes longer than
+    carrying a block of samples, and rclpy does so for every block.
     """
 
     def __init__(self) -> None:

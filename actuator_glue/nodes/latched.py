@@ -1,4 +1,4 @@
-"""Latched messages: of those sent before one listened, the last one counts."""
+"""Latched messages: of those sent before a subscription was made, the last one counts."""
 
 from __future__ import annotations
 

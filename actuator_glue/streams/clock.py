@@ -1,4 +1,4 @@
-"""The sender's clock by the receiver's: offset and skew from the messages that were held up least.
+"""The sender's clock in the receiver's time: offset and skew from the least delayed messages.
 
 A message arrives when it was sent plus a delay that is never negative, so that of the differences
 of both clocks the smallest of each second tells most; a straight line through those of the last

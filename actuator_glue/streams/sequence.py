@@ -1,4 +1,4 @@
-"""Sequence numbers: which samples are missing, twice there or late; none is made up."""
+"""Sequence numbers: which samples are missing, duplicate or late; none is invented."""
 
 from __future__ import annotations
 

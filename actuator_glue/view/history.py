@@ -1,4 +1,4 @@
-"""Samples and events of a test, as many as fit: the oldest make room for the newest."""
+"""Samples and events of a test in bounded memory: the newest replace the oldest."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One process beside another, for work that must not hold it up."""
+"""A worker process, for work that must not hold up the process that asks for it."""
 
 from __future__ import annotations
 

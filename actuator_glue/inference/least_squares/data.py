@@ -192,7 +192,7 @@ class Data:
         return out
 
     def _simulate(self, model: Model, table: Array, same: list[int], out: Array) -> None:
-        """Simulate records that one motion answers into their columns of `out` (m, N).
+        """Simulate records that share one motion into their columns of `out` (m, N).
 
         Few parameter sets at a time, for what is not simulated part by part: beyond some 20 MB
         the memory of a simulation goes back to the system each time, and asking for it anew costs
@@ -220,7 +220,7 @@ class Data:
             yield slice(a - begin, b - begin), slice(a + shift, b + shift)
 
     def _runs_as(self, model: Model, i: int) -> tuple[Record, int]:
-        """A record as a model simulates it, and how many samples of that become one."""
+        """A record as a model simulates it, and how many of its samples are averaged into one."""
         record = self.records[i]
         if self.factors[i] == 1 or isinstance(record, ObservedChannel):
             return record, 1

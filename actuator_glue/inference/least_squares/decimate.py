@@ -1,8 +1,9 @@
 """Records sampled much faster than command and actuator move, brought to the rate they need.
 
 Both channels pass the same linear-phase filter, so that a linear actuator relates what is left of
-them exactly as it related them before; the command then runs linearly between its samples, with
-what a hold over one sample or the straight line over many takes off made up for to fourth order.
+them exactly as it related them before; the command then runs linearly between its samples, and the
+attenuation of a hold over one sample, or of a straight line over many, is compensated to fourth
+order.
 """
 
 from __future__ import annotations
@@ -88,7 +89,7 @@ def needed_rate(record: Record) -> float:
 
 
 def factor(record: Record) -> int:
-    """Return how many samples of a record may become one: of many, a multiple of four."""
+    """Return by what factor a record may be decimated; large ones are multiples of four."""
     if record.rate < 4.0 * _SEEN:  # whatever moves
         return 1
     count = max(1, int(record.rate / needed_rate(record) + 1e-9))

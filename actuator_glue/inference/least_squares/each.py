@@ -1,4 +1,4 @@
-"""Several things at a time, or one after the other."""
+"""Calls of one function, several at a time or one after the other."""
 
 from __future__ import annotations
 

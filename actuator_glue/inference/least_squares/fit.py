@@ -33,7 +33,7 @@ _MORE = 5  # steps as large as the last one that a start may be behind
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """A refitted structure, equal to no other one.
+    """A refitted structure; two are equal only if they are the same object.
 
     Attributes:
         theta: best parameters, physical units, (p,).
@@ -72,7 +72,7 @@ def rms(error: Array) -> float:
 
 @np.errstate(over='ignore', invalid='ignore')
 def _objective(data: Data, z: Array, sums: Array) -> Array:
-    """Sums of squares (s,) at z (s, p), grown by what a prior says against it.
+    """Sums of squares (s,) at z (s, p), enlarged by the penalty of a prior.
 
     Its logarithm times -N/2 is the log posterior density, the noise integrated out.
     """

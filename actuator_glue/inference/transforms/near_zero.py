@@ -11,13 +11,13 @@ from actuator_glue.records import Array
 class NearZero:
     """Transform of coordinates y (m, p) to z: one of them, s, becomes s / scale + ln(s / scale).
 
-    A prior that is uniform in its logarithm heaps up where it is nothing, which the records
-    cannot tell from a little. There z is the logarithm; where they can, z is s itself, in which
-    a ridge is straight.
+    A prior uniform in the logarithm of s piles up at values so small that the records cannot tell
+    them from 0. There z is the logarithm; at larger values z is s itself, in which a ridge is
+    straight.
 
     Args:
         column: of s.
-        scale: what the records can tell from nothing.
+        scale: least value that the records can tell from 0.
         dimension: p.
     """
 

@@ -30,8 +30,8 @@ class Registry(dict[str, Effect]):
             replace: take it in place of another one that was registered under its name.
 
         Raises:
-            InputError: its name or a parameter's belongs to another effect, or a parameter is one
-                that nothing takes.
+            InputError: its name or a parameter's belongs to another effect, or nothing uses a
+                parameter.
         """
         known = self.get(effect.name)
         if known is not None:

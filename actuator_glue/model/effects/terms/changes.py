@@ -1,4 +1,4 @@
-"""What signals change by over a sub-step, for functions that turn over within one."""
+"""Change of signals over a sub-step, for functions that turn over within one."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def asked(expressions: Iterable[Expression]) -> bool:
 
 
 class Changes:
-    """What signals change by by now: steadily, and in the jump of a held command.
+    """Change of each signal so far: its steady part, and the jump of a held command.
 
     Args:
         into: where the instructions go.

@@ -199,7 +199,7 @@ def _neutral(parameters: tuple[Parameter, ...]) -> Array:
 
 
 def changed(starts: _Starts, table: Array, scale: Scale) -> Array:
-    """Return by which share of itself each parameter set (LANES, p) changes its signal."""
+    """Return the relative change of the signal under each parameter set (LANES, p)."""
     made = _program(starts.equation, starts.parameters)
     place = _expression(starts.equation, starts.parameters).place
     before, after = _tried(made, place, table, starts.parameters, scale)
