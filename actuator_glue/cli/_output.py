@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 
 from actuator_glue.arguments import Output, add_force
-from actuator_glue.errors import printable
+from actuator_glue.errors import InputError, printable
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:
@@ -20,6 +20,36 @@ def add_json(parser: argparse.ArgumentParser) -> None:
         help="also write the result as JSON; '-' is standard output",
     )
     add_force(parser)
+
+
+def beside(out: str | None, write: Callable[[str], object]) -> int:
+    """Write a file that goes beside an answer; what fails is told and ends nothing.
+
+    Call it once the answer is printed.
+
+    Args:
+        out: the file; None where nobody asked for it.
+        write: writes it.
+
+    Returns:
+        2 where the file cannot be written, else 0: a fault in drawing takes nothing from the
+        answer and its exit code.
+    """
+    if out is None:
+        return 0
+    try:
+        write(out)
+    except BrokenPipeError:  # the reader of our output has gone
+        raise
+    except (InputError, OSError) as error:
+        print(f'actuator-glue: {printable(str(error))}', file=sys.stderr)
+        return 2
+    except Exception as error:
+        note(
+            f'{out}: could not be made ({type(error).__name__}: {error}); this is a fault of '
+            'actuator-glue, please report it. The answer stands'
+        )
+    return 0
 
 
 def note(line: str) -> None:
@@ -42,7 +72,7 @@ def table(
     from rich.table import Table
 
     shown = Table(
-        title=title or None,
+        title=printable(title) or None,
         box=box.SIMPLE_HEAD,
         title_justify='left',
         pad_edge=False,
@@ -51,7 +81,7 @@ def table(
     for i, column in enumerate(columns):
         shown.add_column(escape(column), justify='left' if i == 0 else 'right', no_wrap=True)
     for row in rows:
-        shown.add_row(*map(escape, row))
+        shown.add_row(*(escape(printable(cell)) for cell in row))
     file = sys.stderr if getattr(args, 'json', None) == '-' else sys.stdout
     console = Console(file=file, highlight=False)
     # A number that is cut off is worse than a line that the terminal folds.

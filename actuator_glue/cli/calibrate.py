@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from actuator_glue.arguments import Output, number, number_or_auto
 from actuator_glue.cli._effects_file import add_effects_file, load_effects
-from actuator_glue.cli._output import add_json, note, progress, say, table
+from actuator_glue.cli._output import add_json, beside, note, progress, say, table
 from actuator_glue.cli._prior import add_prior, prior_options
 from actuator_glue.cli._records import add_records, load
 from actuator_glue.errors import InputError
@@ -133,12 +133,11 @@ def run(args: argparse.Namespace) -> int:
     with progress('calibrating', args.evaluations) as done:
         found = calibrate(records, options, progress=done)
     _show(found, args)
-    if args.save is not None:
-        found.save(args.save)
-    if args.report is not None:
-        found.report(args.report)
-    write_json(found.to_json(), args.json)
-    return 1 if found.problems else 0
+    content = found.to_json()
+    failed = beside(args.json, lambda out: write_json(content, out))
+    failed = beside(args.save, found.save) or failed
+    failed = beside(args.report, found.report) or failed
+    return failed or (1 if found.problems else 0)
 
 
 def bounds(given: Sequence[str]) -> dict[str, tuple[float, float]]:

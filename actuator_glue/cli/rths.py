@@ -10,7 +10,7 @@ import argparse
 from typing import Any
 
 from actuator_glue.arguments import Output, number
-from actuator_glue.cli._output import add_json, note, say, table
+from actuator_glue.cli._output import add_json, beside, note, say, table
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
 
@@ -141,15 +141,14 @@ def run(args: argparse.Namespace) -> int:
     table(f'{found.partition}, compensator: {found.compensator}', HEADER, rows(found), args)
     for line in found.notes:
         note(line)
-    if args.save is not None:
-        found.save(args.save)
-    if args.report is not None:
-        found.report(args.report)
     more: dict[str, Any] = {} if args.limit is None else {'limit': args.limit, 'go': go}
     if compared is not None:
         more['comparison'] = compared.to_json()
-    write_json({**found.to_json(), **more}, args.json)
-    return 0 if go else 1
+    content = {**found.to_json(), **more}
+    failed = beside(args.json, lambda out: write_json(content, out))
+    failed = beside(args.save, found.save) or failed
+    failed = beside(args.report, found.report) or failed
+    return failed or (0 if go else 1)
 
 
 def _criterion(text: str) -> tuple[str, float]:

@@ -123,7 +123,8 @@ def write(path: Path, page: Page) -> Path:
     text = render(page)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text, encoding='utf-8')
+        # A file name may hold bytes that are no text.
+        path.write_text(text, encoding='utf-8', errors='backslashreplace')
     except OSError as error:
         raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error
     return path

@@ -15,6 +15,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike
 
+from actuator_glue.errors import printable
+
 P = ParamSpec('P')
 R = TypeVar('R')
 
@@ -69,10 +71,11 @@ def fit(text: str, width: float, *, tail: str = '', size: float = 9.0) -> str:
         tail: put behind the text, always whole.
         size: of the letters [pt].
     """
+    text = printable(text)  # no font has what a file name may hold
     room = max(int(72 * width / (0.56 * size)) - len(tail), 12)
     if len(text) > room:
         text = f'{text[: room - 3 - room // 3]}...{text[-(room // 3) :]}'
-    return text + tail
+    return text.replace('$', r'\$') + tail  # a name is no formula
 
 
 def styled(draw: Callable[P, R]) -> Callable[P, R]:
