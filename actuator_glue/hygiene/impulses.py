@@ -130,7 +130,7 @@ def find(
     Args:
         residual: of a model that was fitted, (n,) [m].
         motion: quantities that an accident cannot depend on, (n,) each: the speed of the piston,
-        say.
+            say.
         period: time between samples [s].
         phase: of the motion's cycle (n,) [rad], on which an accident cannot depend either; NaN
             where a reading could be off at some phases only.

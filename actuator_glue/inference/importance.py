@@ -66,7 +66,7 @@ class StudentMixture(NamedTuple):
         return np.array(rows)
 
     def refitted(self, points: Array, weights: Array) -> StudentMixture:
-        """Return what weighted points (m, p) make of it; parts that few of them fall to stay."""
+        """Return the mixture refitted to weighted points (m, p); parts with few of them stay."""
         of = self.log_densities(points)
         shares, centres, factors = [], [], []
         parts = np.exp(of - np.logaddexp.reduce(of, axis=0)) * weights

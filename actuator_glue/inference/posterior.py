@@ -77,10 +77,10 @@ class Problem:
         initial: state at each record's first sample.
         settle: uncounted start of each record [s].
         first_index: samples of the test before the records: drifts count from the start of the
-        test.
+            test.
         near: parameters (p,) near the best fit, where known; they save time and change nothing.
         shown: parameters (m, p) of an earlier posterior of this model, which straighten the
-        coordinates.
+            coordinates.
         prior: draws of what is known of the parameters; None: no more than the box.
         force: G of the measured force; None where it is no evidence.
     """

@@ -32,7 +32,7 @@ class Pacer:
 
     Args:
         steps: what to do, in order; iterated in the thread.
-        ready: called until it returns that the stream may begin.
+        ready: called until it is true: the stream may begin.
         speed: stream seconds per second; 0 for as fast as possible.
         done: called in the thread after the last step, or with what a step raised.
         clock: time that paces [s]; None for the computer's. One that stands still holds the

@@ -40,7 +40,7 @@ def chunks(rows: int, columns: int, least: int = _ROWS) -> Iterator[slice]:
 
 
 def _times(whole: Record, period: float, most: int = 1) -> int:
-    """Return how many simulated samples become one: as many as the kernel's steps, or most."""
+    """Return how many simulated samples are averaged into one: the kernel's steps, or `most`."""
     count = round(period / whole.period)
     divisors = [k for k in range(1, count + 1) if count % k == 0]
     steps = next((k for k in divisors if sample_steps(period / k) == 1), count)

@@ -67,7 +67,7 @@ def sum_of_squares(error: Array) -> Array:
 
 
 def diverged(moves: Array, motion: Array) -> NDArray[np.bool_]:
-    """Whether moves (..., N) of a motion (N,) are no small step's, but of an unstable model."""
+    """Whether differences (..., N) of a motion (N,) come from an unstable model, not a step."""
     return np.asarray(~(sum_of_squares(moves) <= _FAR * (motion @ motion)), dtype=np.bool_)
 
 
