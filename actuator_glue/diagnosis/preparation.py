@@ -58,9 +58,9 @@ class Prepared:
         )
 
     def without_impulses(self, model: Model, theta: Array) -> Prepared:
-        """Take out what is an impulse beside a model; the same object where nothing else is.
+        """Remove impulses judged against a model; the same object if nothing changes.
 
-        What passed for one beside another model is restored.
+        Samples that were impulses only by another model are restored.
         """
         fit, found = despike.without_impulses(self.fit, model, theta, self.impulses)
         if self.folded:

@@ -1,4 +1,4 @@
-"""Where draws of a posterior come from first: a Student t for every scale of what is beside.
+"""First proposals of importance sampling: a Student t for every scale of the discrepancy.
 
 Were all linear, the posterior would be one normal distribution for each of these scales, fifty
 times as wide for the largest as for the least: no single one of its moments is anything like it.

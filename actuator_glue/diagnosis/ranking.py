@@ -218,10 +218,10 @@ def _tolerant(
 
 
 def spokesman(name: str, rivals: Sequence[Rival], groups: Mapping[str, str]) -> str:
-    """Return the name that speaks for what is tied: of the kind most of the weight agrees on.
+    """Return which of the tied names is told: the best of the group with most of the weight.
 
-    One name may be ahead by a hair of three of another kind that do the same: a lag, say. The
-    best of these is told then, not the outsider.
+    One name may be barely ahead of three of another group, lags say, that fit alike. Then the best
+    of that group is told.
 
     Args:
         name: the best.

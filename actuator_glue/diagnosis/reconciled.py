@@ -31,7 +31,7 @@ _SURE = 2.0  # standard errors over the blocks
 def reached_by_both(
     error: HeldOutError, material: float, scorer: Scorer, held: Data, before: Side, after: Side
 ) -> HeldOutError:
-    """Ask what parameters leave that neither part excludes, where the best leave more than noise.
+    """Note the error under parameters that neither part excludes, if the best leave structure.
 
     Args:
         error: held-out error, with what is reached to first order.

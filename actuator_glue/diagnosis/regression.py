@@ -1,4 +1,4 @@
-"""A generic surrogate as flexible as a structure: what the catalogue must not do worse than."""
+"""A generic regression as flexible as a structure, than which no effects may be worse."""
 
 from __future__ import annotations
 

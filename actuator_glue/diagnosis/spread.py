@@ -1,4 +1,4 @@
-"""How far what is not known of the parameters moves a simulation, and where it cannot move it."""
+"""How far uncertain parameters move a simulation, and the error that none of them removes."""
 
 from __future__ import annotations
 

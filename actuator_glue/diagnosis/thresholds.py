@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Thresholds:
-    """Thresholds, calibrated on benchmark seeds that are not reported (docs/diagnosis.md).
+    """Thresholds, calibrated on benchmark seeds that are not reported (docs/scores.md).
 
     Attributes:
         noise_share: an effect is material where it removes more than this share of the noise rms,
@@ -25,7 +25,7 @@ class Thresholds:
         beaten_noise, beaten_share: as left_noise and left_share, where a generic surrogate
             explains more than the names do (0.28 of the noise is found in noise alone).
         outside: probability that a name stands for something the catalogue does not hold though
-            nothing remains: 4 of 177 blind cases (docs/diagnosis.md).
+            nothing remains: 4 of 177 blind cases (docs/scores.md).
         described: what the probability of names is multiplied with where learned terms stand
             beside them and structure remains all the same: 1 of 15 was right, on 7 blind machines,
             where 55 % were told on average.

@@ -15,7 +15,7 @@ from actuator_glue.diagnosis.trial import Trial
 
 
 def explained(selection: ModelSelection, found: Selection) -> Selection | None:
-    """Go on from a selection with two more effects at once.
+    """Add two effects at once to a selection.
 
     Args:
         selection: the model selection that ended with `found`.

@@ -23,7 +23,7 @@ _OWN = 2  # parameters: of the least fault and of the share that is fed back
 
 
 def in_the_loop(selection: ModelSelection, found: Selection) -> Selection | None:
-    """Go on from a selection with a faulty transducer in the loop.
+    """Put a fault of the transducer inside the controller's loop.
 
     Asked for where structure remains, and where more parameters than its own may stand for it.
 

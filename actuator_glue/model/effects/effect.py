@@ -74,7 +74,7 @@ class Effect:
     Attributes:
         name: name on the command line.
         place: where in the loop it acts.
-        equation: what it changes, in the symbols of docs/effects.md.
+        equation: what it changes, in the symbols of docs/effects_catalogue.md.
         parameters: what can be estimated; all at `neutral` switch the effect off. A parameter
             that only shapes the effect has a neutral value that is merely a default.
         group: effects of one group leave nearly the same trace in command and displacement.
