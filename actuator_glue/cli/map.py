@@ -110,11 +110,25 @@ def _fault(path: str, text: str | None) -> str:
 def _missing(proposal: Proposal) -> str:
     names = [role for role in ('command', 'measured') if role not in proposal.channels]
     if not names:
-        return 'no column tells the times of the samples; give their rate with --rate HZ'
+        if not proposal.angles:
+            return 'no column tells the times of the samples; give their rate with --rate HZ'
+        told = ' and '.join(
+            f'{role} ({_name(guess)}) is an angle in {guess.column.unit}'
+            for role, guess in proposal.angles.items()
+        )
+        return (
+            f'{told}, and no length is made of it silently: where a lever turns a stroke into it, '
+            'write the channel map by hand with `unit: mm` and `scale`, the mm per unit of angle '
+            '(docs/howto_your_data.md)'
+        )
     return (
         f'no {" and no ".join(names)} could be told from these columns; write the channel map by '
         'hand (docs/howto_your_data.md)'
     )
+
+
+def _name(guess: Guess) -> str:
+    return guess.column.label.strip() or f'column {guess.column.name}'
 
 
 def _write(path: Path, text: str) -> None:
@@ -127,7 +141,7 @@ def _write(path: Path, text: str) -> None:
 def _row(column: ColumnLook, found: FileLook) -> tuple[str, ...]:
     low, high = column.range()
     name = str(column.name)
-    if not name.endswith(column.label):
+    if column.times is None and not name.endswith(column.label):
         name = f'{name} {column.label}'
     number = [f'{low:.6g}', f'{high:.6g}']
     return (name.strip(), column.unit, str(len(column.values)), *number, _remark(column))

@@ -15,6 +15,7 @@ from actuator_glue.io.channel_map import Channel, ChannelMap
 from actuator_glue.io.formats import Column, format_of, formats
 from actuator_glue.io.signature import refuse_pipe
 from actuator_glue.io.text_layout import text_layout
+from actuator_glue.io.units import written_unit
 from actuator_glue.records import Array
 
 
@@ -25,7 +26,7 @@ class ColumnLook:
     Attributes:
         name: as a channel map calls it.
         label: its name without the place where it lies.
-        unit: what the file gives as its unit; empty where it says nothing.
+        unit: what the file gives as its unit, beside the name or in it; empty where none is.
         values: shape (n,), unscaled.
         times: stamps of a topic's messages [s]; None in a file, where all rows are samples.
     """
@@ -137,7 +138,12 @@ def _file(path: Path) -> FileLook:
     named = [columns[i] if i < len(columns) else Column('', '') for i in places]
     names = [column.name for column in columns]
     looks = [
-        ColumnLook(c.name if c.name and names.count(c.name) == 1 else i + 1, c.label, c.unit, v)
+        ColumnLook(
+            c.name if c.name and names.count(c.name) == 1 else i + 1,
+            c.label,
+            c.unit or written_unit(c.label),
+            v,
+        )
         for c, i, v in zip(named, places, table.values(places), strict=True)
         if len(v) > 1
     ]

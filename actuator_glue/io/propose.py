@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from actuator_glue.io.look import ColumnLook, FileLook
-from actuator_glue.io.units import ROLES
+from actuator_glue.io.units import ANGLES, ROLES
 from actuator_glue.records import Array
 
 # Words of the field for each role, in the languages of controllers; whole words or parts.
@@ -58,9 +58,16 @@ class Proposal:
 
     @property
     def complete(self) -> bool:
-        """Whether command and measured were found, and times or a rate."""
+        """Whether command and measured were found, both lengths, and times or a rate."""
         timed = 'time' in self.channels or self.rate is not None
-        return {'command', 'measured'} <= set(self.channels) and timed
+        return {'command', 'measured'} <= set(self.channels) and timed and not self.angles
+
+    @property
+    def angles(self) -> dict[str, Guess]:
+        """Command and measured where they are angles, of which no length is made silently."""
+        return {
+            role: guess for role, guess in self.channels.items() if guess.column.unit in ANGLES
+        }
 
 
 def propose(found: FileLook, given: float | None = None) -> Proposal:
@@ -132,15 +139,18 @@ def _rate(found: FileLook, rest: list[ColumnLook], clock: Guess | None) -> float
 
 def _guess(column: ColumnLook, role: str, reasons: tuple[str, ...]) -> Guess:
     """Return a guess with the unit that name or file give, or the likeliest of the role."""
-    tail = re.search(r'(?:[_\s]|[\[(])([A-Za-zµμ]+)[\])]?\s*$', column.label)
-    for unit in (column.unit, tail[1] if tail else ''):
-        if unit in ROLES[role]:
-            return Guess(column, unit, reasons)
+    if column.unit in ROLES[role]:
+        return Guess(column, column.unit, reasons)
     likeliest = {'time': 's', 'command': 'mm', 'measured': 'mm', 'force': 'kN'}[role]
     if role == 'time' and column.rate is not None and column.rate <= 2.0:
         likeliest = 'ms'  # nobody samples an actuator once a second
-    stated = f'{column.unit!r} is no unit of it' if column.unit else 'the file states no unit'
-    return Guess(column, likeliest, reasons, (f'unit: {stated}, and a scale may be needed',))
+    if not column.unit:
+        said = 'the file states none, and a scale may be needed'
+    elif column.unit in ANGLES:
+        said = f'{column.unit!r} is an angle: give mm per {column.unit} as `scale`'
+    else:
+        said = f'the file says {column.unit!r}: give {likeliest} per {column.unit} as `scale`'
+    return Guess(column, likeliest, reasons, (f'unit: {said}',))
 
 
 def _displacements(

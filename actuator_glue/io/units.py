@@ -7,8 +7,9 @@ import re
 from actuator_glue.errors import InputError
 
 _LENGTH = {'m': 1.0, 'cm': 1e-2, 'mm': 1e-3, 'um': 1e-6, 'µm': 1e-6, 'μm': 1e-6, 'in': 0.0254}
+_LENGTH |= {'inch': 0.0254}
 _FORCE = {'N': 1.0, 'kN': 1e3, 'MN': 1e6, 'lbf': 4.4482216152605, 'kip': 4448.2216152605}
-_TIME = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9}
+_TIME = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'sec': 1.0, 'µs': 1e-6, 'μs': 1e-6}
 
 # What a column can be, and factors to SI by unit.
 ROLES: dict[str, dict[str, float]] = {
@@ -18,11 +19,29 @@ ROLES: dict[str, dict[str, float]] = {
     'force': _FORCE,
 }
 EXAMPLE = 'time_s,command_mm,measured_mm,force_N'
+ANGLES = frozenset(('deg', '°', 'degree', 'degrees', 'rad', 'mrad', 'rev', 'turn', 'turns'))
+# Units of other quantities, so that one which is written is known to be a unit.
+_OTHERS = frozenset(('V', 'mV', 'volt', 'volts', 'mA', '%', 'count', 'counts', 'cnt', 'inc'))
+_OTHERS |= {'bar', 'mbar', 'Pa', 'kPa', 'MPa', 'psi', 'Nm', 'kNm', 'l/min', '°C', 'degC', 'Hz'}
+_OTHERS |= {'m/s', 'mm/s', 'deg/s', 'rad/s', 'rpm', 'g', 'm/s2', 'm/s^2', 'm/s²', 'mm/s2'}
+_QUANTITY = {
+    'time': 'time',
+    'command': 'displacement',
+    'measured': 'displacement',
+    'force': 'force',
+}
 
+# `command_mm`, `Command [mm]`, `command/mm`, `Command in mm`
 _NAME = re.compile(
-    r'^\s*(?P<role>time|command|measured|force)(?:[\s_]*[\[(]?\s*(?P<unit>[^\]\)\s]*)\s*[\])]?)?\s*$',
+    r'(?P<role>time|command|measured|force)'
+    r'(?:[\s_/,;:]*(?:in\s+)?[\[(]?\s*(?P<unit>[^\]\)\s]*)\s*[\])]?)?',
     re.IGNORECASE,
 )
+_BRACKETS = re.compile(r'[\[({<]\s*([^\[\](){}<>]*?)\s*[\])}>]')
+_BETWEEN = re.compile(r'[\s_,;:\[\](){}<>]+')
+_KNOWN = ANGLES.union(_OTHERS, *ROLES.values())
+_LOWER = {unit.lower() for unit in _KNOWN}
+_PLACE = re.compile(r'[\d:,\s]*')  # in brackets: which column of a matrix
 
 
 def factor(role: str, unit: str | None, where: str) -> float:
@@ -39,9 +58,18 @@ def factor(role: str, unit: str | None, where: str) -> float:
             f'{" or ".join(f"{role}_{u}" for u in examples)}'
         )
     if unit not in known:
+        listed = ', '.join(u for u in known if u.isascii())
+        if unit in ANGLES:
+            raise InputError(
+                f'{where} is an angle ({unit}), and a length is needed: where a lever turns a '
+                f'stroke into it, give mm per {unit} as `scale`, with `unit: mm`, in a channel map'
+            )
+        what = 'which is not understood'
+        if unit in _KNOWN:
+            what = f'which is none of {_QUANTITY[role]}'
         raise InputError(
-            f'{where} has unit {unit!r}, which is not understood; use one of '
-            f'{", ".join(u for u in known if u.isascii())} (upper and lower case matter)'
+            f'{where} has unit {unit!r}, {what}; use one of {listed} (upper and lower case '
+            'matter), or give the factor to one as `scale` in a channel map'
         )
     return known[unit]
 
@@ -51,7 +79,7 @@ def recognise(name: str) -> tuple[str, str] | None:
 
     The unit is empty where the name has none; None where the name is no role.
     """
-    match = _NAME.match(name)
+    match = _NAME.fullmatch(name.strip())
     if match is None:
         return None
     return match['role'].lower(), match['unit'] or ''
@@ -63,12 +91,31 @@ def bare(name: str) -> str:
     return recognised[0] if recognised else name
 
 
+def written_unit(name: str) -> str:
+    """Return the unit that is written in a column's name, whatever it is of; empty without one.
+
+    In brackets, behind `_`, `/`, a comma or a blank: `Sollweg [mm]`, `cmd_mm_filtered`, `F / kN`.
+    """
+    inside = [text for text in _BRACKETS.findall(name) if not _PLACE.fullmatch(text)]
+    for text in inside:
+        if text in _KNOWN:
+            return str(text)
+    first, *words = [w for w in _BETWEEN.split(name) if w] or ['']
+    words = words or [first.partition('/')[2]]
+    words = [w if w in _KNOWN else w.partition('/')[2] or w for w in words]
+    # Within a name `in` and one letter may be anything.
+    units = [w for w in words[:-1] if w in _KNOWN and len(w) > 1 and w != 'in']
+    units += [w for w in words[-1:] if w in _KNOWN]
+    capitals = [w for w in words if w.isupper() and len(w) > 1 and w.lower() in _LOWER]
+    return (units or capitals or [str(text) for text in inside] or [''])[-1]
+
+
 def units_line(entries: list[str]) -> list[str]:
     """Return the units that a line below the names holds; nothing where it is no such line.
 
     Each entry is a unit, in brackets or not, empty, or a dash; one is known here at least.
     """
-    known = {unit for role in ROLES.values() for unit in role}
+    known = ANGLES.union(*ROLES.values())
     units = [entry.strip().strip('[]()').strip() for entry in entries]
     short = all(len(u) <= 12 and not _is_number(u) for u in units)
     return units if short and any(u in known for u in units) else []

@@ -1,0 +1,97 @@
+"""Units in the names of columns: every way to write one, and what is no length."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuator_glue.cli.main import main
+from actuator_glue.errors import InputError
+from actuator_glue.io.channel_map import parse_channel_map
+from actuator_glue.io.laboratory import read
+from actuator_glue.io.look import look
+from actuator_glue.io.units import recognise, written_unit
+
+COUNT = 1000
+TIME = np.arange(COUNT) * 1e-3
+COMMAND = 3 * np.sin(40 * TIME**2)
+MEASURED = np.roll(COMMAND, 8)
+
+
+def table(path: Path, names: list[str], by: str = ',') -> Path:
+    """Write time, command and measured below these names."""
+    rows = np.column_stack([TIME, COMMAND, MEASURED])
+    np.savetxt(path, rows, fmt='%.6f', delimiter=by, header=by.join(names), comments='')
+    return path
+
+
+@pytest.mark.parametrize(
+    'form', ['{}_{}', '{} [{}]', '{}/{}', '{} / {}', '{} in {}', '{} ({})', '{}; {}', '{} {}']
+)
+def test_every_way_to_write_a_unit(tmp_path: Path, form: str) -> None:
+    """Read as what it says; `map` shows it and has nothing to ask."""
+    units = {'time': 's', 'command': 'um', 'measured': 'mm'}
+    names = [form.format(role, unit) for role, unit in units.items()]
+    path = table(tmp_path / 'a.csv', names)
+    record = read(path)
+    np.testing.assert_allclose(record.command, COMMAND * 1e-6, atol=1e-12)
+    np.testing.assert_allclose(record.measured, MEASURED * 1e-3, atol=1e-9)
+    assert [recognise(name) for name in names] == list(units.items())
+    assert [column.unit for column in look(path).columns] == list(units.values())
+
+
+@pytest.mark.parametrize(
+    ('name', 'unit'),
+    [
+        ('Sollweg (mm) (gefiltert)', 'mm'),
+        ('cmd_mm_filtered', 'mm'),
+        ('Kraft F / kN', 'kN'),
+        ('Velocity mm/s', 'mm/s'),
+        ('Stroke [furlong]', 'furlong'),
+        ('POS_MM', 'MM'),
+        ('Angle [°]', '°'),
+        ('U [V]', 'V'),
+        ('data(:,2)', ''),
+        ('rec.Y(1).Data', ''),
+        ('Boom Ms', ''),
+        ('Oil in temp', ''),
+        ('in', ''),
+    ],
+)
+def test_a_unit_is_seen_where_it_is_written(name: str, unit: str) -> None:
+    """In brackets, within a name, of no length; and none where none is."""
+    assert written_unit(name) == unit
+
+
+@pytest.mark.parametrize('unit', ['deg', 'rad', '°', 'mrad'])
+def test_an_angle_is_never_a_length(
+    tmp_path: Path, unit: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Refused by name and in a map, not proposed as mm; read with the arm of its lever."""
+    names = ['time_s', f'command_{unit}', f'measured_{unit}']
+    path = table(tmp_path / 'a.csv', names)
+    with pytest.raises(InputError, match=rf'is an angle \({unit}\).*scale'):
+        read(path)
+    with pytest.raises(InputError, match='is an angle'):
+        parse_channel_map({'command': {'column': 2, 'unit': unit}, 'measured': 3}, 'map')
+    assert main(['map', str(path), '--out', str(tmp_path / 'map.yaml')]) == 1
+    assert f'is an angle in {unit}' in capsys.readouterr().err
+    assert not (tmp_path / 'map.yaml').exists()
+    described = {'time': {'column': 1, 'unit': 's'}}
+    for role, column in (('command', 2), ('measured', 3)):
+        described[role] = {'column': column, 'unit': 'mm', 'scale': 4.0}
+    record = read(path, channels=parse_channel_map(described, 'map'))
+    np.testing.assert_allclose(record.command, COMMAND * 4e-3, atol=1e-8)
+
+
+def test_a_unit_of_something_else_is_named(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Volts are no length: refused by name; `map` says what is written and what it needs."""
+    with pytest.raises(InputError, match=r"unit 'V', which is none of displacement.*scale"):
+        read(table(tmp_path / 'a.csv', ['time_s', 'command_V', 'measured_mm']))
+    path = table(tmp_path / 'a.csv', ['t [s]', 'Sollwert [V]', 'Istwert [mm]'])
+    assert main(['map', str(path)]) == 0
+    shown = capsys.readouterr().out
+    assert "CHECK unit: the file says 'V': give mm per V as `scale`" in shown
+    assert 'states none' not in shown
