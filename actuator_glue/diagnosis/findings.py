@@ -22,7 +22,7 @@ from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.effects import CATALOGUE
 
 # Probability at most of a name whose size may be nothing by its own interval: of those told with
-# 95 % 7 of 12 were right on 299 blind machines, and 127 of 129 of all others (docs/diagnosis.md).
+# 95 % 7 of 12 were right on 299 blind machines, and 127 of 129 of all others (docs/scores.md).
 _MAY_BE_NOTHING = 0.7
 
 

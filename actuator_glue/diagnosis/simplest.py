@@ -1,4 +1,4 @@
-"""The simplest that says the same: of what the records cannot tell apart it speaks."""
+"""The simplest of the structures that the records cannot tell apart: it is told."""
 
 from __future__ import annotations
 
