@@ -1,4 +1,4 @@
-"""Arguments that command lines share: numbers, and what is written without overwriting unasked."""
+"""Arguments that command lines share: numbers, and outputs that overwrite only with --force."""
 
 from __future__ import annotations
 

@@ -97,7 +97,7 @@ def record_tracking(
         structure: the model.
         record: the test.
         initial: state at its first sample.
-        settle: samples of its start that only let the initial state be forgotten.
+        settle: samples of its start that are not counted while the initial state decays.
         frequencies: where delay and amplitude are told [Hz].
         origin: time of its first sample since the test began [s].
     """

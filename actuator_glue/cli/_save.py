@@ -99,7 +99,7 @@ def _files(records: list[Record], out: Path, args: argparse.Namespace) -> list[P
 
 @contextmanager
 def _replacing(bag: Path) -> Iterator[None]:
-    """Put a bag that is there aside; it comes back where the new one is not written."""
+    """Move an existing bag aside; restore it if the new one cannot be written."""
     if not bag.exists():
         yield
         return

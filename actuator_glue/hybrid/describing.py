@@ -1,7 +1,7 @@
 """Nonlinear effects as a loop meets them: gain and delay at one frequency and one amplitude.
 
-The describing function (Gelb and Vander Velde 1968) of the whole actuator: what of its answer to
-a sine is a sine of the same frequency. Simulated, so that any effect has one.
+The describing function (Gelb and Vander Velde 1968) of the whole actuator: the fundamental of its
+response to a sine. It is simulated, so that any effect has one.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Linear systems with one input and one output, many side by side: one a draw."""
+"""Linear systems with one input and one output, many side by side: one for each draw."""
 
 from __future__ import annotations
 

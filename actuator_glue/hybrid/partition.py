@@ -162,8 +162,8 @@ class Partition:
     def without_specimen(self) -> Partition:
         """Return the partition whose matrices are those of a reference structure, less specimen.
 
-        What the specimen has of mass, damping and stiffness is taken out of the interface, so that
-        both parts together are the reference structure.
+        The specimen's mass, damping and stiffness are subtracted at the interface, so that both
+        parts together are the reference structure.
         """
         parts = (self.specimen.mass, self.specimen.damping, self.specimen.stiffness)
         out = []

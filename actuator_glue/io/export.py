@@ -25,7 +25,7 @@ def _columns(record: Record, unit: str) -> dict[str, Array]:
 
 @contextmanager
 def _whole(path: Path) -> Iterator[Path]:
-    """Give a file to write beside `path` that takes its name once it is whole and on the disk."""
+    """Yield a file beside `path` that is renamed to it once it is complete and on the disk."""
     temporary = path.with_name(path.name + '.tmp')
     try:
         yield temporary

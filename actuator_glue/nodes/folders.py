@@ -1,4 +1,4 @@
-"""Where files go that nobody has named: beside ROS's own logs, never where one happens to be."""
+"""Where files without a given name go: beside ROS's own logs, not to the working folder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Publishers and subscriptions that share a topic's name and will never exchange a message."""
+"""Publishers and subscriptions of one topic that DDS will never match."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Lifecycle transitions: where they lead, and a word on those that are not possible."""
+"""Lifecycle transitions: where they lead, and a message for those that are not possible."""
 
 from __future__ import annotations
 

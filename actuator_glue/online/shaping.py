@@ -24,7 +24,7 @@ def automatic(record: Record, model: ModelChoice, settle: int, near: Array | Non
     """Return half of the independent samples that the residual of the best fit is worth.
 
     The fit is by least squares, from an earlier window's posterior where there is one. The same
-    samples and the same start give the same factor: a replay has it, too.
+    samples and the same start give the same factor, as a replay needs.
 
     Args:
         record: samples of the window, n.

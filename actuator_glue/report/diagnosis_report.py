@@ -21,7 +21,7 @@ _SAMPLERS = {
 
 
 def _drawn(sampler: Json) -> str:
-    """Say how a posterior was drawn; chains that stand still have no R-hat."""
+    """Return how a posterior was drawn; chains that stand still have no R-hat."""
     known = {k: math.nan if v is None else v for k, v in sampler.items()}
     return _SAMPLERS.get(sampler.get('method', ''), 'draws').format(**known)
 

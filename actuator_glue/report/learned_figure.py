@@ -100,7 +100,7 @@ def learned_terms(found: DiagnosisData) -> Figure:
 
 
 def _ways(at: Array) -> list[slice]:
-    """Cut a path (n,) where it turns: a band is filled one way at a time."""
+    """Cut a path (n,) where it turns, so that its band is filled in one direction at a time."""
     turns = np.flatnonzero(np.diff(np.sign(np.diff(at)))) + 1
     edges = [0, *turns.tolist(), len(at) - 1]
     return [slice(a, b + 1) for a, b in pairwise(edges)]

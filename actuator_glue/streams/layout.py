@@ -80,7 +80,7 @@ class Rows(NamedTuple):
         counter: running number of each as sent, shape (n,), or None.
         time: sender's time of each, shape (n,) [s], or None.
         arrival_ns: when the last of them came, by the receiver's clock [ns].
-        fresh: a connection begins with them: what went before it is not known.
+        fresh: a connection begins with them; earlier samples are not known.
     """
 
     command: Array
