@@ -1,15 +1,20 @@
 """Refits."""
 
+import warnings
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from actuator_glue.diagnosis.identifiable import Working, derivatives
+from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.least_squares import fit as module
+from actuator_glue.inference.least_squares.base_prior import BasePrior
 from actuator_glue.inference.least_squares.data import Data
-from actuator_glue.inference.least_squares.fit import fit
-from actuator_glue.inference.least_squares.space import Space, jacobian
+from actuator_glue.inference.least_squares.fit import base_starts, fit
+from actuator_glue.inference.least_squares.space import UPPER, Space, jacobian
 from actuator_glue.model import commands
-from actuator_glue.model.parameters import Parameter
+from actuator_glue.model.parameters import NAMES, Parameter
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 
@@ -66,3 +71,22 @@ def test_a_derivative_is_taken_on_the_stable_side(low: float, known: float) -> N
     )
     assert np.allclose(seen, 0.5 * command)
     assert np.allclose(to_both[4], known * command)
+
+
+def test_a_start_far_from_a_prior_is_finite() -> None:
+    """Its objective was infinite, and infinity less infinity a warning on the screen.
+
+    A narrow prior and few samples: e^(r'r/N) of the usual starts is beyond any number.
+    """
+    model, rate = Structure(()), 200.0
+    theta = np.array([134.0, 1.1e9, 2.5e5, 0.5])
+    command = np.asarray(commands.sweep(rate, 5.0))
+    bare = Record(command, np.zeros(len(command)), 1.0 / rate, 250e3)
+    records = [Record(command, model.simulate(theta, bare), 1.0 / rate, 250e3)]
+    logs = 1e-5 * np.random.default_rng(1).standard_normal((400, 4))
+    carried = Carried(NAMES, theta * np.exp(logs))
+    data = replace(Data.whole(records), prior=BasePrior(carried, UPPER))
+    with warnings.catch_warnings():
+        warnings.simplefilter('error')
+        found = fit(data, model, base_starts(data))
+    np.testing.assert_allclose(found.theta, theta, rtol=1e-4)

@@ -27,6 +27,8 @@ from actuator_glue.records import Array
 _P = len(BASE)
 _DAMPINGS = np.array([1e-2, 1.0, 1e2])
 _STRAIGHT = 0.01  # of the squared motion between two starts may be beyond the linear
+_FURTHEST = 300.0  # a logarithm: whatever is farther from a prior is as bad
+_MOST = 1e100  # m^2: more is as good as diverged
 _LONG = 100_000  # samples: of each structure tried its slopes stay
 _MORE = 5  # steps as large as the last one that a start may be behind
 
@@ -70,16 +72,17 @@ def rms(error: Array) -> float:
     return float(np.sqrt(np.mean(error**2)))
 
 
-@np.errstate(over='ignore', invalid='ignore')
+@np.errstate(over='ignore')  # a step that diverges is worse than any
 def _objective(data: Data, z: Array, sums: Array) -> Array:
     """Sums of squares (s,) at z (s, p), enlarged by the penalty of a prior.
 
-    Its logarithm times -N/2 is the log posterior density, the noise integrated out.
+    Its logarithm times -N/2 is the log posterior density, the noise integrated out. However far
+    from the prior a start is, it is finite: differences of starts are asked for.
     """
     if data.prior is None:
         return sums
     square = (data.prior.pull(z) ** 2).sum(axis=-1)
-    return np.asarray(sums * np.exp(square / data.target.size))
+    return np.asarray(sums * np.exp(np.minimum(square / data.target.size, _FURTHEST)))
 
 
 def _informed(
@@ -154,7 +157,7 @@ def fit(
     output = found[:, 0]
     error = data.target - output
     sse = sum_of_squares(error)
-    alive = np.isfinite(sse)
+    alive = sse < _MOST
     z, output, error, sse = z[alive], output[alive], error[alive], sse[alive]
     cost = _objective(data, z, sse)
     if not len(z):
