@@ -196,7 +196,7 @@ def _effective(values: Array) -> Array:
 # Strict floating point: what is published must not depend on which process compiled it.
 @njit(fastmath=False)
 def _covariance(values: Array, lag: int) -> Any:
-    """Mean over chains (m, n) without their means of the product with what comes `lag` later."""
+    """Autocovariance at a lag, averaged over chains (m, n) less their means."""
     m, n = values.shape
     total = odd = 0.0
     for i in range(m):

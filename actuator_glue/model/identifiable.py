@@ -1,4 +1,4 @@
-"""Coordinates of Eq. (2a) under one specimen stiffness, compiled; why: online/coordinates.py."""
+"""Coordinates of Eq. (2a) under one specimen stiffness, compiled; why: docs/online_method.md."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def score(share: float) -> float:
 
 @_njit
 def oil_range(inertia: float, s: float, k: float, low: Array, high: Array) -> tuple[float, float]:
-    """Return between what alpha_2 + k the prior's box lies, given d2/n0 and s; maybe nothing.
+    """Return the range of alpha_2 + k inside the prior's box, given d2/n0 and s; may be empty.
 
     alpha_1 beta_0 and alpha_3 grow in proportion to it, each inside its own bounds.
     """

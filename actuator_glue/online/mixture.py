@@ -1,7 +1,7 @@
 """Quantiles of a mixture of normals: posterior draws, each with a residual around it.
 
 By a series about the normal distribution of equal mean and variance where its error bound allows
-(docs/online.md, "Band limits"), else component by component.
+(docs/online_method.md, "Band limits"), else component by component.
 """
 
 from __future__ import annotations

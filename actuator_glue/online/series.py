@@ -1,6 +1,6 @@
 """Quantiles by a series about the normal distribution of equal mean and variance.
 
-Edgeworth's series with an error bound that says how many terms do (docs/online.md, "Band limits").
+Edgeworth's series; an error bound says how many terms do (docs/online_method.md, "Band limits").
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The parts of all effects in the compiled step, put together: one njit function a place.
 
-Each function is what the ones before do, and then the next effect's part. Only what calls them
-is kept: their code is inlined there.
+Each function does what the one before does, and then the next effect's part. Compiled code is kept
+of what calls them only: they are inlined there.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""From physical parameters to the kernel's table (docs/effects.md, 'Scheme').
+"""From physical parameters to the kernel's table (docs/effects_method.md, 'Scheme').
 
 Compiled and written where the kernel reads it: for 32 parameter sets numpy would spend more time
 in its calls than in the arithmetic.

@@ -1,4 +1,4 @@
-"""What a command amounts to between two times: its mean, and the ramp of the same moment."""
+"""Mean and slope of a command between two times: those of a line with the same first moment."""
 
 from __future__ import annotations
 

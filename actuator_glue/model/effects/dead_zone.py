@@ -1,4 +1,4 @@
-"""Dead zone: what of a value lies beyond a limit on either side."""
+"""Dead zone: the part of a value beyond a limit on either side."""
 
 from __future__ import annotations
 
@@ -9,5 +9,5 @@ from actuator_glue.jit import njit
 
 @njit
 def beyond(value: Any, limit: Any) -> Any:
-    """What of a value lies beyond +-limit; a value that is not a number stays so."""
+    """Part of a value beyond +-limit; a value that is not a number stays so."""
     return value - min(max(value, -limit), limit)

@@ -1,4 +1,4 @@
-"""What the controller takes for the piston's position: beyond it, in every lane."""
+"""Feedback through the recorded transducer: what the controller reads beyond the position."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """One compiled step of the servo-hydraulic loop with every effect, many parameter sets at once.
 
-Derivation in docs/effects.md. Per sub-step one scalar equation is solved for the displacement
+Derived in docs/effects_method.md. Per sub-step one scalar equation is solved for the displacement
 increment: trapezoidal rule in the valve, the oil and the specimen, then the balance of forces.
 Each stage is a loop over lanes that the compiler turns into vector code; a stage whose effects
 are off is skipped. Stages that follow one another share a loop only while the processor can look

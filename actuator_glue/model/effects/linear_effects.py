@@ -11,7 +11,7 @@ force over oil stiffness f, rate of the flow q', recorded displacement y:
 
 with d2 = k + alpha_2. A delay moves the command by whole samples and a fraction, at which a held
 command changes and a linear one bends: both enter exactly, through the integral and the double
-integral of the transition matrix (docs/effects.md, 'Linear effects').
+integral of the transition matrix (docs/effects_method.md, 'Linear effects').
 """
 
 from __future__ import annotations

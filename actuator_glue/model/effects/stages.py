@@ -1,7 +1,7 @@
 """Stages of a sub-step before and after its balance of forces, each for one lane.
 
-Derivation in docs/effects.md. A value that only one side of a choice needs is loaded before it: a
-choice between two loads would stop the compiler from writing vector code.
+Derived in docs/effects_method.md. A value that only one side of a choice needs is loaded before
+it: a choice between two loads would stop the compiler from writing vector code.
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ def gapped(w: Array, n: int, push: Any, stiff: Any, free: Any, touched: Any) -> 
 
 @njit
 def passed(w: Array, n: int, dx: Any, gaps: bool) -> Any:
-    """What of an increment moves the specimen."""
+    """Part of an increment that moves the specimen."""
     if not gaps:
         return dx
     here, g = w[r.X + n], w[GAP + n]
