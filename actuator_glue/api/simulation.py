@@ -20,6 +20,7 @@ from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Hold, Record, check_stiffness
 
 BLOCK = 4096  # samples simulated at a time
+STIFFNESS = 250e3  # N/m, of the specimen of the paper
 NOISE = 1e-5  # m, of the displacement sensor where nothing else is asked for
 EFFECTS_FORM = 'effects are written NAME, or NAME:PARAMETER=VALUE,PARAMETER=VALUE, joined by +'
 SHAPES = ('sweep', 'sine', 'noise', 'earthquake')
@@ -135,7 +136,7 @@ def simulate(
         known = benchmark_plant.BenchmarkParameters().stiffness
         moved = _benchmark(rate, hold, draw, sensors)
     else:
-        structure, values = sizes(samples, rate, known, effects, theta)
+        structure, values = sizes(effects, theta)
         moving = Stream(
             structure,
             values,
@@ -209,19 +210,13 @@ def named_effects(text: str) -> dict[str, dict[str, float]]:
     return found
 
 
-def sizes(
-    command: Array,
-    rate: float,
-    stiffness: float,
-    effects: Effects = (),
-    theta: ArrayLike | None = None,
-) -> tuple[Structure, Array]:
+def sizes(effects: Effects = (), theta: ArrayLike | None = None) -> tuple[Structure, Array]:
     """Return a plant's structure and its parameters (p,), typical sizes where none are given.
 
+    Typical is what suits the test that is made where nothing else is asked for, with the specimen
+    of the paper: an effect has one size, whatever the command and the specimen of a test are.
+
     Args:
-        command: the command that tells what is typical, shape (n,) [m].
-        rate: its sample rate [Hz].
-        stiffness: specimen stiffness [N/m].
         effects: names of the catalogue, or parameters by name.
         theta: parameters of Eq. (2), shape (4,); None for Table 2.
 
@@ -234,7 +229,9 @@ def sizes(
     if base.shape != (4,):
         raise InputError(f'theta has shape {base.shape}; Eq. (2) has four parameters')
     values = structure.neutral(base)
-    test = scale([Record(command, command, 1.0 / rate, stiffness)], base)
+    usual = Command()
+    command = usual.samples()
+    test = scale([Record(command, command, 1.0 / usual.rate, STIFFNESS)], base)
     for entry in structure.entries:
         columns = structure.columns(entry.name)
         starts = list(entry.starts(test))

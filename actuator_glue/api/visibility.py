@@ -39,8 +39,8 @@ def unseen(
     """
     samples = samples_of(command)
     changes: dict[str, float] = {}
+    structure, values = sizes(effects, theta)
     for stiffness in stiffnesses:
-        structure, values = sizes(samples, command.rate, stiffness, effects, theta)
         known = dict(zip(structure.names, values, strict=True))
 
         def response(model: Structure, at: Array, k: float = stiffness) -> Array:

@@ -53,7 +53,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=[],
         metavar='NAME[:PARAMETER=VALUE,...]',
         help='switch an effect of the catalogue on; repeatable. Values not given are typical '
-        'ones. The output does not tell: OUT.truth.json does',
+        'ones, the same for every command and specimen. The output does not tell: the screen '
+        'and OUT.truth.json do',
     )
     add_effects_file(plant)
     plant.add_argument('--noise-mm', type=number, help='displacement noise, sd (default 0.01)')
@@ -107,8 +108,9 @@ def run(args: argparse.Namespace) -> int:
             done(test + 1)
     save(records, args)
     if args.effect:
-        write_json(_truth(args, command, stiffnesses[-1]), str(sealed))
-        note(f'what was switched on is in {sealed}')
+        truth = _truth(args)
+        write_json(truth, str(sealed))
+        note(f'hidden: {_hidden(truth)}; {sealed} holds it')
         for line in _unseen(args, command, stiffnesses):
             note(line)
     return 0
@@ -154,15 +156,12 @@ def _unseen(
     )
 
 
-def _truth(
-    args: argparse.Namespace, command: Command | Record, stiffness: float
-) -> dict[str, Any]:
+def _truth(args: argparse.Namespace) -> dict[str, Any]:
     """Return what is true about the plant."""
-    from actuator_glue.api.simulation import samples_of, sizes
+    from actuator_glue.api.simulation import sizes
     from actuator_glue.model.effects import CATALOGUE
 
-    samples = samples_of(command)
-    structure, theta = sizes(samples, command.rate, stiffness, _effects(args), args.theta)
+    structure, theta = sizes(_effects(args), args.theta)
     return {
         'schema': 'actuator_glue.truth/1',
         'plant': args.plant,
@@ -171,6 +170,24 @@ def _truth(
         **CATALOGUE.definitions(structure.effects),
         'seed': args.seed,
     }
+
+
+def _hidden(truth: dict[str, Any]) -> str:
+    """Return the effects of a plant and how large they are, in SI units and as people say it."""
+    from actuator_glue.model.effects import CATALOGUE
+    from actuator_glue.report.quantity import said, said_in
+
+    told = []
+    for name in truth['effects']:
+        values = []
+        for p in CATALOGUE[name].parameters:
+            value = truth['theta'][p.name]
+            factor, _ = said_in(p.unit, value)
+            people = f' ({said(value, p.unit)})' if factor != 1.0 else ''
+            unit = '' if p.unit == '1' else f' {p.unit}'
+            values.append(f'{p.name} = {value:.6g}{unit}{people}')
+        told.append(f'{name} ({", ".join(values)})' if values else name)
+    return ' + '.join(told)
 
 
 def _problem_r(args: argparse.Namespace) -> list[Record]:

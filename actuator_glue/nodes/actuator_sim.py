@@ -117,11 +117,7 @@ class SimulatorNode(streamer.Streamer):
         if values['plant'] == 'benchmark':
             return benchmark_plant(period=1.0 / values['rate'], seed=values['seed'])
         structure, theta = sizes(
-            self.command[:200_000],
-            values['rate'],
-            values['specimen_stiffness'],
-            named_effects(values['undeclared_effect']),
-            [values[p.name] for p in BASE],
+            named_effects(values['undeclared_effect']), [values[p.name] for p in BASE]
         )
         if structure.effects or values['sealed_file']:
             self._seal(structure, theta)

@@ -1,12 +1,15 @@
 """What `simulate` writes, and what it refuses."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from actuator_glue.api.simulation import Command, simulate, sizes
 from actuator_glue.io.load import load_records
+from actuator_glue.model.effects import CATALOGUE
 
 
 def test_simulated_bag_holds_what_was_asked(run, short_bag: Path) -> None:
@@ -114,3 +117,44 @@ def test_an_effect_too_small_to_be_seen_is_told(
     done = run('simulate', tmp_path / 'a.csv', '--rate', 200, '--duration', 8, '--f1', 4, *options)
     assert done.code == 0, done.err
     assert ('cannot be seen' not in done.err) == seen
+
+
+def test_an_effect_is_the_same_machine_under_every_command(run, tmp_path: Path) -> None:
+    """Its default size depends on nothing, and is told as it is: in SI units and as people say."""
+    options = {
+        'usual': (),
+        'small': ('--amplitude-mm', 0.4),
+        'short': ('--duration', 4, '--rate', 250, '--f1', 3),
+        'stiff': ('--stiffness', 0, 2e6),
+        'other': ('--command', 'earthquake', '--duration', 5),
+    }
+    found = {}
+    for name, given in options.items():
+        common = ('--rate', 200, '--duration', 6)
+        done = run('simulate', tmp_path / name, *common, *given, '--effect', 'backlash')
+        assert done.code == 0, done.err
+        truth = json.loads((tmp_path / f'{name}.truth.json').read_text())
+        found[name] = truth['theta']['backlash']
+        # The screen tells what the file holds.
+        told = re.search(r'backlash = (\S+) m \((\S+) um\)', done.err)
+        assert told is not None, done.err
+        assert float(told[1]) == pytest.approx(found[name], rel=1e-4)
+        assert float(told[2]) == pytest.approx(1e6 * found[name], rel=0.01)
+    assert len(set(found.values())) == 1
+    assert 2e-5 < found['usual'] < 1e-4
+
+
+@pytest.mark.parametrize('name', sorted(CATALOGUE))
+def test_every_effect_has_one_default_size(name: str) -> None:
+    """Neither specimen nor command of a test makes another machine of it."""
+    structure, values = sizes([name])
+    moved = [
+        simulate(
+            Command(rate=200.0, duration=3.0, amplitude=a), stiffness=k, effects=[name], seed=5
+        )
+        for a, k in ((5e-4, 0.0), (3e-3, 250e3))
+    ]
+    given = {name: dict(zip(structure.names[4:], values[4:].tolist(), strict=True))}
+    for record in moved:
+        again = simulate(record, stiffness=record.stiffness, effects=given, seed=5)
+        np.testing.assert_array_equal(again.measured, record.measured)
