@@ -37,13 +37,13 @@ def record_figure(record: Record) -> Figure:
     error = figure.add_subplot(grid[2, :], sharex=whole)
     error.plot(time, MM * (record.command - record.measured), color=style.DETERMINISTIC, lw=0.5)
     error.set_ylabel('tracking\nerror [mm]')
-    last = error
     if record.force is not None:
-        last = figure.add_subplot(grid[3, :], sharex=whole)
-        last.plot(time, 1e-3 * record.force, color=style.BAND, lw=0.5)
-        last.set_ylabel('force [kN]')
+        force = figure.add_subplot(grid[3, :], sharex=whole)
+        force.plot(time, 1e-3 * record.force, color=style.BAND, lw=0.5)
+        force.set_ylabel('force [kN]')
     whole.set_xlim(0.0, record.duration)
-    last.set_xlabel('time [s]')
+    for axes in figure.axes:
+        axes.set_xlabel('time [s]')
     figure.legend(*whole.get_legend_handles_labels(), loc='outside lower center', ncols=2)
     k = record.stiffness
     stiffness = 'not known' if k is None else f'{k / 1e3:.6g} kN/m'

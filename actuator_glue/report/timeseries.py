@@ -20,6 +20,7 @@ from actuator_glue.report.frequency import instantaneous_frequency
 
 Zoom = tuple[float, float]
 MM = 1e3
+TOP = 5  # what was measured is seen over every band
 PARAMETER_LOOK: dict[str, Any] = {'color': style.BAND, 'alpha': 0.45, 'lw': 0}
 # Either band may be the wider one: the total one is drawn by its edges.
 TOTAL_LOOK: dict[str, Any] = {
@@ -152,13 +153,15 @@ def band_at_zooms(
     for i, (start, stop) in enumerate(zooms):
         upper, lower = rows[0, i], rows[1, i]
         upper.plot(time, MM * record.command, ':', color=style.COMMAND, label='command')
-        upper.plot(time, MM * record.measured, color=style.MEASURED, lw=0.9, label='measured')
-        bands.draw(upper, time, 0.0, 3)
+        upper.plot(
+            time, MM * record.measured, color=style.MEASURED, lw=0.9, label='measured', zorder=TOP
+        )
+        bands.draw(upper, time, 0.0, 1)
         _zoom(upper, record, start, stop)
         part = slice(*np.searchsorted(time, (start, stop)))
         bands.part(part).draw(lower, time[part], middle[part], 1)
         off = MM * (record.measured[part] - middle[part])
-        lower.plot(time[part], off, color=style.MEASURED, lw=0.6)
+        lower.plot(time[part], off, color=style.MEASURED, lw=0.6, zorder=TOP)
         lower.set_xlabel('time [s]')
         if zoom_titles is not None:
             upper.set_title(zoom_titles[i])

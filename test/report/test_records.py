@@ -25,5 +25,6 @@ def test_a_record_is_drawn_whole(
     labels = ' '.join(axes.get_ylabel() for axes in figure.axes)
     assert ('force [kN]' in labels) == force
     assert 'displacement [mm]' in labels
+    assert {axes.get_xlabel() for axes in figure.axes} == {'time [s]'}
     assert '250 kN/m' in figure.get_suptitle()
     assert overlapping_texts(figure) == []

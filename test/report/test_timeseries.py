@@ -88,3 +88,15 @@ def test_drawing_leaves_global_style_alone(sweep, limits) -> None:
     before = dict(mpl.rcParams)
     style.data_uri(band_at_zooms(sweep, Bands(limits), even_zooms(sweep)))
     assert dict(mpl.rcParams) == before
+
+
+def test_no_band_hides_what_was_measured(sweep) -> None:
+    """However wide bands are, the measured line is whole in the picture, in both rows."""
+    middle = np.tile(1.1 * sweep.measured, (3, 1))
+    wide = band(middle + np.array([[-1e-4], [0.0], [1e-4]]))
+    figure = band_at_zooms(sweep, Bands(wide, total=wide), even_zooms(sweep))
+    for axes in figure.axes:
+        black = [line for line in axes.lines if line.get_color() == style.MEASURED]
+        others = [*axes.collections, *(line for line in axes.lines if line not in black)]
+        assert len(black) == 1 and others
+        assert black[0].get_zorder() > max(other.get_zorder() for other in others)
