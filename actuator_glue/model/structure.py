@@ -48,7 +48,7 @@ class Structure:
         effects: names of the effects.
         parameters: base parameters, then those of every effect.
         names: their names.
-        linear: all effects are linear, the simulation is exact (effects.lti).
+        linear: all effects are linear, the simulation is exact (effects/linear_effects.py).
 
     Raises:
         InputError: unknown or repeated effect.

@@ -1,7 +1,7 @@
 """Forms that a learned term may take: functions of what is known at a place of the loop.
 
-What is smooth and holds at any time is written here, friction in learned_friction.py, what else
-remembers or changes with time in learned_memory.py.
+What is smooth and holds at any time is written here, friction in friction.py, what else remembers
+or changes with time in memory.py.
 Each is an effect written as an expression (docs/effects.md), its sizes scaled to the test, so that
 it is screened, refitted and compared as the effects of the catalogue are.
 """

@@ -19,7 +19,7 @@ _WAYS: Final = (1e-4, 0.1)
 
 
 def forms(sizes: Mapping[str, float]) -> list[Effect]:
-    """Return the forms for a test of these sizes (learned_sizes.sizes_of)."""
+    """Return the forms for a test of these sizes (sizes.sizes_of)."""
     places = ('force', 'specimen') if sizes['k'] > 0.0 else ('force',)
     return [form(place, sizes) for place in places for form in (_friction, _presliding)]
 

@@ -48,7 +48,7 @@ _TIMES = (0.02, 5.0)  # of the test's duration: in the longest all but 9 % of a 
 
 
 def forms(sizes: Mapping[str, float]) -> list[Effect]:
-    """Return the forms for a test of these sizes (learned_sizes.sizes_of)."""
+    """Return the forms for a test of these sizes (sizes.sizes_of)."""
     return [
         *(_play(word, sizes) for word in _LOST),
         *(_hysteresis(word, sizes) for word in _LATE),
