@@ -1,7 +1,8 @@
 """The loop with effects as differential equations for scipy: shares nothing with the kernel.
 
-One right-hand side from the equations of docs/effects_catalogue.md. Dry friction on a massless specimen is
-solved as what it is, a hybrid system: stick, slip forward, slip backward, with located events.
+One right-hand side from the equations of docs/effects_catalogue.md. Dry friction on a massless
+specimen is solved as what it is, a hybrid system: stick, slip forward, slip backward, with located
+events.
 """
 
 from __future__ import annotations
