@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from actuator_glue.api.calibration_result import Calibration
+    from actuator_glue.inference.prior_use import GivenPrior
     from actuator_glue.report import html
 
 Progress = Callable[[str, float], None]
@@ -126,7 +127,8 @@ class DiagnosisOptions:
         jobs: threads for the refits of candidates; the result does not depend on it.
         false_alarms: probability of an addition on a healthy machine.
         prior: an earlier calibration of the actuator, or the file it was saved to: what it knew
-            of Eq. (2)'s parameters goes into fits and posterior. None for nothing.
+            of Eq. (2)'s parameters goes into fits and posterior; or what is known by now, with
+            its drift and age. None for nothing.
         drift: standard deviation by which the logarithm of each parameter may have moved in an
             hour since (random walk) [h^-1/2].
         prior_age: time since that calibration [s].
@@ -136,7 +138,7 @@ class DiagnosisOptions:
     seed: int = 1
     jobs: int = 2
     false_alarms: float = 0.01
-    prior: Calibration | Path | str | None = None
+    prior: Calibration | GivenPrior | Path | str | None = None
     drift: float = 0.02
     prior_age: float = 0.0
     use_force: bool = False
@@ -207,6 +209,5 @@ def _tracking(found: DiagnosisData, records: Sequence[Record]) -> tuple[RecordTr
     known = [r for r in records if r.source in rates]
     fitted = (decimated(r, round(r.rate / rates[r.source])) for r in known)
     return tuple(
-        record_tracking(found.joint, found.names, found.model, r, initial_state(r))
-        for r in fitted
+        record_tracking(found.joint, found.names, found.model, r, initial_state(r)) for r in fitted
     )

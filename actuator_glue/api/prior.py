@@ -24,12 +24,12 @@ def check_prior(drift: float, age: float) -> None:
 
 
 def given_prior(
-    earlier: Calibration | Path | str | None, drift: float, age: float
+    earlier: Calibration | GivenPrior | Path | str | None, drift: float, age: float
 ) -> GivenPrior | None:
     """Return what an earlier calibration, or the file it was saved to, lets one know now.
 
     Args:
-        earlier: None for nothing.
+        earlier: None for nothing; what is known now already stays as it is.
         drift: standard deviation by which the logarithm of each parameter may have moved in an
             hour since (random walk) [h^-1/2].
         age: time since [s].
@@ -38,8 +38,8 @@ def given_prior(
         InputError: a file that holds no calibration, or numbers as `check_prior`.
     """
     check_prior(drift, age)
-    if earlier is None:
-        return None
+    if earlier is None or isinstance(earlier, GivenPrior):
+        return earlier
     source = 'a calibration' if isinstance(earlier, Calibration) else str(earlier)
     found = earlier if isinstance(earlier, Calibration) else Calibration.load(earlier)
     return GivenPrior(found.carried().drifted(Drift(drift), age), source, drift, age)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import fields
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.errors import InputError
@@ -15,7 +18,9 @@ from actuator_glue.inference.choice import ModelChoice, choose_model
 from actuator_glue.inference.informative_prior import informative_prior
 from actuator_glue.nodes import own_effects
 from actuator_glue.nodes.parameters import Spec
+from actuator_glue.online.knowledge import Known
 from actuator_glue.online.settings import CHOICES, LIMITS, EstimatorSettings
+from actuator_glue.online.structures import Proposal, Proposed
 
 
 def _specs() -> list[Spec]:
@@ -110,14 +115,25 @@ def carried(values: Mapping[str, Any]) -> Carried | None:
     return found
 
 
-def requested(request: Any) -> ModelChoice:
-    """Return the model that a SetModel request names.
+def requested(request: Any) -> Proposal:
+    """Return the structures that a SetModel request names.
 
     Raises:
         InputError: unknown effects or parameters, lists that do not belong together.
     """
-    names = list(request.parameter_names)
-    lower, upper, start = list(request.lower), list(request.upper), list(request.start)
+    if not request.structures:
+        return Proposal.of(_model(request))
+    material = float(request.material)
+    return Proposal(
+        tuple(Proposed(_model(s), float(s.weight), _known(s)) for s in request.structures),
+        material if material > 0.0 else math.nan,
+    )
+
+
+def _model(named: Any) -> ModelChoice:
+    """Return the model of a SetModel request or of one of its structures."""
+    names = list(named.parameter_names)
+    lower, upper, start = list(named.lower), list(named.upper), list(named.start)
     if not len(names) == len(lower) == len(upper) or len(start) not in (0, len(names)):
         raise InputError(
             f'{len(names)} parameter names, {len(lower)} lower, {len(upper)} upper bounds and '
@@ -125,4 +141,16 @@ def requested(request: Any) -> ModelChoice:
         )
     bounds = {n: (lo, up) for n, lo, up in zip(names, lower, upper, strict=True)}
     places = dict(zip(names, start, strict=True)) if start else None
-    return choose_model(tuple(request.effects), bounds, places)
+    return choose_model(tuple(named.effects), bounds, places)
+
+
+def _known(structure: Any) -> Known | None:
+    """Return what a ModelProposal says is known of its parameters."""
+    names = tuple(structure.known_names)
+    if not names:
+        return None
+    draws = np.asarray(structure.known, np.float64)
+    if draws.size % len(names):
+        raise InputError(f'{draws.size} numbers are no draws of {len(names)} parameters')
+    carried = Carried(names, draws.reshape(-1, len(names)))
+    return Known(carried, int(structure.known_middle), int(structure.known_last))

@@ -1,10 +1,14 @@
-"""What the model lacks: diagnosis on request, or by itself when coverage breaks."""
+"""What the model lacks: diagnosis on request, or by itself when something speaks for it.
+
+What is due and what follows is decided in `online/live_diagnosis.py`.
+"""
 
 from __future__ import annotations
 
 import sys
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from actuator_glue_msgs.action import Diagnose
@@ -12,7 +16,6 @@ from actuator_glue_msgs.srv import SetModel
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 
 from actuator_glue import sample_block
-from actuator_glue.diagnosis.verdict import against
 from actuator_glue.errors import InputError
 from actuator_glue.nodes import diagnoser_worker, own_effects, spin, topics
 from actuator_glue.nodes.health import ERROR
@@ -20,9 +23,10 @@ from actuator_glue.nodes.latched import Newest
 from actuator_glue.nodes.messages import publish
 from actuator_glue.nodes.working import WorkingNode
 from actuator_glue.online import conversion
-from actuator_glue.online.alarm import CoverageAlarm, SwapWatch
+from actuator_glue.online import live_diagnosis as live
 from actuator_glue.online.collect import Collector
 from actuator_glue.online.stream import Event, Rejected, Restarted
+from actuator_glue.online.structures import Proposal
 from actuator_glue.setups import from_message
 from actuator_glue.workers.worker import DIED, FAILED, PROGRESS, Answer
 
@@ -63,13 +67,12 @@ class DiagnoserNode(WorkingNode):
         self.at_cleanup(self._action.destroy)
 
     def do_activate(self) -> None:
-        """Listen to samples and bands."""
+        """Listen to samples, and to what the estimator makes of them."""
         values = self.parameters.values()
         self.collector = Collector(values['keep'])
-        self.alarm = CoverageAlarm(values['coverage_limit'], values['coverage_windows'])
-        self.swaps = SwapWatch()
+        self.loop = live.init(diagnoser_worker.settings(values))
+        self.memory = live.Memory()
         self._last = float('-inf')
-        self._pending = False
         self.every(0.2, self._check)
         self.listen_when_ready()
 
@@ -80,7 +83,10 @@ class DiagnoserNode(WorkingNode):
             topics.TEST_SETUP,
             lambda message: self._tell(self.collector.setup(from_message(message))),
         )
+        self._estimators = Newest(self, topics.ESTIMATOR_SETUP, self._estimator)
         self.subscribe(topics.BAND, self._band)
+        self.subscribe(topics.POSTERIOR, self._posterior)
+        self.subscribe(topics.DRAWS, self._draws)
         self.subscribe(topics.SAMPLES, self._block)
 
     def do_deactivate(self) -> None:
@@ -91,66 +97,89 @@ class DiagnoserNode(WorkingNode):
             seconds = time.monotonic() - self._last
             text = f'given up after {seconds:.0f} s: the node was deactivated'
             self.complain('diagnosis', f'{text}; a launch waits longer with linger:=SECONDS')
-            self._finish(diagnoser_worker.Outcome(message=text))
+            self._fail(diagnoser_worker.Outcome(message=text))
 
     def do_report(self) -> None:
-        """Coverage and what is being done."""
+        """Coverage, what is being done, and what explains the samples."""
         super().do_report()
-        if hasattr(self, 'alarm'):
+        if hasattr(self, 'loop'):
             self.health.values.update(
                 {
-                    'coverage of the noise band': self.alarm.coverage,
+                    'coverage of the noise band': self.loop.coverage,
                     'diagnosing': self._request is not None,
+                    'explanations': conversion.weighed(self.loop.weights) or 'not known yet',
                 }
             )
 
     def changed(self, names: set[str]) -> None:
-        """A new limit holds from the next band on."""
+        """New settings hold from what comes next on."""
         if self.active:
-            self.alarm.limit = self.parameters['coverage_limit']
+            settings = diagnoser_worker.settings(self.parameters.values())
+            self.loop = replace(self.loop, settings=settings)
 
     # Watching.
 
     def _block(self, message: Any) -> None:
         self._setups.settle()
-        self._tell(self.collector.push(sample_block.from_message(message)))
+        self._estimators.settle()
+        block = sample_block.from_message(message)
+        self.memory.began(block.stamp_ns)
+        before = self.collector.received
+        self._tell(self.collector.push(block))
+        if self.collector.received < before:
+            self.memory.forget()
+        if self.collector.received != before:
+            self._take(live.Received(self.collector.received))
 
     def _tell(self, events: list[Event]) -> None:
         for event in events:
             if isinstance(event, Rejected):
                 self.complain('bad input', event.message)
             elif isinstance(event, Restarted):
-                self.alarm.reset()
-                self.swaps.reset()
+                self._take(live.Began())
+
+    def _estimator(self, message: Any) -> None:
+        settings = conversion.estimator_settings(message)
+        self.memory.setup(settings, conversion.carried(message))
+        self._take(live.Carries(int(message.window)))
 
     def _band(self, message: Any) -> None:
-        if not message.scored or message.kind != message.NOISE:
-            return
-        ratio = self.swaps.update(message.rms_error)
-        if ratio:
-            self._take_back(ratio)
-        if self.alarm.update(message.widest_coverage):
-            self._pending = True
-            self.complain(
-                'coverage',
-                f'the {100 * message.widest_level:g} % band of parameters and sensor noise covers '
-                f'{100 * self.alarm.coverage:.0f} % of the samples: the model lacks something',
-            )
-        if self._pending and self.parameters['automatic'] and self._request is None:
-            self._start_by_itself()
+        if message.scored and message.kind == message.NOISE:
+            self._take(live.Judged(message.widest_coverage, int(message.window)))
 
-    def _start_by_itself(self) -> None:
-        values = self.parameters.values()
-        if time.monotonic() - self._last < values['pause']:
+    def _posterior(self, message: Any) -> None:
+        contradicted = bool(message.prior_contradicted)
+        self._take(live.Estimated(contradicted, conversion.weights(message)))
+
+    def _draws(self, message: Any) -> None:
+        if self.loop.trusted and self.memory.settings is not None:
+            known = conversion.known(message, self.memory.settings)
+            self.memory.learn(known, self.collector.first_ns)
+
+    def _take(self, given: live.Input) -> None:
+        """Have the loop take something, and do what follows."""
+        self.loop, actions = live.step(self.loop, given)
+        for action in actions:
+            if isinstance(action, live.Look):
+                self._look(action.reason)
+            elif isinstance(action, live.Carry):
+                self._carry(action.proposal)
+            else:
+                self.complain(action.kind, action.message)
+
+    def _look(self, reason: str) -> None:
+        values, records = self.parameters.values(), self.collector.records()
+        if not records:
+            self._take(live.Concluded())
             return
-        records = self.collector.records()
-        if sum(r.duration for r in records) < values['minimum']:
-            return
-        self._pending = False
-        self.get_logger().info('diagnosing what was received lately')
+        self.get_logger().info(f'diagnosing {self.collector.received:.0f} s: {reason}')
         self._start(
             diagnoser_worker.Request(
-                records=tuple(records), seed=values['seed'], apply=values['apply']
+                records=tuple(records),
+                known=self.memory.before(records[0].start_ns),
+                seed=values['seed'],
+                apply=values['apply'],
+                reason=reason,
             )
         )
 
@@ -166,10 +195,14 @@ class DiagnoserNode(WorkingNode):
         """Start; the goal is executed, which ends it, when the outcome is there."""
         self._goal = handle
         try:
-            live = () if handle.request.records else tuple(self.collector.records())
-            self._start(diagnoser_worker.asked(handle.request, live))
+            streamed = () if handle.request.records else tuple(self.collector.records())
+            request = diagnoser_worker.asked(handle.request, streamed)
+            if streamed:
+                request = replace(request, known=self.memory.before(streamed[0].start_ns))
+            self._take(live.Asked(bool(streamed)))
+            self._start(request)
         except InputError as error:
-            self._finish(diagnoser_worker.Outcome(message=str(error)))
+            self._fail(diagnoser_worker.Outcome(message=str(error)))
 
     def _start(self, request: diagnoser_worker.Request) -> None:
         self._request = request
@@ -186,7 +219,7 @@ class DiagnoserNode(WorkingNode):
         elif answer.kind in (DIED, FAILED):
             if answer.kind == FAILED:
                 self.complain('diagnosis', str(answer.payload), ERROR)
-            self._finish(diagnoser_worker.Outcome(message=str(answer.payload)))
+            self._fail(diagnoser_worker.Outcome(message=str(answer.payload)))
         else:
             self._diagnosed(answer.payload)
 
@@ -197,71 +230,59 @@ class DiagnoserNode(WorkingNode):
             self._goal.publish_feedback(Diagnose.Feedback(stage=stage, fraction=fraction))
 
     def _diagnosed(self, outcome: diagnoser_worker.Outcome) -> None:
-        request = self._request
-        if outcome.diagnosis is None or request is None:
+        if outcome.diagnosis is None:
             self.complain('diagnosis', outcome.message)
-            self._finish(outcome)
+            self._fail(outcome)
             return
         head = conversion.Head(self.get_clock().now().nanoseconds, outcome.actuator)
         publish(self._diagnosis, head, diagnoser_worker.fields(outcome))
         self.get_logger().info(outcome.message)
-        why_not = against(outcome.diagnosis)
-        if request.apply and not why_not:
-            self._apply(outcome)
-            return
-        if request.apply:
-            self.get_logger().info(f'the estimator goes on as it is: {why_not}')
-        self._finish(outcome)
+        self._request, self._told = None, outcome
+        self._take(outcome.concluded)
+        if self._swap is None:
+            self._finish(outcome)
 
-    def _apply(self, outcome: diagnoser_worker.Outcome) -> None:
-        diagnosis = outcome.diagnosis
-        assert diagnosis is not None
+    def _carry(self, proposal: Proposal) -> None:
+        """Have the estimator carry other structures; the diagnosis ends with its answer."""
+        outcome = self._told
         if not self._model_client.service_is_ready():
             self.complain('set_model', f'{self._model_client.srv_name} is not there')
-            self._finish(outcome)
             return
-        request = self._request
 
         def answered(future: Any) -> None:
-            if self._request is not request:
+            if self._swap is not future:
                 return
             response = future.result()
             if response is None:
                 self.complain('set_model', f'no answer within {ANSWER_SECONDS:g} s')
             elif response.success:
                 self.get_logger().info(f'estimator: {response.message}')
-                self.alarm.reset()
-                self.swaps.swapped()
                 outcome.applied = True
             else:
                 self.complain('set_model', f'the estimator refuses: {response.message}')
             self._finish(outcome)
 
-        self._swap = self._model_client.call_async(diagnoser_worker.augmented(diagnosis))
+        self._swap = self._model_client.call_async(diagnoser_worker.requested(proposal))
         self._swap.add_done_callback(self.guarded(answered))
         self._swap_end = time.monotonic() + ANSWER_SECONDS
-
-    def _take_back(self, ratio: float) -> None:
-        """Have the estimator go back to Eq. (2), for the augmented model forecasts worse."""
-        self.complain(
-            'swap',
-            f'forecasts err {ratio:.2f} times as much as before the model was augmented: back to '
-            'Eq. (2)',
-        )
-        if self._model_client.service_is_ready():
-            self._model_client.call_async(SetModel.Request())
-            self.alarm.reset()
 
     def _check(self) -> None:
         """Give up what is cancelled, and waiting for an answer that was lost."""
         if self._goal is not None and self._request is not None and self._goal.is_cancel_requested:
             self.give_up()
-            self._finish(diagnoser_worker.Outcome(message='cancelled'))
+            self._fail(diagnoser_worker.Outcome(message='cancelled'))
         if self._swap is not None and time.monotonic() > self._swap_end:
             self._swap.cancel()
 
+    def _fail(self, outcome: diagnoser_worker.Outcome) -> None:
+        """End without a diagnosis; the loop goes on."""
+        self._request = None
+        self._finish(outcome)
+        if self.active:
+            self._take(live.Concluded())
+
     def _finish(self, outcome: diagnoser_worker.Outcome) -> None:
-        self._request = self._swap = None
+        self._swap = None
         self._outcome = outcome
         self.health.values['last diagnosis'] = outcome.message
         if self._goal is not None:

@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass, replace
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from dataclasses import fields as dataclass_fields
 from typing import Any
 
 import numpy as np
-from actuator_glue_msgs.msg import Candidate, Effect
+from actuator_glue_msgs.msg import Candidate, Effect, ModelProposal
 from actuator_glue_msgs.srv import SetModel
 
 from actuator_glue.api.diagnosis import Diagnosis, diagnose
+from actuator_glue.api.live import concluded, given
 from actuator_glue.diagnosis.finding import Finding
 from actuator_glue.errors import InputError
+from actuator_glue.inference.carried import Carried, Drift
 from actuator_glue.io.load import load_records
 from actuator_glue.model.commands import noise
 from actuator_glue.model.structure import Structure
@@ -20,6 +25,8 @@ from actuator_glue.nodes import own_effects
 from actuator_glue.nodes.messages import fill
 from actuator_glue.nodes.parameters import Spec
 from actuator_glue.online.conversion import Fields, Head
+from actuator_glue.online.live_diagnosis import Concluded, LiveSettings
+from actuator_glue.online.structures import Proposal, Proposed
 from actuator_glue.records import Record
 from actuator_glue.setups import known_stiffness
 from actuator_glue.workers.worker import Tell
@@ -30,7 +37,7 @@ SPECS = (
     Spec('coverage_limit', 0.8, 'coverage of the noise band that raises the alarm', '1', 0.0, 1.0),
     Spec('coverage_windows', 5, 'windows the coverage is averaged over', '1', 1, 1000, True),
     Spec('minimum', 20.0, 'data needed before a diagnosis by itself', 's', 5.0, 3600.0),
-    Spec('pause', 60.0, 'shortest time between diagnoses by itself', 's', 0.0, 86_400.0),
+    Spec('pause', 10.0, 'least new data between diagnoses by itself', 's', 0.0, 86_400.0),
     Spec('keep', 180.0, 'samples kept for a diagnosis', 's', 10.0, 3600.0, True),
     Spec('seed', 1, 'seed of diagnoses by itself', '1', 0, 2**53),
     own_effects.SPEC,
@@ -50,6 +57,8 @@ class Request:
         holdout_stiffness: its specimen stiffness [N/m], None for what it says.
         seed: seed of the random numbers.
         apply: the estimator is to go on with the augmented model.
+        known: what the estimator knew before the records: draws, drift and age [s].
+        reason: why the stream is diagnosed; empty where it was asked for.
     """
 
     records: tuple[Record, ...] = ()
@@ -59,17 +68,24 @@ class Request:
     holdout_stiffness: float | None = None
     seed: int = 1
     apply: bool = False
+    known: tuple[Carried, Drift, float] | None = None
+    reason: str = ''
 
 
 @dataclass(slots=True)
 class Outcome:
-    """What came of it; `diagnosis` is None where `message` says why not."""
+    """What came of it; `diagnosis` is None where `message` says why not.
+
+    `concluded` is what it means for the estimator, `reason` why the stream was diagnosed.
+    """
 
     diagnosis: Diagnosis | None = None
     message: str = ''
     sources: tuple[str, ...] = ()
     actuator: str = ''
     applied: bool = False
+    concluded: Concluded = field(default_factory=Concluded)
+    reason: str = ''
 
 
 class Overall:
@@ -130,6 +146,7 @@ def work(request: Request, tell: Tell) -> Outcome:
             holdout,
             seed=request.seed,
             jobs=1,
+            prior=given(request.known),
             progress=lambda stage, fraction: tell((stage, fraction)),
         )
     except InputError as error:
@@ -139,6 +156,8 @@ def work(request: Request, tell: Tell) -> Outcome:
         message=found.summary(),
         sources=tuple(r.source for r in records),
         actuator=records[0].actuator,
+        concluded=concluded(found, records, request.apply),
+        reason=request.reason,
     )
 
 
@@ -153,23 +172,34 @@ def warm_up() -> None:
     work(Request(records=(replace(record, measured=measured),)), lambda _: None)
 
 
-def augmented(diagnosis: Diagnosis) -> Any:
-    """Return the SetModel request that has an estimator start from what was found."""
-    known = {p.name: p for p in diagnosis.model.parameters}
-    found = {
-        known[name]: float(posterior.mean)
-        for effect in diagnosis.effects
-        for name, posterior in effect.parameters.items()
-        if name in known
-    }
-    inside = {p: mean for p, mean in found.items() if p.lower <= mean <= p.upper}
+def requested(proposal: Proposal) -> Any:
+    """Return the SetModel request that has an estimator carry structures."""
     return SetModel.Request(
-        effects=list(diagnosis.structure),
-        parameter_names=[p.name for p in inside],
-        lower=[p.lower for p in inside],
-        upper=[p.upper for p in inside],
-        start=list(inside.values()),
+        structures=[_structure(one) for one in proposal.structures],
+        material=0.0 if math.isnan(proposal.material) else proposal.material,
     )
+
+
+def _structure(one: Proposed) -> Any:
+    model, known = one.model, one.known
+    message = ModelProposal(
+        effects=list(model.effects),
+        weight=one.weight,
+        parameter_names=list(model.names),
+        lower=list(model.lower),
+        upper=list(model.upper),
+        start=list(model.start),
+    )
+    if known is not None:
+        message.known_names = list(known.carried.names)
+        message.known = known.carried.draws.ravel().tolist()
+        message.known_middle, message.known_last = known.middle_ns, known.last_ns
+    return message
+
+
+def settings(values: Mapping[str, Any]) -> LiveSettings:
+    """Return the settings of the loop among the node's parameters."""
+    return LiveSettings(**{f.name: values[f.name] for f in dataclass_fields(LiveSettings)})
 
 
 def fields(outcome: Outcome) -> Fields:
@@ -181,6 +211,7 @@ def fields(outcome: Outcome) -> Fields:
     return {
         'verdict': found.verdict,
         'summary': outcome.message,
+        'reason': outcome.reason,
         'records': list(outcome.sources),
         'effects': [effect_message(effect) for effect in found.effects],
         'candidates': [

@@ -13,7 +13,7 @@ from actuator_glue_msgs.srv import SetModel
 
 from actuator_glue import sample_block
 from actuator_glue.errors import InputError
-from actuator_glue.inference.choice import ModelChoice, choose_model
+from actuator_glue.inference.choice import choose_model
 from actuator_glue.nodes import configuration, own_effects, spin, topics
 from actuator_glue.nodes.estimator_worker import compute, warm_up
 from actuator_glue.nodes.health import ERROR, Rate
@@ -33,8 +33,12 @@ from actuator_glue.online.stream import (
     Failed,
     Rejected,
     Restarted,
+    Reweighed,
     Window,
+    structure_name,
 )
+from actuator_glue.online.structures import Proposal
+from actuator_glue.online.windows import WrongRate
 from actuator_glue.setups import from_message
 from actuator_glue.workers.worker import DIED, DONE, FAILED, PROGRESS, Answer
 
@@ -68,7 +72,7 @@ class EstimatorNode(WorkingNode):
         model = choose_model(configuration.effects(self.parameters.values()))
         self.estimator = Estimator(self.settings, model, live=True, carried=self._carried)
         self.contradictions = 0
-        self._announced: ModelChoice | None = None
+        self._announced: Proposal | None = None
         self._arrival: dict[int, float] = {}
         self.samples, self.windows = Rate(), Rate()
         self.dropped = self.late = self.failed = 0
@@ -124,7 +128,9 @@ class EstimatorNode(WorkingNode):
 
     def _tell(self, events: list[Event]) -> None:
         for event in events:
-            if isinstance(event, Rejected):
+            if isinstance(event, WrongRate):
+                self.complain('sample rate', event.message, ERROR)
+            elif isinstance(event, Rejected):
                 self.complain('bad input', event.message)
             elif isinstance(event, Dropped):
                 self.dropped += 1
@@ -138,6 +144,8 @@ class EstimatorNode(WorkingNode):
             elif isinstance(event, Contradicted):
                 self.contradictions += 1
                 self.complain('prior', event.message)
+            elif isinstance(event, Reweighed):
+                self.get_logger().info(event.message)
             elif isinstance(event, Restarted) and event.reason == 'setup':
                 self.get_logger().info(event.message)
                 self._say_identifiable()
@@ -213,31 +221,30 @@ class EstimatorNode(WorkingNode):
 
     def _announce(self, job: Job | None) -> None:
         """Publish what windows are estimated with, once per change."""
-        model = self.estimator.model if job is None else job.model
-        if model == self._announced:
+        proposal = self.estimator.proposal if job is None else job.proposal
+        if proposal is None or proposal is self._announced:
             return
-        self._announced = model
+        self._announced = proposal
         number, index, stamp, actuator = 0, 0, self.get_clock().now().nanoseconds, ''
         if job is not None:
             record = job.window.record
             number, index = job.window.number, record.first_index
             stamp, actuator = record.start_ns, record.actuator
-        fields = conversion.estimator_setup(self.settings, model, number, index, self._carried)
+        fields = conversion.estimator_setup(self.settings, proposal, number, index, self._carried)
         publish(self._out[topics.ESTIMATOR_SETUP], conversion.Head(stamp, actuator), fields)
 
     def _set_model(self, request: Any, response: Any) -> Any:
         try:
             if not self.active:
                 raise InputError('the estimator is not active')
-            model = configuration.requested(request)
-            self.estimator.set_model(model)
+            proposal = configuration.requested(request)
+            self.estimator.set_model(proposal)
         except InputError as error:
             response.success, response.message = False, str(error)
             self.get_logger().warning(f'set_model refused: {error}')
             return response
-        effects = ', '.join(model.effects) or 'no effects'
         response.success = True
-        response.message = f'from the next window on: Eq. (2) with {effects}'
+        response.message = f'from the next window on: {proposal.described()}'
         self.get_logger().info(response.message)
         return response
 
@@ -260,6 +267,10 @@ class EstimatorNode(WorkingNode):
             'windows failed': self.failed,
             'deadlines missed': self.late + self.dropped,
             'model': ', '.join(self.estimator.model.effects) or 'Eq. (2)',
+            'explanations': ', '.join(
+                f'{structure_name(model.effects)} {weight:.0%}'
+                for model, weight in self.estimator.weights
+            ),
             'prior': self.settings.prior,
             'prior contradicted': self.contradictions,
         }

@@ -29,6 +29,17 @@ class Collector:
         pieces = EstimatorSettings(window=PIECE, hop=PIECE, settle=0.0, time_budget=PIECE)
         self._windows = SlidingWindows(pieces)
         self._kept: deque[Window] = deque(maxlen=max(1, round(seconds / PIECE)))
+        self._pieces = 0
+
+    @property
+    def received(self) -> float:
+        """Usable data since the stream began, what is not kept any more included [s]."""
+        return self._pieces * PIECE
+
+    @property
+    def first_ns(self) -> int | None:
+        """Acquisition time of the first sample that is kept [ns]; None where none is."""
+        return self._kept[0].record.start_ns if self._kept else None
 
     def setup(self, setup: StreamSetup) -> list[Event]:
         """Take a test set-up."""
@@ -38,13 +49,15 @@ class Collector:
         """Take a block of samples."""
         events, windows = self._windows.push(block)
         if windows and self._kept and windows[0].epoch != self._kept[-1].epoch:
-            self._kept.clear()  # another actuator
+            self.forget()  # another actuator
         self._kept.extend(windows)
+        self._pieces += len(windows)
         return events
 
     def forget(self) -> None:
         """Let go of everything kept."""
         self._kept.clear()
+        self._pieces = 0
 
     def records(self, shortest: float = 5.0) -> list[Record]:
         """Return what is kept, oldest first.

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 from dataclasses import asdict
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -18,11 +18,15 @@ from actuator_glue.inference.choice import ModelChoice, choose_model
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.online.forecast import Prediction
 from actuator_glue.online.job import WindowResult
+from actuator_glue.online.knowledge import Known
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.stream import Preview
+from actuator_glue.online.stream import Preview, structure_effects, structure_name
+from actuator_glue.online.structures import Proposal
 from actuator_glue.records import Array
+from actuator_glue.sample_block import stamp_ns
 
 Fields = dict[str, Any]
+Weights: TypeAlias = tuple[tuple[frozenset[str], float], ...]
 _NAN = float('nan')
 DRAWS = 200  # of a window's posterior, in a message
 
@@ -39,12 +43,21 @@ def preview(message: Any) -> Preview:
     return Preview(int(message.index), float(message.period), _array(message.command))
 
 
-def model_choice(message: Any) -> ModelChoice:
-    """Return the model of an EstimatorSetup; registers the effects that it defines.
+def proposal(message: Any) -> ModelChoice | Proposal:
+    """Return what is carried by an EstimatorSetup; registers the effects that it defines.
 
     Raises:
         InputError: settings that cannot be read, or a model that the catalogue does not have.
     """
+    leading = _model_choice(message)
+    try:
+        carries = json.loads(message.settings).get('structures')
+    except (ValueError, AttributeError) as error:
+        raise InputError(f'EstimatorSetup: the model cannot be read ({error})') from error
+    return leading if carries is None else Proposal.from_json(carries, 'EstimatorSetup')
+
+
+def _model_choice(message: Any) -> ModelChoice:
     try:
         values = json.loads(message.settings)
         start, defined = values.get('start') or (), values.get('definitions')
@@ -86,7 +99,7 @@ def carried(message: Any) -> Carried | None:
 
 def estimator_setup(
     settings: EstimatorSettings,
-    model: ModelChoice,
+    model: ModelChoice | Proposal,
     window: int,
     index: int,
     carried: Carried | None = None,
@@ -95,15 +108,20 @@ def estimator_setup(
 
     Args:
         settings: settings of the estimator.
-        model: model it goes on with.
+        model: model it goes on with, or several structures.
         window: number of the first window it holds for.
         index: running index of that window's first sample.
         carried: draws that the priors begin with, where there are any.
     """
     # What is no part of the package goes along: the bag alone is enough for a replay.
-    more = CATALOGUE.definitions(model.effects)
+    proposed = Proposal.of(model)
+    model = proposed.structures[0].model
+    names = dict.fromkeys(n for one in proposed.structures for n in one.model.effects)
+    more = CATALOGUE.definitions(tuple(names))
     if carried is not None:
         more = {**more, 'carried': carried.to_json()}
+    if not proposed.plain:
+        more = {**more, 'structures': proposed.to_json()}
     start = [None if np.isnan(v) else v for v in model.start]
     return {
         'index': index,
@@ -156,6 +174,9 @@ def posterior(result: WindowResult, seconds: float) -> tuple[Head, Fields]:
         'seconds': seconds,
         'converged': result.converged,
         'stopped_early': result.stopped_early,
+        'structures': [structure_name(effects) for effects in result.structures],
+        'weights': list(result.weights),
+        'structure_evaluations': list(result.spent),
     }
     for name, mean, stddev in zip(result.model.names, moments.mean, moments.stddev, strict=True):
         if name in ('beta_1', 'alpha_1_beta_0', 'alpha_2', 'alpha_3'):
@@ -170,8 +191,8 @@ def draws(result: WindowResult) -> tuple[Head, Fields]:
     Args:
         result: a result that has a posterior.
     """
-    assert result.frozen is not None and result.ess is not None
-    record, posterior = result.window.record, result.frozen.draws
+    assert result.draws is not None and result.ess is not None
+    record, posterior = result.window.record, result.draws
     rows = np.linspace(0, len(posterior) - 1, min(DRAWS, len(posterior))).astype(np.intp)
     fields: Fields = {
         'window': result.window.number,
@@ -182,6 +203,33 @@ def draws(result: WindowResult) -> tuple[Head, Fields]:
         'converged': result.converged,
     }
     return Head(record.stamp_ns(len(record) - 1), record.actuator), fields
+
+
+def weights(message: Any) -> Weights:
+    """Return effects and weight of each structure of a PosteriorMoments, the likeliest first."""
+    names = list(getattr(message, 'structures', ())) or [structure_name(message.effects)]
+    found = list(getattr(message, 'weights', ())) or [1.0]
+    return tuple(
+        (frozenset(structure_effects(name)), float(weight))
+        for name, weight in zip(names, found, strict=True)
+    )
+
+
+def weighed(found: Weights) -> str:
+    """Return structures and their weights for people."""
+    return ', '.join(f'{structure_name(sorted(name))} {weight:.0%}' for name, weight in found)
+
+
+def known(message: Any, settings: EstimatorSettings) -> Known:
+    """Return the posterior of a PosteriorDraws, and when its samples were taken.
+
+    Raises:
+        InputError: draws that are none.
+    """
+    names, last = tuple(message.parameter_names), stamp_ns(message.header)
+    draws = _array(message.values).reshape(-1, max(len(names), 1))
+    middle = last - round(0.5e9 * (settings.window - settings.settle))
+    return Known(Carried(names, draws), middle, last)
 
 
 def prediction(result: Prediction, actuator: str) -> tuple[Head, Fields]:

@@ -3,20 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.choice import ModelChoice
+from actuator_glue.online import structures
 from actuator_glue.online.fitting import starting_points
 from actuator_glue.online.forecast import FrozenPosterior
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.knowledge import Knowledge
 from actuator_glue.online.sampling import Job, WindowFit
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.stream import Dropped, Event, Failed, Preview, Rejected, Window
+from actuator_glue.online.stream import (
+    Dropped,
+    Event,
+    Failed,
+    Preview,
+    Rejected,
+    Reweighed,
+    Window,
+    structure_name,
+)
+from actuator_glue.online.structures import Proposal
 from actuator_glue.online.windows import SlidingWindows, Tally
 from actuator_glue.records import MAX_DISPLACEMENT, Array
 from actuator_glue.sample_block import Block
@@ -33,23 +44,33 @@ class Schedule:
     """What a live run did, for a replay to repeat it.
 
     Attributes:
-        done: number and evaluations of each window that gave a posterior, by the running index
-            and the acquisition time [ns] of its first sample; all others were dropped.
-        models: model from each window number on, ascending.
+        done: number of each window that gave a posterior, and evaluations of each structure, by
+            the running index and the acquisition time [ns] of its first sample; all others were
+            dropped.
+        models: what is carried from each window number on, ascending.
     """
 
-    done: Mapping[tuple[int, int], tuple[int, int]]
-    models: tuple[tuple[int, ModelChoice], ...] = ()
+    done: Mapping[tuple[int, int], tuple[int, tuple[int, ...]]]
+    models: tuple[tuple[int, ModelChoice | Proposal], ...] = ()
 
 
 @dataclass(slots=True)
-class _Memory:
-    """What is kept from the last result."""
+class _Member:
+    """A structure that is carried, and what is kept from its last result."""
 
+    model: ModelChoice
+    knowledge: Knowledge
     archive: Array | None = None
-    model: ModelChoice | None = None
     epoch: int = -1
-    frozen: list[FrozenPosterior] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class _Before:
+    """Where the last result of the likeliest structure ended."""
+
+    archive: Array
+    model: ModelChoice
+    epoch: int
 
 
 class Estimator:
@@ -61,7 +82,7 @@ class Estimator:
 
     Args:
         settings: settings; they do not change.
-        model: model to fit.
+        model: model to fit, or several structures.
         live: a few windows wait, so that a slow computer drops windows instead of falling
             behind; otherwise every window waits its turn.
         schedule: repeats a live run.
@@ -71,22 +92,40 @@ class Estimator:
     def __init__(
         self,
         settings: EstimatorSettings,
-        model: ModelChoice,
+        model: ModelChoice | Proposal,
         *,
         live: bool = False,
         schedule: Schedule | None = None,
         carried: Carried | None = None,
     ) -> None:
         self.settings = settings
-        self.model = model
+        self.proposal = Proposal.of(model)
         self.live = live
         self.schedule = schedule
         self.running: Job | None = None
         self._windows = SlidingWindows(settings)
         self._waiting: list[Window] = []
-        self._memory = _Memory()
-        self._knowledge = Knowledge(settings, carried)
+        self._carried = carried
+        self._applied = 0  # of the schedule's models
+        self._before: _Before | None = None
+        self._frozen: list[FrozenPosterior] = []
+        self._judged_to: int | None = None
+        self._pending: Proposal | None = None
+        self._members: list[_Member] = []
+        self._begin(self.proposal)
         self._ahead = Ahead()
+
+    @property
+    def model(self) -> ModelChoice:
+        """The likeliest structure, or the one that the next window begins with."""
+        proposal = self._pending
+        return self._members[0].model if proposal is None else proposal.structures[0].model
+
+    @property
+    def weights(self) -> tuple[tuple[ModelChoice, float], ...]:
+        """The structures that are carried and their weights, the likeliest first."""
+        found = structures.weights(self._log_prior, self._evidence).tolist()
+        return tuple((m.model, w) for m, w in zip(self._members, found, strict=True))
 
     @property
     def tally(self) -> Tally:
@@ -111,7 +150,8 @@ class Estimator:
         """Take one block of samples as it came; unusable ones are told, never raised."""
         events, windows = self._windows.push(block)
         for window in windows:
-            self._knowledge.formed(window)
+            for member in self._members:
+                member.knowledge.formed(window)
             planned = self._planned(window)
             if planned is None:
                 continue
@@ -131,9 +171,9 @@ class Estimator:
             return [Rejected(str(error))]
         return []
 
-    def set_model(self, model: ModelChoice) -> None:
-        """Go on with another model from the next job on."""
-        self.model = model
+    def set_model(self, model: ModelChoice | Proposal) -> None:
+        """Go on with another model, or several structures, from the next job on."""
+        self._pending = Proposal.of(model)
 
     def drop(self, late: Callable[[Window], bool]) -> list[Event]:
         """Drop windows that wait and for which it is too late; the newest is always wanted."""
@@ -147,52 +187,129 @@ class Estimator:
         if self.running is not None or not self._waiting:
             return None
         window = self._waiting.pop(0)
-        memory, model = self._memory, self._model_for(window)
-        record, prior = window.record, self._knowledge.prior(window, model.effects)
+        proposal = self._proposed(window)
+        if proposal is not None:
+            self._begin(proposal)
+        stops: tuple[int | None, ...] = (None,) * len(self._members)
+        if self.schedule is not None:
+            stops = self.schedule.done[_key(window)][1]
+        jobs = [self._job(m, window, stop) for m, stop in zip(self._members, stops, strict=True)]
+        ahead = self._ahead.between(window.end, jobs[0].forecast[1], window.record.period)
+        shares = structures.weights(self._log_prior, self._evidence).tolist()
+        jobs = [replace(job, weight=share) for job, share in zip(jobs, shares, strict=True)]
+        self.running = replace(
+            jobs[0],
+            ahead=ahead,
+            frozen=self._judged(window),
+            rivals=tuple(jobs[1:]),
+            proposal=proposal,
+        )
+        return self.running
+
+    def _job(self, member: _Member, window: Window, stop: int | None) -> Job:
+        """Return what one structure has to do for a window."""
+        model, record = member.model, window.record
+        prior, before = member.knowledge.prior(window), self._before
         archive, afresh = None, True
-        if (
-            memory.archive is not None
-            and memory.model is not None
-            and (memory.epoch == window.epoch)
-        ):
+        if member.archive is not None and member.epoch == window.epoch:
+            afresh, archive = False, starting_points(model, model.names, member.archive, ())
+        elif before is not None and before.epoch == window.epoch:
             seed = (self.settings.seed, record.first_index, 2)
-            afresh = model != memory.model
-            known, points = memory.model.names, memory.archive
-            if afresh and prior is not None:
+            known, points = before.model.names, before.archive
+            if prior is not None:
                 # Where another model ended is further away than what was known before either.
                 known = prior.names
                 points = prior.points(len(points), np.random.default_rng((*seed, 1)))
             archive = starting_points(model, known, points, seed)
-        job = Job(
+        return Job(
             window=window,
             settings=self.settings,
             model=model,
             archive=archive,
             afresh=afresh,
-            stop_at=None if self.schedule is None else self.schedule.done[_key(window)][1],
-            frozen=self._judged(window),
+            stop_at=stop,
             prior=prior,
         )
-        ahead = self._ahead.between(window.end, job.forecast[1], record.period)
-        self.running = replace(job, ahead=ahead)
-        return self.running
 
     def finish(self, result: WindowResult | WindowFit) -> list[Event]:
         """Take the result of the running job, or its first part, all that the next one needs."""
         self.running = None
-        window, memory = result.window, self._memory
+        window = result.window
         if result.failure:
             # A replay leaves such windows out: nothing may depend on them.
             return [Failed(window.number, window.record.first_index, result.failure)]
-        if result.archive is not None:
-            memory.archive, memory.model, memory.epoch = result.archive, result.model, window.epoch
-        memory.frozen = [
-            f for f in memory.frozen if f.segment == window.segment and f.stop > window.end
+        self._frozen = [
+            f for f in self._frozen if f.segment == window.segment and f.stop > window.end
         ]
         if result.frozen is not None:
-            memory.frozen.append(result.frozen)
-            del memory.frozen[:-MAX_FROZEN]
-        return [*self._knowledge.learn(window, result.learned, result.conflict)]
+            self._frozen.append(result.frozen)
+            del self._frozen[:-MAX_FROZEN]
+        events: list[Event] = []
+        for member, found in zip(self._members, (result, *result.rivals), strict=True):
+            if found.failure:
+                continue
+            if found.archive is not None:
+                member.archive, member.epoch = found.archive, window.epoch
+            contradicted = member.knowledge.learn(window, found.learned, found.conflict)
+            # What a less likely structure contradicts is its own affair.
+            events += contradicted if member is self._members[0] else []
+        leading = self._members[0]
+        if leading.archive is not None:
+            self._before = _Before(leading.archive, leading.model, leading.epoch)
+        return [*events, *self._weigh(result)]
+
+    def _begin(self, proposal: Proposal) -> None:
+        """Carry these structures from now on; what one of them has learned before goes on."""
+        self.proposal, self._pending = proposal, None
+        old = {member.model: member for member in self._members}
+        began = self._members[0].knowledge.began_ns if self._members else None
+        self._members = []
+        for one in proposal.structures:
+            member = None if one.known is not None else old.get(one.model)
+            if member is None:
+                known = Knowledge(self.settings, self._carried, one.known, began)
+                member = _Member(one.model, known)
+            self._members.append(member)
+        self._log_prior = proposal.log_weights
+        self._evidence = np.zeros(len(self._members))
+        self._judged_to = None
+
+    def _weigh(self, result: WindowResult | WindowFit) -> list[Event]:
+        """Move weights by the forecasts that a window has judged; what has none left leaves."""
+        if len(self._members) < 2 or not result.errors:
+            return []
+        settings, window = self.settings, result.window
+        since = settings.hop
+        if self._judged_to is not None:
+            since = max(since, (window.end - self._judged_to) * window.record.period)
+        self._judged_to = window.end
+        material = self.proposal.material
+        if np.isnan(material) and result.frozen is not None:
+            material = structures.MATERIAL * result.frozen.noise
+        memory = structures.MEMORY * settings.window
+        self._evidence = structures.moved(self._evidence, result.errors, material, since, memory)
+        before = self._members[0].model
+        shares = structures.weights(self._log_prior, self._evidence)
+        order = [int(i) for i in np.argsort(-shares, kind='stable')]
+        kept = [i for i in order if shares[i] >= structures.LEAVES]
+        left = [self._members[i].model for i in order if shares[i] < structures.LEAVES]
+        self._members = [self._members[i] for i in kept]
+        self._log_prior, self._evidence = self._log_prior[kept], self._evidence[kept]
+        if not left and self._members[0].model is before:
+            return []
+        now = tuple((model.effects, share) for model, share in self.weights)
+        said = ', '.join(f'{structure_name(name)} {share:.0%}' for name, share in now)
+        gone = ', '.join(structure_name(model.effects) for model in left)
+        return [
+            Reweighed(
+                window.number,
+                window.end,
+                now,
+                tuple(model.effects for model in left),
+                f'forecasts up to sample {window.end} weigh {said}'
+                + (f'; no longer carried: {gone}' if gone else ''),
+            )
+        ]
 
     def abandon(self, reason: str) -> list[Event]:
         """Give up the running job, whose process has died."""
@@ -211,7 +328,7 @@ class Estimator:
         # All commands since their windows' ends are known.
         return tuple(
             f
-            for f in self._memory.frozen
+            for f in self._frozen
             if f.segment == window.segment and first <= f.end and f.stop <= window.end
         )
 
@@ -222,12 +339,15 @@ class Estimator:
         done = self.schedule.done.get(_key(window))
         return None if done is None else replace(window, number=done[0])
 
-    def _model_for(self, window: Window) -> ModelChoice:
-        if self.schedule is not None:
-            for number, model in self.schedule.models:
-                if number <= window.number:
-                    self.model = model
-        return self.model
+    def _proposed(self, window: Window) -> Proposal | None:
+        """Return what is to be carried from a window on, where that is new."""
+        if self.schedule is None:
+            return self._pending
+        due = [model for number, model in self.schedule.models if number <= window.number]
+        if len(due) == self._applied:
+            return None
+        self._applied = len(due)
+        return Proposal.of(due[-1])
 
 
 def _key(window: Window) -> tuple[int, int]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -36,6 +37,8 @@ class FrozenPosterior:
         noise: standard deviation of the sensor noise [m].
         past: last samples of its window, from which its responses run on: nothing measured after
             the window's end enters a forecast, whenever it is computed.
+        weight: weight of the model among those that are carried, when the window closed.
+        beside: posteriors of the others.
     """
 
     number: int
@@ -47,6 +50,22 @@ class FrozenPosterior:
     residual: ResidualModel
     noise: float
     past: Record
+    weight: float = 1.0
+    beside: tuple[FrozenPosterior, ...] = ()
+
+    @property
+    def parts(self) -> tuple[FrozenPosterior, ...]:
+        """The posteriors of all structures, each cut to its share of the draws."""
+        if not self.beside:
+            return (self,)
+        total = self.weight + sum(one.weight for one in self.beside)
+        found = []
+        for one in (self, *self.beside):
+            wanted = round(one.weight / total * len(one.draws))
+            rows = np.linspace(0, len(one.draws) - 1, wanted).astype(np.intp)
+            if wanted:
+                found.append(replace(one, draws=one.draws[rows], beside=()))
+        return tuple(found)
 
     @property
     def end(self) -> int:
@@ -83,7 +102,7 @@ class Prediction:
 
 def predictions(
     frozen: FrozenPosterior,
-    simulated: Array,
+    responses: Sequence[Array],
     *,
     levels: tuple[float, ...],
     seed: int,
@@ -95,18 +114,22 @@ def predictions(
 
     Args:
         frozen: the posterior.
-        simulated: response of each of its draws over the forecast, shape (m, n) [m].
+        responses: of each draw of its `parts` over the forecast, shapes (m, n) [m].
         levels: probability of each band.
         seed: of the estimator; with the forecast's first index it seeds the residual's draws.
         measured: the samples, shape (n,) [m], where they are known by now.
     """
-    if not np.isfinite(simulated).all():
-        simulated = simulated[np.isfinite(simulated).all(axis=1)]
+    rng = np.random.default_rng((seed, frozen.start, 1))
+    told = []
+    for part, rows in zip(frozen.parts, responses, strict=True):
+        finite = rows if np.isfinite(rows).all() else rows[np.isfinite(rows).all(axis=1)]
+        noise = np.full(len(finite), max(part.noise, TINY))
+        told.append((finite, *part.residual.levels(rng, len(finite)), noise))
+    simulated, mean, sd, sensor = told[0]
+    if len(told) > 1:
+        simulated, mean, sd, sensor = map(np.concatenate, zip(*told, strict=True))
     if len(simulated) < 2:
         return []
-    rng = np.random.default_rng((seed, frozen.start, 1))
-    mean, sd = frozen.residual.levels(rng, len(simulated))
-    sensor = np.full(len(simulated), max(frozen.noise, TINY))
     bands: list[tuple[Kind, Band]] = [
         ('parameter', band(simulated, levels)),
         ('total', mixture_band(simulated, mean, np.maximum(sd, TINY), levels)),

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
+from typing import TypeAlias
 
 import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.inference.carried import Carried
+from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.inference.convergence import rhat_and_ess
 from actuator_glue.inference.moments import Moments, moments
@@ -19,8 +22,15 @@ from actuator_glue.online.response import ResponseBand, response_band
 from actuator_glue.online.sampling import Job, WindowFit
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Window
+from actuator_glue.online.structures import pooled
 from actuator_glue.records import Array
 
+# Whether a share of the time budget is spent.
+Expired: TypeAlias = Callable[[float], bool]
+# Share of the time budget within which Eq. (2) alone is sampled beside others.
+_QUICK = 0.3
+# Draws whose mean response is the forecast that a structure's weight is judged by.
+_FEW = 32
 # Generations that R-hat and ESS are computed from.
 DIAGNOSED = 150
 
@@ -53,6 +63,13 @@ class WindowResult:
         learned: the posterior, for the priors of later windows.
         conflict: how far the window contradicts its prior.
         failure: why there is no posterior; empty where there is one.
+        rivals: first parts of the other structures that are carried, without their chains.
+        errors: as in `WindowFit`.
+        structures: effects of each structure that the numbers above are a mixture of, the
+            likeliest first, which is `model`.
+        weights: their weights, fixed before the window.
+        spent: likelihood evaluations of each.
+        draws: some draws of the mixture, shape (m, p).
     """
 
     window: Window
@@ -78,9 +95,15 @@ class WindowResult:
     learned: Carried | None = None
     conflict: Conflict | None = None
     failure: str = ''
+    rivals: tuple[WindowFit, ...] = ()
+    errors: tuple[float, ...] = ()
+    structures: tuple[tuple[str, ...], ...] = ()
+    weights: tuple[float, ...] = ()
+    spent: tuple[int, ...] = ()
+    draws: Array | None = None
 
 
-def run(job: Job, expired: Callable[[], bool] | None = None) -> WindowResult:
+def run(job: Job, expired: Expired | None = None) -> WindowResult:
     """Estimate one window.
 
     The result depends on the job alone, but where `expired` ends the sampling; the result then
@@ -88,17 +111,65 @@ def run(job: Job, expired: Callable[[], bool] | None = None) -> WindowResult:
 
     Args:
         job: what to compute.
-        expired: tells that the time budget is spent; None never stops early.
+        expired: tells whether a share of the time budget, in (0, 1], is spent; None never stops
+            early.
     """
     return report(job, fit(job, expired))
 
 
-def fit(job: Job, expired: Callable[[], bool] | None = None) -> WindowFit:
-    """Do the first part of `run`, all that the next job needs; a window may fail."""
+def fit(job: Job, expired: Expired | None = None) -> WindowFit:
+    """Do the first part of `run`, all that the next job needs; a window may fail.
+
+    Where several structures are carried, those without effects come first, for they are quick;
+    the likeliest has twice the time of each other one.
+    """
+    jobs = (job, *job.rivals)
+    heavy = [i for i, one in enumerate(jobs) if one.model.effects]
+    share = {i: (place + 2.0) / (len(heavy) + 1.0) for place, i in enumerate(heavy)}
+    found = [WindowFit(job.window, one.model) for one in jobs]
+    for i in sorted(range(len(jobs)), key=lambda i: (i in share, i)):
+        wanted = share.get(i, _QUICK if heavy else 1.0)
+        limit = None if expired is None else partial(expired, wanted)
+        found[i] = _fit(jobs[i], limit)
+        if found[i].failure and i == 0:
+            return found[0]
+    leading, *rivals = found
+    if not rivals:
+        return leading
+    assert leading.frozen is not None
+    beside = tuple(one.frozen for one in rivals if one.frozen is not None)
+    return replace(
+        leading,
+        rivals=tuple(rivals),
+        frozen=replace(leading.frozen, beside=beside),
+        errors=_errors(job),
+    )
+
+
+def _fit(job: Job, expired: Callable[[], bool] | None) -> WindowFit:
     try:
         return sampling.fit(job, expired)
     except InputError as error:
         return WindowFit(job.window, job.model, failure=str(error))
+
+
+def _errors(job: Job) -> tuple[float, ...]:
+    """Return the mean square error of each structure's forecasts over a window's samples [m^2]."""
+    record, models = job.window.recent, [one.model for one in (job, *job.rivals)]
+    squares: list[list[float]] = []
+    for old in job.frozen:
+        own = {part.model: part for part in (old, *old.beside)}
+        if any(model not in own for model in models):
+            continue
+        end, start, stop = (i - record.first_index for i in (old.end, old.start, old.stop))
+        row = []
+        for model in models:
+            part = own[model]
+            few = replace(part, draws=part.draws[sampling.spread(len(part.draws), _FEW)])
+            middle = _respond(few, record.command[end:stop]).mean(axis=0)
+            row.append(float(np.mean((record.measured[start:stop] - middle) ** 2)))
+        squares.append(row)
+    return tuple(np.mean(squares, axis=0).tolist()) if squares else ()
 
 
 def report(job: Job, fitted: WindowFit, limits: bool = True) -> WindowResult:
@@ -127,6 +198,8 @@ def _failed(job: Job, fitted: WindowFit, reason: str) -> WindowResult:
         learned=fitted.learned,
         conflict=fitted.conflict,
         failure=reason,
+        rivals=_lean(fitted),
+        errors=fitted.errors,
     )
 
 
@@ -137,7 +210,9 @@ def _report(job: Job, fitted: WindowFit, limits: bool) -> WindowResult:
         return _failed(job, fitted, fitted.failure)
     # R-hat and ESS of very many draws would cost more than the sampling.
     rhat, ess = rhat_and_ess(chains.kept[:: max(1, len(chains.kept) // DIAGNOSED)])
-    summary = moments(chains.posterior(), *model.bounds)
+    posterior = _mixed(job, fitted, chains)
+    summary = moments(posterior, *model.bounds)
+    drawn = posterior[sampling.spread(len(posterior), settings.draws)]
     scored = [p for old in job.frozen for p in _score(job, old)]
     if not limits:
         scored = [replace(p, band=p.band.slice(0, 0)) for p in scored]
@@ -157,16 +232,37 @@ def _report(job: Job, fitted: WindowFit, limits: bool) -> WindowResult:
         evaluations=chains.evaluations,
         stopped_early=not fitted.complete,
         converged=bool(chains.annealed and rhat.max() <= settings.rhat_limit),
-        response=(
-            response_band(frozen.draws, record.known_stiffness(), settings) if limits else None
-        ),
+        response=(response_band(drawn, record.known_stiffness(), settings) if limits else None),
         scored=tuple(scored),
         forecast=tuple(_forecast(job, frozen)) if limits else (),
         frozen=frozen,
         archive=fitted.archive,
         learned=fitted.learned,
         conflict=fitted.conflict,
+        rivals=_lean(fitted),
+        errors=fitted.errors,
+        structures=tuple(one.model.effects for one in (job, *job.rivals)),
+        weights=tuple(one.weight for one in (job, *job.rivals)),
+        spent=tuple(
+            0 if one.chains is None else one.chains.evaluations for one in (fitted, *fitted.rivals)
+        ),
+        draws=drawn,
     )
+
+
+def _lean(fitted: WindowFit) -> tuple[WindowFit, ...]:
+    """Return the first parts of the other structures without what is not needed any more."""
+    return tuple(replace(one, chains=None) for one in fitted.rivals)
+
+
+def _mixed(job: Job, fitted: WindowFit, chains: Chains) -> Array:
+    """Return draws (m, p) of all structures, each with its weight."""
+    parts = [(job.weight, job.model.names, chains.posterior())]
+    for rival, one in zip(job.rivals, fitted.rivals, strict=True):
+        if one.chains is not None:
+            parts.append((rival.weight, rival.model.names, one.chains.posterior()))
+    rng = np.random.default_rng((job.settings.seed, job.window.record.first_index, 3))
+    return pooled(job.model.names, parts, rng)
 
 
 def _score(job: Job, old: FrozenPosterior) -> list[Prediction]:
@@ -175,7 +271,7 @@ def _score(job: Job, old: FrozenPosterior) -> list[Prediction]:
     end, start, stop = (i - record.first_index for i in (old.end, old.start, old.stop))
     return predictions(
         old,
-        _respond(old, record.command[end:stop]),
+        [_respond(part, record.command[end:stop]) for part in old.parts],
         levels=job.settings.levels,
         seed=job.settings.seed,
         measured=record.measured[start:stop],
@@ -188,7 +284,7 @@ def _forecast(job: Job, frozen: FrozenPosterior) -> list[Prediction]:
         return []
     return predictions(
         frozen,
-        _respond(frozen, job.ahead),
+        [_respond(part, job.ahead) for part in frozen.parts],
         levels=job.settings.levels,
         seed=job.settings.seed,
     )

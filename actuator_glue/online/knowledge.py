@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
+from actuator_glue.errors import InputError
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.prior_conflict import Conflict, SequentialTest
 from actuator_glue.online.settings import EstimatorSettings
@@ -13,13 +15,31 @@ from actuator_glue.online.stream import Contradicted, Window
 _MOST = 1000
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Learned:
+@dataclass(frozen=True, slots=True)
+class Known:
     """A posterior, and the time of its middle and of its last sample [ns]."""
 
     carried: Carried
     middle_ns: int
     last_ns: int
+
+    def to_json(self) -> dict[str, Any]:
+        """Return a JSON object from which `from_json` makes the same bits."""
+        times = {'middle_ns': self.middle_ns, 'last_ns': self.last_ns}
+        return {'carried': self.carried.to_json(), **times}
+
+    @staticmethod
+    def from_json(value: Any, source: str = '') -> Known:
+        """Return what `to_json` wrote.
+
+        Raises:
+            InputError: it is no such object.
+        """
+        try:
+            carried = Carried.from_json(value['carried'], source)
+            return Known(carried, int(value['middle_ns']), int(value['last_ns']))
+        except (KeyError, TypeError, ValueError) as error:
+            raise InputError(f'{source}: what is known cannot be read ({error})') from error
 
 
 class Knowledge:
@@ -27,44 +47,51 @@ class Knowledge:
 
     A window's samples are counted from `settle` on. Its sequential prior is the posterior of the
     newest window that ended before that, drifted by the time between their middles: each
-    sample is counted once along the chain of windows that led there. With another model it
-    begins again: what was learned was learned with a model that was found wanting.
+    sample is counted once along the chain of windows that led there. It belongs to one model:
+    what was learned with another was learned with a model that was found wanting.
 
     Args:
         settings: of the estimator; `prior` says which prior is wanted.
         carried: draws of the calibration, where there is one.
+        handed: what whoever proposed the model knows of its parameters: the prior of windows
+            whose samples it has not seen.
+        began_ns: acquisition time of the stream's first counted sample [ns], where it has begun.
     """
 
-    def __init__(self, settings: EstimatorSettings, carried: Carried | None) -> None:
+    def __init__(
+        self,
+        settings: EstimatorSettings,
+        carried: Carried | None,
+        handed: Known | None = None,
+        began_ns: int | None = None,
+    ) -> None:
         self._settings = settings
         self._given = carried if settings.prior != 'box' else None
         self._first = self._given
         self._drift = settings.drifts()
-        self._began_ns: int | None = None
-        self._learned: list[_Learned] = []
-        self._under: tuple[int, tuple[str, ...]] | None = None
+        self.began_ns = began_ns
+        self._learned: list[Known] = [] if handed is None else [handed]
+        # Windows that share samples with what was handed over do not know of it.
+        self._from_ns = 0 if handed is None else handed.last_ns + 1
+        self._epoch: int | None = None
         self._tested_ns: int | None = None
         independent = 3600.0 / max(settings.window - settings.settle, settings.hop)
         self._test = SequentialTest(independent, settings.false_alarms)
 
     def formed(self, window: Window) -> None:
         """Note where the stream begins: with its first window, estimated or not."""
-        if self._began_ns is None:
-            self._began_ns = self._times(window)[0]
+        if self.began_ns is None:
+            self.began_ns = self._times(window)[0]
 
-    def prior(self, window: Window, effects: tuple[str, ...]) -> Carried | None:
-        """Return what is known before a window; None where it is no more than the box.
-
-        Args:
-            window: the window.
-            effects: of the model that it will be fitted with.
-        """
+    def prior(self, window: Window) -> Carried | None:
+        """Return what is known before a window; None where it is no more than the box."""
         if self._settings.prior == 'box':
             return None
-        if self._under != (window.epoch, effects):
-            self._under = window.epoch, effects
-            self._first, self._learned, self._tested_ns = self._given, [], None
-            self._test.restart()
+        if self._epoch != window.epoch:
+            if self._epoch is not None:  # another actuator
+                self._first, self._learned, self._tested_ns = self._given, [], None
+                self._test.restart()
+            self._epoch = window.epoch
         start, middle, _ = self._times(window)
         before = [one for one in self._learned if one.last_ns < start]
         if before:
@@ -73,7 +100,7 @@ class Knowledge:
             return known.carried.drifted(self._drift, (middle - known.middle_ns) * 1e-9)
         if self._first is None:
             return None
-        elapsed = (middle - (self._began_ns or start)) * 1e-9
+        elapsed = (middle - (self.began_ns or start)) * 1e-9
         return self._first.drifted(self._drift, self._settings.prior_age + elapsed)
 
     def learn(
@@ -81,8 +108,9 @@ class Knowledge:
     ) -> list[Contradicted]:
         """Take a window's posterior, and how far it contradicts the window's prior."""
         start, middle, last = self._times(window)
-        if self._settings.prior == 'sequential' and posterior is not None:
-            self._learned.append(_Learned(posterior, middle, last))
+        wanted = self._settings.prior == 'sequential' and start >= self._from_ns
+        if wanted and posterior is not None:
+            self._learned.append(Known(posterior, middle, last))
             del self._learned[:-_MOST]
         # Windows that share samples share their errors: only separate ones are counted.
         if found is None or (self._tested_ns is not None and start <= self._tested_ns):
@@ -102,7 +130,7 @@ class Knowledge:
             if self._first is not None:
                 self._first = self._first.widened(factor)
             self._learned = [
-                _Learned(one.carried.widened(factor), one.middle_ns, one.last_ns)
+                Known(one.carried.widened(factor), one.middle_ns, one.last_ns)
                 for one in self._learned
             ]
         what = {

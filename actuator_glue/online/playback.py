@@ -14,6 +14,7 @@ from actuator_glue.online.job import WindowResult, fit, report
 from actuator_glue.online.sampling import Job, WindowFit
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Event, Failed, Preview, Rejected
+from actuator_glue.online.structures import Proposal
 from actuator_glue.records import Record
 from actuator_glue.sample_block import Block
 from actuator_glue.setups import StreamSetup, from_message
@@ -40,7 +41,7 @@ def told(result: WindowResult) -> WindowResult | Failed:
 def replay(
     items: Iterable[Item],
     settings: EstimatorSettings,
-    model: ModelChoice | None = None,
+    model: ModelChoice | Proposal | None = None,
     schedule: Schedule | None = None,
     reports: Callable[[Iterable[Event | Sampled]], Iterator[WindowResult | Event]] = at_once,
     carried: Carried | None = None,
@@ -50,7 +51,7 @@ def replay(
     Args:
         items: set-ups, blocks and previews as they came.
         settings: settings of the estimator.
-        model: model to fit; Eq. (2) where None.
+        model: model to fit, or several structures; Eq. (2) where None.
         schedule: repeats what a live run dropped or stopped early.
         reports: computes what windows publish, perhaps beside the sampling of the next ones.
         carried: draws of an earlier calibration, for the priors that start from one.

@@ -16,6 +16,7 @@ from actuator_glue.online import conversion
 from actuator_glue.online.estimator import Schedule
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.settings import EstimatorSettings
+from actuator_glue.online.structures import Proposal
 from actuator_glue.records import check_period
 from actuator_glue.sample_block import stamp_ns
 
@@ -26,7 +27,7 @@ class Published:
 
     Attributes:
         settings: its settings; None where the bag has no EstimatorSetup.
-        models: model from each window number on.
+        models: what is carried from each window number on.
         carried: draws that its priors began with; None where they began from the box.
         posteriors: PosteriorMoments by window number.
         scored: scored PredictionBands by window number, index and kind, as `_brief` leaves
@@ -34,7 +35,7 @@ class Published:
     """
 
     settings: EstimatorSettings | None = None
-    models: list[tuple[int, ModelChoice]] = field(default_factory=list)
+    models: list[tuple[int, ModelChoice | Proposal]] = field(default_factory=list)
     carried: Carried | None = None
     posteriors: dict[int, Any] = field(default_factory=dict)
     scored: dict[tuple[int, int, str], Any] = field(default_factory=dict)
@@ -47,7 +48,7 @@ class Published:
         for number, message in self.posteriors.items():
             last = stamp_ns(message.header)
             start = last - round((message.samples - 1) * message.period * 1e9)
-            done[int(message.index), start] = (number, int(message.evaluations))
+            done[int(message.index), start] = (number, _spent(message))
         return Schedule(done, tuple(sorted(self.models, key=lambda m: m[0])))
 
 
@@ -63,7 +64,7 @@ def published(messages: Iterable[tuple[str, Any]]) -> Published:
         if kind == 'EstimatorSetup':
             found.settings = conversion.estimator_settings(message)
             found.carried = conversion.carried(message)
-            found.models.append((int(message.window), conversion.model_choice(message)))
+            found.models.append((int(message.window), conversion.proposal(message)))
         elif kind == 'PosteriorMoments':
             check_period(message.period, f'posterior of window {message.window}')
             found.posteriors[int(message.window)] = message
@@ -71,6 +72,13 @@ def published(messages: Iterable[tuple[str, Any]]) -> Published:
             key = (int(message.window), int(message.index), str(message.kind))
             found.scored[key] = _brief(message)
     return found
+
+
+def _spent(message: Any) -> tuple[int, ...]:
+    """Return the evaluations of each structure of a PosteriorMoments, the likeliest first."""
+    # Older bags know of one structure only.
+    spent = tuple(int(count) for count in getattr(message, 'structure_evaluations', ()))
+    return spent or (int(message.evaluations),)
 
 
 @dataclass(slots=True)

@@ -26,6 +26,7 @@ from actuator_glue.online.sensor_noise import sensor_noise, white_noise
 from actuator_glue.online.settings import AUTOMATIC, EstimatorSettings
 from actuator_glue.online.shaping import automatic
 from actuator_glue.online.stream import Window
+from actuator_glue.online.structures import Proposal
 from actuator_glue.records import Array, Record
 
 # A command that moves less than this many noise standard deviations calibrates nothing.
@@ -56,6 +57,9 @@ class Job:
         ahead: commands from the window's end to the forecast's, shape (na,) [m], where known.
         frozen: earlier posteriors whose forecasts this window's samples judge.
         prior: what is known before the window; None for no more than the box.
+        rivals: what other structures that are carried have to do for the same window.
+        weight: weight of the model among them, before the window.
+        proposal: what is carried from this window on, where that is new.
     """
 
     window: Window
@@ -67,6 +71,9 @@ class Job:
     ahead: Array | None = None
     frozen: tuple[FrozenPosterior, ...] = ()
     prior: Carried | None = None
+    rivals: tuple[Job, ...] = ()
+    weight: float = 1.0
+    proposal: Proposal | None = None
 
     @property
     def evaluations(self) -> int:
@@ -113,6 +120,9 @@ class WindowFit:
         conflict: how far the window contradicts its prior; None where that is the box.
         complete: the sampling was not ended early.
         failure: why there is nothing of all this; empty where there is.
+        rivals: the same of the other structures that are carried.
+        errors: mean square error of the forecasts that the window has judged, of each structure,
+            the likeliest first [m^2]; empty where only one is carried or there were none.
     """
 
     window: Window
@@ -127,6 +137,8 @@ class WindowFit:
     conflict: Conflict | None = None
     complete: bool = False
     failure: str = ''
+    rivals: tuple[WindowFit, ...] = ()
+    errors: tuple[float, ...] = ()
 
 
 def fit(job: Job, expired: Callable[[], bool] | None = None) -> WindowFit:
@@ -171,6 +183,7 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> WindowFit:
             residual=fit_residual(residual, parameters=len(job.model.names)),
             noise=sensor_noise(residual, record.command[settle:], white),
             past=_past(job, start),
+            weight=job.weight,
         ),
         archive=_archive(posterior[spread(len(posterior), ARCHIVE)], job.archive),
         learned=(

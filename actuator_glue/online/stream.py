@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 from actuator_glue.records import Array, Record
 
+_PLAIN, _BESIDE = 'Eq. (2)', ' + '
 Reason: TypeAlias = Literal['gap', 'stream', 'clock', 'setup', 'bad-input', 'model']
 
 
@@ -94,4 +96,33 @@ class Contradicted:
     message: str
 
 
-Event: TypeAlias = Restarted | Rejected | Dropped | Failed | Contradicted
+@dataclass(frozen=True, slots=True)
+class Reweighed:
+    """Another structure has become the likeliest, or some have left.
+
+    Attributes:
+        number: window whose samples decided it.
+        index: running index one past its last sample.
+        weights: effects of each structure that is carried, and its weight, the likeliest first.
+        left: effects of those that left.
+        message: for people.
+    """
+
+    number: int
+    index: int
+    weights: tuple[tuple[tuple[str, ...], float], ...]
+    left: tuple[tuple[str, ...], ...]
+    message: str
+
+
+def structure_name(effects: Sequence[str]) -> str:
+    """Return what a structure is called by its effects."""
+    return _BESIDE.join(effects) or _PLAIN
+
+
+def structure_effects(name: str) -> tuple[str, ...]:
+    """Return the effects of a structure that is called so."""
+    return () if name == _PLAIN else tuple(name.split(_BESIDE))
+
+
+Event: TypeAlias = Restarted | Rejected | Dropped | Failed | Contradicted | Reweighed

@@ -72,7 +72,7 @@ class Live:
                 job = estimator.next_job()
                 self.models.append((number, models[1]))
             asked = iter(range(10**9))
-            expired = None if stop is None else (lambda asked=asked: next(asked) >= stop)
+            expired = None if stop is None else (lambda _, asked=asked: next(asked) >= stop)
             result = run(pickle.loads(pickle.dumps(job)), expired)
             self.events += estimator.finish(pickle.loads(pickle.dumps(result)))
             if number in drop:
@@ -80,7 +80,7 @@ class Live:
             if not result.failure:
                 self.results.append(result)
                 key = (result.window.record.first_index, result.window.record.start_ns)
-                self.done[key] = (number, result.evaluations)
+                self.done[key] = (number, result.spent)
 
     def schedule(self):
         return Schedule(self.done, tuple(self.models))

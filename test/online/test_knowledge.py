@@ -179,7 +179,7 @@ def test_a_first_window_without_a_posterior_changes_no_later_prior():
             once.append(run(job))
             live.finish(once[-1])
             first = job.window.record
-            done[first.first_index, first.start_ns] = job.window.number, once[-1].evaluations
+            done[first.first_index, first.start_ns] = job.window.number, once[-1].spent
     again = replay(stream(record(6.0)), settings, schedule=Schedule(done), carried=known())
     twice = [r for r in again if isinstance(r, WindowResult)]
     assert len(once) == len(twice) > 5
@@ -194,7 +194,7 @@ def test_memory_is_bounded():
         estimator.setup(item) if isinstance(item, StreamSetup) else estimator.push(item)
         while (job := estimator.next_job()) is not None:
             estimator.finish(run(job))
-            most = max(most, len(estimator._knowledge._learned))
+            most = max(most, len(estimator._members[0].knowledge._learned))
     assert most <= 2 + SEQUENTIAL.window / SEQUENTIAL.hop
 
 

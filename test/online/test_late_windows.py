@@ -42,7 +42,7 @@ def test_nothing_depends_on_a_window_that_failed():
                 told.append(result)
             live.finish(result)
     done = {
-        (r.window.record.first_index, r.window.record.start_ns): (r.window.number, r.evaluations)
+        (r.window.record.first_index, r.window.record.start_ns): (r.window.number, r.spent)
         for r in told
     }
     again = results(items, schedule=Schedule(done))

@@ -11,7 +11,6 @@ from scipy.stats import norm
 from actuator_glue.inference.predictive import ResidualModel, total_band
 from actuator_glue.model import identifiable, linear
 from actuator_glue.normal import below
-from actuator_glue.online.alarm import CoverageAlarm, SwapWatch
 from actuator_glue.online.collect import PIECE, Collector
 from actuator_glue.online.mixture import mixture_band
 from actuator_glue.online.playback import stream
@@ -83,14 +82,6 @@ def test_the_frequency_response_band_holds_the_truth():
     assert found.headline[3] == pytest.approx(-np.angle(truth[at]) / (10 * np.pi), rel=0.02)
 
 
-def test_the_alarm_is_raised_once_and_armed_again():
-    alarm = CoverageAlarm(0.8, 3)
-    told = [alarm.update(c) for c in (0.9, 0.9, 0.95, 0.7, 0.7, 0.5, 0.4, 0.95, 0.95, 0.95, 0.1)]
-    assert told == [False, False, False, False, True, False, False, False, False, False, True]
-    alarm.reset()
-    assert np.isnan(alarm.coverage)
-
-
 @given(st.lists(st.tuples(st.integers(1, 120), st.booleans()), min_size=1, max_size=80))
 def test_the_collector_is_bounded_and_joins_only_what_is_contiguous(pieces):
     collector = Collector(4.0)
@@ -118,22 +109,3 @@ def test_the_collector_gives_back_the_record():
     assert found.stiffness == whole.stiffness and found.start_ns == whole.start_ns
     collector.forget()
     assert collector.records() == []
-
-
-def test_a_swap_that_makes_forecasts_worse_is_told_once():
-    """Errors before against errors after; bands right after the swap are nobody's."""
-    watch = SwapWatch(count=4, settle=2)
-    assert [watch.update(1.0) for _ in range(6)] == [0.0] * 6
-    watch.swapped()
-    told = [watch.update(e) for e in (9.0, 9.0, 1.5, 1.4, 1.5, 1.6, 1.5)]
-    assert told == [0.0] * 5 + [1.5, 0.0]
-    watch.swapped()
-    assert not any(watch.update(1.0) for _ in range(10))
-
-
-def test_a_swap_without_a_past_is_not_judged():
-    """Nor is an error that is not known."""
-    watch = SwapWatch(count=4, settle=0)
-    watch.update(float('nan'))
-    watch.swapped()
-    assert not any(watch.update(5.0) for _ in range(10))

@@ -1,0 +1,121 @@
+"""What a diagnosis takes from an estimator, and what that is to carry because of it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from actuator_glue.api.diagnosis import Diagnosis
+from actuator_glue.diagnosis.finding import Finding
+from actuator_glue.diagnosis.verdict import against
+from actuator_glue.errors import InputError
+from actuator_glue.inference.carried import Carried, Drift
+from actuator_glue.inference.choice import ModelChoice, choose_model
+from actuator_glue.inference.prior_use import GivenPrior
+from actuator_glue.online.knowledge import Known
+from actuator_glue.online.live_diagnosis import Concluded
+from actuator_glue.online.structures import LEAVES, MOST, Proposal, Proposed
+from actuator_glue.records import Array, Record
+
+# Eq. (2) alone is carried beside every addition, at least with this weight, until its forecasts
+# exclude it: what a diagnosis is sure of, it is sure of for the data that it has seen.
+_PLAIN = 0.02
+# Weight of a structure with effects that have no probability: learned terms.
+_DESCRIBED = 0.9
+
+
+def given(known: tuple[Carried, Drift, float] | None) -> GivenPrior | None:
+    """Return what an estimator knew before some records as the prior of their diagnosis.
+
+    Args:
+        known: draws at the records' beginning, how they drift, and their age [s]; None where
+            nothing was known.
+    """
+    if known is None:
+        return None
+    carried, drift, age = known
+    return GivenPrior(carried, 'the estimator', drift.every, age)
+
+
+def concluded(found: Diagnosis, records: Sequence[Record], apply: bool | None = None) -> Concluded:
+    """Return what a diagnosis of a stream means for the live loop.
+
+    Args:
+        found: the diagnosis.
+        records: what was diagnosed.
+        apply: whether the estimator is to carry it; None for what the loop's settings say.
+    """
+    left_open = found.verdict in ('unexplained', 'undecided') or any(
+        effect.alternatives for effect in found.effects
+    )
+    why_not = against(found)
+    if found.verdict == 'none':
+        return Concluded(Proposal.of(choose_model()), '', left_open, apply)
+    learned = ', '.join(term.name for term in found.learned)
+    if learned and not why_not:
+        why_not = f'{learned} was learned from these records: no effect of the catalogue'
+    if why_not:
+        return Concluded(None, why_not, left_open, apply)
+    return Concluded(proposed(found, records), '', left_open, apply)
+
+
+def proposed(found: Diagnosis, records: Sequence[Record]) -> Proposal:
+    """Return the structures that a diagnosis leaves possible, with what it knows of their sizes.
+
+    The one it tells comes with its posterior, which stands for the middle of the records; those
+    that are tied with it with starting values only, and Eq. (2) alone beside them.
+    """
+    first, last = records[0], records[-1]
+    start, end = first.start_ns, last.stamp_ns(len(last) - 1)
+    model, draws = _within_bounds(found)
+    carried = Carried.thinned(model.names, draws)
+    main = Proposed(model, _weight(found), Known(carried, (start + end) // 2, end))
+    others = [Proposed(choose_model(names), odds * main.weight) for names, odds in _tied(found)]
+    others = sorted(others, key=lambda one: -one.weight)[: MOST - 2]
+    others = [one for one in others if one.weight >= LEAVES]
+    left = 1.0 - main.weight - sum(one.weight for one in others)
+    plain = Proposed(choose_model(), max(left, _PLAIN))
+    return Proposal((main, *others, plain), found.alarm.threshold)
+
+
+def _within_bounds(found: Diagnosis) -> tuple[ModelChoice, Array]:
+    """Return the augmented model, where to start with it, and its draws (m, p) inside its box."""
+    structure = found.model
+    names = tuple(p.name for p in structure.parameters)
+    columns = [found.names.index(name) for name in names]
+    draws = found.posterior[:, columns]
+    lower = np.array([p.lower for p in structure.parameters])
+    upper = np.array([p.upper for p in structure.parameters])
+    inside = draws[((draws > lower) & (draws < upper)).all(axis=1)]
+    if len(inside) < len(draws) / 2:
+        raise InputError('what was found lies outside the bounds of the catalogue')
+    start = dict(zip(names, np.median(inside, axis=0).tolist(), strict=True))
+    return choose_model(found.structure, start=start), inside
+
+
+def _weight(found: Diagnosis) -> float:
+    """Return the probability of the structure that is told."""
+    each = [_probability(effect) for effect in found.effects if effect.name in found.structure]
+    return float(np.clip(np.prod(each), LEAVES, 1.0 - _PLAIN))
+
+
+def _probability(effect: Finding) -> float:
+    return _DESCRIBED if math.isnan(effect.probability) else effect.probability
+
+
+def _tied(found: Diagnosis) -> list[tuple[tuple[str, ...], float]]:
+    """Return structures with a tied name for one that is told, and their odds against it."""
+    out = []
+    for effect in found.effects:
+        if effect.name not in found.structure:
+            continue
+        rest = [name for name in found.structure if name != effect.name]
+        known = frozenset(found.structure)
+        for rival in effect.rivals:
+            names = tuple(dict.fromkeys((*rest, *rival.effects)))
+            if rival.name != effect.name and rival.tied and frozenset(names) != known:
+                odds = rival.probability / max(_probability(effect), LEAVES)
+                out.append((names, min(odds, 1.0)))
+    return out

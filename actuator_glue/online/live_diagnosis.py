@@ -1,0 +1,363 @@
+"""When a stream is diagnosed, and what follows: a state and a step, without clock, ROS or data.
+
+A diagnosis is due when coverage breaks, when the estimator's prior is contradicted, and, while
+names are tied or structure remains, each time that twice as much has been received. What it says
+replaces what was added before: an addition that later data contradict is taken out.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+import numpy as np
+
+from actuator_glue.inference.carried import Carried, Drift
+from actuator_glue.online.knowledge import Known
+from actuator_glue.online.settings import EstimatorSettings
+from actuator_glue.online.structures import Proposal
+
+# The likeliest structure is proposed again where it has less weight than this by now.
+_DOUBTED = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class LiveSettings:
+    """When to diagnose by itself.
+
+    Attributes:
+        automatic: diagnose without being asked.
+        apply: have the estimator carry what was found.
+        coverage_limit: mean coverage of the noise band below which it has broken.
+        coverage_windows: successive bands the mean is taken over.
+        minimum: data needed before a diagnosis [s].
+        pause: data that must have come since the diagnosis before began [s].
+    """
+
+    automatic: bool = True
+    apply: bool = False
+    coverage_limit: float = 0.8
+    coverage_windows: int = 5
+    minimum: float = 20.0
+    pause: float = 10.0
+
+
+@dataclass(frozen=True, slots=True)
+class Received:
+    """So much usable data has come since the stream began [s]."""
+
+    seconds: float
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """A band of parameters and sensor noise was held against its samples.
+
+    Attributes:
+        coverage: share of the samples that it covers.
+        number: window that made it.
+    """
+
+    coverage: float
+    number: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Carries:
+    """The estimator carries other structures from a window on; earlier bands are of others."""
+
+    number: int
+
+
+@dataclass(frozen=True, slots=True)
+class Estimated:
+    """A window's posterior.
+
+    Attributes:
+        contradicted: the alarm of the check of the prior stands.
+        weights: effects and weight of each structure that is carried, the likeliest first.
+    """
+
+    contradicted: bool
+    weights: tuple[tuple[frozenset[str], float], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Began:
+    """Windows begin anew: a gap, another test, or the stream began again."""
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """Somebody has asked for a diagnosis, which begins now.
+
+    Attributes:
+        streamed: of what has been received, not of other records.
+    """
+
+    streamed: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Concluded:
+    """A diagnosis of the stream has ended.
+
+    Attributes:
+        proposal: what the estimator should carry; None where it should go on as it is.
+        why_not: why there is no proposal, for people.
+        left_open: names are tied, or structure remains.
+        apply: the estimator is to carry it; None for what the settings say.
+    """
+
+    proposal: Proposal | None = None
+    why_not: str = ''
+    left_open: bool = False
+    apply: bool | None = None
+
+
+Input: TypeAlias = Received | Judged | Carries | Estimated | Began | Asked | Concluded
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """Diagnose what has been received, for a reason."""
+
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class Carry:
+    """Have the estimator carry other structures.
+
+    Attributes:
+        proposal: what to carry.
+        taken_out: effects that were carried and are not any more.
+    """
+
+    proposal: Proposal
+    taken_out: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Say:
+    """Tell people."""
+
+    kind: str
+    message: str
+
+
+Action: TypeAlias = Look | Carry | Say
+
+
+@dataclass(frozen=True, slots=True)
+class State:
+    """All that decides what is done next.
+
+    Attributes:
+        settings: when to diagnose.
+        seconds: data received since the stream began [s].
+        coverages: of the last bands.
+        broken: their mean is below the limit.
+        contradicted: the alarm of the check of the prior stands.
+        since: window that the structures are carried from.
+        weights: structures that are carried, the likeliest first.
+        reason: why a diagnosis is due; empty for none.
+        running: a diagnosis is under way.
+        looked: data there were when the last one began [s]; NaN before the first.
+        left_open: the last one left names tied, or structure.
+    """
+
+    settings: LiveSettings
+    seconds: float = 0.0
+    coverages: tuple[float, ...] = ()
+    broken: bool = False
+    contradicted: bool = False
+    since: int = 0
+    weights: tuple[tuple[frozenset[str], float], ...] = ()
+    reason: str = ''
+    running: bool = False
+    looked: float = math.nan
+    left_open: bool = False
+
+    @property
+    def coverage(self) -> float:
+        """Mean coverage of the last bands; NaN before there are enough."""
+        full = len(self.coverages) >= self.settings.coverage_windows
+        return float(np.mean(self.coverages)) if full else math.nan
+
+    @property
+    def trusted(self) -> bool:
+        """Whether bands have been judged, and nothing speaks against what is known now."""
+        return self.coverage >= self.settings.coverage_limit and not self.contradicted
+
+
+def init(settings: LiveSettings) -> State:
+    """Return the state before a stream."""
+    return State(settings)
+
+
+def step(state: State, given: Input) -> tuple[State, tuple[Action, ...]]:
+    """Take one input; return the next state and what to do."""
+    match given:
+        case Received():
+            state, told = _received(state, given.seconds), ()
+        case Judged():
+            state, told = _judged(state, given)
+        case Carries():
+            state, told = replace(_began(state), since=given.number), ()
+        case Estimated():
+            state, told = _estimated(state, given)
+        case Began():
+            state, told = _began(state), ()
+        case Asked():
+            looked = state.seconds if given.streamed else state.looked
+            return replace(state, running=True, looked=looked), ()
+        case Concluded():
+            state, told = _concluded(state, given)
+    reason = _due(state)
+    if not reason:
+        return state, told
+    state = replace(state, running=True, looked=state.seconds, reason='')
+    return state, (*told, Look(reason))
+
+
+def _judged(state: State, given: Judged) -> tuple[State, tuple[Action, ...]]:
+    if given.number < state.since:
+        return state, ()
+    count = state.settings.coverage_windows
+    state = replace(state, coverages=(*state.coverages, given.coverage)[-count:])
+    broken = state.coverage < state.settings.coverage_limit
+    if math.isnan(state.coverage) or broken == state.broken:
+        return state, ()
+    if not broken:
+        return replace(state, broken=False), ()
+    what = (
+        f'the band of parameters and sensor noise covers {state.coverage:.0%} of the samples: '
+        'the model lacks something'
+    )
+    return replace(state, broken=True, reason=what), (Say('coverage', what),)
+
+
+def _estimated(state: State, given: Estimated) -> tuple[State, tuple[Action, ...]]:
+    rises = given.contradicted and not state.contradicted
+    state = replace(state, contradicted=given.contradicted, weights=given.weights)
+    if rises:
+        what = 'samples contradict what the estimator knew of the parameters'
+        return replace(state, reason=state.reason or what), ()
+    return state, ()
+
+
+def _received(state: State, seconds: float) -> State:
+    """Take how much has come; less than before is another actuator's."""
+    if seconds >= state.seconds:
+        return replace(state, seconds=seconds)
+    fresh = State(state.settings, running=state.running)
+    return replace(fresh, seconds=seconds)
+
+
+def _began(state: State) -> State:
+    """Let go of bands, which are of windows before."""
+    return replace(state, coverages=(), broken=False)
+
+
+def _concluded(state: State, given: Concluded) -> tuple[State, tuple[Action, ...]]:
+    state = replace(state, running=False, left_open=given.left_open)
+    apply = state.settings.apply if given.apply is None else given.apply
+    if not apply:
+        return state, ()
+    if given.proposal is None:
+        said = (Say('diagnosis', f'the estimator goes on as it is: {given.why_not}'),)
+        return state, said if given.why_not else ()
+    wanted = frozenset(given.proposal.structures[0].model.effects)
+    leading, weight = state.weights[0] if state.weights else (frozenset(), 1.0)
+    if wanted == leading and weight >= _DOUBTED:
+        return state, ()
+    out = tuple(sorted(leading - wanted))
+    told: tuple[Action, ...] = ()
+    if out:
+        told = (Say('taken out', f'{", ".join(out)}: later data contradict it'),)
+    return _began(state), (*told, Carry(given.proposal, out))
+
+
+def _due(state: State) -> str:
+    """Return why a diagnosis is due; empty where none is."""
+    settings, seconds = state.settings, state.seconds
+    if state.running or not settings.automatic or seconds < settings.minimum:
+        return ''
+    if state.reason and not seconds < state.looked + settings.pause:
+        return state.reason
+    if state.left_open and seconds >= 2.0 * state.looked:
+        return 'names are tied or structure remains, and there are twice as many data'
+    return ''
+
+
+class Memory:
+    """What an estimator knew of Eq. (2)'s parameters before some samples; bounded.
+
+    Each sample counts once: what is known before records is the calibration that the estimator
+    began with, or its posterior of windows that ended before the records begin.
+
+    Attributes:
+        settings: of the estimator; None before they are known.
+    """
+
+    def __init__(self) -> None:
+        self.settings: EstimatorSettings | None = None
+        self._carried: Carried | None = None
+        self._began_ns: int | None = None
+        self._known: deque[Known] = deque()
+
+    def setup(self, settings: EstimatorSettings, carried: Carried | None) -> None:
+        """Take what the estimator works with."""
+        if settings != self.settings or carried != self._carried:
+            self._known.clear()
+        self.settings, self._carried = settings, carried
+
+    def forget(self) -> None:
+        """Let go of posteriors: they are of another actuator."""
+        self._known.clear()
+        self._began_ns = None
+
+    def began(self, stamp_ns: int) -> None:
+        """Note when the stream began [ns]."""
+        if self._began_ns is None:
+            self._began_ns = stamp_ns
+
+    def learn(self, known: Known, first_ns: int | None) -> None:
+        """Take a posterior that nothing speaks against.
+
+        Args:
+            known: the posterior.
+            first_ns: when the records that are kept begin [ns]: of older posteriors only the
+                newest can still be asked for.
+        """
+        if self.settings is None or self.settings.prior != 'sequential':
+            return
+        if self._known and known.last_ns < self._known[-1].last_ns + 1_000_000_000:
+            return
+        self._known.append(known)
+        while first_ns is not None and len(self._known) > 1 and self._known[1].last_ns < first_ns:
+            self._known.popleft()
+
+    def before(self, first_ns: int) -> tuple[Carried, Drift, float] | None:
+        """Return what was known before records that begin at a time [ns].
+
+        Returns:
+            Draws that have drifted to that time, by how much they drift, and their age [s]; None
+            where nothing was known.
+        """
+        if self.settings is None:
+            return None
+        drift = self.settings.drifts()
+        earlier = [one for one in self._known if one.last_ns < first_ns]
+        if earlier:
+            known = earlier[-1]
+            age = (first_ns - known.middle_ns) * 1e-9
+            return known.carried.drifted(drift, age), drift, age
+        if self._carried is None:
+            return None
+        since = 0 if self._began_ns is None else max(first_ns - self._began_ns, 0)
+        age = self.settings.prior_age + since * 1e-9
+        return self._carried.drifted(drift, age), drift, age

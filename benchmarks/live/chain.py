@@ -1,0 +1,166 @@
+"""Estimator and live diagnosis joined as the nodes join them, in the stream's own time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from actuator_glue.api.diagnosis import diagnose
+from actuator_glue.api.live import concluded, given
+from actuator_glue.inference.carried import Carried
+from actuator_glue.inference.choice import choose_model
+from actuator_glue.online import live_diagnosis as live
+from actuator_glue.online.collect import Collector
+from actuator_glue.online.estimator import Estimator
+from actuator_glue.online.job import WindowResult, run
+from actuator_glue.online.knowledge import Known
+from actuator_glue.online.playback import stream
+from actuator_glue.online.settings import EstimatorSettings
+from actuator_glue.online.stream import Contradicted, Event
+from actuator_glue.records import Record
+from actuator_glue.sample_block import Block
+from actuator_glue.setups import StreamSetup
+
+SETTINGS = EstimatorSettings(prior='sequential', evaluations=4000, start_evaluations=16_000)
+KEPT = 180.0  # s
+BLOCK = 0.5  # s
+
+
+@dataclass
+class Chain:
+    """A run: every window's result, and what was done when.
+
+    Attributes:
+        results: of all windows.
+        said: time [s] and text of what was told or done.
+        broke: when the coverage broke first [s]; NaN for never.
+        added: when an effect was carried first [s].
+        removed: when one was taken out again [s].
+        proposals: time and effects of each proposal's structures.
+        looks: how many diagnoses there were.
+    """
+
+    results: list[WindowResult] = field(default_factory=list)
+    said: list[tuple[float, str]] = field(default_factory=list)
+    broke: float = np.nan
+    added: float = np.nan
+    removed: list[float] = field(default_factory=list)
+    proposals: list[tuple[float, tuple[tuple[str, ...], ...]]] = field(default_factory=list)
+    looks: int = 0
+
+
+def chain(
+    record: Record,
+    carried: Carried | None,
+    wanted: live.LiveSettings,
+    settings: EstimatorSettings = SETTINGS,
+    takes: float = 8.0,
+    seed: int = 1,
+) -> Chain:
+    """Run a stream through estimator and diagnosis.
+
+    Args:
+        record: what is streamed.
+        carried: what a calibration knows; None for nothing.
+        wanted: when to diagnose.
+        settings: of the estimator.
+        takes: time that a diagnosis takes, in which the stream goes on [s].
+        seed: of the diagnoses.
+    """
+    loop = _Loop(carried, wanted, settings, takes, seed)
+    for item in stream(record, round(BLOCK * record.rate)):
+        if isinstance(item, StreamSetup):
+            loop.estimator.setup(item)
+            loop.collector.setup(item)
+        elif isinstance(item, Block):
+            loop.push(item)
+    return loop.out
+
+
+class _Loop:
+    """Both state machines and what passes between them; arguments as `chain`."""
+
+    def __init__(
+        self,
+        carried: Carried | None,
+        wanted: live.LiveSettings,
+        settings: EstimatorSettings,
+        takes: float,
+        seed: int,
+    ) -> None:
+        self.out = Chain()
+        self.estimator = Estimator(settings, choose_model(), carried=carried)
+        self.collector = Collector(KEPT)
+        self._settings, self._takes, self._seed = settings, takes, seed
+        self._state, self._memory = live.init(wanted), live.Memory()
+        self._memory.setup(settings, carried)
+        self._waiting: list[tuple[float, live.Concluded]] = []
+        self._now = 0.0
+
+    def push(self, block: Block) -> None:
+        """Take a block, and do all that follows."""
+        self._now = (block.index + len(block)) * block.period
+        self._memory.began(block.stamp_ns)
+        self.estimator.push(block)
+        self.collector.push(block)
+        while self._waiting and self._waiting[0][0] <= self._now:
+            self._take(self._waiting.pop(0)[1])
+        self._take(live.Received(self.collector.received))
+        while (job := self.estimator.next_job()) is not None:
+            result = run(job)
+            told = self.estimator.finish(result)
+            if job.proposal is not None:
+                self._take(live.Carries(job.window.number))
+            if not result.failure:
+                self._estimated(result, told)
+
+    def _estimated(self, result: WindowResult, told: list[Event]) -> None:
+        self.out.results.append(result)
+        self.out.said += [(self._now, event.message) for event in told]
+        for prediction in result.scored:
+            if prediction.kind == 'noise' and prediction.coverage is not None:
+                self._take(live.Judged(float(prediction.coverage[-1]), prediction.number))
+        weights = tuple((frozenset(m.effects), w) for m, w in self.estimator.weights)
+        contradicted = any(isinstance(event, Contradicted) for event in told)
+        self._take(live.Estimated(contradicted, weights))
+        if self._state.trusted:
+            self._memory.learn(_known(result, self._settings), self.collector.first_ns)
+
+    def _take(self, given: live.Input) -> None:
+        self._state, actions = live.step(self._state, given)
+        out, now = self.out, self._now
+        for action in actions:
+            if isinstance(action, live.Look):
+                out.looks += 1
+                out.said.append((now, f'looks: {action.reason}'))
+                self._waiting.append((now + self._takes, self._look()))
+            elif isinstance(action, live.Carry):
+                self.estimator.set_model(action.proposal)
+                carried = tuple(one.model.effects for one in action.proposal.structures)
+                out.said.append((now, f'carries {action.proposal.described()}'))
+                out.proposals.append((now, carried))
+                if carried[0] and np.isnan(out.added):
+                    out.added = now
+                if action.taken_out:
+                    out.removed.append(now)
+            else:
+                if action.kind == 'coverage' and np.isnan(out.broke):
+                    out.broke = now
+                out.said.append((now, action.message))
+
+    def _look(self) -> live.Concluded:
+        records = self.collector.records()
+        known = given(self._memory.before(records[0].start_ns))
+        found = diagnose(records, seed=self._seed, jobs=1, prior=known)
+        self.out.said.append((self._now, found.summary()))
+        return concluded(found, records)
+
+
+def _known(result: WindowResult, settings: EstimatorSettings) -> Known:
+    """Return a window's posterior as its PosteriorDraws tells it."""
+    record = result.window.record
+    assert result.draws is not None
+    start = record.stamp_ns(round(settings.settle / record.period))
+    last = record.stamp_ns(len(record) - 1)
+    return Known(Carried(result.model.names, result.draws), (start + last) // 2, last)

@@ -1,0 +1,178 @@
+"""When a stream is diagnosed and what follows, as a pure state machine."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from actuator_glue.inference.carried import Carried
+from actuator_glue.inference.choice import choose_model
+from actuator_glue.model.parameters import NAMES
+from actuator_glue.online import live_diagnosis as live
+from actuator_glue.online.knowledge import Known
+from actuator_glue.online.settings import EstimatorSettings
+from actuator_glue.online.structures import Proposal
+
+SETTINGS = live.LiveSettings(apply=True, coverage_windows=3, minimum=20.0, pause=10.0)
+PLAY = frozenset({'backlash'})
+
+
+def proposal(*effects):
+    return Proposal.of(choose_model(effects))
+
+
+def run(state, *inputs):
+    """The last state and all actions."""
+    actions = []
+    for given in inputs:
+        state, told = live.step(state, given)
+        actions += told
+    return state, actions
+
+
+def looks(actions):
+    return [action.reason for action in actions if isinstance(action, live.Look)]
+
+
+def carries(actions):
+    return [a.proposal.structures[0].model.effects for a in actions if isinstance(a, live.Carry)]
+
+
+def broken(seconds=30.0):
+    """A loop whose first diagnosis runs, because coverage broke."""
+    state, actions = run(live.init(SETTINGS), live.Received(seconds), *[live.Judged(0.5)] * 3)
+    assert len(looks(actions)) == 1 and state.running
+    return state
+
+
+def test_a_break_is_told_once_and_diagnosed_as_soon_as_there_are_enough_data():
+    state, actions = run(live.init(SETTINGS), live.Received(12.0), *[live.Judged(0.6)] * 6)
+    assert looks(actions) == [] and [a.kind for a in actions] == ['coverage']
+    state, actions = run(state, live.Received(19.9), live.Received(20.0), live.Received(20.5))
+    assert looks(actions) == ['the band of parameters and sensor noise covers 60% of '
+                              'the samples: the model lacks something']  # fmt: skip
+
+
+def test_a_break_is_told_once_and_armed_again():
+    state, told = live.init(SETTINGS), []
+    for coverage in (0.9, 0.9, 0.95, 0.7, 0.7, 0.5, 0.4, 0.95, 0.95, 0.95, 0.1):
+        state, actions = run(state, live.Judged(coverage))
+        told.append(bool(actions))
+    assert told == [False] * 4 + [True] + [False] * 5 + [True]
+    assert math.isnan(run(state, live.Began())[0].coverage)
+
+
+def test_healthy_bands_start_nothing():
+    state, actions = run(
+        live.init(SETTINGS),
+        *[x for i in range(500) for x in (live.Judged(0.94), live.Received(i))],
+    )
+    assert actions == [] and state.trusted
+
+
+def test_it_looks_again_at_twice_the_data_while_something_is_open():
+    state, actions = run(broken(20.0), live.Concluded(proposal('backlash'), left_open=True))
+    assert carries(actions) == [('backlash',)]
+    asked = []
+    for seconds in range(21, 200):
+        state, actions = run(state, live.Received(float(seconds)))
+        if looks(actions):
+            asked.append(seconds)
+            state, _ = run(state, live.Concluded(proposal('backlash'), left_open=True))
+    assert asked == [40, 80, 160]
+    state, actions = run(state, live.Concluded(proposal('backlash')), live.Received(1e4))
+    assert looks(actions) == []
+
+
+def test_a_contradicted_prior_is_looked_into_and_once():
+    state, _ = run(broken(), live.Concluded(proposal('coulomb-friction')))
+    wrong = live.Estimated(True, ((frozenset({'coulomb-friction'}), 1.0),))
+    state, actions = run(state, live.Received(38.0), wrong, wrong)
+    assert looks(actions) == []  # the pause
+    state, actions = run(state, live.Received(40.0), wrong, live.Received(41.0))
+    assert len(looks(actions)) == 1 and 'contradict' in looks(actions)[0]
+
+
+def test_what_later_data_contradict_is_taken_out_and_told():
+    state, _ = run(broken(), live.Concluded(proposal('coulomb-friction'), left_open=True))
+    state, _ = run(state, live.Estimated(False, ((frozenset({'coulomb-friction'}), 0.9),)))
+    state, actions = run(state, live.Received(60.0), live.Concluded(proposal('backlash')))
+    assert carries(actions) == [('backlash',)]
+    (told,) = [a for a in actions if isinstance(a, live.Say)]
+    assert told.kind == 'taken out' and 'coulomb-friction' in told.message
+    state, _ = run(state, live.Estimated(False, ((PLAY, 0.9),)))
+    _, actions = run(state, live.Asked(), live.Concluded(proposal()))
+    assert carries(actions) == [()]
+
+
+def test_what_is_carried_already_is_not_handed_over_again_unless_it_is_in_doubt():
+    state, _ = run(broken(), live.Concluded(proposal('backlash'), left_open=True))
+    sure = live.Estimated(False, ((PLAY, 0.97), (frozenset(), 0.03)))
+    _, actions = run(state, sure, live.Asked(), live.Concluded(proposal('backlash')))
+    assert carries(actions) == []
+    unsure = live.Estimated(False, ((PLAY, 0.45), (frozenset(), 0.4)))
+    _, actions = run(state, unsure, live.Asked(), live.Concluded(proposal('backlash')))
+    assert carries(actions) == [('backlash',)]
+
+
+def test_bands_of_windows_before_the_change_break_nothing():
+    state, _ = run(broken(), live.Concluded(proposal('backlash')), live.Carries(12))
+    state, actions = run(state, live.Received(99.0), *[live.Judged(0.4, 11)] * 9)
+    assert actions == [] and not state.broken
+    _, actions = run(state, *[live.Judged(0.4, 12)] * 3)
+    assert len(looks(actions)) == 1
+
+
+def test_nothing_is_carried_where_nobody_asked_for_it():
+    state = replace(broken(), settings=replace(SETTINGS, apply=False))
+    _, actions = run(state, live.Concluded(proposal('backlash')))
+    assert carries(actions) == []
+    _, actions = run(state, live.Concluded(proposal('backlash'), apply=True))
+    assert carries(actions) == [('backlash',)]
+    _, actions = run(broken(), live.Concluded(None, 'it acts in one record only'))
+    assert carries(actions) == [] and 'one record' in actions[0].message
+
+
+def test_another_actuator_begins_anew():
+    state, _ = run(broken(), live.Concluded(proposal('backlash'), left_open=True))
+    state, actions = run(state, live.Received(0.5), live.Received(500.0))
+    assert looks(actions) == [] and math.isnan(state.looked)
+
+
+def known(seconds, beta=134.0):
+    draws = np.array([beta, 1.1e9, 2.5e5, 0.5]) * np.linspace(0.99, 1.01, 60)[:, None]
+    at = round(seconds * 1e9)
+    return Known(Carried(NAMES, draws), at - 2_500_000_000, at)
+
+
+def test_each_sample_counts_once_in_what_is_known_before_records():
+    memory = live.Memory()
+    assert memory.before(0) is None
+    settings = EstimatorSettings(prior='sequential', drift=0.06, prior_age=1800.0)
+    memory.setup(settings, known(0.0, 100.0).carried)
+    memory.began(0)
+    for second in range(5, 60):
+        memory.learn(known(float(second), 100.0 + second), None)
+    # Records that go back to the beginning: the calibration, as old as it is.
+    draws, drift, age = memory.before(0)
+    assert draws.draws[:, 0].mean() == pytest.approx(100.0) and age == 1800.0
+    assert draws.spread[0] == pytest.approx(0.06 * math.sqrt(0.5)) and drift.every == 0.06
+    # Records that begin at 40 s: the newest posterior that ended before them.
+    draws, _, age = memory.before(40_000_000_000)
+    assert draws.draws[:, 0].mean() == pytest.approx(139.0) and age == pytest.approx(3.5)
+
+
+def test_what_an_estimator_from_the_box_says_of_a_window_is_no_knowledge():
+    memory = live.Memory()
+    memory.setup(EstimatorSettings(), None)
+    memory.learn(known(5.0), None)
+    assert memory.before(10**12) is None
+
+
+def test_memory_of_posteriors_is_bounded():
+    memory = live.Memory()
+    memory.setup(EstimatorSettings(prior='sequential'), None)
+    for second in range(5, 5000):
+        memory.learn(known(float(second)), max(0, second - 180) * 1_000_000_000)
+    assert len(memory._known) < 200
