@@ -63,6 +63,14 @@ reproduce: $(VENV_STAMP) ## the paper beside our numbers; report in out/reproduc
 study-rths: $(VENV_STAMP) ## predicted stability against simulated hybrid tests, an hour (stopped, it goes on); out/study-rths
 	@$(BIN)/python -m studies.hybrid --out out/study-rths --workers 2 $(STUDY_ARGS)
 
+# Seeds 900 and up decide nothing that is reported; a run that was stopped goes on.
+tables: $(VENV_STAMP) ## tables of structures of blind machines, and what another choice from them says; out/tables
+	@for generator in cases variant mixed far; do \
+		$(BIN)/python benchmarks/blind/campaign.py --first 900 --cases 18 --jobs 2 \
+			--generator $$generator --out out/tables/$$generator; \
+		$(BIN)/python benchmarks/blind/tables.py out/tables/$$generator --generator $$generator; \
+	done
+
 $(SAFETY_STAMP): $(VENV_STAMP)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt --editable '.[safety]'
 	@touch $@

@@ -22,6 +22,7 @@ from actuator_glue.diagnosis import (
     reconciled,
     response,
     ridge,
+    table,
     verdict,
     wrong_setup,
 )
@@ -166,7 +167,7 @@ def diagnose(
     judged = verdict.conclude(decision.verdict, bool(decision.names), error, found.material)
     if other is not None and any(map(learned_term.is_learned, final.structure.entries)):
         # A description of what another set-up explains with none describes the set-up.
-        judged = 'undecided' if judged in verdict.COMPLETE else judged
+        judged = 'unexplained' if judged in verdict.COMPLETE else judged
     setup = result.prepared.setup or (None if judged in verdict.COMPLETE else other)
     if judged not in verdict.COMPLETE:
         search, left = result.selection.search, decision.left
@@ -231,6 +232,9 @@ def diagnose(
         onset=result.onset,
         prior=used,
         setup=setup,
+        structures=table.rows(
+            result.selection.search.left_at_most(math.inf), scorer, final.effects
+        ),
         names=tuple(p.name for p in after.model.parameters),
         posterior=mixed,
         joint=after.draws,
@@ -245,6 +249,7 @@ def diagnose(
         remaining=decision.remaining,
         seconds=clock() - start if clock else math.nan,
         at_bound=held_at,
+        preparation=tuple(prepared.told),
         sampling=tuple(
             {
                 'source': r.source,

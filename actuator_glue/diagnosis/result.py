@@ -15,6 +15,7 @@ from actuator_glue.diagnosis.learned.term import LearnedTerm
 from actuator_glue.diagnosis.next_experiment import Experiment
 from actuator_glue.diagnosis.onset.onset import Onset
 from actuator_glue.diagnosis.response import Response
+from actuator_glue.diagnosis.table import Row
 from actuator_glue.diagnosis.verdict import COMPLETE
 from actuator_glue.diagnosis.wrong_setup import WrongSetup
 from actuator_glue.inference.at_bound import Pressed
@@ -146,7 +147,7 @@ class DiagnosisData:
         candidates: all effects tried first, best first.
         coverage: share of held-out samples in the 95 % band, before and after.
         alarm: detection statistics.
-        advice: what to do next, for people.
+        advice: what to do next, and last what was done to the records, for people.
         base: posterior of the base parameters in the augmented model.
         structure: effect names of the augmented model.
         names: parameter names of the columns of `posterior`.
@@ -163,6 +164,7 @@ class DiagnosisData:
         seconds: wall time.
         at_bound: parameters that their bounds hold.
         sampling: per record its source, its rate as recorded and as fitted [Hz].
+        preparation: the lines of `advice` that say what was done to the records.
         learned: terms among the effects that were learned from these records.
         base_before: posterior of Eq. (2)'s parameters without any addition.
         responses: frequency response of the augmented model at each stiffness.
@@ -172,6 +174,8 @@ class DiagnosisData:
             errors are then those of the data since.
         prior: what was known of Eq. (2)'s parameters before, beside the bounds; None for nothing.
         setup: another set-up of the records that explains them far better than the one given.
+        structures: all structures that the search which led to the answer refitted, least error
+            left out first.
     """
 
     verdict: Verdict
@@ -193,6 +197,7 @@ class DiagnosisData:
     seconds: float
     at_bound: tuple[Pressed, ...] = ()
     sampling: tuple[Json, ...] = ()
+    preparation: tuple[str, ...] = ()
     learned: tuple[LearnedTerm, ...] = ()
     base_before: dict[str, Estimate] = field(default_factory=dict)
     responses: tuple[Response, ...] = ()
@@ -201,6 +206,7 @@ class DiagnosisData:
     onset: Onset | None = None
     prior: PriorUse | None = None
     setup: WrongSetup | None = None
+    structures: tuple[Row, ...] = ()
     sampler: Json = field(default_factory=dict)
     joint: Array = field(default_factory=lambda: np.empty((0, 0)))
 
@@ -232,6 +238,7 @@ class DiagnosisData:
             'onset': self.onset.to_json() if self.onset else None,
             'prior': asdict(self.prior) if self.prior else None,
             'setup': self.setup.to_json() if self.setup else None,
+            'structures': [row.to_json() for row in self.structures],
             'surrogate': self.surrogate,
             'remaining': self.remaining,
             'advice': list(self.advice),

@@ -71,7 +71,7 @@ class WrongSetup(JsonObject):
         return f'check the set-ups: with {" and ".join(parts)} {alone}'
 
 
-def find(data: Data, settings: Thresholds) -> WrongSetup | None:
+def find(data: Data, settings: Thresholds, both_holds: bool = False) -> WrongSetup | None:
     """Return a set-up that explains records far better than the one given; None for none.
 
     A command that was given as held and runs linearly is found with what else it leads to
@@ -80,6 +80,7 @@ def find(data: Data, settings: Thresholds) -> WrongSetup | None:
     Args:
         data: the fitting part.
         settings: thresholds.
+        both_holds: whether it is asked here either way round.
     """
     some = _stretches(data)
     given = base_fit(some)
@@ -87,7 +88,7 @@ def find(data: Data, settings: Thresholds) -> WrongSetup | None:
     left, noise = pooled(some, splits_of(some, given.error))
     if left < settings.material(noise, stroke):
         return None
-    others = list(_others(data))
+    others = list(_others(data, both_holds))
     if not others:
         return None
     parts = [_stretches(other) for other in others]
@@ -126,7 +127,7 @@ def _nats(data: Data, better: Fit, given: Fit) -> float:
     return evidence(scorer.block_scores(better), scorer.block_scores(given))
 
 
-def _others(data: Data) -> Iterator[Data]:
+def _others(data: Data, both_holds: bool) -> Iterator[Data]:
     """Yield the data with stiffnesses exchanged, with the other hold, and with both."""
     known = [r.known_stiffness() for r in data.records]
     values = sorted(set(known))
@@ -142,5 +143,5 @@ def _others(data: Data) -> Iterator[Data]:
     exchanged = [data.with_setup(stiffness=order) for order in orders]
     yield from exchanged
     linear = any(r.hold == 'linear' for r in data.recorded)
-    for one in (*exchanged, *([data] if linear else [])):
+    for one in (*exchanged, *([data] if linear or both_holds else [])):
         yield one.with_setup(hold='zoh' if linear else 'linear')
