@@ -18,7 +18,9 @@ OUTSIDE = sorted(p for f in ('studies', 'examples') for p in (ROOT.parent / f).r
 OURS = ('test', 'benchmarks', 'launch', 'scripts')
 EVERY = [*SOURCES, *OUTSIDE, *(p for f in OURS for p in (ROOT.parent / f).rglob('*.py'))]
 
-BOTTOM = {'errors', 'records', 'setups', 'sample_block', 'jit', 'normal', 'json_value'}
+BOTTOM = {
+    'errors', 'records', 'setups', 'sample_block', 'rate_check', 'jit', 'normal', 'json_value',
+}  # fmt: skip
 CORE = BOTTOM | {'model', 'inference'}
 READY = CORE | {'hygiene'}
 EVERYTHING = READY | {
@@ -39,6 +41,7 @@ ARROWS = {
     'records': {'errors'},
     'setups': {'records', 'errors'},
     'sample_block': {'records', 'setups', 'errors'},
+    'rate_check': set(),
     'jit': set(),
     'normal': {'jit'},
     'json_value': set(),
@@ -51,8 +54,17 @@ ARROWS = {
     'diagnosis': READY,
     'hybrid': CORE,
     'report': CORE | {'online', 'diagnosis', 'io'},
-    'io': {'records', 'setups', 'sample_block', 'errors', 'json_value', 'interfaces', 'hybrid'},
-    'streams': {'records', 'errors', 'io'},
+    'io': {
+        'records',
+        'setups',
+        'sample_block',
+        'rate_check',
+        'errors',
+        'json_value',
+        'interfaces',
+        'hybrid',
+    },
+    'streams': {'records', 'rate_check', 'errors', 'io'},
     'view': {'records', 'sample_block', 'setups', 'errors', 'io', 'interfaces'},
     'workers': CORE | {'online'},
     'api': EVERYTHING,
@@ -65,6 +77,7 @@ PURE = (
     'records',
     'setups',
     'sample_block',
+    'rate_check',
     'normal',
     'json_value',
     'model',

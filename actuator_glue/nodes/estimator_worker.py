@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+import math
+import statistics
 import time
+from collections import deque
 from typing import NamedTuple
 
 from actuator_glue.api.tracking import FREQUENCIES, RecordTracking, window_tracking
 from actuator_glue.online.job import WindowResult, run
 from actuator_glue.online.sampling import Job
-from actuator_glue.workers.warm import warm_windows
+from actuator_glue.workers.warm import warm_prior, warm_windows
 from actuator_glue.workers.worker import Tell
 
 # From the worker to the published message [s].
@@ -17,16 +20,39 @@ ON_THE_WAY = 5e-3
 SLACK = 0.08
 
 
-class _Reserve:
-    """How long a window still takes once its sampling has ended; lives in the worker.
+class _Lately:
+    """How long something took lately, one stall or two among the last times left out.
 
-    Attributes:
-        seconds: without its tracking numbers.
-        tracking: for these alone.
+    At most twice the median of the last times: a computer that stalls once makes a window late,
+    and those after it have their time for sampling.
     """
 
-    seconds = 0.0
-    tracking = 0.0
+    def __init__(self) -> None:
+        self._times: deque[float] = deque(maxlen=7)
+
+    @property
+    def seconds(self) -> float:
+        """How long it will take [s]; 0 where nothing is known."""
+        if not self._times:
+            return 0.0
+        return min(max(self._times), 2.0 * statistics.median_low(self._times))
+
+    def add(self, seconds: float) -> None:
+        """Note how long it took [s]."""
+        self._times.append(seconds)
+
+    def fade(self) -> None:
+        """Forget the oldest of the last times."""
+        if self._times:
+            self._times.popleft()
+
+    def forget(self) -> None:
+        """Begin anew."""
+        self._times.clear()
+
+
+# What follows a window's sampling, and its tracking numbers alone; they live in the worker.
+_REPORT, _TRACKING = _Lately(), _Lately()
 
 
 class Tracked(NamedTuple):
@@ -54,27 +80,26 @@ def compute(
     delay and amplitude at the frequencies [Hz], come afterwards where the deadline leaves time for
     them; None where not, or without a posterior.
     """
-    last = time.monotonic()
-    kept = ON_THE_WAY + SLACK * job.settings.time_budget
+    began = last = time.monotonic()
+    end = deadline - 1.3 * _REPORT.seconds - ON_THE_WAY - SLACK * job.settings.time_budget
 
-    def expired() -> bool:
+    def expired(share: float) -> bool:
         nonlocal last
         last = time.monotonic()
-        return last > deadline - 1.3 * _Reserve.seconds - kept
+        return last > began + share * (end - began)
 
     result = run(job, expired)
-    now = time.monotonic()
-    _Reserve.seconds = max(now - last, 0.8 * _Reserve.seconds)
+    _REPORT.add(time.monotonic() - last)
     # Bands are waited for, these numbers are not. On one core with real-time priority the node
     # publishes nothing before the worker rests.
     tell(result)
     time.sleep(ON_THE_WAY)
     now = time.monotonic()
-    if now > deadline - 1.3 * _Reserve.tracking - ON_THE_WAY:
-        _Reserve.tracking *= 0.9  # one slow moment must not end them for good
+    if now > deadline - 1.3 * _TRACKING.seconds - ON_THE_WAY:
+        _TRACKING.fade()  # slow moments must not end them for good
         return None
     numbers = window_tracking(result, frequencies)
-    _Reserve.tracking = max(time.monotonic() - now, 0.8 * _Reserve.tracking)
+    _TRACKING.add(time.monotonic() - now)
     if numbers is None:
         return None
     record = result.window.record
@@ -83,11 +108,20 @@ def compute(
 
 
 def warm_up() -> None:
-    """Compile and import what windows need, and learn how long they take once that is done."""
-    for windows, swap in (3, True), (1, False):
-        # The first time compiling counts: ten windows would find no time left for sampling.
-        _Reserve.seconds = _Reserve.tracking = 0.0
-        warm_windows(lambda job: computed(job, time.monotonic() + 60.0)[0], swap, windows)
+    """Compile and import what windows need, and learn how long they take once that is done.
+
+    However long that takes: a window that is cut short has not called all that is called live.
+    """
+
+    def compute_whole(job: Job) -> WindowResult:
+        return computed(job, math.inf)[0]
+
+    warm_windows(compute_whole)
+    warm_windows(compute_whole, windows=2, carried=warm_prior())
+    # Compiling does not count: ten windows would find no time left for sampling.
+    _REPORT.forget()
+    _TRACKING.forget()
+    warm_windows(compute_whole, swap=False, windows=1)
 
 
 def computed(job: Job, deadline: float) -> tuple[WindowResult, Tracked | None]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.nodes.blocks import BlockPublisher
+from actuator_glue.nodes.health import ERROR
 from actuator_glue.nodes.pacer import Step
 from actuator_glue.nodes.streamer import Streamer
 from actuator_glue.streams.address import Allowed
@@ -127,11 +128,16 @@ class LiveSource:
                 time.sleep(self._pause)
 
     def report(self) -> dict[str, Any]:
-        """Return counts, offset and skew of the sender's clock."""
-        clock = self._reception.clock
+        """Return counts, offset and skew of the sender's clock; tell of a wrong rate."""
+        clock, fault = self._reception.clock, self._reception.rate_fault
+        if fault:
+            self._node.complain(
+                'sample rate', f'{fault}; give the true one as rate or in the layout', ERROR
+            )
         return {
             'source': str(self._address),
             'order by': self._reception.order,
+            'sample rate (Hz)': 1.0 / self._period,
             **{name: self._told[name] for name in ('messages', 'connections', *FAULTS)},
             'clock offset to sender (s)': clock.offset,
             'clock skew to sender (ppm)': 1e6 * clock.skew,

@@ -15,9 +15,22 @@ from actuator_glue.online.stream import (
     Restarted,
     Window,
 )
+from actuator_glue.rate_check import LEAST_SECONDS, RateWatch, disagreement
 from actuator_glue.records import Array, Record
 from actuator_glue.sample_block import Block, check_block
 from actuator_glue.setups import Setups, StreamSetup
+
+# Stamps are held against index and period over so long a stretch at most [s].
+_RATE_SECONDS = 3.0
+
+
+class WrongRateError(InputError):
+    """Stamps tell another sample rate than the period of the samples."""
+
+
+@dataclass(frozen=True, slots=True)
+class WrongRate(Rejected):
+    """Samples that were not used because their stamps tell another sample rate."""
 
 
 @dataclass(slots=True)
@@ -89,6 +102,8 @@ class SlidingWindows:
         self._stamp_ns = 0
         self._last_stamp_ns = 0
         self._epoch = 0
+        self._rate = 1.0
+        self._watch = RateWatch(self._rate)
 
     def setup(self, setup: StreamSetup) -> list[Event]:
         """Take a test set-up; it holds from the sample it names, at once where that is past."""
@@ -102,9 +117,11 @@ class SlidingWindows:
             if self._next is None:
                 events += self._begin_all(self._setups.begun(block.index))
             self._check_period(block)
+            self._check_rate(block)
         except InputError as error:
             self.tally.rejected += 1
-            events.append(Rejected(str(error)))
+            kind = WrongRate if isinstance(error, WrongRateError) else Rejected
+            events.append(kind(str(error)))
             if len(block.command) and self._tail is not None and len(self._tail):
                 events.append(self._restart(block.index, 'bad-input', str(error)))
             self._step_over(block)
@@ -138,6 +155,28 @@ class SlidingWindows:
             raise InputError(
                 f'block at sample {block.index}: period {block.period:g} s, but the test set-up '
                 f'says {1.0 / setup.period:g} Hz; publish a set-up with the rate of the samples'
+            )
+
+    def _check_rate(self, block: Block) -> None:
+        """Hold the stamps against index and period: a factor of two would pass as a slow actuator.
+
+        Raises:
+            WrongRateError: they have told another rate over the last seconds.
+        """
+        rate = 1.0 / block.period
+        if abs(rate / self._rate - 1.0) > 1e-4:
+            self._rate = rate
+            # Told before the first window, where that is long enough to tell anything.
+            seconds = max(LEAST_SECONDS, min(0.75 * self.settings.window, _RATE_SECONDS))
+            self._watch = RateWatch(rate, seconds=seconds)
+        elif self._next is not None and block.index < self._next:
+            self._watch.begin()
+        self._watch.push(block.index, block.stamp_ns * 1e-9)
+        if self._watch.found is not None:
+            told = disagreement(rate, {'the stamps of the samples': self._watch.found})
+            raise WrongRateError(
+                f'{told}; nothing is estimated until both agree: mend the rate of whoever '
+                'publishes the samples'
             )
 
     def _follow(self, block: Block) -> list[Event]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.errors import InputError
-from actuator_glue.io.rate_check import RateWatch, disagreement, rate_by_steps
+from actuator_glue.rate_check import RateWatch, disagreement, rate_by_steps
 from actuator_glue.records import Array
 from actuator_glue.streams.clock import ClockMap
 from actuator_glue.streams.layout import FLOAT32_COUNTS, TYPES, Layout, Rows

@@ -9,7 +9,7 @@ from online_streams import RATE, block, setup
 from actuator_glue.errors import InputError
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Rejected, Restarted
-from actuator_glue.online.windows import SlidingWindows, Tail
+from actuator_glue.online.windows import SlidingWindows, Tail, WrongRate
 from actuator_glue.sample_block import MAX_BLOCK
 
 SETTINGS = EstimatorSettings(window=0.5, hop=0.2, settle=0.0, time_budget=0.1)
@@ -245,3 +245,47 @@ def test_unusable_settings_say_why(values, told):
     with pytest.raises(InputError) as error:
         EstimatorSettings(**values)
     assert told in str(error.value)
+
+
+def stamped(rate, seconds, *, start=0, jitter=0.0, size=10):
+    """Blocks that say 200 Hz, with the stamps of samples taken at another rate."""
+    rng = np.random.default_rng(3)
+    for index in range(start, start + round(rate * seconds), size):
+        late = abs(jitter * rng.standard_normal())
+        yield block(index, size, stamp_ns=10**18 + round((index / rate + late) * 1e9))
+
+
+@pytest.mark.parametrize('rate', [100.0, 197.0, 203.0, 400.0])
+def test_stamps_that_tell_another_rate_give_no_window(rate):
+    """`rate:=500` for samples at 1 kHz was a posterior of half the beta_1, and all was well."""
+    settings = EstimatorSettings(window=3.0, hop=0.5, settle=0.0, time_budget=0.1)
+    found, events, windows = run(stamped(rate, 12.0, jitter=2e-3), settings)
+    told = [e for e in events if isinstance(e, WrongRate)]
+    assert not found and told
+    assert f'said to be {RATE:g} Hz' in told[0].message
+    number = float(told[0].message.partition('it is ')[2].partition(' Hz')[0])
+    assert number == pytest.approx(rate, rel=0.004)
+    assert windows.tally.rejected == len(told) and windows.tally.lost == 0
+
+
+@pytest.mark.parametrize('rate', [199.0, 201.0])
+def test_a_clock_that_drifts_or_jitters_is_no_other_rate(rate):
+    settings = EstimatorSettings(window=3.0, hop=0.5, settle=0.0, time_budget=0.1)
+    found, events, _ = run(stamped(rate, 12.0, jitter=5e-3), settings)
+    assert len(found) > 15 and not [e for e in events if isinstance(e, Rejected)]
+
+
+def test_windows_come_again_when_the_rate_is_mended():
+    """The same numbering goes on, and what was refused is not said to be lost."""
+    settings = EstimatorSettings(window=2.5, hop=0.5, settle=0.0, time_budget=0.1)
+    wrong = list(stamped(400.0, 5.0))
+    stop = wrong[-1].index + len(wrong[-1])
+    begin = wrong[-1].stamp_ns
+    right = [
+        block(i, 10, stamp_ns=begin + round((i - stop + 1) / RATE * 1e9))
+        for i in range(stop, stop + 4000, 10)
+    ]
+    found, events, windows = run([*wrong, *right], settings)
+    assert isinstance(events[1], WrongRate)
+    assert found and found[0].record.first_index >= stop
+    assert windows.tally.lost == 0

@@ -1,6 +1,11 @@
 """What a worker learns while it warms up."""
 
+import math
+import subprocess
+import sys
+from collections.abc import Callable
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
@@ -14,9 +19,77 @@ from actuator_glue.workers.warm import warm_windows
 
 def test_compiling_does_not_count_as_what_a_window_takes() -> None:
     """The first run after installing left the first eleven windows no time to sample."""
-    estimator_worker._Reserve.seconds = 30.0
+    estimator_worker._REPORT.add(30.0)
     estimator_worker.warm_up()
-    assert estimator_worker._Reserve.seconds < 0.4
+    assert 0.0 < estimator_worker._REPORT.seconds < 0.4
+
+
+CALLED = """
+import gc, math, pickle, sys
+import numpy as np
+from numba.core.dispatcher import Dispatcher
+from actuator_glue.inference.choice import choose_model
+from actuator_glue.model.effects import CATALOGUE
+from actuator_glue.nodes import estimator_worker as worker
+from actuator_glue.online.estimator import Estimator
+from actuator_glue.online.playback import give, stream
+from actuator_glue.online.settings import EstimatorSettings
+from actuator_glue.records import Record
+
+def compiled():
+    every = [d for d in gc.get_objects() if isinstance(d, Dispatcher)]
+    return {(d.py_func.__name__, str(s)) for d in every for s in d.overloads}
+
+def live(effects=(), stiffness=1e5, hold='zoh', **settings):
+    rate, rng = 250.0, np.random.default_rng(1)
+    command = 1e-3 * np.sin(9.0 * np.arange(1000) / rate)
+    measured = command + 1e-5 * rng.standard_normal(1000)
+    settings = {'window': 2.0, 'evaluations': 2000, 'start_evaluations': 2000} | settings
+    estimator = Estimator(EstimatorSettings(**settings), choose_model(), live=True)
+    for item in stream(Record(command, measured, 1 / rate, stiffness, hold=hold)):
+        give(estimator, item)
+        while (job := estimator.next_job()) is not None:
+            job = pickle.loads(pickle.dumps(job))  # as it comes through a pipe
+            estimator.finish(worker.computed(job, math.inf)[0])
+            estimator.set_model(choose_model(effects))
+
+worker.warm_up()
+known = compiled()
+assert len(known) > 30
+live(stiffness=0.0, hold='linear')
+live(likelihood='gaussian', prior='sequential')
+live(('drift', 'backlash'), prior='sequential')
+names = sorted(CATALOGUE) if 'all' in sys.argv else ['hum', 'valve-hysteresis', 'sensor-curve']
+for name in names:
+    live((name,))
+print(sorted(compiled() - known))
+"""
+
+
+@pytest.mark.parametrize(
+    'which', ['some', pytest.param('all', marks=[pytest.mark.slow, pytest.mark.timeout(900)])]
+)
+def test_a_live_stream_has_nothing_left_to_compile(which: str) -> None:
+    """Eight band kernels were compiled in the stream of a cold launch: 320 s to a posterior."""
+    done = subprocess.run(
+        [sys.executable, '-c', CALLED, which], capture_output=True, text=True, check=False
+    )
+    assert done.stdout.strip() == '[]', done.stdout + done.stderr
+
+
+def test_warming_up_is_cut_short_by_no_deadline(monkeypatch: pytest.MonkeyPatch) -> None:
+    """After a minute of compiling it was called ready, with half still to be compiled."""
+    ends: list[float] = []
+
+    def note(job: Job, deadline: float) -> tuple[WindowResult, Tracked | None]:
+        ends.append(deadline)
+        found = computed(job, deadline)
+        assert not found[0].failure and found[0].scored is not None
+        return found
+
+    monkeypatch.setattr(estimator_worker, 'computed', note)
+    estimator_worker.warm_up()
+    assert len(ends) > 5 and set(ends) == {math.inf}
 
 
 def test_tracking_numbers_take_no_time_from_a_window(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -32,7 +105,8 @@ def test_tracking_numbers_take_no_time_from_a_window(monkeypatch: pytest.MonkeyP
     monkeypatch.setattr(estimator_worker, 'computed', note)
     estimator_worker.warm_up()
     assert all(t is not None and 'J2' in t.numbers.predicted for t in found)
-    monkeypatch.setattr(estimator_worker._Reserve, 'tracking', 100.0)
+    for _ in range(7):
+        estimator_worker._TRACKING.add(100.0)
     done = len(found)
     late = estimator_worker.time.monotonic() + 60.0
     warm_windows(lambda job: note(job, late)[0], swap=False)
@@ -40,6 +114,54 @@ def test_tracking_numbers_take_no_time_from_a_window(monkeypatch: pytest.MonkeyP
     for _ in range(10):
         warm_windows(lambda job: note(job, late)[0], swap=False)
     assert found[-1] is not None
+
+
+class Clock:
+    """A computer on which time passes as it is told."""
+
+    def __init__(self) -> None:
+        self.now = 0.0
+
+    def monotonic(self) -> float:
+        """Return the time [s]."""
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        """Let time pass."""
+        self.now += seconds
+
+
+@pytest.mark.parametrize('stalls', [{4}, {4, 5}, {4, 9}, {0}])
+def test_a_stall_takes_the_time_for_sampling_from_no_other_window(
+    stalls: set[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One slow moment after the sampling of a window left the next ten no time for theirs."""
+    clock, sampled = Clock(), []
+
+    def window(job: Job, expired: Callable[[float], bool]) -> None:
+        began = clock.now
+        while not expired(1.0):
+            clock.sleep(1e-3)
+        sampled.append(clock.now - began)
+        clock.sleep(0.7 if len(sampled) - 1 in stalls else 0.04)
+
+    monkeypatch.setattr(estimator_worker, 'time', clock)
+    monkeypatch.setattr(estimator_worker, 'run', window)
+    monkeypatch.setattr(estimator_worker, 'window_tracking', lambda *_: None)
+    job = SimpleNamespace(settings=SimpleNamespace(time_budget=0.8))
+    estimator_worker._REPORT.forget()
+    estimator_worker._TRACKING.forget()
+    for _ in range(20):
+        estimator_worker.compute(job, clock.now + 0.8, (5.0,), lambda _: None)  # type: ignore[arg-type]
+    usual = sampled[3] if 0 not in stalls else sampled[-1]
+    assert 0.6 < usual < 0.75
+    starved = [n for n, seconds in enumerate(sampled) if seconds < 0.9 * usual]
+    assert len(starved) <= 2
+    # A computer that has become slow for good is reckoned with.
+    stalls.update(range(20, 40))
+    for _ in range(8):
+        estimator_worker.compute(job, clock.now + 0.8, (5.0,), lambda _: None)  # type: ignore[arg-type]
+    assert sampled[-1] < 0.1
 
 
 def test_a_window_is_told_before_its_tracking_numbers(monkeypatch: pytest.MonkeyPatch) -> None:
