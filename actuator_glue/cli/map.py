@@ -46,8 +46,10 @@ def run(args: argparse.Namespace) -> int:
     rows = [_row(column, found) for column in found.columns]
     title = f'{args.file}: {found.what}, {len(found.columns)} columns of numbers'
     table(title, ('column', 'unit', 'samples', 'least', 'greatest', 'remark'), rows, args)
-    text = map_text(found, proposal) if proposal.complete else ''
-    refused = _fault(args.file, text) if text else _missing(proposal)
+    # What we recorded says itself what its channels are; no other topic of it is one.
+    ours = plain and found.what == 'bag'
+    text = map_text(found, proposal) if proposal.complete and not ours else ''
+    refused = _fault(args.file, text) if text else '' if ours else _missing(proposal)
     if text:
         for line in text.splitlines():
             say(line, args)
@@ -150,11 +152,18 @@ def _row(column: ColumnLook, found: FileLook) -> tuple[str, ...]:
 def _remark(column: ColumnLook) -> str:
     if column.times is not None:
         return f'{column.rate:.6g} messages/s' if column.rate else ''
+    from actuator_glue.io.time_base import uneven
+
     if column.counts:
         return 'goes up by one'
-    if column.rate is not None:
-        return f'even steps of {1.0 / column.rate:.6g}'
-    return '' if column.moves else 'does not move'
+    if column.missing:
+        return f'no number in {column.missing} rows'
+    steps = column.steps
+    if steps is None:
+        return '' if column.moves else 'does not move'
+    if column.rate is None or uneven(steps):
+        return f'uneven steps of {steps.min():.3g} to {steps.max():.3g}'
+    return f'even steps of {1.0 / column.rate:.6g}'
 
 
 def _describe(column: ColumnLook) -> dict[str, Any]:

@@ -1,4 +1,8 @@
-"""Numbers out of any topic of a bag, decoded by the definitions that the bag itself holds."""
+"""Numbers out of any topic of a bag, decoded by the definitions that the bag itself holds.
+
+Elements of an array that a list of names goes with are called by their name, as in
+`/joint_states.position[act1]`: their order may be another in each message.
+"""
 
 from __future__ import annotations
 
@@ -23,7 +27,13 @@ Stamps = Literal['header', 'published', 'logged']
 _MOST_ELEMENTS = 32
 # Types end up as code in rosbags: nothing but a name may be one.
 _TYPE = re.compile(r'[A-Za-z]\w*(/[A-Za-z]\w*){1,2}')
-_STEP = re.compile(r'(\w+)(?:\[(\d+)\])?')
+_STEP = re.compile(r'(\w+)(?:\[([^\]]+)\])?\.?')
+# Fields that hold a list of names: `name` of a JointState, `joint_names`, `labels`.
+_NAMES = re.compile(r'(^|_)(names?|labels?|ids?)$')
+_DEEPEST = 8  # messages in messages
+# A step into a message: field, element by number or name, and of the latter how many levels above
+# the list of names is, and its field.
+_Step = tuple[str, int | str | None, int, str]
 
 
 @dataclass(slots=True)
@@ -34,7 +44,7 @@ class TopicSeries:
         topic: its name.
         type: of its messages.
         times: by kind of stamp, [ns]; `header` only where every message has one.
-        columns: values by path within the message, e.g. `wrench.force.x`, `position[0]`.
+        columns: values by path within the message, e.g. `wrench.force.x`, `position[act1]`.
     """
 
     topic: str
@@ -43,6 +53,11 @@ class TopicSeries:
         default_factory=lambda: {k: array('q') for k in ('header', 'published', 'logged')}
     )
     columns: dict[str, array[float]] = field(default_factory=dict)
+    _asked: bool = False
+    _steps: dict[str, list[_Step]] = field(default_factory=dict)
+    # Of elements that are asked for by their number: their names in the first message, and the
+    # path by those.
+    _called: dict[str, tuple[list[str], str]] = field(default_factory=dict)
 
     def names(self) -> list[str]:
         """Return what a channel map calls the columns; the topic alone where there is but one."""
@@ -97,30 +112,61 @@ def topic_series(
             raise InputError(
                 f'{path}: topic {message.topic} ({message.type}) cannot be decoded ({error})'
             ) from error
-        series = found.get(message.topic)
+        series = found.get(topic)
         if series is None:
-            series = found[message.topic] = TopicSeries(message.topic, message.type)
-            names = [name for name, _ in _numbers(content)]
-            if wanted is not None and not (topic in wanted and len(names) == 1):
-                names = [name for name in names if f'{topic}.{name}' in wanted] or names
-            series.columns = {name: array('d') for name in names}
+            series = found[topic] = TopicSeries(topic, message.type)
+            _begin(series, content, wanted)
         _append(series, content, message, path)
-    return found
+    return {topic: series for topic, series in found.items() if series.columns}
+
+
+def _begin(series: TopicSeries, content: Any, wanted: Collection[str] | None) -> None:
+    """Choose the columns of a topic by its first message."""
+    paths = offered = list(_numbers(content))
+    if wanted is not None:
+        asked = [n.removeprefix(f'{series.topic}.') for n in wanted]
+        paths = [path for path in asked if _resolved(content, path)]
+        if series.topic in wanted and len(offered) == 1:
+            paths = offered
+        series._asked = bool(paths)
+        paths = paths or offered  # to say what there is
+    for path in paths:
+        series.columns[path] = array('d')
+        series._steps[path] = _resolved(content, path) or []
+        series._called[path] = _by_number(content, path)
 
 
 def _append(series: TopicSeries, content: Any, message: BagMessage, path: Path | str) -> None:
+    """Append one message; a column that it lacks is left out where nobody asks for it.
+
+    Raises:
+        InputError: a column that is wanted is not there, or may be another channel's.
+    """
     header = getattr(content, 'header', None)
     stamp = stamp_ns(header) if hasattr(header, 'stamp') else 0
     series.times['header'].append(stamp)
     series.times['published'].append(message.publish_time)
     series.times['logged'].append(message.log_time)
-    for name, values in series.columns.items():
+    for name, values in list(series.columns.items()):
         try:
-            values.append(float(_value(content, name)))
-        except (IndexError, AttributeError, TypeError) as error:
+            values.append(float(_value(content, series._steps[name])))
+            if not series._asked:
+                continue
+        except (IndexError, AttributeError, TypeError, ValueError) as error:
+            if not series._asked:
+                del series.columns[name]
+                continue
             raise InputError(
                 f'{path}: topic {series.topic}: message {len(values)} has no {name}'
             ) from error
+        called, by_name = series._called[name]
+        named = _by_number(content, name)[0] if called else []
+        if named and named != called:
+            raise InputError(
+                f'{path}: topic {series.topic}: {name} is {called[-1]!r} in the first message and '
+                f'{named[-1]!r} in message {len(values) - 1}; choose the channel by its name: '
+                f'{series.topic}.{by_name}'
+            )
 
 
 def _decoder(name: str, summary: Summary) -> Callable[[bytes], Any]:
@@ -135,25 +181,108 @@ def _decoder(name: str, summary: Summary) -> Callable[[bytes], Any]:
     return lambda data: store.deserialize_cdr(data, name)
 
 
-def _numbers(content: Any, prefix: str = '', depth: int = 0) -> Iterator[tuple[str, float]]:
-    """Yield path and value of every number of a message; headers and longer arrays are none."""
+def _numbers(content: Any) -> Iterator[str]:
+    """Yield the path of every number of a message; headers and longer arrays are none."""
+    yield from _within(content, '', ())
+
+
+def _within(content: Any, prefix: str, above: tuple[Any, ...]) -> Iterator[str]:
+    levels = (*above, content)
     for name in getattr(content, '__dataclass_fields__', {}):
         value = getattr(content, name)
         where = f'{prefix}{name}'
         if name.startswith('__') or name == 'header' or isinstance(value, bool):
             continue
         if isinstance(value, (int, float)):
-            yield where, float(value)
-        elif isinstance(value, np.ndarray) and value.dtype.kind in 'fiu':
-            if len(value) <= _MOST_ELEMENTS:
-                yield from ((f'{where}[{i}]', float(v)) for i, v in enumerate(value))
-        elif is_dataclass(value) and depth < 8:
-            yield from _numbers(value, f'{where}.', depth + 1)
+            yield where
+        elif is_dataclass(value) and len(levels) <= _DEEPEST:
+            yield from _within(value, f'{where}.', levels)
+        elif isinstance(value, (list, np.ndarray)) and 0 < len(value) <= _MOST_ELEMENTS:
+            names = _names(levels, len(value))
+            keys = [str(i) for i in range(len(value))] if names is None else names[2]
+            if isinstance(value, np.ndarray) and value.dtype.kind in 'fiu':
+                yield from (f'{where}[{key}]' for key in keys)
+            elif names and is_dataclass(value[0]) and len(levels) <= _DEEPEST:
+                for key, element in zip(keys, value, strict=True):
+                    yield from _within(element, f'{where}[{key}].', levels)
 
 
-def _value(content: Any, path: str) -> Any:
-    for name, index in _STEP.findall(path):
+def _names(levels: tuple[Any, ...], size: int) -> tuple[int, str, list[str]] | None:
+    """Return the names that go with an array of a message: levels up, field, names.
+
+    The nearest list of so many names, no two alike, none that would be taken for a number.
+    """
+    for up, level in enumerate(reversed(levels)):
+        for name in level.__dataclass_fields__:
+            held = getattr(level, name)
+            if _NAMES.search(name) and isinstance(held, list) and len(held) == size:
+                plain = all(isinstance(n, str) and n and ']' not in n for n in held)
+                if plain and len(set(held)) == size and not any(n.isdigit() for n in held):
+                    return up, name, held
+    return None
+
+
+def _resolved(content: Any, path: str) -> list[_Step] | None:
+    """Return the steps to a number of a message; None where there is none."""
+    steps: list[_Step] = []
+    levels: tuple[Any, ...] = ()
+    if ''.join(match[0] for match in _STEP.finditer(path)) != path:
+        return None
+    for name, key in _STEP.findall(path):
+        levels = (*levels, content)
+        if name not in getattr(content, '__dataclass_fields__', {}):
+            return None
         content = getattr(content, name)
-        if index:
-            content = content[int(index)]
+        if not key:
+            steps.append((name, None, 0, ''))
+            continue
+        if not isinstance(content, (list, np.ndarray)):
+            return None
+        names = _names(levels, len(content))
+        if key.isdigit() and int(key) < len(content):
+            steps.append((name, int(key), 0, ''))
+            content = content[int(key)]
+        elif names and key in names[2]:
+            steps.append((name, key, names[0], names[1]))
+            content = content[names[2].index(key)]
+        else:
+            return None
+    number = isinstance(content, (int, float, np.number)) and not isinstance(content, bool)
+    return steps if number else None
+
+
+def _value(content: Any, steps: list[_Step]) -> Any:
+    """Return the number at the end of some steps.
+
+    Raises:
+        IndexError, AttributeError, TypeError, ValueError: it is not there in this message.
+    """
+    levels = []
+    for name, key, up, names in steps:
+        levels.append(content)
+        content = getattr(content, name)
+        if isinstance(key, str):
+            key = getattr(levels[-1 - up], names).index(key)
+        if key is not None:
+            content = content[key]
     return content
+
+
+def _by_number(content: Any, path: str) -> tuple[list[str], str]:
+    """Return names of the elements that a path takes by number, and the path that names them."""
+    found: list[str] = []
+    levels: tuple[Any, ...] = ()
+    said = ''
+    for name, key in _STEP.findall(path):
+        levels = (*levels, content)
+        content = getattr(content, name)
+        said += f'.{name}'
+        if not key:
+            continue
+        names = _names(levels, len(content))
+        at = names[2].index(key) if names and not key.isdigit() else int(key)
+        if names and key.isdigit():
+            found.append(names[2][at])
+        said += f'[{names[2][at] if names else key}]'
+        content = content[at]
+    return found, said[1:]
