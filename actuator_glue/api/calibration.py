@@ -21,6 +21,7 @@ from actuator_glue.api.options import chosen
 from actuator_glue.api.prior import check_prior, given_prior
 from actuator_glue.api.tracking import record_tracking
 from actuator_glue.diagnosis.force import check_forces
+from actuator_glue.diagnosis.residual_structure import residual_structure
 from actuator_glue.errors import InputError
 from actuator_glue.hygiene.clean import clean, initial_state
 from actuator_glue.hygiene.despike import despiked
@@ -173,6 +174,9 @@ def calibrate(
             conflict(target.prior, chains.posterior()).p_value,
         )
     converged = judgement.converged(parameters)
+    structure = Structure(model.effects)
+    best = chains.best[: len(structure.names)]
+    left = residual_structure(cleaned, initial, settle, structure, best)
     forces: tuple[RecordForce, ...] = ()
     if options.use_force:
         forces = force_errors(model, chains.best, cleaned, initial, settle)
@@ -182,8 +186,9 @@ def calibrate(
         best=chains.best,
         log_density=chains.log_density[chains.burn :],
         error=fit,
+        structure=left,
         at_bound=at_bound,
-        problems=tuple(judgement.problems(at_bound, parameters, fit, prior)),
+        problems=tuple(judgement.problems(at_bound, parameters, fit, prior, left)),
         notes=(
             *judgement.remarks(
                 cleaned, parameters, chains.posterior(), converged, at_bound, prior
@@ -209,9 +214,7 @@ def calibrate(
         prior=prior,
         records=tuple(cleaned),
         tracking=tuple(
-            record_tracking(
-                chains.posterior(), model.names, Structure(model.effects), record, initial
-            )
+            record_tracking(chains.posterior(), model.names, structure, record, initial)
             for record in cleaned
         ),
     )

@@ -84,10 +84,11 @@ def error_line(found: Calibration) -> str:
     """Return the error of the best draw in one line."""
     share = found.error.nrmse
     percent = '-' if share is None else f'{100 * share:.2f} %'
-    return (
+    line = (
         f'error of the best draw: {1e3 * found.error.rms_m:.4g} mm rms, {percent} of the spread '
         'measured'
     )
+    return line if found.structure is None else f'{line}; {found.structure.amounts()}'
 
 
 def brief(found: Calibration) -> list[html.Block]:

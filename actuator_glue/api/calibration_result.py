@@ -12,6 +12,7 @@ from actuator_glue.api import store
 from actuator_glue.api.calibration_parts import CalibratedRecord, FitError, Marginal, RecordForce
 from actuator_glue.api.result import Result
 from actuator_glue.api.tracking import RecordTracking
+from actuator_glue.diagnosis.residual_structure import ResidualStructure
 from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.prior_use import PriorUse
@@ -39,6 +40,8 @@ class Calibration(Result):
         log_density: log likelihood of each draw, shape (steps, chains).
         best: draw of the highest likelihood, shape (p,).
         error: free-run error of the best draw.
+        structure: what is left of the records beside noise; None where they are too short to tell,
+            and in files of earlier versions.
         at_bound: parameters that a bound of the prior holds.
         problems: why the posterior must not be used as it stands; empty where it may.
         notes: what these records cannot tell, and what was done to them.
@@ -88,6 +91,7 @@ class Calibration(Result):
     sampler: str = 'adaptive'
     automatic_shaping: bool = False
     force: tuple[RecordForce, ...] = ()
+    structure: ResidualStructure | None = None
 
     @property
     def model_effects(self) -> tuple[str, ...]:
@@ -141,6 +145,7 @@ class Calibration(Result):
             'seconds': self.seconds,
             'compile_seconds': self.compile_seconds,
             'error': asdict(self.error),
+            'structure': None if self.structure is None else self.structure.to_json(),
             'problems': list(self.problems),
             'at_bound': [p.to_json() for p in self.at_bound],
             'notes': list(self.notes),

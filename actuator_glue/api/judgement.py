@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from actuator_glue.api.calibration_parts import FitError, Marginal
+from actuator_glue.diagnosis.residual_structure import ResidualStructure
 from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.inference.prior_use import PriorUse
 from actuator_glue.records import Array, Record
@@ -29,6 +30,7 @@ def problems(
     parameters: Mapping[str, Marginal],
     fit: FitError,
     prior: PriorUse | None = None,
+    left: ResidualStructure | None = None,
 ) -> list[str]:
     """Return why a posterior must not be used as it stands, one line each; empty where it may.
 
@@ -37,6 +39,7 @@ def problems(
         parameters: posterior of each parameter.
         fit: error of the best draw.
         prior: what was known before, if anything.
+        left: structure and noise of the residual, where they can be told.
     """
     told = []
     apart = {n: p.rhat for n, p in parameters.items() if not p.rhat <= APART}
@@ -60,6 +63,10 @@ def problems(
             f'{offset}; check channels, signs, units and which record has which stiffness, then '
             '`diagnose`'
         )
+    structure = None if left is None else left.problem()
+    if structure is not None and left is not None:
+        # Where the set-up is another one the rest follows from it.
+        told.insert(0 if left.setup else len(told), structure)
     if prior is not None and prior.contradicted:
         told.append(prior.contradiction())
     for p in found:

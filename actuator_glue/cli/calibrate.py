@@ -1,7 +1,7 @@
 """Calibrate the servo-hydraulic model from one or several records jointly (GLUE, DREAM(ZS)).
 
-Exit code 0: a posterior to go on with. 1: the model does not fit, or a bound holds a parameter;
-the first line says so. 2: the input cannot be used.
+Exit code 0: a posterior to go on with. 1: more than noise is left, so that the intervals do not
+hold, or a bound holds a parameter; the first line says so. 2: the input cannot be used.
 """
 
 from __future__ import annotations
