@@ -17,22 +17,40 @@ Hold: TypeAlias = Literal['zoh', 'linear']
 MAX_DISPLACEMENT = 10.0  # m
 MAX_FORCE = 1e9  # N
 MAX_STIFFNESS = 1e12  # N/m
+# What no servo-hydraulic test violates. The longest strokes, of shake tables, are 2 m; an actuator
+# that moves with up to 100 Hz is sampled with 5 Hz at least, and controllers with 100 kHz at most.
+LONGEST_STROKE = 2.0  # m
+SLOWEST_RATE = 5.0  # Hz
+FASTEST_RATE = 100e3  # Hz
 
 
 def _kept(values: ArrayLike) -> TypeGuard[Array]:
     """Whether nobody writes to these values any more: a column of another record."""
     return (
-        isinstance(values, np.ndarray)
+        type(values) is np.ndarray
         and values.dtype == np.float64
         and values.flags.owndata
         and not values.flags.writeable
     )
 
 
+def numbers(values: ArrayLike) -> Array:
+    """Return numbers as a new array of doubles, NaN where they are masked: nobody measured those.
+
+    Raises:
+        TypeError, ValueError: what is no number, complex numbers among them.
+    """
+    if isinstance(values, np.ndarray) and values.dtype.kind in 'cmM':
+        raise TypeError(f'{values.dtype} is no displacement or force')
+    if isinstance(values, np.ma.MaskedArray):
+        return np.asarray(values.astype(np.float64).filled(np.nan))
+    return np.array(values, dtype=np.float64)
+
+
 def _column(values: ArrayLike, name: str, unit: str, limit: float, source: str) -> Array:
     where = f'{source}: ' if source else ''
     try:
-        column = values if _kept(values) else np.array(values, dtype=np.float64)
+        column = values if _kept(values) else numbers(values)
     except (TypeError, ValueError) as error:
         raise InputError(f'{where}{name} is not a list of numbers ({error})') from error
     if column.ndim != 1:
@@ -205,13 +223,39 @@ class Record:
             )
         return self.stiffness
 
+    def check_scale(self) -> None:
+        """Refuse times and lengths that are in other units than they say.
+
+        Raises:
+            InputError: a sample rate or a stroke that no servo-hydraulic test has.
+        """
+        where = f'{self.source}: ' if self.source else ''
+        # A rate from a column of times is off by a rounding error.
+        if not SLOWEST_RATE <= 1.001 * self.rate <= 1.002 * FASTEST_RATE:
+            raise InputError(
+                f'{where}the sample rate is {self.rate:.4g} Hz, and no servo-hydraulic test is '
+                f'sampled with less than {SLOWEST_RATE:g} Hz or more than '
+                f'{FASTEST_RATE / 1e3:g} kHz; check the units: a column in milliseconds is named '
+                'time_ms (`unit: ms` in a channel map), and a period is in seconds'
+            )
+        for name in ('command', 'measured'):
+            stroke = float(np.ptp(getattr(self, name)))
+            if stroke >= LONGEST_STROKE:
+                raise InputError(
+                    f'{where}{name} moves over {stroke:.4g} m, and the longest servo-hydraulic '
+                    f'actuators have {LONGEST_STROKE:g} m; check the units: a column in '
+                    f'millimetres is named {name}_mm (`unit: mm` in a channel map), and arrays '
+                    'are in metres'
+                )
+
     def check_channels(self) -> None:
         """Refuse channels from which no actuator can be identified.
 
         Raises:
             InputError: a channel that does not move, measured displacement that is the command
-                itself, or units that cannot belong together.
+                itself, units that cannot belong together, or no test has.
         """
+        self.check_scale()
         where = f'{self.source}: ' if self.source else ''
         if np.ptp(self.command) == 0.0:
             raise InputError(f'{where}the command is constant; nothing can be identified from it')

@@ -12,7 +12,8 @@ from actuator_glue.io.channel_map import Channel, ChannelMap, read_channel_map
 from actuator_glue.io.formats import Column, FileTable, format_of
 from actuator_glue.io.signature import refuse_pipe
 from actuator_glue.io.time_base import uniform_period
-from actuator_glue.io.units import choose, factor
+from actuator_glue.io.units import ROLES, choose, factor, recognise
+from actuator_glue.rate_check import APART, disagreement, rate_by_clock
 from actuator_glue.records import Array, Hold, Record
 
 # A channel "at rest" may move by this share of its range: noise does, a test does not.
@@ -112,8 +113,39 @@ def _mapped(path: Path, channels: ChannelMap) -> tuple[dict[str, Array], float, 
         _check_counter(counter, path)
     values = in_si(raw, channels, str(path))
     if channels.rate is not None:
+        _check_rate(channels.rate, values.get('time'), table, path)
         return values, 1.0 / channels.rate, table.start_ns
     return values, uniform_period(values['time'], str(path)), table.start_ns
+
+
+def _check_rate(rate: float, time: Array | None, table: FileTable, path: Path) -> None:
+    """Refuse a rate in a channel map that the file's own clock contradicts.
+
+    Args:
+        rate: as the map says [Hz].
+        time: times of the samples by the map [s]; None where it names none: then a column that
+            is called time with a unit is looked at.
+        table: the file.
+        path: for messages.
+
+    Raises:
+        InputError: more than 1 % apart.
+    """
+    clocks = {}
+    for at, column in enumerate(table.columns if time is None else ()):
+        role, unit = recognise(column.label) or ('', '')
+        if role == 'time' and (unit or column.unit) in ROLES['time']:
+            time = table.values([at])[0] * ROLES['time'][unit or column.unit]
+            break
+    if time is not None:
+        found = rate_by_clock(np.arange(len(time)), time, rate)
+        clocks = {} if found is None else {'its column of times': found}
+    elif table.period is not None and abs(table.period * rate - 1.0) > APART:
+        clocks = {'what the file states': 1.0 / table.period}
+    if clocks:
+        raise InputError(
+            f'{path}: {disagreement(rate, clocks)}; take `rate` out of the channel map, or mend it'
+        )
 
 
 def in_si(raw: dict[str, Array], channels: ChannelMap, source: str) -> dict[str, Array]:

@@ -63,7 +63,8 @@ def load_records(
         warn: called with one line per set-up of a bag that cannot be used; the rest is.
 
     Raises:
-        InputError: a path cannot be used, or the number of stiffnesses does not fit.
+        InputError: a path cannot be used, its rate or stroke is none of a servo-hydraulic test, or
+            the number of stiffnesses does not fit.
     """
     if isinstance(paths, (str, Path)):
         paths = [paths]
@@ -82,6 +83,8 @@ def load_records(
         else:
             groups.append([laboratory.read(path, channels=channels, hold=hold)])
     records = [record for group in groups for record in group]
+    for record in records:
+        record.check_scale()
     if hold is not None:
         records = [replace(record, hold=hold) for record in records]
     if stiffness is None:

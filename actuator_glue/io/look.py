@@ -38,16 +38,23 @@ class ColumnLook:
     times: Array | None = None
 
     @property
-    def rate(self) -> float | None:
-        """Messages per second of a topic, or rows per unit of a column that is a clock."""
+    def steps(self) -> Array | None:
+        """Steps of a column, or of a topic's stamps, that goes up all the time, shape (n - 1,)."""
         clock = self.times if self.times is not None else self.values
-        steps = np.diff(clock)
-        if len(steps) < 2 or not np.isfinite(clock).all() or not steps.min() > 0.0:
+        steps: Array = np.diff(clock)
+        ascends = len(steps) > 1 and np.isfinite(clock).all() and steps.min() > 0.0
+        return steps if ascends else None
+
+    @property
+    def rate(self) -> float | None:
+        """Messages per second of a topic, or rows per unit of a column that goes up evenly."""
+        steps = self.steps
+        if steps is None:
             return None
         typical = float(np.median(steps))
         if self.times is None and float(np.abs(steps - typical).max()) > typical:
             return None
-        return len(steps) / float(clock[-1] - clock[0])
+        return len(steps) / float(steps.sum())
 
     @property
     def counts(self) -> bool:
@@ -56,10 +63,15 @@ class ColumnLook:
         return len(steps) > 1 and bool((steps == 1.0).all())
 
     @property
+    def missing(self) -> int:
+        """How many of its values are no number."""
+        return int(np.count_nonzero(~np.isfinite(self.values)))
+
+    @property
     def moves(self) -> bool:
         """Whether it has numbers, and not always the same."""
-        finite = self.values[np.isfinite(self.values)]
-        return len(finite) > 0.9 * len(self.values) and bool(np.ptp(finite) > 0.0)
+        low, high = self.range()
+        return self.missing < 0.1 * len(self.values) and low < high
 
     def range(self) -> tuple[float, float]:
         """Return the least and the greatest number; NaN where there is none."""

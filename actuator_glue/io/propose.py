@@ -8,8 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from actuator_glue.io.look import ColumnLook, FileLook
+from actuator_glue.io.time_base import uneven
 from actuator_glue.io.units import ANGLES, ROLES
-from actuator_glue.records import Array
+from actuator_glue.records import SLOWEST_RATE, Array
 
 # Words of the field for each role, in the languages of controllers; whole words or parts.
 _WORDS = {
@@ -114,23 +115,24 @@ def _plain(label: str) -> str:
 
 
 def _clock(columns: list[ColumnLook]) -> Guess | None:
-    """Return the column of times: it goes on evenly, and not by one."""
+    """Return the column of times: it is called so and goes up, or goes on evenly, not by one."""
     even = [c for c in columns if c.rate is not None and not c.counts]
-    even += [c for c in columns if c.rate is not None and c.counts and _called(c, 'time')]
-    even.sort(key=lambda c: not _called(c, 'time'))
-    if not even:
+    named = [c for c in columns if _called(c, 'time')]
+    best = [c for c in named if c.steps is not None] or even or named
+    if not best:
         return None
-    column = even[0]
-    reasons = ['goes on evenly']
-    if _called(column, 'time'):
-        reasons.insert(0, f'called {column.label.strip()!r}')
+    column = next((c for c in best if c.rate is not None), best[0])
+    reasons = [f'called {column.label.strip()!r}'] if column in named else []
+    if column.steps is not None:
+        even_clock = column.rate is not None and not uneven(column.steps)
+        reasons.append('goes on evenly' if even_clock else 'goes on, in uneven steps')
     return _guess(column, 'time', tuple(reasons))
 
 
 def _rate(found: FileLook, rest: list[ColumnLook], clock: Guess | None) -> float | None:
     """Return samples per second: by the clock, by stamps, or as the file states."""
-    if clock is not None and clock.column.rate is not None:
-        return clock.column.rate / ROLES['time'][clock.unit]
+    if clock is not None and clock.column.steps is not None:
+        return 1.0 / (float(clock.column.steps.mean()) * ROLES['time'][clock.unit])
     if found.period is not None:
         return 1.0 / found.period
     rates = [c.rate for c in rest if c.times is not None and c.rate is not None]
@@ -142,8 +144,9 @@ def _guess(column: ColumnLook, role: str, reasons: tuple[str, ...]) -> Guess:
     if column.unit in ROLES[role]:
         return Guess(column, column.unit, reasons)
     likeliest = {'time': 's', 'command': 'mm', 'measured': 'mm', 'force': 'kN'}[role]
-    if role == 'time' and column.rate is not None and column.rate <= 2.0:
-        likeliest = 'ms'  # nobody samples an actuator once a second
+    if role == 'time' and column.steps is not None:
+        pace = float(column.steps.mean()) * SLOWEST_RATE
+        likeliest = next((u for u in ('s', 'ms', 'us') if pace * ROLES['time'][u] <= 1.0), 'ns')
     if not column.unit:
         said = 'the file states none, and a scale may be needed'
     elif column.unit in ANGLES:

@@ -9,7 +9,10 @@ from actuator_glue.records import Array
 
 # A sample may lie this far off the uniform grid, in periods: rounded time stamps do.
 _TOLERANCE = 0.25
-_ROUNDED = 'where times are only rounded, give the rate in a channel map (--channels MAP.yaml)'
+# Share of the steps that differ so far from their median where a clock is uneven throughout: a
+# few that do are gaps.
+_THROUGHOUT = 0.1
+_DECIMALS = 6  # digits behind the point to which stamps are looked at for having been rounded
 
 
 def uniform_period(time: Array, where: str) -> float:
@@ -35,38 +38,88 @@ def uniform_period(time: Array, where: str) -> float:
     back = steps <= 0.0
     if back.any():
         at = int(back.argmax())
-        how = 'goes back' if steps[at] < 0.0 else 'stands still'
-        hint = '' if steps[at] < 0.0 else f'; {_ROUNDED}'
+        how, remedy = 'goes back', 'sort the record, or cut it there'
+        if steps[at] == 0.0:
+            how, remedy = (
+                'stands still',
+                'cut the record there; where the times are only rounded, and the rate of the '
+                'controller is known, a channel map says it in place of them',
+            )
         raise InputError(
             f'{where}: time {how} at sample {at + 1} ({time[at]:.9g} s, then '
-            f'{time[at + 1]:.9g} s); sort the record, or cut it there{hint}'
+            f'{time[at + 1]:.9g} s); {remedy}'
         )
     typical = float(np.median(steps))
-    gap = steps > 1.5 * typical
-    at = int(gap.argmax())
-    # A step between 1.5 and 1.75 periods may be two rounded stamps; a longer one is a gap.
-    if gap.any() and steps[at] > (1.5 + _TOLERANCE) * typical:
-        raise InputError(
-            f'{where}: {steps[at]:.4g} s without samples after sample {at} ({time[at]:.9g} s); '
-            'cut the record there and give the parts as records of their own'
-        )
-    del steps, gap  # of a long record they are large
     period = float((time[-1] - time[0]) / (len(time) - 1))
     off = time - time[0]
     off -= period * np.arange(len(time))
     np.abs(off, out=off)
-    if float(off.max()) > _TOLERANCE * period:
-        at = int(off.argmax())
+    at = int(off.argmax())
+    rounding = _rounding(time)
+    if uneven(steps):
+        # Stamps rounded to milliseconds lie within one of them of an even clock, jitter does not.
+        if not off[at] <= rounding < period:
+            raise InputError(
+                f'{where}: samples are not uniform in time: the clock is jittered, its steps are '
+                f'{span(steps)}; a record has even steps: resample it first, or log with the '
+                "controller's clock"
+            )
+        return near_whole_rate(period, len(time), rounding)
+    gap = int((steps > 1.5 * typical).argmax())
+    # A step between 1.5 and 1.75 periods may be two rounded stamps; a longer one is a gap.
+    if steps[gap] > (1.5 + _TOLERANCE) * typical:
+        raise InputError(
+            f'{where}: {steps[gap]:.4g} s without samples after sample {gap} ({time[gap]:.9g} s); '
+            'cut the record there and give the parts as records of their own'
+        )
+    if off[at] > _TOLERANCE * period:
         raise InputError(
             f'{where}: samples are not uniform in time: sample {at} is {off[at] / period:.2g} '
-            f'periods off; resample the record; {_ROUNDED}'
+            'periods off an even clock; resample the record'
         )
-    return near_whole_rate(period, len(time))
+    return near_whole_rate(period, len(time), rounding)
 
 
-def near_whole_rate(period: float, samples: int) -> float:
-    """Return the period of a whole number of Hz where so many samples do not tell it from it."""
+def uneven(steps: Array) -> bool:
+    """Return whether steps of a clock differ throughout, not at a few gaps alone.
+
+    Args:
+        steps: differences of ascending times, shape (n,).
+    """
+    typical = float(np.median(steps))
+    odd = int(np.count_nonzero(np.abs(steps - typical) > _TOLERANCE * typical))
+    return odd > max(1.0, _THROUGHOUT * len(steps))
+
+
+def span(steps: Array) -> str:
+    """Return the shortest and the longest step of a clock in words.
+
+    Args:
+        steps: differences of ascending times, shape (n,) [s].
+    """
+    ends = [1e3 * float(end) for end in (steps.min(), steps.max())]
+    return ' to '.join(f'{end:.2g}' if end < 100.0 else f'{end:.0f}' for end in ends) + ' ms'
+
+
+def _rounding(time: Array) -> float:
+    """Return the decimal step to which times are rounded [s]; 0 where they are not."""
+    passed = time - time[0]
+    for decimals in range(_DECIMALS + 1):
+        scaled = passed * 10.0**decimals
+        if float(np.abs(scaled - np.rint(scaled)).max()) < 1e-3:
+            return float(10.0**-decimals)
+    return 0.0
+
+
+def near_whole_rate(period: float, samples: int, rounding: float = 0.0) -> float:
+    """Return the period of a whole number of Hz where so many samples do not tell it from it.
+
+    Args:
+        period: mean step of the times [s].
+        samples: how many there are.
+        rounding: step to which the times are rounded [s].
+    """
     whole = round(1.0 / period)
-    if whole and abs(1.0 / whole - period) * samples < 0.05 * period:
+    if whole and abs(1.0 / whole - period) * samples < max(0.05 * period, min(rounding, period)):
         return 1.0 / whole
     return period

@@ -226,8 +226,8 @@ def test_names_that_numpy_wrote(tmp_path: Path, by: str) -> None:
     np.savetxt(path, np.column_stack(COLUMNS), delimiter=by, header='Test 7\n' + ', '.join(NAMES))
     check(path)
     np.savetxt(path, np.column_stack(COLUMNS), delimiter=by)
-    described = {r: {'column': i, 'unit': u} for i, (r, u) in
-                 enumerate([('time', 's'), ('command', 'mm'), ('measured', 'mm')], 1)}  # fmt: skip
+    places = [('time', 1, 's'), ('command', 2, 'mm'), ('measured', 3, 'mm')]
+    described = {role: {'column': at, 'unit': unit} for role, at, unit in places}
     assert len(read(path, channels=parse_channel_map(described, 'map'))) == COUNT
     with pytest.raises(InputError, match='first line must name the columns'):
         read(path)
