@@ -10,8 +10,11 @@ from typing import Any
 import yaml
 
 from actuator_glue.errors import InputError
+from actuator_glue.io.disk_room import reserve
 
 NAME = 'metadata.yaml'
+_TEMPORARY = NAME + '.tmp'
+ROOM_BYTES = 64 * 1024  # of metadata of a hundred topics and files
 # libyaml, where PyYAML was built with it, is ten times as fast.
 _LOADER: Any = getattr(yaml, 'CSafeLoader', yaml.SafeLoader)
 _FOREVER = {'sec': 9223372036, 'nsec': 854775807}
@@ -159,13 +162,29 @@ class Metadata:
         """Return the text that rosbag2 also keeps inside the .mcap."""
         return str(yaml.safe_dump(self.information(), sort_keys=False))
 
+    def reserve(self, bag: Path) -> None:
+        """Have room for metadata.yaml, so that it can be written when the disk is full.
+
+        Raises:
+            OSError: there is none.
+        """
+        room = ROOM_BYTES + 2 * len(self.serialized())
+        with (bag / _TEMPORARY).open('ab') as file:
+            reserve(file.fileno(), 0, room)
+
     def write(self, bag: Path) -> None:
-        """Write metadata.yaml in one step; its presence says that the bag is finished."""
+        """Write metadata.yaml in one step; its presence says that the bag is finished.
+
+        Raises:
+            OSError: it cannot be written.
+        """
         content = {'rosbag2_bagfile_information': self.information()}
-        temporary = bag / (NAME + '.tmp')
-        with temporary.open('w', encoding='utf-8') as file:
-            yaml.safe_dump(content, file, sort_keys=False)
+        temporary = bag / _TEMPORARY
+        # Not emptied by opening it, which would give back the room reserved for it.
+        with os.fdopen(os.open(temporary, os.O_WRONLY | os.O_CREAT, 0o666), 'wb') as file:
+            file.write(yaml.safe_dump(content, sort_keys=False).encode())
             file.flush()
+            file.truncate()
             os.fsync(file.fileno())
         temporary.replace(bag / NAME)
 

@@ -3,18 +3,26 @@
 rosbag2's own layout, `NAME/NAME_0.mcap` and `NAME/metadata.yaml`. Messages leave the process in
 small chunks at least every `flush_period`, so a SIGKILL loses no more than that; metadata.yaml is
 renamed into place when everything else is on the disk, so a bag that has it is finished.
+
+On a disk that gets full the file being written is finished, in room that was kept for that; what
+comes then waits in memory until there is room for the next file.
 """
 
 from __future__ import annotations
 
+import shutil
+import threading
 import time
+from collections import deque
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from actuator_glue.errors import InputError
+from actuator_glue.io import recover
 from actuator_glue.io.bag_metadata import BagTopic, Metadata, Qos
-from actuator_glue.io.mcap_file import McapFile, disk_error
+from actuator_glue.io.mcap_file import DiskError, McapFile, Message, disk_error
 from actuator_glue.io.messages import PACKAGE, message_type, serialize, trimmed
 
 FLUSH_PERIOD = 0.2  # s
@@ -26,7 +34,10 @@ MAX_FILE_FLUSHES = 1500
 
 
 class BagWriter:
-    """Writer of one bag; use as a context manager.
+    """Writer of one bag; use as a context manager, and from any thread.
+
+    A message that the disk does not take is kept and written first when one of the next calls
+    finds that it does.
 
     Log times are made strictly increasing (by 1 ns steps where they are not), because the order
     of equal stamps is not defined when a bag is played; header stamps stay as they are.
@@ -38,7 +49,8 @@ class BagWriter:
         custom: text kept in metadata.yaml under `custom_data`.
 
     Raises:
-        InputError: the bag exists, or cannot be written (permission, disk full).
+        InputError: the bag exists.
+        DiskError: it cannot be written (permission, disk full).
     """
 
     def __init__(
@@ -57,6 +69,10 @@ class BagWriter:
         self._definitions: dict[str, str] = {}
         self._last_time = -1
         self._closed = False
+        self._lock = threading.RLock()
+        self._waiting: deque[Message] = deque()
+        self._cut: list[Path] = []  # files that could not be finished
+        self._begun = 0
         try:
             self.path.mkdir(parents=True)
         except FileExistsError as error:
@@ -64,13 +80,22 @@ class BagWriter:
                 f'{self.path} exists already; choose another name or move it'
             ) from error
         except OSError as error:
-            raise disk_error(self.path, error) from error
-        self._file = self._next_file()
+            raise disk_error(self.path, error, kept=False) from error
+        try:
+            self._file: McapFile | None = self._next_file()
+        except DiskError:
+            shutil.rmtree(self.path, ignore_errors=True)  # ours, and empty
+            raise
 
     @property
     def count(self) -> int:
         """Messages written so far."""
         return sum(part.count for part in self.metadata.parts)
+
+    @property
+    def waiting(self) -> int:
+        """Messages that the disk has not taken yet; after `close` those that are lost."""
+        return len(self._waiting)
 
     def add_topic(
         self,
@@ -91,7 +116,7 @@ class BagWriter:
             rihs01: its hash.
 
         Raises:
-            InputError: unknown type, the topic has another type already, disk full.
+            InputError: unknown type, or the topic has another type already.
         """
         if definition is None:
             known = message_type(type_name)
@@ -104,10 +129,15 @@ class BagWriter:
                 )
             return
         topic = BagTopic(name, type_name, rihs01, [q.as_dict() for q in qos])
-        self._file.add_topic(topic, definition)
-        self._topics[name] = topic
-        self._definitions[type_name] = definition
-        self.metadata.topics.append(topic)
+        with self._lock:
+            self._topics[name] = topic
+            self._definitions[type_name] = definition
+            self.metadata.topics.append(topic)
+            if self._file is not None:
+                try:
+                    self._file.add_topic(topic, definition)
+                except DiskError:
+                    self._put_aside()  # the next file has it from its beginning
 
     def write_raw(
         self, topic: str, data: bytes, log_time: int, publish_time: int | None = None
@@ -121,7 +151,8 @@ class BagWriter:
             publish_time: time of publication [ns], log_time where not known.
 
         Raises:
-            InputError: topic not declared, disk full, bag closed.
+            InputError: topic not declared, bag closed.
+            DiskError: the disk does not take it; it is kept and waits.
         """
         declared = self._declared(topic)
         if declared.type.startswith(PACKAGE):
@@ -134,6 +165,7 @@ class BagWriter:
 
         Raises:
             InputError: as write_raw.
+            DiskError: as write_raw.
         """
         declared = self._declared(topic)
         self._write(declared, serialize(declared.type, content), log_time, None)
@@ -148,59 +180,87 @@ class BagWriter:
     def _write(
         self, topic: BagTopic, data: bytes, log_time: int, publish_time: int | None
     ) -> None:
-        log_time = max(int(log_time), self._last_time + 1, 0)
-        self._last_time = log_time
-        published = log_time if publish_time is None else max(int(publish_time), 0)
-        self._file.write(topic, data, log_time, published)
-        self.flush_if_due()
+        with self._lock:
+            log_time = max(int(log_time), self._last_time + 1, 0)
+            self._last_time = log_time
+            published = log_time if publish_time is None else max(int(publish_time), 0)
+            self._waiting.append(Message(topic, data, log_time, published))
+            self._hand_over()
+            self.flush_if_due()
 
     def flush_if_due(self) -> None:
         """Flush where the last flush is older than `flush_period`; call it also when idle.
 
         Raises:
-            InputError: disk full.
+            DiskError: disk full.
         """
         if not self._closed and time.monotonic() - self._flushed >= self._flush_period:
             self.flush()
 
     def flush(self) -> None:
-        """Hand everything written so far to the operating system.
+        """Hand everything written so far to the operating system, and what waits before it.
 
         Raises:
-            InputError: disk full.
+            DiskError: disk full.
         """
-        self._file.flush()
-        self._flushed = time.monotonic()
-        if self._file.size >= self._max_file_bytes or self._file.flushes >= MAX_FILE_FLUSHES:
-            self._file.finish(self.metadata.serialized())
+        with self._lock:
+            self._hand_over()
+            file = self._file
+            if file is None:
+                return
             try:
-                self._file = self._next_file()
-            except InputError as error:
-                self._file.refuse(error)
+                file.flush()
+                self._flushed = time.monotonic()
+                if file.size >= self._max_file_bytes or file.flushes >= MAX_FILE_FLUSHES:
+                    file.finish(self.metadata.serialized())
+                    self._file = None  # the next message begins another
+            except DiskError:
+                self._put_aside()
                 raise
 
     def sync(self) -> None:
         """Wait until the disk has what was flushed; any thread may call this.
 
         Raises:
-            InputError: the disk does not take it.
+            DiskError: the disk does not take it.
         """
-        self._file.sync()
+        file = self._file  # without the lock: a disk may take long
+        if file is not None:
+            file.sync()
 
     def close(self) -> None:
         """Finish the bag: index, fsync, metadata.yaml in one step; closing twice is harmless.
 
         Raises:
-            InputError: disk full; what was flushed before stays readable.
+            DiskError: disk full; what was flushed before stays readable.
         """
-        if self._closed:
-            return
-        self._closed = True
-        self._file.finish(self.metadata.serialized())
-        try:
-            self.metadata.write(self.path)
-        except OSError as error:
-            raise disk_error(self.path, error) from error
+        with self._lock:
+            if self._closed:
+                return
+            failure = ''
+            for _ in range(2):  # what a file that cannot be finished did not take: into another
+                try:
+                    self._hand_over()
+                except DiskError as error:
+                    failure = str(error)
+                    break
+                failure = self._put_aside()
+                if not self._waiting:
+                    break
+            self._closed = True
+            if self._waiting:
+                failure += f'; {self.waiting} messages were not written'
+            try:
+                for file in self._cut:
+                    recover.mend(file, self.path)
+                self._write_metadata()
+            except InputError as error:
+                failure = failure or str(error)
+                failure += f'; `actuator-glue recover {self.path}` finishes the bag'
+            else:
+                failure = failure if self._waiting else ''
+            if failure:
+                raise DiskError(failure)
 
     def __enter__(self) -> BagWriter:
         return self
@@ -214,11 +274,65 @@ class BagWriter:
             if error is None:
                 raise
 
+    def _hand_over(self) -> None:
+        """Write what waits; begin a file where there is none.
+
+        Raises:
+            DiskError: the disk does not take it; what it has not taken still waits.
+        """
+        if self._waiting and self._file is None:
+            self._file = self._next_file()
+        try:
+            while self._waiting:
+                assert self._file is not None
+                self._file.write(self._waiting[0])
+                self._waiting.popleft()
+        except DiskError:
+            self._put_aside()
+            raise
+
+    def _put_aside(self) -> str:
+        """Finish the file being written; what the disk does not take of it waits; return why."""
+        file, self._file = self._file, None
+        failure = ''
+        if file is None:
+            return failure
+        try:
+            file.finish(self.metadata.serialized())
+        except DiskError as error:
+            failure = str(error)
+            self._waiting.extendleft(reversed(file.unsure))
+            if file.part.count:
+                self._cut.append(file.path)
+        if not file.part.count and (failure or len(self.metadata.parts) > 1):
+            # Nothing of it is worth to be kept.
+            self.metadata.parts.remove(file.part)
+            with suppress(OSError):
+                file.path.unlink()
+        return failure
+
+    def _write_metadata(self) -> None:
+        try:
+            self.metadata.write(self.path)
+        except OSError as error:
+            raise disk_error(self.path, error) from error
+
     def _next_file(self) -> McapFile:
-        name = f'{self.path.name}_{len(self.metadata.parts)}.mcap'
-        file = McapFile(self.path / name, self.path)
-        for topic in self._topics.values():
-            file.add_topic(topic, self._definitions[topic.type])
+        name = f'{self.path.name}_{self._begun}.mcap'
+        try:
+            self.metadata.reserve(self.path)
+        except OSError as error:
+            raise disk_error(self.path, error, kept=self._begun > 0) from error
+        spare = 2 * len(self.metadata.serialized())
+        file = McapFile(self.path / name, self.path, spare, kept=self._begun > 0)
+        self._begun += 1
         self.metadata.parts.append(file.part)
+        try:
+            for topic in self._topics.values():
+                file.add_topic(topic, self._definitions[topic.type])
+        except DiskError:
+            self._file = file
+            self._put_aside()
+            raise
         self._flushed = time.monotonic()
         return file

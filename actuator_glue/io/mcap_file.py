@@ -8,44 +8,89 @@ import io
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
+from typing import NamedTuple
 
 import yaml
 from mcap.writer import CompressionType, Writer
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.bag_metadata import BagFile, BagTopic
+from actuator_glue.io.disk_room import reserve
 
 CHUNK_BYTES = 64 * 1024
+# Room on the disk is reserved in such steps [B], always for the end of the file, too.
+STEP_BYTES = 256 * 1024
+# Of that end: what is the same for each file, each chunk and each topic in a chunk [B].
+END_BYTES, CHUNK_END_BYTES, TOPIC_END_BYTES = 64 * 1024, 200, 16
+# Of a message beside its data [B], and what a chunk has per byte beside its messages.
+MESSAGE_BYTES, CHUNK_SHARE = 64, 1.02
+
+
+class DiskError(InputError):
+    """The disk does not take a bag now: it is full, read-only or broken."""
+
+
+class Message(NamedTuple):
+    """A serialized message and its times [ns]."""
+
+    topic: BagTopic
+    data: bytes
+    log_time: int
+    publish_time: int
 
 
 class McapFile:
     """File in rosbag2's MCAP profile, uncompressed small chunks.
 
+    Where the file system lets it, room for what is written and for the end of the file is
+    reserved: a file on a disk that gets full can still be finished.
+
     Args:
         path: file to make; must not exist.
         bag: what messages call the bag.
+        spare: room for `finish`'s text, besides [B].
+        kept: whether something was written before, which errors then say.
 
     Attributes:
+        path: the file.
         part: name, times and number of messages, for metadata.yaml.
         size: bytes that are surely whole on the disk.
         flushes: how often `flush` was called.
+        unsure: messages since the last `flush`; once the disk has failed they are gone from the
+            file and from all counts.
 
     Raises:
-        InputError: the file exists or cannot be written.
+        DiskError: the file exists or cannot be written.
     """
 
-    def __init__(self, path: Path, bag: Path) -> None:
+    def __init__(self, path: Path, bag: Path, spare: int = 0, *, kept: bool = True) -> None:
+        self.path = path
         self.part = BagFile(path.name)
         self.size = 0
         self.flushes = 0
+        self.unsure: list[Message] = []
         self._bag = bag
-        self._failure: InputError | None = None
+        self._kept = kept
+        self._kept_part = replace(self.part)
+        self._failure: DiskError | None = None
         self._raw: io.FileIO | None = None
         self._schemas: dict[str, int] = {}
         self._channels: dict[str, int] = {}
+        # Where what was written ends at most, what follows it, and how far room is reserved [B].
+        self._bound, self._end, self._reserved = 0, END_BYTES + spare, 0
+        try:
+            self._begin()
+        except DiskError:
+            if self._raw is not None:  # ours, and empty
+                with suppress(OSError):
+                    path.unlink()
+            raise
+
+    def _begin(self) -> None:
         with self._disk():
-            self._raw = io.FileIO(path, 'x')
+            self._raw = io.FileIO(self.path, 'x')
             with suppress(OSError):  # some network disks cannot lock; the lock only guards
                 fcntl.flock(self._raw, fcntl.LOCK_EX | fcntl.LOCK_NB)
             self._stream = io.BufferedWriter(self._raw, 2 * CHUNK_BYTES)
@@ -53,13 +98,19 @@ class McapFile:
                 self._stream, chunk_size=CHUNK_BYTES, compression=CompressionType.NONE
             )
             self._writer.start(profile='ros2', library='actuator_glue')
+        self._make_room(STEP_BYTES)
 
     def add_topic(self, topic: BagTopic, definition: str) -> None:
         """Declare a topic once, with the ros2msg text of its type.
 
         Raises:
-            InputError: disk full.
+            DiskError: disk full.
         """
+        qos = yaml.safe_dump(topic.qos, sort_keys=False)
+        # It is said where it begins and again at the end.
+        said = 1024 + len(topic.name) + len(qos) + len(definition.encode())
+        self._end += said + TOPIC_END_BYTES
+        self._make_room(said)
         with self._disk():
             if topic.type not in self._schemas:
                 self._schemas[topic.type] = self._writer.register_schema(
@@ -69,38 +120,42 @@ class McapFile:
                 topic.name,
                 'cdr',
                 self._schemas[topic.type],
-                {
-                    'offered_qos_profiles': yaml.safe_dump(topic.qos, sort_keys=False),
-                    'topic_type_hash': topic.rihs01,
-                },
+                {'offered_qos_profiles': qos, 'topic_type_hash': topic.rihs01},
             )
 
-    def write(self, topic: BagTopic, data: bytes, log_time: int, publish_time: int) -> None:
-        """Write one serialized message of a declared topic; times in ns.
+    def write(self, message: Message) -> None:
+        """Write one serialized message of a declared topic.
 
         Raises:
-            InputError: disk full.
+            DiskError: disk full; the message is not in the file.
         """
+        topic = message.topic
+        self._make_room(int(CHUNK_SHARE * len(message.data)) + MESSAGE_BYTES)
         with self._disk():
             self._writer.add_message(
                 channel_id=self._channels[topic.name],
-                log_time=log_time,
-                data=data,
-                publish_time=publish_time,
+                log_time=message.log_time,
+                data=message.data,
+                publish_time=message.publish_time,
                 sequence=topic.count & 0xFFFFFFFF,
             )
+        self.unsure.append(message)
         topic.count += 1
-        self.part.add(log_time)
+        self.part.add(message.log_time)
 
     def flush(self) -> None:
         """Hand everything to the operating system, so that a SIGKILL cannot take it.
 
         Raises:
-            InputError: disk full.
+            DiskError: disk full.
         """
         with self._disk():
             self._writer.flush()
-            self.size = self._stream.tell()
+            before, self.size = self.size, self._stream.tell()
+        chunks = 1 + (self.size - before) // CHUNK_BYTES
+        self._end += chunks * (CHUNK_END_BYTES + TOPIC_END_BYTES * len(self._channels))
+        self._bound = self.size
+        self._sure()
         self.flushes += 1
 
     def sync(self) -> None:
@@ -109,7 +164,7 @@ class McapFile:
         Another thread may call this while the file is written.
 
         Raises:
-            InputError: the disk does not take it.
+            DiskError: the disk does not take it.
         """
         try:
             if self._raw is not None:
@@ -124,19 +179,38 @@ class McapFile:
         """Write index and end, and wait until the disk has them.
 
         Raises:
-            InputError: disk full; what was flushed before stays readable.
+            DiskError: disk full; what was flushed before stays readable.
         """
         with self._disk():
             self._writer.add_metadata('rosbag2', {'serialized_metadata': serialized_metadata})
             self._writer.finish()
             self._stream.flush()
             assert self._raw is not None
+            self._raw.truncate()  # gives back the room that was reserved beyond
             os.fsync(self._raw.fileno())
             self._stream.close()
+        self._sure()
 
-    def refuse(self, failure: InputError) -> None:
-        """Have everything from now on fail with this."""
-        self._failure = failure
+    def _make_room(self, more: int) -> None:
+        """Have room for so many bytes and for the end of the file; the file stays as it is.
+
+        Raises:
+            DiskError: the disk has no room for them.
+        """
+        wanted = self._bound + more + self._end
+        if wanted > self._reserved and self._raw is not None and not self._raw.closed:
+            try:
+                reserve(self._raw.fileno(), self._reserved, wanted + STEP_BYTES - self._reserved)
+            except OSError as error:
+                kept = self._kept or self.size > 0
+                raise disk_error(self._bag, error, kept=kept) from error
+            self._reserved = wanted + STEP_BYTES
+        self._bound += more
+
+    def _sure(self) -> None:
+        """All messages are in the file."""
+        self.unsure.clear()
+        self._kept_part = replace(self.part)
 
     @contextmanager
     def _disk(self) -> Iterator[None]:
@@ -146,13 +220,18 @@ class McapFile:
         try:
             yield
         except OSError as error:
-            self._failure = disk_error(self._bag, error)
+            kept = self._kept or self.size > 0
+            self._failure = disk_error(self._bag, error, kept=kept)
             if self._raw is not None:
                 # Cut off a half-written chunk: everything before it then reads cleanly.
                 with suppress(OSError, ValueError):
                     self._raw.truncate(self.size)
                 with suppress(OSError):
                     self._raw.close()
+            for message in self.unsure:
+                message.topic.count -= 1
+            part, before = self.part, self._kept_part
+            part.start, part.stop, part.count = before.start, before.stop, before.count
             raise self._failure from error
 
 
@@ -168,15 +247,21 @@ def in_use(path: Path) -> bool:
     return False
 
 
-def disk_error(path: Path, error: OSError) -> InputError:
-    """Return what to tell when a bag cannot be written."""
-    kept = f'; what was written before is kept, `actuator-glue recover {path}` finishes it'
+def disk_error(path: Path, error: OSError, *, kept: bool = True) -> DiskError:
+    """Return what to tell when a bag cannot be written.
+
+    Args:
+        path: the bag.
+        error: of the operating system.
+        kept: whether something was written before.
+    """
+    rest = '; what was written before is kept' if kept else ''
     if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG):
-        return InputError(f'{path}: the disk or the quota is full ({error.strerror}){kept}')
+        return DiskError(f'{path}: the disk or the quota is full ({error.strerror}){rest}')
     if error.errno == errno.EROFS:
-        return InputError(f'{path}: the disk is read-only{kept}')
+        return DiskError(f'{path}: the disk is read-only{rest}')
     if error.errno in (errno.EACCES, errno.EPERM):
-        return InputError(f'{path}: no permission to write ({error.strerror}); choose another')
+        return DiskError(f'{path}: no permission to write ({error.strerror}); choose another')
     if error.errno in (errno.ENOTDIR, errno.ENAMETOOLONG, errno.EEXIST):
-        return InputError(f'{path}: cannot be made ({error.strerror}); choose another name')
-    return InputError(f'{path}: cannot be written ({error.strerror or error}){kept}')
+        return DiskError(f'{path}: cannot be made ({error.strerror}); choose another name')
+    return DiskError(f'{path}: cannot be written ({error.strerror or error}){rest}')

@@ -11,9 +11,10 @@ from actuator_glue.errors import InputError
 from actuator_glue.io import bag_metadata
 from actuator_glue.io.bag_metadata import BagTopic, Metadata
 from actuator_glue.io.bag_reader import Summary, bag_files, messages
-from actuator_glue.io.mcap_file import McapFile, disk_error, in_use
+from actuator_glue.io.mcap_file import DiskError, McapFile, Message, disk_error, in_use
 
 KEPT = '.cut'  # suffix of the original of a file that was written anew
+MESSAGES_IN_MEMORY = 1000  # while a file is written anew
 
 
 @dataclass(slots=True)
@@ -72,6 +73,15 @@ def recover(path: Path | str) -> Recovery:
     return recovery
 
 
+def mend(file: Path, bag: Path) -> None:
+    """Write a cut file of a bag anew from what is whole in it.
+
+    Raises:
+        InputError: no room.
+    """
+    _mend(file, bag, Recovery(), Metadata(), {})
+
+
 def _mend(
     file: Path, bag: Path, recovery: Recovery, metadata: Metadata, topics: dict[str, BagTopic]
 ) -> None:
@@ -102,11 +112,19 @@ def _rewrite(file: Path, bag: Path, summary: Summary, own: Metadata) -> None:
     serialized = own.serialized()
     new = McapFile(temporary, bag)
     topics = {t.name: BagTopic(t.name, t.type, t.rihs01, t.qos) for t in own.topics}
-    for topic in topics.values():
-        new.add_topic(topic, summary.definitions[topic.type])
-    for found in messages(file, note=lambda _: None):
-        new.write(topics[found.topic], found.data, found.log_time, found.publish_time)
-    new.finish(serialized)
+    try:
+        for topic in topics.values():
+            new.add_topic(topic, summary.definitions[topic.type])
+        for found in messages(file, note=lambda _: None):
+            topic = topics[found.topic]
+            new.write(Message(topic, found.data, found.log_time, found.publish_time))
+            if len(new.unsure) >= MESSAGES_IN_MEMORY:
+                new.flush()
+        new.finish(serialized)
+    except DiskError:
+        with suppress(OSError):
+            temporary.unlink()
+        raise
     try:
         # A second name first, so that there is no moment without the file.
         _unused(file).hardlink_to(file)

@@ -21,6 +21,7 @@ from actuator_glue.nodes import diagnoser_worker, own_effects, spin, topics
 from actuator_glue.nodes.health import ERROR
 from actuator_glue.nodes.latched import Newest
 from actuator_glue.nodes.messages import publish
+from actuator_glue.nodes.now import now_ns
 from actuator_glue.nodes.working import WorkingNode
 from actuator_glue.online import conversion
 from actuator_glue.online import live_diagnosis as live
@@ -234,7 +235,7 @@ class DiagnoserNode(WorkingNode):
             self.complain('diagnosis', outcome.message)
             self._fail(outcome)
             return
-        head = conversion.Head(self.get_clock().now().nanoseconds, outcome.actuator)
+        head = conversion.Head(now_ns(self.get_clock()), outcome.actuator)
         publish(self._diagnosis, head, diagnoser_worker.fields(outcome))
         self.get_logger().info(outcome.message)
         self._request, self._told = None, outcome
@@ -296,7 +297,7 @@ class DiagnoserNode(WorkingNode):
             message=outcome.message,
             applied=outcome.applied,
         )
-        head = conversion.Head(self.get_clock().now().nanoseconds, outcome.actuator)
+        head = conversion.Head(now_ns(self.get_clock()), outcome.actuator)
         diagnoser_worker.fill_message(result.diagnosis, head, outcome)
         if handle.is_cancel_requested:
             handle.canceled()

@@ -19,6 +19,7 @@ from actuator_glue.nodes.estimator_worker import compute, warm_up
 from actuator_glue.nodes.health import ERROR, Rate
 from actuator_glue.nodes.latched import Newest
 from actuator_glue.nodes.messages import publish
+from actuator_glue.nodes.now import now_ns
 from actuator_glue.nodes.tracking import publish_tracking
 from actuator_glue.nodes.working import WorkingNode
 from actuator_glue.online import conversion
@@ -225,7 +226,7 @@ class EstimatorNode(WorkingNode):
         if proposal is None or proposal is self._announced:
             return
         self._announced = proposal
-        number, index, stamp, actuator = 0, 0, self.get_clock().now().nanoseconds, ''
+        number, index, stamp, actuator = 0, 0, now_ns(self.get_clock()), ''
         if job is not None:
             record = job.window.record
             number, index = job.window.number, record.first_index

@@ -17,8 +17,10 @@ from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from actuator_glue.errors import InputError
 from actuator_glue.io.bag_metadata import LATCHED, Qos
 from actuator_glue.io.bag_writer import BagWriter
+from actuator_glue.io.mcap_file import DiskError
 from actuator_glue.nodes import base, folders, spin, topics
 from actuator_glue.nodes.health import ERROR, Rate
+from actuator_glue.nodes.now import begun
 from actuator_glue.nodes.parameters import Spec
 from actuator_glue.nodes.partners import refusal, type_name
 
@@ -33,20 +35,36 @@ SPECS = (
     Spec('topics', [''], 'further topics, recorded as soon as they appear', read_only=True),
     Spec('flush_period', 0.2, 'longest time a message stays in memory', 's', 0.01, 10.0, True),
     Spec('max_file', 1 << 30, 'size at which the next file begins', 'B', 1 << 20, 1 << 40, True),
-    Spec('max_waiting', 256 << 20, 'messages kept while the disk stalls', 'B', 1 << 20, 1 << 40),
+    Spec(
+        'max_waiting',
+        256 << 20,
+        'messages kept in memory while the disk stalls or is full, or /clock has not begun',
+        'B',
+        1 << 20,
+        1 << 40,
+    ),
 )
 
 
 SYNC_PERIOD = 1.0  # s after which the disk itself, and not the system's memory, has a message
+RETRY_PERIOD = 0.5  # s between two attempts on a disk that takes nothing
 
 
 class Item(NamedTuple):
-    """A message on its way to the disk; times in ns, `arrived` is monotonic [s]."""
+    """A message on its way to the disk.
+
+    Attributes:
+        topic: fully qualified.
+        data: as it came.
+        received: by the node's clock [ns]; None before the first /clock.
+        published: by the publisher's computer [ns]; None where the middleware does not say.
+        arrived: monotonic [s].
+    """
 
     topic: str
     data: bytes
-    received: int
-    published: int
+    received: int | None
+    published: int | None
     arrived: float
 
 
@@ -71,14 +89,15 @@ class RecorderNode(base.SuiteNode):
         self._bags += 1
         self.get_logger().info(f'recording to {self.writer.path}')
         self._queue: queue.SimpleQueue[Item | None] = queue.SimpleQueue()
+        self._early: list[Item] = []
         self._waiting_bytes = self._lost = 0
         self._lag = self._worst_lag = 0.0
-        self._failed = ''
+        self._failed = self._unsynced = ''
         self.received = Rate()
         self._wanted = {name for name in values['topics'] if name}
+        self._finished = threading.Event()
         self._thread = threading.Thread(target=self._write, name='writer', daemon=True)
         self._thread.start()
-        self._finished = threading.Event()
         threading.Thread(target=self._sync, name='sync', daemon=True).start()
         self._heard: dict[str, tuple[topics.Topic, Any]] = {}
         for topic in topics.RECORDED if values['suite'] else ():
@@ -87,19 +106,29 @@ class RecorderNode(base.SuiteNode):
         self.every(0.5, self._look)
 
     def do_deactivate(self) -> None:
-        """Write what has arrived and finish the bag."""
-        if self.writer is None:
+        """Write what has arrived and finish the bag; what cannot be written is told."""
+        writer = self.writer
+        if writer is None:
             return
         self._take_what_waits()
+        self._release_early(last=True)
         self._finished.set()
         self._queue.put(None)
         self._thread.join()
         try:
-            self.writer.close()
+            writer.close()
         except InputError as error:
             self.get_logger().error(str(error))
+        self._lost += writer.waiting
+        found = f'{writer.path}: {writer.count} messages'
+        if self._lost:
+            # Of what a test leaves behind nobody may think that it is all.
+            self.exit_code = 1
+            self.complain('lost', f'{found}, {self._lost} more are lost', ERROR)
         else:
-            self.get_logger().info(f'{self.writer.path}: {self.writer.count} messages, finished')
+            self.get_logger().info(f'{found}, finished')
+        self._failed = self._unsynced = ''
+        self.do_report()
         self.writer = None
 
     def do_report(self) -> None:
@@ -118,7 +147,13 @@ class RecorderNode(base.SuiteNode):
             }
         )
         if self._failed:
-            self.complain('bag', self._failed, ERROR)
+            text = f'{self._failed}; what comes waits in memory until the disk takes it'
+            self.complain('bag', text, ERROR)
+        if self._unsynced:
+            self.complain('disk', self._unsynced, ERROR)
+        if self._early:
+            text = f'{len(self._early)} messages wait in memory for the first /clock, their time'
+            self.complain('early', text)
 
     def _path(self, values: Mapping[str, Any]) -> Path:
         # Recorders of several actuators begin at the same moment.
@@ -150,6 +185,7 @@ class RecorderNode(base.SuiteNode):
 
     def _look(self) -> None:
         """Subscribe to further topics that have appeared; adapt to what publishers offer."""
+        self._release_early()
         for name, types in self.get_topic_names_and_types() if self._wanted else ():
             for wanted in [w for w in self._wanted if self.resolve_topic_name(w) == name]:
                 self._wanted.discard(wanted)
@@ -191,12 +227,35 @@ class RecorderNode(base.SuiteNode):
         self.received.add()
         if self._waiting_bytes + len(data) > self.parameters['max_waiting']:
             self._lost += 1
-            self.complain('disk', f'the disk stalls: {self._lost} messages lost', ERROR)
+            why = 'the disk stalls or is full' if begun(self.get_clock()) else 'no /clock has come'
+            self.complain('lost', f'{why}: {self._lost} messages lost', ERROR)
             return
         self._waiting_bytes += len(data)
-        now = self.get_clock().now().nanoseconds
-        item = Item(name, data, now, info['source_timestamp'] or now, time.monotonic())
+        now = self.get_clock().now().nanoseconds or None
+        item = Item(name, data, now, info['source_timestamp'] or None, time.monotonic())
+        if now is None:
+            self._early.append(item)
+            return
+        self._release_early()
         self._queue.put(item)
+
+    def _release_early(self, last: bool = False) -> None:
+        """Record what came before the first /clock, at the time that this says.
+
+        Args:
+            last: the clock is waited for no longer: where it has not begun, the time of each
+                message is that of its publisher's computer.
+        """
+        count, now = len(self._early), self.get_clock().now().nanoseconds
+        if not count or not (now or last):
+            return
+        for item in self._early:
+            self._queue.put(item._replace(received=now or item.published or time.time_ns()))
+        self._early.clear()
+        self.get_logger().warning(
+            f'{count} messages came before the first /clock; recorded at '
+            + ('the time that it says' if now else "the computer's time, for it never came")
+        )
 
     def _write(self) -> None:
         """Write what arrives until None arrives; runs in its own thread."""
@@ -209,16 +268,43 @@ class RecorderNode(base.SuiteNode):
                 item = Item('', b'', 0, 0, time.monotonic())
             if item is None:
                 return
+            if self._failed and self._finished.is_set():
+                self._lost += bool(item.topic)  # the disk was waited for long enough
+                continue
             try:
                 if item.topic:
+                    assert item.received is not None
                     writer.write_raw(item.topic, item.data, item.received, item.published)
                 else:
                     writer.flush_if_due()
-            except Exception as error:  # the thread outlives whatever disk and messages do
-                self._failed = str(error) or type(error).__name__
+            except DiskError as error:
+                self._wait_for_disk(writer, error)
+            except Exception as error:  # the thread outlives whatever messages are like
+                self._lost += 1
+                text = f'a message of {item.topic} cannot be recorded: {error or type(error)}'
+                self.complain('message', text, ERROR)
             self._waiting_bytes -= len(item.data)
             self._lag = time.monotonic() - item.arrived
             self._worst_lag = max(self._worst_lag, self._lag)
+
+    def _wait_for_disk(self, writer: BagWriter, failure: DiskError) -> None:
+        """Wait until the disk takes messages again, or the bag is to be finished."""
+        began, self._failed = time.monotonic(), str(failure)
+        while True:
+            over = self._finished.wait(RETRY_PERIOD)
+            try:
+                writer.flush()
+            except DiskError as error:
+                self._failed = str(error)
+                if over:
+                    return
+            else:
+                break
+        self._failed = ''
+        seconds = time.monotonic() - began
+        self.get_logger().warning(
+            f'the disk takes messages again after {seconds:.1f} s; {self._lost} are lost so far'
+        )
 
     def _sync(self) -> None:
         """Have the disk take what was written; a thread of its own, for a disk may take long."""
@@ -227,8 +313,9 @@ class RecorderNode(base.SuiteNode):
         while not finished.wait(SYNC_PERIOD):
             try:
                 writer.sync()
+                self._unsynced = ''
             except InputError as error:
-                self._failed = str(error)
+                self._unsynced = str(error)
 
 
 def _suited(asked: QoSProfile, offered: Sequence[QoSProfile]) -> QoSProfile:

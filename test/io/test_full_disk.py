@@ -7,7 +7,6 @@ import sys
 import textwrap
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from actuator_glue.errors import InputError
@@ -16,46 +15,146 @@ from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.io.recover import recover
 from actuator_glue.records import Record
 
-STARVED = textwrap.dedent(
+# Numbered blocks of 1.6 kB; `blocks(bag)` are the numbers that a bag holds, in its order.
+NUMBERED = textwrap.dedent(
     """
-    import resource, signal, sys
+    import resource, sys
+    from pathlib import Path
     import numpy as np
     from actuator_glue.errors import InputError
-    from actuator_glue.io.bag_records import write_record
+    from actuator_glue.io.bag_reader import decoded, summarise
     from actuator_glue.io.bag_writer import BagWriter
-    from actuator_glue.records import Record
+    from actuator_glue.io.mcap_file import DiskError
+    from actuator_glue.io.messages import header, message
+    from actuator_glue.io.recover import recover
 
-    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 300_000))
-    values = np.arange(50_000) * 1e-6
-    writer = BagWriter(sys.argv[1], flush_period=0.0)
-    for attempt in range(2):
-        try:
-            write_record(writer, Record(values, values, 1e-3), block=50)
-        except InputError as error:
-            print(error)
-    try:
-        writer.close()
-    except InputError as error:
-        print(error)
+    def write(writer, numbers):
+        refused = 0
+        for n in numbers:
+            content = message(
+                'SampleBlock',
+                header=header(10**18, 'rig'),
+                index=n,
+                period=1e-3,
+                command=np.full(100, float(n)),
+                measured=np.zeros(100),
+                force=np.empty(0),
+            )
+            try:
+                writer.write('/samples', content, 10**18 + n)
+            except DiskError as error:
+                refused += 1
+                assert 'full' in str(error) and 'kept' in str(error), error
+        return refused
+
+    def blocks(bag):
+        return [m.index for _, m in decoded(bag, ('SampleBlock',))]
+
+    def whole(bag):
+        assert summarise(bag).finished and (bag / 'metadata.yaml').exists()
+        assert recover(bag).notes == [], recover(bag).notes
+        assert all(m.command[0] == m.index for _, m in decoded(bag, ('SampleBlock',)))
+
+    bag = Path('disk/bag')
     """
 )
 
 
-def test_a_full_disk_is_one_message_and_keeps_the_rest(tmp_path: Path) -> None:
-    """The message comes back on every later call; what was flushed is readable and mendable."""
-    done = subprocess.run(
-        [sys.executable, '-c', STARVED, str(tmp_path / 'bag')], capture_output=True, text=True
-    )
-    assert done.returncode == 0, done.stderr
-    lines = done.stdout.splitlines()
-    assert len(lines) == 3
-    assert all('full' in line and 'recover' in line for line in lines)
-    assert done.stderr == ''
-    recover(tmp_path / 'bag')
-    (record,) = read_records(tmp_path / 'bag')
-    assert len(record) > 5_000
-    assert record.command.tobytes() == (np.arange(len(record)) * 1e-6).tobytes()
+def on_small_disk(tmp_path: Path, script: str, *, size: str = '3m') -> None:
+    """Run a script whose folder `disk` is a disk of its own, where users may mount one."""
+    (tmp_path / 'disk').mkdir()
+    (tmp_path / 'script.py').write_text(NUMBERED + textwrap.dedent(script))
+    mount = f'mount -t tmpfs -o size={size} tmpfs disk || exit 77; exec {sys.executable} script.py'
+    command = ['unshare', '--map-root-user', '--mount', 'sh', '-c', mount]
+    try:
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    except OSError as error:
+        pytest.skip(f'no mount namespaces here ({error})')
+    if done.returncode == 77 or 'unshare' in done.stderr:
+        pytest.skip(f'no mount namespaces here ({done.stderr.strip()})')
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_what_a_full_disk_refuses_is_written_when_there_is_room(tmp_path: Path) -> None:
+    """Not one message is missing, none comes twice; the bag needs no mending."""
+    script = """
+        Path('disk/other').write_bytes(bytes(1 << 20))
+        writer = BagWriter(bag, flush_period=0.01)
+        writer.add_topic('/samples', 'SampleBlock')
+        refused = write(writer, range(1200))
+        assert 10 < refused < 1000 and writer.waiting == refused, (refused, writer.waiting)
+        assert summarise(bag / 'bag_0.mcap').finished  # while the disk is full
+        Path('disk/other').unlink()
+        writer.flush()
+        assert writer.waiting == 0
+        assert write(writer, range(1200, 1300)) == 0
+        writer.close()
+        assert blocks(bag) == list(range(1300))
+        assert writer.count == 1300
+        whole(bag)
+    """
+    on_small_disk(tmp_path, script)
+
+
+def test_a_bag_on_a_disk_that_stays_full_is_finished_and_says_what_it_lacks(
+    tmp_path: Path,
+) -> None:
+    """Index and metadata.yaml have had their room from the beginning."""
+    script = """
+        writer = BagWriter(bag, flush_period=0.01)
+        writer.add_topic('/samples', 'SampleBlock')
+        assert write(writer, range(2500)) > 10
+        with open('disk/other', 'wb', buffering=0) as file:  # not one byte is left
+            try:
+                while file.write(bytes(4096)): pass
+            except OSError: pass
+        lost = writer.waiting
+        try:
+            writer.close()
+            raise SystemExit('it says nothing')
+        except DiskError as error:
+            assert 'is full' in str(error) and f'{lost} messages were not' in str(error), error
+        assert blocks(bag) == list(range(2500 - lost))
+        whole(bag)
+    """
+    on_small_disk(tmp_path, script)
+
+
+def test_where_nothing_was_written_nothing_is_said_to_be_kept(tmp_path: Path) -> None:
+    """And no folder is left that would be in the way of the next attempt."""
+    script = """
+        try:
+            BagWriter(bag)
+            raise SystemExit('it says nothing')
+        except DiskError as error:
+            assert 'is full' in str(error), error
+            assert 'kept' not in str(error) and 'recover' not in str(error), error
+        assert not bag.exists()
+    """
+    on_small_disk(tmp_path, script, size='100k')
+
+
+LIMITED = textwrap.dedent(
+    """
+    bag = Path(sys.argv[1])
+    resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 2_000_000))
+    writer = BagWriter(bag, flush_period=0.01)
+    writer.add_topic('/samples', 'SampleBlock')
+    assert 0 < write(writer, range(500)) < 10
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2_000_000, 2_000_000))
+    writer.close()
+    assert blocks(bag) == list(range(500))
+    whole(bag)
+    """
+)
+
+
+def test_what_a_file_does_not_take_goes_into_the_next_one(tmp_path: Path) -> None:
+    """A limit that no reservation foresees cuts the file; what it had not taken is not lost."""
+    script = [sys.executable, '-c', NUMBERED + LIMITED, str(tmp_path / 'bag')]
+    done = subprocess.run(script, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert len(list((tmp_path / 'bag').glob('*.mcap'))) > 2
 
 
 def test_a_next_file_that_cannot_be_made_is_said_again_and_again(

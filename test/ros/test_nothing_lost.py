@@ -5,11 +5,13 @@ import resource
 import signal
 import subprocess
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import pytest
 from actuator_glue_msgs.msg import SampleBlock
+from rclpy.duration import Duration
 from rclpy.qos import QoSProfile
 from ros_nodes import QUICK, RATE, recorded
 
@@ -100,25 +102,86 @@ def test_a_hundred_kills_lose_half_a_second_each_at_most(start, probe, tmp_path,
     killed_at_random(start, probe, tmp_path, 100, rng_seed)
 
 
-def test_a_full_disk_is_said_and_what_is_there_stays(start, probe, tmp_path):
-    """The largest file allowed shrinks while the recorder runs, as a quota does."""
+def sending(probe, condition):
+    """The condition, looked at after each of a stream of blocks of 2 kB."""
+
+    def looked_at():
+        probe.block(np.zeros(100), np.zeros(100))
+        return condition()
+
+    return looked_at
+
+
+def test_what_comes_while_a_disk_is_full_is_recorded_when_it_is_not(start, probe, tmp_path):
+    """The largest file allowed shrinks while the recorder runs, as a quota does, and grows."""
     bag = tmp_path / 'bag'
     recorder = start('recorder', bag=str(bag))
-    simulator = start('actuator_sim', rate=1000.0, repeat=True, wait_for=1)
-    probe.until(lambda: probe.number('recorder', 'messages written') > 200, 60, 'recording')
-    size = (bag / 'bag_0.mcap').stat().st_size
-    resource.prlimit(recorder.process.pid, resource.RLIMIT_FSIZE, (size + 50_000, size + 50_000))
-    probe.until(lambda: 'quota is full' in probe.faults['recorder'], 30, 'a full disk')
-    assert recorder.alive
-    written = probe.number('recorder', 'messages written')
-    probe.for_a_while(2.0)
-    # Nothing more is written, and nothing of what was is touched.
-    assert probe.number('recorder', 'messages written') == written
+    probe.open_stream()
+
+    def number(key):
+        return probe.number('recorder', key)
+
+    probe.until(sending(probe, lambda: number('messages written') > 50), 60, 'recording')
+    _, most = resource.prlimit(recorder.process.pid, resource.RLIMIT_FSIZE, (20_000, -1))
+    full = sending(probe, lambda: 'quota is full' in probe.faults['recorder'])
+    probe.until(full, 30, 'a full disk')
+    written = number('messages written')
+    probe.until(sending(probe, lambda: number('messages waiting (B)') > 50_000), 30, 'it waits')
+    assert number('messages written') <= written
+    resource.prlimit(recorder.process.pid, resource.RLIMIT_FSIZE, (most, most))
+    again = sending(probe, lambda: 'takes messages again' in recorder.text)
+    probe.until(again, 20, 'it goes on')
+    probe.until(sending(probe, lambda: number('messages written') > probe.index / 100 - 50), 20)
+    assert probe.value('recorder', 'messages lost') == '0'
+    assert probe.samples_out.wait_for_all_acked(Duration(seconds=20.0))
     assert recorder.end() == 0 and 'Traceback' not in recorder.text
-    assert simulator.end() == 0
-    assert recover(bag).messages > 200
+    assert (bag / 'metadata.yaml').exists() and summarise(bag).finished
+    assert np.array_equal(recorded(bag), np.arange(probe.index))
+    assert recover(bag).notes == []
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A disk of 3 MB, where this user may mount one."""
+    folder = tmp_path / 'small'
+    folder.mkdir()
+    command = ['mount', '-t', 'tmpfs', '-o', 'size=3m', 'tmpfs', str(folder)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        pytest.skip(f'no disk of its own here ({done.stderr.strip()})')
+    yield folder
+    subprocess.run(['umount', '--lazy', str(folder)], check=True)
+
+
+def test_a_disk_that_stays_full_leaves_a_finished_bag_and_the_loss_is_told(
+    small_disk, start, probe
+):
+    bag = small_disk / 'bag'
+    recorder = start('recorder', bag=str(bag))
+    probe.open_stream()
+
+    def number(key):
+        return probe.number('recorder', key)
+
+    probe.until(sending(probe, lambda: number('messages written') > 50), 60, 'recording')
+    with (small_disk / 'other').open('wb', buffering=0) as file, suppress(OSError):
+        while file.write(bytes(4096)):
+            pass
+    full = sending(probe, lambda: 'quota is full' in probe.faults['recorder'])
+    probe.until(full, 60, 'a full disk')
+    probe.until(sending(probe, lambda: number('messages waiting (B)') > 50_000), 30, 'it waits')
+    assert probe.samples_out.wait_for_all_acked(Duration(seconds=20.0))
+    # What could not be written is lost with the process: it says how much, and fails.
+    assert recorder.end() == 1, recorder.text
+    probe.until(lambda: 'more are lost' in probe.faults['recorder'], 10, 'the loss')
+    lost = number('messages lost')
+    assert lost > 20 and f'{lost:g} more are lost' in recorder.text
+    assert 'Traceback' not in recorder.text
+    assert (bag / 'metadata.yaml').exists() and summarise(bag).finished
     index = recorded(bag)
-    assert np.array_equal(index, np.arange(index[0], index[0] + len(index)))
+    assert len(index) > 5000 and np.array_equal(index, np.arange(len(index)))
+    assert probe.index - len(index) <= 100 * lost
+    assert recover(bag).notes == []
 
 
 @pytest.fixture

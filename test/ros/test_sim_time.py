@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from actuator_glue_msgs.msg import SampleBlock
 from rclpy.qos import QoSProfile
-from ros_nodes import RATE, Timekeeper
+from ros_nodes import RATE, Timekeeper, recorded
 
+from actuator_glue.io.bag_reader import decoded, messages
 from actuator_glue.nodes.pacer import Pacer, Step
 
 
@@ -64,6 +65,48 @@ def test_a_stream_runs_pauses_and_jumps_with_the_clock(node, start, probe, clock
     steps = np.diff(stamps(blocks))
     assert (np.abs(steps - 10 / RATE) > 0.2).sum() == 2
     assert process.alive and process.end() == 0, process.text
+
+
+def test_what_comes_before_the_clock_is_recorded_at_its_first_time(start, probe, tmp_path):
+    """Log times of 1970 would put hours between a set-up and its samples."""
+    bag = tmp_path / 'bag'
+    recorder = start('recorder', use_sim_time=True, bag=str(bag))
+    probe.until(lambda: probe.value('recorder', 'state') == 'active', 60)
+    probe.open_stream()
+    probe.setup()
+    for _ in range(20):
+        probe.block(np.zeros(20), np.zeros(20))
+    probe.until(lambda: 'wait in memory for the first /clock' in probe.faults['recorder'], 20)
+    keeper = Timekeeper(probe)
+    probe.until(lambda: probe.number('recorder', 'messages written') > 20, 20, 'it goes on')
+    probe.block(np.zeros(20), np.zeros(20))
+    probe.for_a_while(0.5)
+    assert recorder.end() == 0, recorder.text
+    keeper.end()
+    assert np.array_equal(recorded(bag), np.arange(420))
+    logged = np.array([m.log_time for m in messages(bag)]) * 1e-9
+    assert logged.min() >= 1000.0 and logged.max() <= keeper.now
+    assert 'messages came before the first /clock' in recorder.text
+    # What the recorder says of itself has a stamp, too, and tells whose.
+    reports = [m for _, m in decoded(bag, ('DiagnosticArray',))]
+    said = np.array([m.header.stamp.sec for m in reports])
+    assert (said >= 1000).all()
+    assert "computer's time" in probe.faults['recorder']
+
+
+def test_where_the_clock_never_comes_the_computers_time_is_taken_and_told(start, probe, tmp_path):
+    bag = tmp_path / 'bag'
+    recorder = start('recorder', use_sim_time=True, bag=str(bag))
+    probe.until(lambda: probe.value('recorder', 'state') == 'active', 60)
+    probe.open_stream()
+    probe.setup()
+    probe.block(np.zeros(20), np.zeros(20))
+    probe.until(lambda: 'wait in memory for the first /clock' in probe.faults['recorder'], 20)
+    assert recorder.end() == 0, recorder.text
+    assert np.array_equal(recorded(bag), np.arange(20))
+    logged = np.array([m.log_time for m in messages(bag)]) * 1e-9
+    assert np.abs(logged - time.time()).max() < 120.0
+    assert 'for it never came' in recorder.text
 
 
 def test_a_pacer_keeps_to_the_clock_it_is_given():
