@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from actuator_glue.errors import InputError
+from actuator_glue.given import number
 
 Array: TypeAlias = NDArray[np.float64]
 Hold: TypeAlias = Literal['zoh', 'linear']
@@ -43,7 +44,7 @@ def numbers(values: ArrayLike) -> Array:
     if isinstance(values, np.ndarray) and values.dtype.kind in 'cmM':
         raise TypeError(f'{values.dtype} is no displacement or force')
     if isinstance(values, np.ma.MaskedArray):
-        return np.asarray(values.astype(np.float64).filled(np.nan))
+        return np.asarray(np.ma.filled(values.astype(np.float64), np.nan))
     return np.array(values, dtype=np.float64)
 
 
@@ -79,10 +80,7 @@ def check_stiffness(stiffness: float, source: str = '') -> float:
         InputError: negative, not finite or above 1e12 N/m.
     """
     where = f'{source}: ' if source else ''
-    try:
-        value = float(stiffness)
-    except (TypeError, ValueError) as error:
-        raise InputError(f'{where}specimen stiffness is not a number ({error})') from error
+    value = number(stiffness, f'{where}specimen stiffness')
     if not 0.0 <= value <= MAX_STIFFNESS:
         raise InputError(
             f'{where}specimen stiffness {value:g} N/m is outside [0, {MAX_STIFFNESS:g}] N/m; '
@@ -103,12 +101,13 @@ def check_period(period: float, source: str = '') -> float:
     Raises:
         InputError: not finite or outside [1e-6, 10] s.
     """
+    where = f'{source}: ' if source else ''
+    period = number(period, f'{where}sample period')
     if not 1e-6 <= period <= 10.0:
-        where = f'{source}: ' if source else ''
         raise InputError(
             f'{where}sample period {period:g} s is outside [1e-6, 10] s; time is in seconds'
         )
-    return float(period)
+    return period
 
 
 def check_hold(hold: str, source: str = '') -> Hold:
@@ -167,7 +166,7 @@ class Record:
             raise InputError(f'{where}channels have different lengths {lengths}')
         if lengths[0] < 2:
             raise InputError(f'{where}{lengths[0]} sample(s); at least two are needed')
-        check_period(self.period, self.source)
+        put(self, 'period', check_period(self.period, self.source))
         check_hold(self.hold, self.source)
         if self.stiffness is not None:
             put(self, 'stiffness', check_stiffness(self.stiffness, self.source))

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from actuator_glue.errors import InputError
-from actuator_glue.records import MAX_DISPLACEMENT, MAX_FORCE, Array
+from actuator_glue.records import MAX_DISPLACEMENT, MAX_FORCE, Array, numbers
 from actuator_glue.setups import MAX_INDEX
 
 # A block is a moment of a test; more than this is a file sent by mistake.
@@ -107,6 +107,8 @@ def check_block(block: Block) -> Block:
 def _check_channel(
     where: str, index: int, name: str, values: Array, unit: str, limit: float
 ) -> None:
+    if isinstance(values, np.ma.MaskedArray):
+        values = numbers(values)
     # One pass where all is well: a NaN fails the comparison as well.
     if np.abs(values).max() <= limit:
         return

@@ -8,7 +8,7 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.model.commands import ground_acceleration
-from actuator_glue.records import Array
+from actuator_glue.records import Array, numbers
 
 _LONGEST = 5_000_000  # samples at the loop's rate
 _LARGEST = 100.0  # m/s^2
@@ -33,7 +33,7 @@ class GroundMotion:
     name: str = 'ground motion'
 
     def __post_init__(self) -> None:
-        values = np.ascontiguousarray(self.acceleration, dtype=np.float64)
+        values = numbers(self.acceleration)
         object.__setattr__(self, 'acceleration', values)
         if values.ndim != 1 or len(values) < 2 or not np.isfinite(values).all():
             raise InputError(f'{self.name}: not one row of two or more finite accelerations')

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
 from actuator_glue.errors import InputError
-from actuator_glue.records import Array
+from actuator_glue.records import Array, numbers
 
 
 class FrequencyEvaluation(NamedTuple):
@@ -166,7 +166,7 @@ def energy_error(target: Array, measured: Array, force: Array, stiffness: float)
         InputError: as `_checked`, a force of another length, a stiffness that is not positive.
     """
     target, measured = _checked(target, measured)
-    force = np.asarray(force, np.float64)
+    force = numbers(force)
     if force.shape != target.shape or not np.isfinite(force).all():
         raise InputError(f'force has shape {force.shape}; give one finite value a sample')
     if not 0.0 < stiffness < np.inf:
@@ -185,7 +185,7 @@ def _checked(target: Array, measured: Array) -> tuple[Array, Array]:
     Raises:
         InputError: not two rows of one length, values that are not finite, a target at rest.
     """
-    target, measured = np.asarray(target, np.float64), np.asarray(measured, np.float64)
+    target, measured = numbers(target), numbers(measured)
     if target.ndim != 1 or target.shape != measured.shape or len(target) < 4:
         raise InputError(
             f'target has shape {target.shape}, measured {measured.shape}; give two rows of one '

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from actuator_glue.errors import InputError
 from actuator_glue.jit import njit
 from actuator_glue.model.sensor import Sensor, SensorSpec
-from actuator_glue.records import MAX_DISPLACEMENT, Array, Hold
+from actuator_glue.records import MAX_DISPLACEMENT, Array, Hold, numbers
 
 
 class Plant(Protocol):
@@ -37,6 +37,8 @@ def command_block(command: ArrayLike) -> Array:
     Raises:
         InputError: not one row of finite samples, or beyond any actuator's stroke.
     """
+    if isinstance(command, np.ma.MaskedArray):
+        command = numbers(command)
     block = np.ascontiguousarray(command, dtype=np.float64)
     if block.ndim != 1:
         raise InputError(f'command block has shape {block.shape}; one row of samples is needed')
