@@ -200,17 +200,18 @@ def init(settings: LiveSettings) -> State:
 
 def step(state: State, given: Input) -> tuple[State, tuple[Action, ...]]:
     """Take one input; return the next state and what to do."""
+    told: tuple[Action, ...] = ()
     match given:
         case Received():
-            state, told = _received(state, given.seconds), ()
+            state = _received(state, given.seconds)
         case Judged():
             state, told = _judged(state, given)
         case Carries():
-            state, told = replace(_began(state), since=given.number), ()
+            state = replace(_began(state), since=given.number)
         case Estimated():
             state, told = _estimated(state, given)
         case Began():
-            state, told = _began(state), ()
+            state = _began(state)
         case Asked():
             looked = state.seconds if given.streamed else state.looked
             return replace(state, running=True, looked=looked), ()

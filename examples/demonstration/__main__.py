@@ -1,6 +1,7 @@
 """Run the suite as real nodes for a minute; replay, report, and diagnose what the model lacks.
 
-Exit codes: 0 done; 1 a sample was lost or the replay differs; 2 the input cannot be used.
+Exit codes: 0 done; 1 a sample was lost, the replay differs, or the live chain did not find what
+is hidden; 2 the input cannot be used.
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ def parser() -> argparse.ArgumentParser:
         add(name, type=number, default=value, metavar=unit, help=f'{meaning} (%(default)g)')
     add(
         '--effect',
-        default='backlash',
+        default=sources.PROMISED_EFFECT,
         metavar='NAME',
         help='effect of the simulated actuator that no node is told of (%(default)s; none for '
         'none); its oil warms, too',
@@ -73,7 +74,7 @@ def parser() -> argparse.ArgumentParser:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Run the demonstration; 1 where a sample was lost or the replay differs.
+    """Run the demonstration; 1 where a sample was lost, the replay differs or a promise is broken.
 
     Raises:
         InputError: no sourced workspace, unusable data, or a node that dies.
@@ -104,7 +105,8 @@ def run(args: argparse.Namespace) -> int:
     write_json(outcome.to_json(), str(folder / 'summary.json'))
     outcome.show(console)
     console.print(f'results   {folder}')
-    return 0 if outcome.lossless and outcome.comparison.identical else 1
+    kept = not outcome.broken_promises()
+    return 0 if outcome.lossless and outcome.comparison.identical and kept else 1
 
 
 def _source(args: argparse.Namespace, folder: Path) -> sources.Source:

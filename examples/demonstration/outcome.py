@@ -15,10 +15,12 @@ from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.io.bag_reader import decoded
 from actuator_glue.model.parameters import NAMES
+from actuator_glue.online import conversion
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.playback import items, replay, stream
 from actuator_glue.online.replay_comparison import ReplayComparison, compare, published
 from actuator_glue.online.settings import EstimatorSettings
+from actuator_glue.online.stream import structure_name
 from actuator_glue.records import Array
 from actuator_glue.report.bag_content import Content
 from actuator_glue.workers.reports import Reports
@@ -35,6 +37,8 @@ LOOK: dict[str, Any] = {
     'caption_justify': 'left',
     'pad_edge': False,
 }
+# Share of windows in which a parameter has to be inside its 95 % interval.
+PROMISED = 0.9
 INPUTS = ('SampleBlock', 'TestSetup')
 RESULTS = ('EstimatorSetup', 'PosteriorMoments', 'PredictionBand')
 
@@ -81,6 +85,7 @@ class SessionOutcome:
         comparison: the replay held against the live run.
         truth: true parameters of Eq. (2) in each window where they are known, shape (windows, 4).
         diagnosis: what the model lacks, None where nobody asked.
+        hidden: effects that the live chain had to find; empty where nothing is promised.
         seconds: time from the first process to the last picture [s].
     """
 
@@ -90,6 +95,7 @@ class SessionOutcome:
     comparison: ReplayComparison
     truth: Array | None = None
     diagnosis: DiagnosisData | None = None
+    hidden: tuple[str, ...] = ()
     seconds: float = float('nan')
 
     def count(self, key: str) -> int:
@@ -115,14 +121,40 @@ class SessionOutcome:
         }
 
     def truth_inside(self) -> dict[str, float] | None:
-        """Return in which share of the last model's windows the truth is within 1.96 sd."""
+        """Return in which share of windows the truth is within 1.96 sd.
+
+        Of all windows from the first addition on; where nothing was added, of all.
+        """
         posteriors = self.content.posteriors
         if self.truth is None or not posteriors:
             return None
-        same = [list(p.effects) == list(posteriors[-1].effects) for p in posteriors]
+        first = next((i for i, p in enumerate(posteriors) if list(p.effects)), 0)
         mean, sd = (np.array([getattr(p, c)[:4] for p in posteriors]) for c in ('mean', 'stddev'))
         inside = np.abs(mean - self.truth) <= 1.96 * sd
-        return dict(zip(NAMES, inside[same].mean(axis=0).tolist(), strict=True))
+        return dict(zip(NAMES, inside[first:].mean(axis=0).tolist(), strict=True))
+
+    def broken_promises(self) -> list[str]:
+        """Return what the live chain should have shown and did not; nothing is a good run.
+
+        At the end what is hidden has the largest weight, and each parameter is inside its 95 %
+        interval in nine of ten windows after the first addition.
+        """
+        posteriors, inside = self.content.posteriors, self.truth_inside()
+        if not self.hidden or not posteriors or inside is None:
+            return []
+        found = [
+            f'{name} was inside its 95 % interval in {share:.0%} of the windows after the first '
+            f'addition, not in {PROMISED:.0%}'
+            for name, share in inside.items()
+            if share < PROMISED
+        ]
+        last = list(posteriors[-1].effects)
+        if set(last) != set(self.hidden):
+            found.append(
+                f'at the end {structure_name(last)} had the largest weight, not '
+                f'{structure_name(self.hidden)}'
+            )
+        return found
 
     def drift(self) -> dict[str, dict[str, float]] | None:
         """Return how parameters that drift were followed, from the last model's first window on.
@@ -147,6 +179,19 @@ class SessionOutcome:
             for j, name in enumerate(NAMES)
             if true[j] != 0.0
         }
+
+    def explanations(self) -> list[tuple[float, str]]:
+        """Return by what the windows were explained, and from when on [s]; told on each change."""
+        found: list[tuple[float, str]] = []
+        before: list[str] | None = None
+        for p in self.content.posteriors:
+            weights = conversion.weights(p)
+            names = [structure_name(sorted(name)) for name, _ in weights]
+            if names != before:
+                end = (int(p.index) + int(p.samples) - self.content.record.first_index) * p.period
+                found.append((float(end), conversion.weighed(weights)))
+            before = names
+        return found
 
     @property
     def lossless(self) -> bool:
@@ -178,6 +223,8 @@ class SessionOutcome:
             },
             'moments': self.moments(),
             'truth_inside_95': self.truth_inside(),
+            'explanations': self.explanations(),
+            'broken_promises': self.broken_promises(),
             'drift': self.drift(),
             'replay_identical': self.comparison.identical,
             'replay': {
@@ -207,7 +254,13 @@ class SessionOutcome:
             )
         if (inside := self.truth_inside()) is not None:
             shares = ', '.join(f'{name} {share:.0%}' for name, share in inside.items())
-            console.print(f'truth     inside the 95 % interval of the last model: {shares}')
+            console.print(
+                f'truth     inside the 95 % interval, windows from the first addition on: {shares}'
+            )
+        for at, said in self.explanations():
+            console.print(f'explained from {at:.0f} s on by {said}')
+        for line in self.broken_promises():
+            console.print(f'BROKEN    {line}')
         for name, moved in (self.drift() or {}).items():
             console.print(
                 f'drift     {name} by {moved["true"]:.3g} under the last model, estimated as '

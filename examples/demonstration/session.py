@@ -180,6 +180,7 @@ def finish(
     display.advance(stage, 4)
     outcome = SessionOutcome(source.title, _sent(source, folder), content, comparison, truth)
     if diagnose:
+        outcome.hidden = source.hidden if source.promises else ()
         _diagnose(outcome, folder, display, seed)
     return outcome
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from actuator_glue.api.simulation import named_effects
 from actuator_glue.records import Array, Hold
 
 # Commands are published this far ahead, so that a forecast precedes its data.
@@ -19,6 +20,8 @@ BLOCKS_PER_SECOND = 50.0
 TRUTH = {'beta_1': 134.0, 'alpha_1_beta_0': 1.1e9, 'alpha_2': 2.5e5, 'alpha_3': 0.5}
 STIFFNESS = 250e3  # N/m, the paper's second test
 # What its oil does to it while it warms: one parameter grows by so much of itself in the test.
+# What the live chain has to find, in a test that leaves it the time to: others may be tied.
+PROMISED_EFFECT, PROMISED_SECONDS = 'backlash', 60.0
 DRIFTS, DRIFT = 'alpha_1_beta_0', 0.03
 
 
@@ -57,6 +60,8 @@ class Source:
         title: what it is, for people.
         truth: true parameters where it is simulated.
         drift_of: what the estimator is told of their drift.
+        hidden: names of the effects that no node is told of.
+        promises: the live chain has to find all of them.
     """
 
     node: str
@@ -65,6 +70,8 @@ class Source:
     title: str
     truth: Truth | None = None
     drift_of: tuple[str, ...] = ()
+    hidden: tuple[str, ...] = ()
+    promises: bool = False
 
 
 def simulator(
@@ -109,6 +116,8 @@ def simulator(
         f'simulated actuator, {k / 1e3:g} kN/m',
         Truth(np.array(list(TRUTH.values())), growth),
         drift_of,
+        tuple(named_effects('+'.join(hidden))),
+        effect == PROMISED_EFFECT and seconds >= PROMISED_SECONDS,
     )
 
 

@@ -23,10 +23,12 @@ from actuator_glue.io.messages import header, message
 from actuator_glue.model.parameters import NAMES
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.playback import replay, stream
+from actuator_glue.online.replay_comparison import ReplayComparison
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.records import Array, Record
 from examples.demonstration import __main__ as command
 from examples.demonstration import domain
+from examples.demonstration.outcome import SessionOutcome
 from examples.demonstration.processes import Nodes, executable
 from examples.demonstration.session import prepare
 from examples.demonstration.sources import STIFFNESS, Truth, simulator
@@ -206,6 +208,7 @@ _HOLDER = """
 import sys, time
 from pathlib import Path
 from examples.demonstration import domain
+from examples.demonstration.outcome import SessionOutcome
 from examples.demonstration.processes import Nodes, end_in_order
 end_in_order()
 with Nodes() as nodes:
@@ -270,3 +273,62 @@ def _need_nodes() -> None:
         executable('estimator')
     except InputError as error:
         pytest.skip(str(error))
+
+
+def windows(effects: list[list[str]], inside: list[bool]) -> SimpleNamespace:
+    """What a bag holds of as many windows: effects of each, and whether it holds the truth."""
+    truth = np.array([134.0, 1.1e9, 2.5e5, 0.5])
+    posteriors = [
+        SimpleNamespace(
+            effects=names,
+            structures=[' + '.join(names) or 'Eq. (2)'],
+            weights=[1.0],
+            mean=truth * (1.01 if right else 1.03),
+            stddev=0.01 * truth,
+            index=1000 * i,
+            samples=5000,
+            period=1e-3,
+        )
+        for i, (names, right) in enumerate(zip(effects, inside, strict=True))
+    ]
+    record = SimpleNamespace(first_index=0)
+    return SimpleNamespace(posteriors=posteriors, record=record, truth=truth)
+
+
+@pytest.mark.parametrize(
+    ('last', 'wrong', 'said'),
+    [
+        (['backlash', 'gain-drift'], 1, []),
+        (['gain-drift', 'backlash'], 2, ['beta_1', 'alpha_1_beta_0', 'alpha_2', 'alpha_3']),
+        (['coulomb-friction'], 0, ['at the end coulomb-friction had the largest weight']),
+        ([], 0, ['at the end Eq. (2) had the largest weight, not backlash + gain-drift']),
+    ],
+)
+def test_the_live_chain_is_held_to_what_it_promises(
+    last: list[str], wrong: int, said: list[str]
+) -> None:
+    """Windows before the first addition do not count; one of ten after it may miss the truth."""
+    effects = [[]] * 5 + [['backlash']] * 9 + [last]
+    content = windows(effects, [False] * 5 + [True] * (10 - wrong) + [False] * wrong)
+    outcome = SessionOutcome(
+        'a simulator',
+        0,
+        content,  # type: ignore[arg-type]
+        ReplayComparison(),
+        np.tile(content.truth, (15, 1)),
+        hidden=('backlash', 'gain-drift'),
+    )
+    broken = outcome.broken_promises()
+    assert len(broken) == len(said)
+    assert all(text in line for text, line in zip(said, broken, strict=True))
+    assert outcome.explanations()[0] == (5.0, 'Eq. (2) 100%')
+    assert outcome.explanations()[1] == (10.0, 'backlash 100%')
+    assert not replace(outcome, hidden=()).broken_promises()
+
+
+def test_only_the_default_demonstration_promises_what_it_finds(tmp_path: Path) -> None:
+    """Other effects may be tied, and a short test ends before an answer."""
+    usual = simulator(60.0, 1000.0, None, 'backlash', tmp_path / 't', 1)
+    assert usual.promises and set(usual.hidden) == {'backlash', 'gain-drift'}
+    assert not simulator(30.0, 1000.0, None, 'backlash', tmp_path / 't', 1).promises
+    assert not simulator(60.0, 1000.0, None, 'delay', tmp_path / 't', 1).promises
