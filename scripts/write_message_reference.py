@@ -1,12 +1,19 @@
-"""Write the tables of docs/messages.md from the interface texts; `--check` only compares."""
+"""Write docs/messages_reference.md from the interface texts; `--check` only compares."""
 
 import re
 import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = ROOT / 'docs' / 'messages.md'
-MARK = '<!-- Everything below is written by scripts/write_message_reference.py -->\n'
+PAGE = ROOT / 'docs' / 'messages_reference.md'
+HEAD = """# Fields of messages, services and actions
+
+What each field holds and in which unit; [messages](messages.md) says who publishes what, and how
+to publish samples.
+
+<!-- Everything below is written by scripts/write_message_reference.py -->
+
+"""
 PARTS = {'msg': [''], 'srv': ['Request', 'Response'], 'action': ['Goal', 'Result', 'Feedback']}
 
 
@@ -34,7 +41,7 @@ def section(path: Path) -> str:
     head, fields = [], path.read_text(encoding='utf-8').splitlines()
     while fields and fields[0].startswith('#'):
         head.append(fields.pop(0).removeprefix('#').strip())
-    lines = [f'### {path.stem}', '', *head]
+    lines = [f'## {path.stem}', '', *head]
     parts = '\n'.join(fields).split('\n---\n')
     for title, part in zip(PARTS[path.suffix[1:]], parts, strict=True):
         lines += ['', *([f'**{title}**', ''] if title else [])]
@@ -43,13 +50,12 @@ def section(path: Path) -> str:
 
 
 def page() -> str:
-    """Return the whole page: what people wrote, then the tables."""
-    written = PAGE.read_text(encoding='utf-8').partition(MARK)[0]
+    """Return the whole page."""
     interfaces = [p for kind in PARTS for p in sorted((ROOT / 'msg_defs' / kind).glob('*'))]
-    return written + MARK + '\n' + '\n'.join(section(path) for path in interfaces)
+    return HEAD + '\n'.join(section(path) for path in interfaces)
 
 
 if __name__ == '__main__':
     if '--check' in sys.argv:
-        sys.exit(page() != PAGE.read_text(encoding='utf-8'))
+        sys.exit(not PAGE.exists() or page() != PAGE.read_text(encoding='utf-8'))
     PAGE.write_text(page(), encoding='utf-8')
