@@ -88,6 +88,15 @@ def tdms(path: Path) -> None:
             )
 
 
+def labview(path: Path) -> None:
+    """Write a LabVIEW measurement file without a column of times."""
+    rows = np.column_stack([COLUMNS['command_mm'], COLUMNS['measured_mm']]).tolist()
+    lines = ['LabVIEW Measurement', 'Separator\tTab', 'X_Columns\tNo', '***End_of_Header***', '']
+    lines += ['Channels\t2', 'Y_Unit_Label\tmm\tmm', 'X0\t0\t0', 'Delta_X\t0.001\t0.001']
+    lines += ['***End_of_Header***', 'X_Value\tCommand\tMeasured\tComment']
+    path.write_text('\n'.join([*lines, *(f'\t{u!r}\t{y!r}' for u, y in rows)]))
+
+
 def parquet(path: Path) -> None:
     """Write a Parquet file of three groups."""
     pq.write_table(pa.table(COLUMNS), path, row_group_size=100)
@@ -131,6 +140,7 @@ FORMATS: dict[str, tuple[str, Callable[[Path], object], Callable[[Path], object]
     'mat_6': ('.mat', mat_6, read_all),
     'hdf5': ('.h5', hdf5, read_all),
     'tdms': ('.tdms', tdms, read_all),
+    'labview': ('.lvm', labview, read_all),
     'parquet': ('.parquet', parquet, read_all),
     'excel': ('.xlsx', excel, read_all),
     'mcap': ('.mcap', mcap, read_all),

@@ -72,6 +72,7 @@ class Format:
         write: write columns and notes to a path; None where such files are only read.
         begins: first bytes by which it is known whatever its suffix; empty for text.
         name: what such a file is called in messages.
+        text: such files are text; one that begins otherwise is delimited text.
     """
 
     suffixes: tuple[str, ...]
@@ -79,6 +80,7 @@ class Format:
     write: Callable[[Path, Mapping[str, Array], Mapping[str, str | float]], None] | None
     begins: bytes = b''
     name: str = 'delimited text'
+    text: bool = False
 
 
 @cache
@@ -103,6 +105,8 @@ def format_of(path: Path) -> Format:
     start = beginning(path) if path.is_file() else b''
     # What begins as another does is that, whatever it is called; a .mat may be an HDF5 file.
     found = [f for f in _formats() if f.begins and start.startswith(f.begins)]
+    if named is not None and named.text and named not in found:
+        named = None
     return next((f for f in found if f is not named), None) or named or formats()['.csv']
 
 

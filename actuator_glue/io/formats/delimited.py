@@ -359,7 +359,7 @@ def _numbers(entries: list[str], decimal: Decimal) -> Array:
     )
 
 
-def _entry(path: Path, head: TextHead, row: int, position: int) -> str:
+def entry_at(path: Path, head: TextHead, row: int, position: int) -> str:
     """Return where the file has an entry, and what it is, for messages."""
     with open_text(path, errors='replace') as file:
         number, line = next(islice(_rows(file, head), row, None))
@@ -433,7 +433,7 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
         [Column(name, name, unit) for name, unit in zip(names, head.units, strict=True)],
         head.notes,
         values,
-        entry=lambda row, at: _entry(path, head, row, at),
+        entry=lambda row, at: entry_at(path, head, row, at),
     )
 
 

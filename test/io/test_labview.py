@@ -1,0 +1,138 @@
+"""LabVIEW's text measurement files, in the forms that its writer has."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuator_glue.errors import InputError
+from actuator_glue.io.laboratory import read
+from actuator_glue.io.look import look
+
+COUNT = 2000
+COMMAND = 5 * np.sin(1e-5 * np.arange(COUNT) ** 2)  # mm
+MEASURED = 1e3 * np.roll(COMMAND, 12)  # um
+START = 1_714_730_400_123_000_000  # 2024-05-03 10:00:00.123 UTC [ns]
+FILE = {
+    'Writer_Version': '2',
+    'Separator': 'Tab',
+    'Decimal_Separator': '.',
+    'Multi_Headings': 'No',
+    'X_Columns': 'No',
+    'Time_Pref': 'Relative',
+    'Date': '2024/05/03',
+    'Time': '10:00:00.123',
+}
+CHANNELS = {
+    'Channels': '2',
+    'Samples': ('2000', '2000'),
+    'Date': ('2024/05/03', '2024/05/03'),
+    'Time': ('10:00:00.1230000000', '10:00:00.1230000000'),
+    'Y_Unit_Label': ('mm', 'um'),
+    'X_Dimension': ('Time', 'Time'),
+    'X0': ('0.0', '0.0'),
+    'Delta_X': ('0.002', '0.002'),
+}
+
+
+def labview(
+    path: Path,
+    *,
+    x: str = 'No',
+    by: str = '\t',
+    decimal: str = '.',
+    first: float = 0.0,
+    comment: str | None = None,
+    file: dict | None = None,
+    channels: dict | None = None,
+) -> Path:
+    """Write a file: `x` as its heading calls it; `file` and `channels` change the headings."""
+    words = {'\t': 'Tab', ',': 'Comma', ';': 'Semicolon'}
+    of_file = {**FILE, 'X_Columns': x, 'Separator': words[by], 'Decimal_Separator': decimal}
+    lines = [f'LabVIEW Measurement{by}']
+    lines += [f'{k}{by}{v}' for k, v in {**of_file, **(file or {})}.items()]
+    lines += [f'***End_of_Header***{by}', by]
+    between = by * 2 if x == 'Multi' else by
+    for key, entries in {**CHANNELS, **(channels or {})}.items():
+        entries = (entries,) if isinstance(entries, str) else entries
+        lines.append(f'{key}{by}{between.join(entries)}{by}'.replace('0.', f'0{decimal}'))
+    lines.append(f'***End_of_Header***{by}{by}{by}')
+    names = ['X_Value', 'Command', *(['X_Value'] if x == 'Multi' else []), 'Measured', 'Comment']
+    lines.append(by.join(names))
+    for i, (u, y) in enumerate(zip(COMMAND, MEASURED, strict=True)):
+        time = '' if x == 'No' else f'{first + i * 2e-3:.6f}'
+        row = [time, f'{u:.6f}', *([time] if x == 'Multi' else []), f'{y:.6f}']
+        row += [comment] if comment is not None and i == 3 else []
+        lines.append(by.join(row).replace('.', decimal))
+    path.write_text('\r\n'.join(lines) + '\r\n', encoding='cp1252')
+    return path
+
+
+def check(path: Path, start_ns: int = START) -> None:
+    """Compare with what was written."""
+    record = read(path)
+    np.testing.assert_allclose(record.command, COMMAND * 1e-3, atol=1e-9)
+    np.testing.assert_allclose(record.measured, MEASURED * 1e-6, atol=1e-11)
+    assert record.period == 2e-3
+    assert record.start_ns == pytest.approx(start_ns, abs=600)
+
+
+@pytest.mark.parametrize('comment', [None, 'touched it, sorry'])
+@pytest.mark.parametrize('x', ['No', 'One', 'Multi'])
+@pytest.mark.parametrize(('by', 'decimal'), [('\t', '.'), ('\t', ','), (';', ','), (',', '.')])
+def test_every_form_is_read(
+    tmp_path: Path, x: str, by: str, decimal: str, comment: str | None
+) -> None:
+    """Times in a column, for each channel, or in the heading; separators; units; a comment."""
+    path = labview(tmp_path / 'a.lvm', x=x, by=by, decimal=decimal, comment=comment)
+    check(path)
+    path.rename(tmp_path / 'a.txt')  # known by its first bytes
+    check(tmp_path / 'a.txt')
+    found = look(tmp_path / 'a.txt')
+    assert [column.unit for column in found.columns][-2:] == ['mm', 'um']
+
+
+def test_where_time_begins(tmp_path: Path) -> None:
+    """`X0` is later than the date; absolute times count from 1904; without a date from 0."""
+    check(labview(tmp_path / 'a.lvm', channels={'X0': ('0.5', '0.5')}), START + 500_000_000)
+    check(labview(tmp_path / 'a.lvm', x='One', first=0.5), START + 500_000_000)
+    for x, absolute in (('No', {'X0': ('3797575200.123',) * 2}), ('One', {})):
+        check(labview(tmp_path / 'a.lvm', x=x, first=3797575200.123, channels=absolute))
+    nothing = {'Date': '', 'Time': ''}
+    check(labview(tmp_path / 'a.lvm', file=nothing, channels=nothing), 0)
+
+
+@pytest.mark.parametrize(
+    ('changed', 'words'),
+    [
+        ({'Delta_X': ('0.002', '0.001')}, 'Delta_X differs between channels'),
+        ({'X0': ('0.0', '0.004')}, 'X0 differs between channels'),
+        ({'Time': ('10:00:00', '10:00:01')}, 'Time differs between channels'),
+        ({'X_Dimension': ('Frequency', 'Frequency')}, 'over Frequency, not over time'),
+        ({'Delta_X': ''}, 'Delta_X is .*no column of times'),
+    ],
+)
+def test_channels_without_a_common_clock_are_refused(
+    tmp_path: Path, changed: dict, words: str
+) -> None:
+    """Other steps, other starts, no time at all."""
+    with pytest.raises(InputError, match=words):
+        read(labview(tmp_path / 'a.lvm', channels=changed))
+
+
+def test_several_measurements_in_a_file_are_refused(tmp_path: Path) -> None:
+    """Each has a heading; rows of one that follows are no rows of the first."""
+    one = labview(tmp_path / 'a.lvm', file={'Multi_Headings': 'Yes'}).read_text()
+    check(tmp_path / 'a.lvm')
+    (tmp_path / 'a.lvm').write_text(one + one.partition('***End_of_Header***\t\n')[2])
+    with pytest.raises(InputError, match='several measurements'):
+        read(tmp_path / 'a.lvm')
+
+
+def test_text_that_is_only_called_so_is_text(tmp_path: Path) -> None:
+    """LabVIEW writes no heading where it is told so."""
+    rows = np.column_stack([np.arange(COUNT) * 2e-3, COMMAND, MEASURED])
+    head = 'time_s\tcommand_mm\tmeasured_um'
+    np.savetxt(tmp_path / 'a.lvm', rows, delimiter='\t', header=head, comments='')
+    check(tmp_path / 'a.lvm', 0)
+    assert look(tmp_path / 'a.lvm').what == 'delimited text'
