@@ -10,7 +10,7 @@ import math
 import zipfile
 from array import array
 from collections.abc import Iterable
-from datetime import UTC, datetime
+from datetime import UTC, datetime, time, timedelta
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -21,7 +21,7 @@ import numpy as np
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
 from actuator_glue.io.formats import Column, FileTable, Format, library, reading
-from actuator_glue.io.units import units_line
+from actuator_glue.io.units import bare, units_line
 from actuator_glue.records import Array
 
 _NAME = 'an Excel workbook (.xlsx)'
@@ -43,10 +43,13 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
                 first = _first_sample(head) if lines is None else lines
                 if first is None or not any(_is_number(v) for row in head[first:] for v in row):
                     continue
-                columns, skip = _columns(head, first), first
+                timed, skip = _timed(head[first:]), first
+                columns = _columns(head, first, timed)
                 rows = sheet.iter_rows(min_row=skip + 1, values_only=True)
-                table = _numbers(rows, len(columns), skip, path)
-                return FileTable(columns, {}, partial(_chosen, table))
+                table = _numbers(rows, [at in timed for at in range(len(columns))], skip, path)
+                return FileTable(
+                    columns, {}, partial(_chosen, table), entry=partial(_place, skip, columns)
+                )
         finally:
             book.close()
     raise InputError(f'{path}: no sheet with named columns of numbers in this workbook')
@@ -68,16 +71,31 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, (int, float)) and not isinstance(value, bool)
 
 
+def _is_time(value: Any) -> bool:
+    return isinstance(value, (datetime, time, timedelta))
+
+
 def _first_sample(head: list[tuple[Any, ...]]) -> int | None:
-    """Return the row from 0 of the first sample: most of its cells are numbers."""
+    """Return the row from 0 of the first sample: most of its cells are numbers or times."""
     for i, row in enumerate(head):
         filled = [v for v in row if v is not None]
-        if len(filled) >= 2 and sum(map(_is_number, filled)) > len(filled) / 2:
+        numbers = sum(map(_is_number, filled))
+        if numbers and numbers + sum(map(_is_time, filled)) > max(len(filled) / 2, 1):
             return i
     return None
 
 
-def _columns(head: list[tuple[Any, ...]], first: int) -> list[Column]:
+def _timed(rows: list[tuple[Any, ...]]) -> set[int]:
+    """Return the positions of columns whose first value is a date, a time of day or a duration."""
+    firsts: dict[int, Any] = {}
+    for row in rows:
+        for at, value in enumerate(row):
+            if value is not None:
+                firsts.setdefault(at, value)
+    return {at for at, value in firsts.items() if _is_time(value)}
+
+
+def _columns(head: list[tuple[Any, ...]], first: int, timed: set[int]) -> list[Column]:
     """Return the names above the first sample, with the units between where there are some."""
     texts = [[str(v).strip() if v is not None else '' for v in row] for row in head[:first]]
     above = [row for row in texts if any(row)][-2:]
@@ -86,14 +104,21 @@ def _columns(head: list[tuple[Any, ...]], first: int) -> list[Column]:
         units, above = found, above[:1]
     names = above[-1] if above else [str(i + 1) for i in range(len(head[first]))]
     units += [''] * (len(names) - len(units))
-    return [Column(n, n, u) for n, u in zip(names, units, strict=False)]
+    # Dates and times of day are seconds, whatever their column is called.
+    return [
+        Column(n, bare(n) if at in timed else n, 's' if at in timed else u)
+        for at, (n, u) in enumerate(zip(names, units, strict=False))
+    ]
 
 
-def _numbers(rows: Iterable[tuple[Any, ...]], width: int, skip: int, path: Path) -> Array:
-    """Return the cells below the head, shape (n, width); text and empty cells are NaN."""
-    read = array('d')
+def _numbers(rows: Iterable[tuple[Any, ...]], timed: list[bool], skip: int, path: Path) -> Array:
+    """Return the cells below the head, shape (n, width); text and empty cells are NaN.
+
+    So are times among numbers, and numbers among times.
+    """
+    read, width = array('d'), len(timed)
     for row in rows:
-        cells = [_number(v) for v in row[:width]]
+        cells = [_seconds(v) if t else _number(v) for v, t in zip(row, timed, strict=False)]
         read.extend(cells + [math.nan] * (width - len(cells)))
     table = np.frombuffer(read).reshape(-1, width)
     (filled,) = np.nonzero((~np.isnan(table)).any(axis=1))
@@ -102,14 +127,26 @@ def _numbers(rows: Iterable[tuple[Any, ...]], width: int, skip: int, path: Path)
     return table[: int(filled[-1]) + 1]  # formatted rows may follow
 
 
+def _place(skip: int, columns: list[Column], row: int, at: int) -> str:
+    return f'row {skip + row + 1} of column {columns[at].name!r}'
+
+
 def _chosen(table: Array, places: list[int]) -> list[Array]:
     return [table[:, at] for at in places]
 
 
 def _number(value: Any) -> float:
+    return float(value) if _is_number(value) else math.nan
+
+
+def _seconds(value: Any) -> float:
     if isinstance(value, datetime):
         return value.replace(tzinfo=UTC).timestamp()
-    return float(value) if _is_number(value) else math.nan
+    if isinstance(value, time):  # of a day
+        return (datetime.combine(datetime.min, value) - datetime.min).total_seconds()
+    if isinstance(value, timedelta):
+        return value.total_seconds()
+    return math.nan
 
 
 FORMAT = Format(('.xlsx',), _read, None, name=_NAME)
