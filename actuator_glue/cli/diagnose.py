@@ -130,6 +130,8 @@ def _load(args: argparse.Namespace) -> tuple[list[Record], list[Record]]:
 
 
 def _show(found: Diagnosis, args: argparse.Namespace) -> None:
+    from actuator_glue.report.quantity import plain, said_in
+
     say(found.summary(), args)
     e = found.error
     micro = [f'{1e6 * v:.2f}' for v in (e.before, *e.before_ci, e.after, *e.after_ci)]
@@ -148,13 +150,14 @@ def _show(found: Diagnosis, args: argparse.Namespace) -> None:
         rows = []
         for effect in found.effects:
             for i, (name, p) in enumerate(effect.parameters.items()):
+                factor, unit = said_in(p.unit, p.mean, p.stddev)
                 rows.append(
                     [
                         effect.name if i == 0 else '',
                         name,
-                        f'{p.mean:.4g}',
-                        f'{p.stddev:.2g}',
-                        p.unit,
+                        plain(factor * p.mean, 4),
+                        plain(factor * p.stddev, 2),
+                        unit or '-',
                         ', '.join(effect.alternatives) if i == 0 else '',
                     ]
                 )

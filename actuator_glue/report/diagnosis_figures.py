@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from actuator_glue.diagnosis.result import DiagnosisData, Trace
 from actuator_glue.records import Array, source_name
 from actuator_glue.report import style
+from actuator_glue.report.quantity import said_in
 from actuator_glue.report.style import (
     BAND,
     DETERMINISTIC,
@@ -24,6 +25,7 @@ from actuator_glue.report.style import (
 )
 
 BEFORE, AFTER = DETERMINISTIC, TOTAL
+NOISE = '#dddddd'
 _POINTS = 4000  # per line: more cannot be seen
 _SECONDS = 4.0  # of each periodogram that is averaged
 _SMOOTH = 0.02  # s, so that loops are seen through the noise
@@ -69,6 +71,46 @@ def _lines(trace: Trace, *columns: Array) -> Array:
     gap = np.full((1, len(columns)), np.nan)
     parts = [piece for part in stretches(trace) for piece in (table[part][::step], gap)]
     return np.vstack(parts).T
+
+
+@styled
+def residual_summary(found: DiagnosisData) -> Figure:
+    """Residual where both models differ most, before and after, with the noise; rms errors.
+
+    Both of held-out data.
+    """
+    trace = next(t for t in found.traces if t.held_out)
+    part, error = _differing(trace, _SECONDS), found.error
+    figure = new_figure(2.9)
+    left, right = figure.subplots(1, 2, width_ratios=(2.6, 1.0))
+    floor = 2e6 * error.noise_floor
+    left.axhspan(-floor, floor, color=NOISE, lw=0, label='noise (2 standard deviations)')
+    for side, color in _sides(found):
+        residual = 1e6 * (trace.measured[part] - getattr(trace, side)[part])
+        left.plot(trace.time[part], residual, color=color, lw=0.7, label=_text(found, side))
+    left.set_xlabel('time [s]')
+    left.set_ylabel('measured less model [um]')
+    left.set_title(_title(trace, 0.7 * style.WIDTH - 0.7))
+    bars = [
+        (_text(found, side), getattr(error, side), getattr(error, f'{side}_ci'), color)
+        for side, color in _sides(found)
+    ]
+    for at, (_, rms, (low, high), color) in enumerate(bars):
+        right.bar(at, 1e6 * rms, color=color, width=0.6)
+        if np.isfinite([low, high]).all():
+            right.plot([at, at], [1e6 * low, 1e6 * high], color=MEASURED, lw=1.2)
+        right.annotate(
+            f'{1e6 * rms:.1f}', (at, 1e6 * np.nanmax([rms, high])), (0, 2), ha='center',
+            va='bottom', textcoords='offset points',
+        )  # fmt: skip
+    right.axhspan(0.0, 1e6 * error.noise_floor, color=NOISE, lw=0, zorder=0.5)
+    right.set_xticks(range(len(bars)), [name.replace(', ', ',\n') for name, *_ in bars])
+    right.set_xlim(-0.6, len(bars) - 0.4)
+    right.margins(y=0.15)
+    right.set_ylabel('rms error [um]')
+    right.set_title('all held-out data')
+    _legend(figure, left)
+    return figure
 
 
 @styled
@@ -202,10 +244,11 @@ def posteriors(found: DiagnosisData) -> Figure:
     for unused in panels[len(names) :]:
         unused.set_visible(False)
     for axes, name, draws in zip(panels, names, found.posterior.T[4:], strict=False):
-        exponent = style.engineering(draws)
-        axes.hist(draws / 10.0**exponent, bins=40, color=BAND, density=True)
         unit = estimates[name].unit if name in estimates else ''
-        axes.set_xlabel(style.label(name, unit, exponent))
+        factor, unit = said_in(unit, draws)
+        exponent = style.engineering(factor * draws)
+        axes.hist(factor * draws / 10.0**exponent, bins=40, color=BAND, density=True)
+        axes.set_xlabel(style.label(name, unit or '-', exponent))
         axes.set_yticks([])
         axes.locator_params(axis='x', nbins=4)
     return figure
@@ -218,7 +261,7 @@ def bands(found: DiagnosisData) -> Figure:
     The lower panels show the same less the middle of the band.
     """
     trace = next(t for t in found.traces if t.held_out)
-    part = _second(trace)
+    part = _differing(trace, 1.0)
     t, measured = trace.time[part], trace.measured[part]
     figure = new_figure(4.2)
     looks = {'before': PUBLISHED, 'after': LIGHT_BAND}
@@ -246,9 +289,9 @@ def bands(found: DiagnosisData) -> Figure:
     return figure
 
 
-def _second(trace: Trace) -> slice:
-    """Return the second without a gap in which both models differ most."""
-    wanted = max(10, round(1.0 / float(np.median(np.diff(trace.time)))))
+def _differing(trace: Trace, seconds: float) -> slice:
+    """Return the stretch of a duration, without a gap, in which both models differ most."""
+    wanted = max(10, round(seconds / float(np.median(np.diff(trace.time)))))
     parts = stretches(trace)
     length = min(wanted, max(p.stop - p.start for p in parts))
     total = np.cumsum(np.append(0.0, (trace.before - trace.after) ** 2))

@@ -12,11 +12,21 @@ from actuator_glue.report import diagnosis_figures as figures
 from actuator_glue.report.diagnosis_summary import closing, summary
 from actuator_glue.report.html import Block, Note, Page, Picture, Section, Table, Text
 from actuator_glue.report.learned_figure import learned_terms
+from actuator_glue.report.quantity import plain, said_in, word
 
 _SAMPLERS = {
     'importance': '{effective_draws:.0f} effective draws by importance sampling, k {pareto_k:.2f}',
     'dream': '{effective_draws:.0f} effective draws by DREAM(ZS), R-hat {rhat:.3f}',
     'laplace': 'Laplace approximation',
+}
+
+
+_STATISTICS = {
+    'ljung_box_p': ('p-value of whiteness (Ljung-Box, 20 lags, least of the records)', 1.0),
+    'input_correlation': ('largest correlation with the command within 0.5 s', 1.0),
+    'even_share': ('share of variance that even functions of the motion explain [%]', 100.0),
+    'odd_share': ('share of variance that odd functions of the motion explain [%]', 100.0),
+    'trend': ('largest trend [um/s]', 1e6),
 }
 
 
@@ -65,19 +75,16 @@ def _error(found: DiagnosisData) -> Section:
 
 
 def _posterior(found: DiagnosisData) -> Table:
-    rows = [
-        [
-            e.name,
-            name,
-            f'{p.mean:.4g}',
-            f'{p.stddev:.2g}',
-            f'{p.lower:.4g} to {p.upper:.4g}',
-            p.unit,
-        ]
-        for e in found.effects
-        for name, p in e.parameters.items()
-    ]
-    header = ['effect', 'parameter', 'mean', 'sd', '95 % interval', 'unit']
+    rows = []
+    for e in found.effects:
+        meanings = {p.name: p.meaning for p in found.entry(e.name).parameters}
+        for name, p in e.parameters.items():
+            factor, unit = said_in(p.unit, p.mean, p.lower, p.upper)
+            numbers = [(p.mean, 4), (p.stddev, 2), (p.lower, 4), (p.upper, 4)]
+            mean, sd, low, high = (plain(factor * v, digits) for v, digits in numbers)
+            told = meanings.get(name, word(name))
+            rows.append([e.name, told, mean, sd, f'{low} to {high}', unit or '-'])
+    header = ['effect', 'size', 'mean', 'sd', '95 % interval', 'unit']
     return Table(header, rows, 'Posterior of the effects.')
 
 
@@ -145,7 +152,11 @@ def _effects(found: DiagnosisData) -> Section:
 
 def _residual(found: DiagnosisData) -> Section:
     a = found.alarm
-    tests = [[name, f'{value:.3g}'] for name, value in a.tests.items()]
+    tests = [
+        [text, plain(factor * a.tests[name])]
+        for name, (text, factor) in _STATISTICS.items()
+        if name in a.tests
+    ]
     rows = [
         [
             source_name(r['source']),
@@ -203,7 +214,8 @@ def _records(found: DiagnosisData) -> Section:
         for t in found.traces
     ]
     header = ['record', 'part', 'stiffness [kN/m]', 'samples', 'source']
-    return Section('Records', [Table(header, rows, 'What was read, and from where.', prose=True)])
+    table = Table(header, rows, 'What was read, and from where.', prose=True)
+    return Section('Records', [table, *(Note(line) for line in found.preparation)])
 
 
 def brief(found: DiagnosisData) -> list[Block]:
@@ -211,7 +223,8 @@ def brief(found: DiagnosisData) -> list[Block]:
     blocks: list[Block] = [Text(found.summary())]
     if found.effects:
         blocks.append(_posterior(found))
-    return [*blocks, *(Note(line) for line in found.advice)]
+    advice = [line for line in found.advice if line not in found.preparation]
+    return [*blocks, *(Note(line) for line in advice)]
 
 
 def page(found: DiagnosisData, tracking: Sequence[Block] = ()) -> Page:

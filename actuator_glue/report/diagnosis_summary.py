@@ -6,13 +6,17 @@ import math
 
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.result import DiagnosisData
-from actuator_glue.report.html import Block, Note, Section, Table, Text
+from actuator_glue.model.parameters import BASE
+from actuator_glue.report.diagnosis_figures import residual_summary
+from actuator_glue.report.html import Block, Note, Picture, Section, Table, Text
+from actuator_glue.report.quantity import percents, spread, word
 
 _MEANS = {
-    'none': 'Nothing material is missing.',
-    'missing-effect': 'The additions named are the whole story, as far as these records go.',
-    'unexplained': 'Material structure remains beside what is named.',
-    'undecided': 'Fitting and held-out records contradict each other.',
+    'none': 'The model is enough: nothing material is missing.',
+    'missing-effect': 'Something is missing, and what is named below is all of it as far as '
+    'these records go.',
+    'unexplained': 'Not explained: material structure remains beside what is named.',
+    'undecided': 'Not decided: fitting and held-out records contradict each other.',
 }
 _WORDS = (
     ('Eq. (2)', 'the linear model of the actuator with four parameters, without additions'),
@@ -48,18 +52,23 @@ def _range(pair: tuple[float, float], scale: float, digits: int = 1) -> str:
 
 
 def _certainty(found: DiagnosisData) -> list[Block]:
-    """How sure the names are."""
+    """What is missing, how large it is, and how sure the name is."""
     rows = []
     for e in found.effects:
         shown = [r for r in e.rivals if r.tied and r.name != e.name]
-        others = ', '.join(f'{r.name} {100 * r.probability:.0f} %' for r in shown)
-        known = math.isfinite(e.probability)
-        sure = f'{100 * e.probability:.0f} %' if known else 'a description, or noise: no name'
-        rows.append([e.name, sure, others or '-', f'{100 * e.none:.0f} %' if known else '-'])
+        sizes = ', '.join(f'{word(n)} {_estimate(p)}' for n, p in e.parameters.items())
+        if math.isfinite(e.probability):
+            known = [e.none] if math.isfinite(e.none) else []
+            own, *rest = percents([e.probability, *(r.probability for r in shown), *known])
+            others = [f'{r.name} {share} %' for r, share in zip(shown, rest, strict=False)]
+            none = f'{rest[-1]} %' if known else '-'
+            rows.append([e.name, sizes, f'{own} %', ', '.join(others) or '-', none])
+        else:
+            rows.append([e.name, sizes, 'a description, or noise: no name', '-', '-'])
     if not rows:
         return []
-    header = ['effect', 'probability', 'or', 'none of these']
-    return [Table(header, rows, 'How sure the names are.', prose=True)]
+    header = ['effect', 'size (95 % interval)', 'probability', 'or', 'none of these']
+    return [Table(header, rows, 'What is missing, and how sure its name is.', prose=True)]
 
 
 def _error(found: DiagnosisData) -> Table:
@@ -82,17 +91,18 @@ def _error(found: DiagnosisData) -> Table:
 def _estimate(p: Estimate | None) -> str:
     if p is None:
         return '-'
-    text = f'{p.mean:.4g} ({p.lower:.4g} to {p.upper:.4g})'
+    text = spread(p.mean, p.lower, p.upper, p.unit)
     return text if p.identified else f'{text}, not identified'
 
 
 def _parameters(found: DiagnosisData) -> Table:
+    meanings = {p.name: p.meaning for p in BASE}
     rows = [
-        [name, p.unit, _estimate(found.base_before.get(name)), _estimate(p)]
-        for name, p in found.base.items()
+        [word(n), meanings.get(n, ''), _estimate(found.base_before.get(n)), _estimate(p)]
+        for n, p in found.base.items()
     ]
-    header = ['parameter', 'unit', 'before', 'after']
-    return Table(header, rows, "Eq. (2)'s parameters, means and 95 % intervals.")
+    header = ['parameter', 'what it is', 'before', 'after']
+    return Table(header, rows, "Eq. (2)'s parameters: means, 95 % intervals.", prose=True)
 
 
 def _response(found: DiagnosisData) -> list[Block]:
@@ -125,10 +135,18 @@ def equation(found: DiagnosisData) -> str:
 
 
 def summary(found: DiagnosisData) -> Section:
-    """Return verdict, how sure, what next, errors, parameters, response and equation."""
-    blocks: list[Block] = [Text(f'{found.verdict}: {_MEANS[found.verdict]}')]
-    blocks += _certainty(found)
-    blocks += [Note(line) for line in found.advice]
+    """Return the verdict, the residual, what is missing, errors, what next, parameters."""
+    blocks: list[Block] = [
+        Text(_MEANS[found.verdict]),
+        Picture.of(
+            residual_summary(found),
+            'What the model leaves of held-out data, where both models differ most, and its rms '
+            'error over all of them; grey is noise, which no model explains.',
+        ),
+        _error(found),
+        *_certainty(found),
+        *(Note(line) for line in found.advice if line not in found.preparation),
+    ]
     if found.experiments:
         rows = [
             [e.text, f'{1e3 * e.amplitude:.2g}', f'{e.stiffness / 1e3:g}', f'{e.nats:.3g}']
@@ -136,17 +154,19 @@ def summary(found: DiagnosisData) -> Section:
         ]
         header = ['test', 'amplitude [mm]', 'k [kN/m]', 'nats expected']
         blocks.append(Table(header, rows, 'Tests that would tell tied names apart.', prose=True))
-    blocks.append(_error(found))
     if found.base:
         blocks.append(_parameters(found))
     blocks += _response(found)
-    blocks.append(Text(f'Model: {equation(found)}'))
-    return Section('In short', blocks)
+    return Section('The answer', blocks)
 
 
 def closing(found: DiagnosisData) -> list[Section]:
-    """Return the glossary and how the report was made."""
-    out = [Section('Glossary', [Table(['word', 'meaning'], _WORDS, 'Words.', prose=True)])]
+    """Return the model for programs, the glossary and how the report was made."""
+    model = Text(f'Names and SI units as programs have them: {equation(found)}')
+    out = [
+        Section('The model as text', [model]),
+        Section('Glossary', [Table(['word', 'meaning'], _WORDS, 'Words.', prose=True)]),
+    ]
     if found.provenance:
         rows = list(found.provenance.items())
         table = Table(['', 'value'], rows, 'How this was made.', prose=True)

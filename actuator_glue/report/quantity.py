@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -23,6 +24,28 @@ _SAID: dict[str, tuple[tuple[float, str, float], ...]] = {
     '1/m^2': ((0.0, '1/m^2', 1.0), (1e3, '1/mm^2', 1e-6)),
     '1': ((0.0, '', 1.0),),
 }
+
+
+_SYMBOLS = {
+    'beta_1': '\u03b2\u2081',
+    'alpha_1_beta_0': '\u03b1\u2081\u03b2\u2080',
+    'alpha_2': '\u03b1\u2082',
+    'alpha_3': '\u03b1\u2083',
+}
+
+
+def word(name: str) -> str:
+    """Return what a parameter or a number is called where people read: no key of a program."""
+    return _SYMBOLS.get(name, name.replace('_', ' '))
+
+
+def percents(shares: Sequence[float]) -> list[int]:
+    """Return shares of one whole in whole percent that add up as the shares do."""
+    exact = 100.0 * np.asarray(shares, dtype=np.float64)
+    low = np.floor(exact).astype(int)
+    most = np.argsort(low - exact, kind='stable')
+    low[most[: round(float(exact.sum())) - int(low.sum())]] += 1
+    return [int(value) for value in low]
 
 
 def said_in(unit: str, *values: ArrayLike) -> tuple[float, str]:
@@ -56,3 +79,10 @@ def plain(value: float, digits: int = 3) -> str:
     decimals = max(digits - 1 - math.floor(math.log10(abs(value))), 0)
     text = f'{value:.{decimals}f}'
     return text.rstrip('0').rstrip('.') if '.' in text else text
+
+
+def spread(mean: float, lower: float, upper: float, unit: str, digits: int = 4) -> str:
+    """Return a size with its interval as people say it: '41 um (40.2 to 41.9)'."""
+    factor, name = said_in(unit, mean, lower, upper)
+    low, high = (plain(factor * v, digits) for v in (lower, upper))
+    return f'{plain(factor * mean, digits)} {name}'.rstrip() + f' ({low} to {high})'

@@ -150,7 +150,7 @@ def test_lines_break_where_samples_were_held_out() -> None:
     for t in found.traces:
         part = figures._slow_part(t)
         assert np.diff(t.time[part]).max() < 1.5 / RATE
-        second = figures._second(t)
+        second = figures._differing(t, 1.0)
         assert t.time[second][-1] - t.time[second][0] < 1.0
 
 
@@ -225,3 +225,45 @@ def test_chains_that_stand_still_have_no_r_hat_and_a_report_all_the_same() -> No
     still = Draws(np.zeros((4, 2)), 'dream', 128).told()
     assert still['rhat'] is None
     assert diagnosis_report._drawn(still) == 'nan effective draws by DREAM(ZS), R-hat nan'
+
+
+def test_the_answer_comes_first_and_what_was_done_to_the_records_last() -> None:
+    """Verdict, picture of the residual, errors, what is missing, advice, parameters; sampling."""
+    sampling = tuple(f'record {i} at 1000 Hz is fitted at 250 Hz' for i in range(3))
+    base = {'alpha_2': Estimate(2.4e5, 1e3, 2.3e5, 2.5e5, 'N/m')}
+    found = diagnosis(6e-5)
+    finding = replace(found.effects[0], rivals=(), probability=0.9749)
+    found = replace(
+        found, effects=(finding,), base=base, base_before=base,
+        advice=('check the pins', *sampling), preparation=sampling,
+        alarm=replace(found.alarm, tests={'ljung_box_p': 0.5, 'trend': 2e-6}),
+    )  # fmt: skip
+    page = render(page_of(found))
+    lead, first = page.index('class="lead"'), page.index('<img')
+    assert lead < page.index('Something is missing') < first < page.index('<table')
+    text = re.sub(r'data:image/png;base64,[^"]*|<style.*?</style>', '', page, flags=re.DOTALL)
+    text = re.sub(r'<[^>]+>', ' ', text)
+    order = ['removable error removed', '60 um (54 to 66)', 'check the pins', '240 kN/m (230 to']
+    places = [text.index(words) for words in order]
+    assert places == sorted(places)
+    records = text.index('What was read, and from where')
+    assert all(text.index(line) > records and text.count(line) == 1 for line in sampling)
+    before_programs = text[: text.index('Names and SI units as programs have them')]
+    for key in ('alpha_2', 'ljung_box_p', 'missing-effect', 'e-05', 'e+05'):
+        assert key not in before_programs, key
+    assert 'largest trend [um/s]' in before_programs
+
+
+def test_the_first_picture_shows_residual_and_noise(overlapping_texts) -> None:
+    """Before and after over the same stretch of held-out data, and what noise makes of it."""
+    for play in (6e-5, 0.0):
+        found = diagnosis(play)
+        figure = drawn('residual_summary', found)
+        left, right = figure.axes
+        assert len(left.lines) == len(right.patches) - 1 == (2 if play else 1)
+        rms = [1e6 * found.error.before, 1e6 * found.error.after][: len(left.lines)]
+        assert [p.get_height() for p in right.patches][:-1] == pytest.approx(rms)
+        heights = [p.get_height() for p in left.patches]
+        assert heights == pytest.approx([4e6 * found.error.noise_floor])
+        assert any('noise' in t.get_text() for t in figure.legends[0].get_texts())
+        assert overlapping_texts(figure) == []

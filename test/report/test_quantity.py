@@ -2,11 +2,12 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.parameters import BASE, TABLE_2
-from actuator_glue.report.quantity import plain, said, said_in
+from actuator_glue.report.quantity import percents, plain, said, said_in, spread, word
 
 
 @pytest.mark.parametrize(
@@ -42,8 +43,8 @@ def test_every_unit_of_the_catalogue_keeps_its_value() -> None:
         for part, sign in zip(
             unit.replace('(', '').replace(')', '').split('/'), (1, -1), strict=False
         ):
-            for word in part.split():
-                base, _, power = word.partition('^')
+            for one in part.split():
+                base, _, power = one.partition('^')
                 if len(base) > 1 and base not in {'kg', 'Hz'}:
                     total *= in_si[base[0]] ** (sign * int(power or 1))
         return total
@@ -66,3 +67,25 @@ def test_numbers_are_plain() -> None:
         '0.5',
         '2e+07',
     ]
+
+
+def test_shares_of_a_whole_add_up() -> None:
+    """What was 98 % beside 3 % for none of these: together 100."""
+    assert percents([0.9751, 0.0249]) == [98, 2]
+    assert percents([0.975, 0.025]) in ([98, 2], [97, 3])
+    assert percents([0.335, 0.335, 0.33]) in ([34, 33, 33], [33, 34, 33])
+    assert percents([0.5, 0.2]) == [50, 20]  # names that are not shown have the rest
+    rng = np.random.default_rng(4)
+    for count in range(2, 9):
+        shares = rng.dirichlet(np.full(count, 0.4))
+        told = np.array(percents(shares))
+        assert told.sum() == 100
+        assert np.abs(told - 100 * shares).max() < 1.0
+
+
+def test_words_and_intervals() -> None:
+    """No key of a program, and one unit for a size and its interval."""
+    assert word('alpha_1_beta_0') == '\u03b1\u2081\u03b2\u2080'
+    assert word('coulomb_force') == 'coulomb force'
+    assert spread(4.25e-5, 4.2e-5, 4.3e-5, 'm') == '42.5 um (42 to 43)'
+    assert spread(9e-4, 4e-4, 2e-3, 'm') == '0.9 mm (0.4 to 2)'
