@@ -205,6 +205,7 @@ class EstimatorSettings:
             raise InputError(f'{source}: estimator settings are no JSON ({error})') from error
         if not isinstance(values, dict):
             raise InputError(f'{source}: estimator settings are no JSON object')
-        for name in ('start', 'definitions', 'carried'):  # belong to the model and the prior
+        # They belong to the model and the prior.
+        for name in ('start', 'definitions', 'carried', 'structures'):
             values.pop(name, None)
         return EstimatorSettings.from_mapping(values, source)

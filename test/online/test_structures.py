@@ -3,6 +3,7 @@
 import math
 import pickle
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,11 +16,12 @@ from actuator_glue.inference.choice import choose_model
 from actuator_glue.model.commands import noise
 from actuator_glue.model.parameters import NAMES
 from actuator_glue.model.structure import Structure
+from actuator_glue.online import conversion
 from actuator_glue.online.estimator import Estimator, Schedule
 from actuator_glue.online.job import WindowResult, run
 from actuator_glue.online.knowledge import Known
 from actuator_glue.online.playback import give, replay
-from actuator_glue.online.replay_comparison import differences
+from actuator_glue.online.replay_comparison import differences, published
 from actuator_glue.online.stream import Reweighed
 from actuator_glue.online.structures import Proposal, Proposed, moved, pooled, weights
 from actuator_glue.records import Record
@@ -173,6 +175,17 @@ def test_a_proposal_survives_its_way_through_a_bag_to_the_last_bit():
     assert again.structures[1].model.start[4] == SIZE
     with pytest.raises(InputError, match='cannot be read'):
         Proposal.from_json({'carried': [{}]}, 'a bag')
+
+
+def test_a_bag_tells_what_was_carried_from_which_window_on():
+    rng = np.random.default_rng(2)
+    draws = np.array([*THETA, SIZE]) * np.exp(0.01 * rng.standard_normal((80, 5)))
+    proposal = both(Known(Carried((*NAMES, 'backlash'), draws), 10**18 + 1, 10**18 + 7))
+    first = conversion.estimator_setup(SETTINGS, choose_model(), 0, 0)
+    later = conversion.estimator_setup(SETTINGS, proposal, 9, 1800)
+    live = published(('EstimatorSetup', SimpleNamespace(**f)) for f in (first, later))
+    assert live.settings == SETTINGS
+    assert live.models == [(0, choose_model()), (9, proposal)]
 
 
 def test_handed_sizes_are_the_prior_of_windows_that_they_have_not_seen():
