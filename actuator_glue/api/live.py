@@ -50,7 +50,7 @@ def concluded(found: Diagnosis, records: Sequence[Record], apply: bool | None = 
     left_open = found.verdict in ('unexplained', 'undecided') or any(
         effect.alternatives for effect in found.effects
     )
-    why_not = against(found)
+    why_not = against(found.verdict, found.effects, found.structure, found.error)
     if found.verdict == 'none':
         return Concluded(Proposal.of(choose_model()), '', left_open, apply)
     learned = ', '.join(term.name for term in found.learned)

@@ -8,12 +8,12 @@ import numpy as np
 
 from actuator_glue.diagnosis.completeness import Decision
 from actuator_glue.diagnosis.estimate import Estimate, Json
+from actuator_glue.diagnosis.held_out import HeldOutError
 from actuator_glue.diagnosis.homogeneity import Homogeneity
 from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.next_experiment import Experiment
 from actuator_glue.diagnosis.posterior import RHAT
 from actuator_glue.diagnosis.regression import Surrogate
-from actuator_glue.diagnosis.result import HeldOutError
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.verdict import excuse, misses
 from actuator_glue.inference.at_bound import Pressed

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_glue.diagnosis.estimate import Json
+from actuator_glue.diagnosis.held_out import Verdict
 from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.measured.measurement import Measured
 from actuator_glue.diagnosis.regression import Surrogate
-from actuator_glue.diagnosis.result import Verdict
 from actuator_glue.diagnosis.score import splits_of
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds

@@ -29,6 +29,7 @@ from actuator_glue.diagnosis import (
 from actuator_glue.diagnosis.detect import alarm_of
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.force import check_forces
+from actuator_glue.diagnosis.held_out import COMPLETE
 from actuator_glue.diagnosis.hold import with_the_right_hold
 from actuator_glue.diagnosis.learned import term as learned_term
 from actuator_glue.diagnosis.next_experiment import Experiment, ranked
@@ -148,7 +149,7 @@ def diagnose(
     open_ridge = ridge.left_open(space, after.model, scorer, after.theta)
     others = alternatives.alternatives(result)
     larger = final
-    if decision.verdict in verdict.COMPLETE:
+    if decision.verdict in COMPLETE:
         larger = companions.with_companions(result.selection, final)
     told = draws
     # Chains that met nowhere give no interval that anything beside, or in place, could widen.
@@ -167,9 +168,9 @@ def diagnose(
     judged = verdict.conclude(decision.verdict, bool(decision.names), error, found.material)
     if other is not None and any(map(learned_term.is_learned, final.structure.entries)):
         # A description of what another set-up explains with none describes the set-up.
-        judged = 'unexplained' if judged in verdict.COMPLETE else judged
-    setup = result.prepared.setup or (None if judged in verdict.COMPLETE else other)
-    if judged not in verdict.COMPLETE:
+        judged = 'unexplained' if judged in COMPLETE else judged
+    setup = result.prepared.setup or (None if judged in COMPLETE else other)
+    if judged not in COMPLETE:
         search, left = result.selection.search, decision.left
         form = model_form.open_form(search, final, left, space, scorer)
         mixed = model_form.widened(mixed, form, space, rng)
@@ -195,7 +196,7 @@ def diagnose(
         used = prior.used(known.components, known.quality, p_value)
     contradicted = advice.contradicted(error, found.material)
     beside = companions.sentences(final, larger, prepared.held, bool(contradicted))
-    if contradicted and not beside and decision.verdict in verdict.COMPLETE:
+    if contradicted and not beside and decision.verdict in COMPLETE:
         beside = companions.hint(result.selection, final, prepared.held)
     tell('done', 1.0)
     return DiagnosisData(

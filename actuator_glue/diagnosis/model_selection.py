@@ -4,98 +4,29 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import cached_property
 
-from actuator_glue.diagnosis import false_alarms, forecast, pairs, ranking, simplest
+from actuator_glue.diagnosis import false_alarms, pairs, ranking, simplest
 from actuator_glue.diagnosis.finding import Rival
+from actuator_glue.diagnosis.judge import Judge
 from actuator_glue.diagnosis.ranking import compare, removed, spokesman, standard_error, worth
-from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
+from actuator_glue.diagnosis.score import evidence
 from actuator_glue.diagnosis.search import Search, by_score
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.stages import EFFECTS, Progress
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
-from actuator_glue.inference.least_squares.fit import Fit
 
 # Rounds in which members may be swapped for better or simpler ones.
 _SWAPS = 4
 _SURE = 2.0  # standard errors over the blocks: what is less is not told apart
-# Of what matters: two that remove this share each remove what matters.
-_PART = 0.5**0.5
 
 
-class ModelSelection:
+class ModelSelection(Judge):
     """Beam search over effect sets on one data set."""
 
     def __init__(self, search: Search, settings: Thresholds, progress: Progress) -> None:
-        self.search, self.settings, self.progress = search, settings, progress
-        self.noise = self.first = self.material = 0.0
-        self.nats = settings.nats
-        self._known: tuple[Fit, tuple[float, float]] | None = None
-
-    def renoise(self, error_of: Trial | None = None) -> None:
-        """Take the noise from the residual of a structure (first: of the base)."""
-        fit = error_of.fit if error_of else self.search.base()
-        parts = splits_of(self.search.data, fit.error)
-        self.search.scorer = scorer = Scorer.of(self.search.data, parts)
-        left, self.noise = self._apart(fit)
-        self.first = self.first or left
-        self.material = self.settings.material(self.noise, self.search.scale().stroke)
-        self.search.scorer = replace(scorer, likely=left < self.material)
-
-    def left(self, trial: Trial) -> float:
-        """Rms structure that remains in the residual of a structure [m]."""
-        return self._apart(trial.fit)[0]
-
-    def _apart(self, fit: Fit) -> tuple[float, float]:
-        """Rms structure and noise of a residual [m].
-
-        A command that is as stationary as noise lets structure pass for noise: there a forecast
-        of samples that were not fitted says how much noise there is at most.
-        """
-        if self._known is not None and self._known[0] is fit:
-            return self._known[1]
-        data, scorer = self.search.data, self.search.scorer
-        splits = splits_of(data, fit.error)
-        if any(self._stationary) and scorer is not None:
-            theta = self.search.scale().theta
-            most = forecast.noise(data, scorer, theta, fit, self.settings.nats)
-            splits = [
-                replace(s, noise=min(s.noise, limit)) if asked else s
-                for s, limit, asked in zip(splits, most, self._stationary, strict=True)
-            ]
-        self._known = fit, pooled(data, splits)
-        return self._known[1]
-
-    @cached_property
-    def _stationary(self) -> list[bool]:
-        return forecast.stationary(self.search.data)
-
-    def rescored(self, trials: Sequence[Trial]) -> list[Trial]:
-        """Score with the present noise, best first."""
-        return sorted((self.search.trial(t.effects, t.added) for t in trials), key=by_score)
-
-    def better(self, larger: Trial, smaller: Trial, threshold: float, cost: float = 0.0) -> bool:
-        """Whether the larger structure is worth its parameters: significant and material.
-
-        Args:
-            larger: the structure that adds something.
-            smaller: the structure without it.
-            threshold: least rms error to be removed [m].
-            cost: nats to be gained beyond those of any addition.
-        """
-        extra = len(larger.fit.theta) - len(smaller.fit.theta)
-        nats = evidence(larger.scores, smaller.scores) - extra - cost
-        return removed(smaller, larger) >= threshold and nats >= self.nats
-
-    def part(self) -> float:
-        """Error that one of two effects must remove which matter only together [m]."""
-        return _PART * self.material
-
-    def least(self, larger: Trial, smaller: Trial) -> float:
-        """Error that a member must remove [m]: less where it makes what is left immaterial."""
-        completes = self.left(larger) < self.material <= self.left(smaller)
-        return self.part() if completes else self.material
+        super().__init__(search, settings)
+        self.progress = progress
 
     def extend(self, beam: Sequence[Trial], stage: int) -> list[Trial]:
         """Refit every structure of the beam with its most promising further effects."""

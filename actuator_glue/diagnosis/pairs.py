@@ -10,18 +10,15 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuator_glue.diagnosis.candidates import FAULTS, FEEDBACK
 from actuator_glue.diagnosis.finding import BESIDE, Rival
+from actuator_glue.diagnosis.judge import Judge
 from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.search import Search
-from actuator_glue.diagnosis.transducer import FAULTS, FEEDBACK
 from actuator_glue.diagnosis.trial import Trial
-
-if TYPE_CHECKING:
-    from actuator_glue.diagnosis.model_selection import ModelSelection
 
 
 def price(count: int) -> float:
@@ -65,7 +62,7 @@ def rivals(
 
 
 def ahead(
-    selection: ModelSelection,
+    judge: Judge,
     current: Trial,
     name: str,
     row: Sequence[Rival],
@@ -78,31 +75,29 @@ def ahead(
     only together they must be material.
 
     Args:
-        selection: what judges.
+        judge: what judges.
         current: the structure with the effect.
         name: the effect.
         row: weights of all its rivals.
         two: pairs refitted in its place.
     """
     known = {r.name: r.weight for r in row}
-    least = math.exp(selection.settings.tie_nats) * known[name]
-    cost, material = price(len(selection.search.names)), selection.material
-    better = (
-        t for t in two if known[t.added] > least or selection.better(t, current, material, cost)
-    )
-    return [t for t in sorted(better, key=lambda t: -known[t.added]) if both_worth(selection, t)]
+    least = math.exp(judge.settings.tie_nats) * known[name]
+    cost, material = price(len(judge.search.names)), judge.material
+    better = (t for t in two if known[t.added] > least or judge.better(t, current, material, cost))
+    return [t for t in sorted(better, key=lambda t: -known[t.added]) if both_worth(judge, t)]
 
 
-def both_worth(selection: ModelSelection, pair: Trial) -> bool:
+def both_worth(judge: Judge, pair: Trial) -> bool:
     """Whether each of a pair that was added last is significant beside the other."""
     names = pair.added.split(BESIDE)
-    return all(selection.better(pair, selection.search.without(pair, n), 0.0) for n in names)
+    return all(judge.better(pair, judge.search.without(pair, n), 0.0) for n in names)
 
 
-def whole(selection: ModelSelection, trial: Trial, best: Trial) -> bool:
+def whole(judge: Judge, trial: Trial, best: Trial) -> bool:
     """Whether a structure is a pair that leaves nothing material, and less than another."""
     less = BESIDE in trial.added and trial.mean_square < best.mean_square
-    return less and selection.left(trial) < selection.material
+    return less and judge.left(trial) < judge.material
 
 
 def screened(

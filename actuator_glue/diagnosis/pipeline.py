@@ -21,6 +21,7 @@ from actuator_glue.diagnosis import (
     together,
     transducer,
 )
+from actuator_glue.diagnosis.candidates import mean_effects
 from actuator_glue.diagnosis.completeness import Decision, decide
 from actuator_glue.diagnosis.measured import hum
 from actuator_glue.diagnosis.measured.hum import Line
@@ -38,13 +39,6 @@ from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.each import Each
 from actuator_glue.inference.least_squares.fit import fit
-from actuator_glue.model.effects import CATALOGUE
-
-
-def mean_effects(reserved: bool = False) -> tuple[str, ...]:
-    """Return the effects with a mean response; measurement.py and hum.py find the others."""
-    names = CATALOGUE.searched(reserved)
-    return tuple(n for n in names if CATALOGUE[n].variance is None and n != 'hum')
 
 
 @dataclass(frozen=True)

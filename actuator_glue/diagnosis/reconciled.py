@@ -13,8 +13,8 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
+from actuator_glue.diagnosis.held_out import HeldOutError
 from actuator_glue.diagnosis.ranking import standard_error
-from actuator_glue.diagnosis.result import HeldOutError
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.verdict import misses, takes_nothing
 from actuator_glue.diagnosis.verify import Side

@@ -3,19 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
 
 from actuator_glue.diagnosis import pairs, ranking
 from actuator_glue.diagnosis.finding import Rival
+from actuator_glue.diagnosis.judge import Judge
 from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.trial import Trial
 
-if TYPE_CHECKING:
-    from actuator_glue.diagnosis.model_selection import ModelSelection
-
 
 def instead(
-    selection: ModelSelection,
+    judge: Judge,
     current: Trial,
     rivals: Mapping[str, Sequence[Rival]],
     complete: bool,
@@ -23,7 +20,7 @@ def instead(
     """Take a rival that these data cannot tell from a member: simpler, or names for it.
 
     Args:
-        selection: what judges.
+        judge: what judges.
         current: the structure.
         rivals: of each member, best first.
         complete: whether it leaves nothing material.
@@ -32,23 +29,21 @@ def instead(
         The structure with the rival in the member's place; the same object where there is none.
     """
     for name, row in rivals.items():
-        two = [r for r in row if len(r.effects) > 1 and is_learned(selection.search.entries[name])]
+        two = [r for r in row if len(r.effects) > 1 and is_learned(judge.search.entries[name])]
         one = [r for r in row if len(r.effects) == 1 and r.name != name]
         for rival in (*one, *sorted(two, key=lambda r: -r.weight)):
-            if not (rival.tied and _says_the_same(selection, current, name, rival, complete)):
+            if not (rival.tied and _says_the_same(judge, current, name, rival, complete)):
                 continue
             others = (n for n in current.effects if n != name)
-            trial = selection.search.trial((*others, *rival.effects), rival.name)
-            if len(rival.effects) == 1 or pairs.both_worth(selection, trial):
+            trial = judge.search.trial((*others, *rival.effects), rival.name)
+            if len(rival.effects) == 1 or pairs.both_worth(judge, trial):
                 return trial
     return current
 
 
-def _says_the_same(
-    selection: ModelSelection, current: Trial, name: str, rival: Rival, complete: bool
-) -> bool:
+def _says_the_same(judge: Judge, current: Trial, name: str, rival: Rival, complete: bool) -> bool:
     """Whether a rival is simpler and as good, or names what is described."""
-    search, settings, material = selection.search, selection.settings, selection.material
+    search, settings, material = judge.search, judge.settings, judge.material
     size = {n: len(search.entries[n].parameters) for n in (name, *rival.effects)}
     fewer = sum(size[n] for n in rival.effects) < size[name]
     alike = complete and rival.nats < settings.tie_nats

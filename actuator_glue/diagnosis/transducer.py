@@ -8,17 +8,12 @@ apart, so the loop is asked for together with one.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
 
+from actuator_glue.diagnosis.candidates import FAULTS, FEEDBACK
+from actuator_glue.diagnosis.model_selection import ModelSelection
+from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
 
-if TYPE_CHECKING:
-    from actuator_glue.diagnosis.model_selection import ModelSelection
-    from actuator_glue.diagnosis.selection import Selection
-
-FEEDBACK = 'sensor-feedback'
-# A bias or a drift inside of the loop leaves nothing in the record but the way there.
-FAULTS = ('backlash', 'sensor-curve', 'sensor-lag')
 _OWN = 2  # parameters: of the least fault and of the share that is fed back
 
 

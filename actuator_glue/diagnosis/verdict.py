@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
+from actuator_glue.diagnosis.finding import Finding
+from actuator_glue.diagnosis.held_out import HeldOutError, Verdict
 from actuator_glue.diagnosis.thresholds import Thresholds
 
-if TYPE_CHECKING:
-    from actuator_glue.diagnosis.finding import Finding
-    from actuator_glue.diagnosis.result import DiagnosisData, HeldOutError, Verdict
-
-COMPLETE = ('none', 'missing-effect')  # verdicts that leave nothing material
 _LATER = Thresholds().later_share  # of what was removed: less is small change
 _FAR = 2.0  # times the noise's mean square: less than half of the held-out error is noise then
 _SOME = 0.5  # of what matters, removed in the held-out part by what was added
@@ -173,17 +170,25 @@ def _share_reached(error: HeldOutError) -> float:
     return (without**2 - error.least**2) / (without**2 - floor**2)
 
 
-def against(found: DiagnosisData) -> str:
+def against(
+    verdict: Verdict, effects: Sequence[Finding], structure: Sequence[str], error: HeldOutError
+) -> str:
     """Say why an estimator should not go on with the augmented model; empty where it may.
 
     Additions of one record only are no property of the machine; what the held-out part does not
     bear out would make forecasts worse.
+
+    Args:
+        verdict: of both parts.
+        effects: the additions.
+        structure: names of the augmented model's effects.
+        error: held-out error before and after.
     """
-    own = [e.name for e in found.effects if e.records]
-    if found.verdict not in ('missing-effect', 'unexplained') or not found.structure:
+    own = [e.name for e in effects if e.records]
+    if verdict not in ('missing-effect', 'unexplained') or not structure:
         return 'nothing is supported that could be added'
     if own:
         return f'{", ".join(own)} acts in one record only'
-    if not found.error.removed_ci[0] > 0.0:
+    if not error.removed_ci[0] > 0.0:
         return 'the error that it removes in the held-out part does not exclude zero'
     return ''

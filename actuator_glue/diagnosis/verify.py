@@ -8,9 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.diagnosis import zero
+from actuator_glue.diagnosis.held_out import HeldOutError
 from actuator_glue.diagnosis.measured import hum
 from actuator_glue.diagnosis.measured.hum import Line
-from actuator_glue.diagnosis.result import HeldOutError, Trace
+from actuator_glue.diagnosis.result import Trace
 from actuator_glue.diagnosis.score import BLOCK, pooled, splits_of
 from actuator_glue.diagnosis.spread import spread
 from actuator_glue.inference.least_squares.data import Data

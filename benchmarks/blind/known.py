@@ -43,8 +43,8 @@ def intervals(seed: int, generator: str, evaluations: int) -> list[Interval]:
     from equivalents import OTHERWISE
 
     from actuator_glue.diagnosis import posterior
+    from actuator_glue.diagnosis.candidates import mean_effects
     from actuator_glue.diagnosis.discrepancy import beside, responses
-    from actuator_glue.diagnosis.pipeline import mean_effects
     from actuator_glue.diagnosis.preparation import prepare
     from actuator_glue.diagnosis.ridge import left_open
     from actuator_glue.diagnosis.score import Scorer, pooled, splits_of

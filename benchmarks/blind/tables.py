@@ -27,7 +27,7 @@ from equivalents import catalogued
 from reliability import answers
 from score import share
 
-from actuator_glue.diagnosis.pipeline import mean_effects
+from actuator_glue.diagnosis.candidates import mean_effects
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.structure import Structure

@@ -5,7 +5,7 @@ import pytest
 from scipy import signal
 
 from actuator_glue.diagnosis import discrepancy, posterior
-from actuator_glue.diagnosis.pipeline import mean_effects
+from actuator_glue.diagnosis.candidates import mean_effects
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.inference.least_squares.data import Data

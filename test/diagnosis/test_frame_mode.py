@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from actuator_glue.diagnosis.candidates import mean_effects
 from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.model_selection import ModelSelection
-from actuator_glue.diagnosis.pipeline import mean_effects
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.inference.least_squares.data import Data

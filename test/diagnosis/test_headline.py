@@ -12,7 +12,8 @@ from actuator_glue.cli.main import main
 from actuator_glue.diagnosis.advice import contradicted, zeros
 from actuator_glue.diagnosis.finding import Finding, Rival
 from actuator_glue.diagnosis.headline import headline
-from actuator_glue.diagnosis.result import Alarm, DiagnosisData, HeldOutError, Verdict
+from actuator_glue.diagnosis.held_out import HeldOutError, Verdict
+from actuator_glue.diagnosis.result import Alarm, DiagnosisData
 from actuator_glue.diagnosis.verdict import against, certainty, conclude, misses, named
 from actuator_glue.diagnosis.wrong_setup import WrongSetup
 
@@ -227,16 +228,21 @@ def test_a_record_with_a_zero_of_its_own_contradicts_nothing() -> None:
     assert [row['after_without_zero'] for row in rows] == [10e-6, 13e-6]
 
 
+def refused(found: DiagnosisData) -> str:
+    """Why an estimator should not go on with what was found."""
+    return against(found.verdict, found.effects, found.structure, found.error)
+
+
 def test_only_what_the_held_out_part_bears_out_is_applied() -> None:
     """And what is a property of the machine: of all records."""
     effect = finding('backlash')
     good = replace(diagnosis('missing-effect', 40e-6, 10e-6, effect), structure=('backlash',))
-    assert against(good) == ''
-    assert 'one record' in against(replace(good, effects=(replace(effect, records=('a',)),)))
+    assert refused(good) == ''
+    assert 'one record' in refused(replace(good, effects=(replace(effect, records=('a',)),)))
     doubtful = replace(good.error, removed_ci=(-0.1, 0.5))
-    assert 'exclude zero' in against(replace(good, error=doubtful))
-    assert against(replace(good, verdict='undecided'))
-    assert against(diagnosis('none', 10e-6, 10e-6))
+    assert 'exclude zero' in refused(replace(good, error=doubtful))
+    assert refused(replace(good, verdict='undecided'))
+    assert refused(diagnosis('none', 10e-6, 10e-6))
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,8 @@ from scipy import signal
 from trials import ENTRIES, THETA, trial
 
 from actuator_glue.diagnosis import learning
+from actuator_glue.diagnosis.candidates import mean_effects
 from actuator_glue.diagnosis.model_selection import ModelSelection
-from actuator_glue.diagnosis.pipeline import mean_effects
 from actuator_glue.diagnosis.ranking import standard_error
 from actuator_glue.diagnosis.score import Scorer, pooled, splits_of
 from actuator_glue.diagnosis.search import Search

@@ -10,8 +10,8 @@ from scipy import stats
 
 from actuator_glue.diagnosis import false_alarms, ranking, verdict
 from actuator_glue.diagnosis.finding import Rival
+from actuator_glue.diagnosis.held_out import HeldOutError
 from actuator_glue.diagnosis.ranking import standard_error, weights
-from actuator_glue.diagnosis.result import HeldOutError
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
@@ -167,8 +167,10 @@ def test_held_out_records_that_contradict_lower_the_certainty() -> None:
     """Names that leave three times the noise where nothing was fitted are not certain."""
     error = HeldOutError(95e-6, (0, 1), 31e-6, (25e-6, 37e-6), 10e-6, 0.9, (0.8, 1.0), 95e-6)
     assert verdict.certainty(0.95, error, 5e-6) == pytest.approx(0.9)
-    # What one stretch of it shows alone is none of that.
-    assert verdict.certainty(0.95, replace(error, after_ci=(9e-6, 50e-6)), 5e-6) == 0.95
+    # What one stretch of it shows alone is none of that, unless it is far above the noise.
+    stretch = replace(error, after=13e-6, after_ci=(9e-6, 20e-6))
+    assert verdict.certainty(0.95, stretch, 5e-6) == 0.95
+    assert verdict.certainty(0.95, replace(error, after_ci=(9e-6, 50e-6)), 5e-6) == 0.9
     good = replace(error, after=11e-6, removable_removed=0.99)
     assert verdict.certainty(0.95, good, 5e-6) == 0.95
     # A verdict that says the held-out part does not ask for the name gives it no probability.

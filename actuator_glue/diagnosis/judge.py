@@ -1,0 +1,101 @@
+"""What a structure leaves beside the noise, and whether a larger one is worth its parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import cached_property
+
+from actuator_glue.diagnosis import forecast
+from actuator_glue.diagnosis.ranking import removed
+from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
+from actuator_glue.diagnosis.search import Search, by_score
+from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.inference.least_squares.fit import Fit
+
+# Of what matters: two that remove this share each remove what matters.
+_PART = 0.5**0.5
+
+
+class Judge:
+    """Noise, and what matters beside it, of the structures that a search has refitted.
+
+    Attributes:
+        search: the structures.
+        settings: thresholds.
+        noise: rms of what no structure explains [m].
+        first: rms structure of the residual of Eq. (2) [m].
+        material: least rms error that matters [m].
+        nats: evidence that any addition must have.
+    """
+
+    def __init__(self, search: Search, settings: Thresholds) -> None:
+        self.search, self.settings = search, settings
+        self.noise = self.first = self.material = 0.0
+        self.nats = settings.nats
+        self._known: tuple[Fit, tuple[float, float]] | None = None
+
+    def renoise(self, error_of: Trial | None = None) -> None:
+        """Take the noise from the residual of a structure (first: of the base)."""
+        fit = error_of.fit if error_of else self.search.base()
+        parts = splits_of(self.search.data, fit.error)
+        self.search.scorer = scorer = Scorer.of(self.search.data, parts)
+        left, self.noise = self._apart(fit)
+        self.first = self.first or left
+        self.material = self.settings.material(self.noise, self.search.scale().stroke)
+        self.search.scorer = replace(scorer, likely=left < self.material)
+
+    def left(self, trial: Trial) -> float:
+        """Rms structure that remains in the residual of a structure [m]."""
+        return self._apart(trial.fit)[0]
+
+    def _apart(self, fit: Fit) -> tuple[float, float]:
+        """Rms structure and noise of a residual [m].
+
+        A command that is as stationary as noise lets structure pass for noise: there a forecast
+        of samples that were not fitted says how much noise there is at most.
+        """
+        if self._known is not None and self._known[0] is fit:
+            return self._known[1]
+        data, scorer = self.search.data, self.search.scorer
+        splits = splits_of(data, fit.error)
+        if any(self._stationary) and scorer is not None:
+            theta = self.search.scale().theta
+            most = forecast.noise(data, scorer, theta, fit, self.settings.nats)
+            splits = [
+                replace(s, noise=min(s.noise, limit)) if asked else s
+                for s, limit, asked in zip(splits, most, self._stationary, strict=True)
+            ]
+        self._known = fit, pooled(data, splits)
+        return self._known[1]
+
+    @cached_property
+    def _stationary(self) -> list[bool]:
+        return forecast.stationary(self.search.data)
+
+    def rescored(self, trials: Sequence[Trial]) -> list[Trial]:
+        """Score with the present noise, best first."""
+        return sorted((self.search.trial(t.effects, t.added) for t in trials), key=by_score)
+
+    def better(self, larger: Trial, smaller: Trial, threshold: float, cost: float = 0.0) -> bool:
+        """Whether the larger structure is worth its parameters: significant and material.
+
+        Args:
+            larger: the structure that adds something.
+            smaller: the structure without it.
+            threshold: least rms error to be removed [m].
+            cost: nats to be gained beyond those of any addition.
+        """
+        extra = len(larger.fit.theta) - len(smaller.fit.theta)
+        nats = evidence(larger.scores, smaller.scores) - extra - cost
+        return removed(smaller, larger) >= threshold and nats >= self.nats
+
+    def part(self) -> float:
+        """Error that one of two effects must remove which matter only together [m]."""
+        return _PART * self.material
+
+    def least(self, larger: Trial, smaller: Trial) -> float:
+        """Error that a member must remove [m]: less where it makes what is left immaterial."""
+        completes = self.left(larger) < self.material <= self.left(smaller)
+        return self.part() if completes else self.material
