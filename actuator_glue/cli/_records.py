@@ -22,7 +22,7 @@ def add_records(parser: argparse.ArgumentParser) -> None:
 
 
 def add_reading(parser: argparse.ArgumentParser) -> None:
-    """Add --stiffness, --channels, --hold and --split."""
+    """Add --stiffness, --channels, --hold, --resample and --split."""
     parser.add_argument(
         '--stiffness',
         action='append',
@@ -39,6 +39,13 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
         choices=('zoh', 'linear'),
         help='how the command runs between its samples; wins over what a file says '
         '(a wrong one is a delay of half a sample)',
+    )
+    parser.add_argument(
+        '--resample',
+        type=number,
+        metavar='HZ',
+        help='make the jittered clock of a file even by straight lines between its samples; what '
+        'is lost is told beside the record',
     )
     parser.add_argument(
         '--split',
@@ -61,6 +68,7 @@ def load(args: argparse.Namespace) -> list[Record]:
         stiffness=args.stiffness,
         channels=args.channels,
         hold=args.hold,
+        resample=args.resample,
         gap=note if args.split else None,
         warn=note,
     )

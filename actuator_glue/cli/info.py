@@ -48,6 +48,7 @@ def run(args: argparse.Namespace) -> int:
                 stiffness=args.stiffness,
                 channels=args.channels,
                 hold=args.hold,
+                resample=args.resample,
                 note=lambda _: None,
                 gap=note if args.split else content['damage'].append,
                 warn=content['warnings'].append,

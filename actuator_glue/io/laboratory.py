@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+from collections.abc import Callable
 from pathlib import Path
 from typing import cast
 
@@ -10,6 +12,7 @@ import numpy as np
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import Channel, ChannelMap, read_channel_map
 from actuator_glue.io.formats import Column, FileTable, format_of
+from actuator_glue.io.resample import resample_evenly
 from actuator_glue.io.signature import refuse_pipe
 from actuator_glue.io.time_base import uniform_period
 from actuator_glue.io.units import ROLES, choose, factor, recognise
@@ -27,6 +30,8 @@ def read(
     stiffness: float | None = None,
     hold: Hold | None = None,
     actuator: str | None = None,
+    resample: float | None = None,
+    warn: Callable[[str], None] = warnings.warn,
 ) -> Record:
     """Return the record of a laboratory file.
 
@@ -37,6 +42,10 @@ def read(
         stiffness: specimen stiffness [N/m]; None for what map or file say.
         hold: how the command runs between its samples; None for what map or file say, else zoh.
         actuator: name of the actuator; None for what map or file say.
+        resample: samples per second [Hz] to which a jittered clock is made even by straight lines;
+            None where an uneven clock is refused. The record's source tells it, and its command
+            runs straight between samples where nothing else is given.
+        warn: called with a line that tells what resampling cost.
 
     Raises:
         InputError: the file cannot be used; the message says what, where and what to do.
@@ -52,13 +61,27 @@ def read(
     notes: dict[str, str] = {}
     if channels is not None:
         values, period, start_ns = _mapped(path, channels)
-        notes = {'hold': channels.hold or 'zoh', 'actuator': channels.actuator}
+        said = {'hold': channels.hold, 'actuator': channels.actuator}
+        notes = {name: text for name, text in said.items() if text is not None}
         stiffness = channels.stiffness if stiffness is None else stiffness
     else:
         values, notes, period, start_ns = _by_name(path)
         if stiffness is None:
             stiffness = _noted_stiffness(notes, path)
     first = float(values['time'][0]) if 'time' in values else 0.0
+    source = str(path)
+    if period is None:
+        try:
+            period = uniform_period(values['time'], source)
+        except InputError:
+            if resample is None:
+                raise
+            made = resample_evenly(values, resample, source)
+            values, period = made.values, made.period
+            warn(f'{path}: {made.told()}')
+            source, notes = f'{path} ({made.name()})', {'hold': 'linear', **notes}
+    elif resample is not None:
+        raise InputError(f'{path}: no column of times is used, so there is nothing to resample')
     for column in values.values():
         column.flags.writeable = False  # nobody else has them: the record need not copy them
     # Record refuses another.
@@ -72,7 +95,7 @@ def read(
         start_ns=max(start_ns + round(first * 1e9), 0),
         hold=chosen,
         actuator=actuator or notes.get('actuator', 'actuator'),
-        source=str(path),
+        source=source,
     )
 
 
@@ -84,8 +107,11 @@ def _noted_stiffness(notes: dict[str, str], path: Path) -> float | None:
         raise InputError(f'{path}: stiffness_N_per_m = {text!r} is not a number') from error
 
 
-def _by_name(path: Path) -> tuple[dict[str, Array], dict[str, str], float, int]:
-    """Return channels in SI units by the names of their columns, notes, period and start [ns]."""
+def _by_name(path: Path) -> tuple[dict[str, Array], dict[str, str], float | None, int]:
+    """Return channels in SI units by the names of their columns, notes, period and start [ns].
+
+    There is no period where times say it.
+    """
     table = format_of(path).read(path, None)
     labels, units = [c.label for c in table.columns], [c.unit for c in table.columns]
     columns = choose(labels, units, str(path), timed=table.period is not None)
@@ -98,14 +124,14 @@ def _by_name(path: Path) -> tuple[dict[str, Array], dict[str, str], float, int]:
         }
     notes, period, start_ns = table.notes, table.period, table.start_ns
     del raw, table  # a long file's columns as they were read are not held beside these
-    if 'time' in values:
-        return values, notes, uniform_period(values['time'], str(path)), start_ns
-    assert period is not None  # or `choose` had missed the times
-    return values, notes, period, start_ns
+    return values, notes, None if 'time' in values else period, start_ns
 
 
-def _mapped(path: Path, channels: ChannelMap) -> tuple[dict[str, Array], float, int]:
-    """Return channels in SI units, rest offsets removed, the period and the start [ns]."""
+def _mapped(path: Path, channels: ChannelMap) -> tuple[dict[str, Array], float | None, int]:
+    """Return channels in SI units, rest offsets removed, the period and the start [ns].
+
+    There is no period where times say it.
+    """
     roles = channels.roles()
     table = format_of(path).read(path, channels)
     raw, counter = _raw(path, channels, roles, table)
@@ -115,7 +141,7 @@ def _mapped(path: Path, channels: ChannelMap) -> tuple[dict[str, Array], float, 
     if channels.rate is not None:
         _check_rate(channels.rate, values.get('time'), table, path)
         return values, 1.0 / channels.rate, table.start_ns
-    return values, uniform_period(values['time'], str(path)), table.start_ns
+    return values, None, table.start_ns
 
 
 def _check_rate(rate: float, time: Array | None, table: FileTable, path: Path) -> None:

@@ -21,6 +21,7 @@ def load(
     stiffness: float | None = None,
     channels: ChannelMap | Path | str | None = None,
     hold: Hold | None = None,
+    resample: float | None = None,
 ) -> Record:
     """Return the one record of a bag or laboratory file.
 
@@ -29,11 +30,14 @@ def load(
         stiffness: specimen stiffness [N/m]; None for what the file says.
         channels: channel map for a laboratory file, or one of topics for a bag.
         hold: how the command runs between its samples; None for what the file says.
+        resample: samples per second [Hz] to which a jittered clock of a file is made even.
 
     Raises:
         InputError: the file cannot be used, or holds several records.
     """
-    found = load_records(path, stiffness=stiffness, channels=channels, hold=hold)
+    found = load_records(
+        path, stiffness=stiffness, channels=channels, hold=hold, resample=resample
+    )
     if len(found) > 1:
         raise InputError(f'{path} holds {len(found)} records; `load_records` returns them all')
     return found[0]
@@ -45,6 +49,7 @@ def load_records(
     stiffness: Sequence[float] | float | None = None,
     channels: ChannelMap | Path | str | None = None,
     hold: Hold | None = None,
+    resample: float | None = None,
     note: Note = refuse,
     gap: Note | None = None,
     warn: Note = warn_caller,
@@ -57,10 +62,13 @@ def load_records(
             None for what the files say. What is given wins over what the files say.
         channels: channel map for the laboratory files, or for bags where it names topics.
         hold: how the command runs between its samples; None for what the files say.
+        resample: samples per second [Hz] to which the jittered clock of a file is made even by
+            straight lines; an even one is left as it is. The record's source tells it.
         note: called with one line per damage of a bag; the default raises it.
         gap: called with one line where a bag lacks samples or its clock jumps, and is split
             there; the default raises.
-        warn: called with one line per set-up of a bag that cannot be used; the rest is.
+        warn: called with one line per set-up of a bag that cannot be used; the rest is; and
+            with what resampling cost.
 
     Raises:
         InputError: a path cannot be used, its rate or stroke is none of a servo-hydraulic test, or
@@ -76,12 +84,17 @@ def load_records(
         channels = replace(channels, hold=hold)
     groups: list[list[Record]] = []
     for path in paths:
+        if resample is not None and is_bag(path):
+            raise InputError(f'{path}: the samples of a bag are counted; only files are resampled')
         if is_bag(path) and channels is not None and channels.topics:
             groups.append(read_mapped(path, channels, note=note, gap=gap, warn=warn))
         elif is_bag(path):
             groups.append(read_records(path, note=note, gap=gap, warn=warn))
         else:
-            groups.append([laboratory.read(path, channels=channels, hold=hold)])
+            record = laboratory.read(
+                path, channels=channels, hold=hold, resample=resample, warn=warn
+            )
+            groups.append([record])
     records = [record for group in groups for record in group]
     for record in records:
         record.check_scale()

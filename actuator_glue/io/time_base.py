@@ -61,7 +61,8 @@ def uniform_period(time: Array, where: str) -> float:
         if not off[at] <= rounding < period:
             raise InputError(
                 f'{where}: samples are not uniform in time: the clock is jittered, its steps are '
-                f'{span(steps)}; a record has even steps: resample it first, or log with the '
+                f'{span(steps)}; a record has even steps: --resample {_near(1.0 / period)} makes '
+                'straight lines between, and tells what that costs; better log with the '
                 "controller's clock"
             )
         return near_whole_rate(period, len(time), rounding)
@@ -78,6 +79,11 @@ def uniform_period(time: Array, where: str) -> float:
             'periods off an even clock; resample the record'
         )
     return near_whole_rate(period, len(time), rounding)
+
+
+def _near(rate: float) -> str:
+    """Return a round number of samples per second near a mean one."""
+    return f'{rate:.2g}' if rate < 100.0 else f'{round(rate, -1):.0f}'
 
 
 def uneven(steps: Array) -> bool:

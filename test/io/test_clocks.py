@@ -47,7 +47,8 @@ def test_jitter_is_told_as_what_it_is(
     assert 'time: {column: "Zeit"' in shown.out
     for words in (str(caught.value), shown.err):
         assert 'cut' not in words
-        assert 'rate' not in words
+        assert '--rate' not in words
+        assert '--resample' in words
     assert 'uneven steps' in shown.out
 
 
