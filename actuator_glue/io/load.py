@@ -84,17 +84,17 @@ def load_records(
         channels = replace(channels, hold=hold)
     groups: list[list[Record]] = []
     for path in paths:
-        if resample is not None and is_bag(path):
-            raise InputError(f'{path}: the samples of a bag are counted; only files are resampled')
-        if is_bag(path) and channels is not None and channels.topics:
-            groups.append(read_mapped(path, channels, note=note, gap=gap, warn=warn))
-        elif is_bag(path):
-            groups.append(read_records(path, note=note, gap=gap, warn=warn))
-        else:
+        if not is_bag(path):
             record = laboratory.read(
                 path, channels=channels, hold=hold, resample=resample, warn=warn
             )
             groups.append([record])
+        elif resample is not None:
+            raise InputError(f'{path}: the samples of a bag are counted; only files are resampled')
+        elif channels is not None and channels.topics:
+            groups.append(read_mapped(path, channels, note=note, gap=gap, warn=warn))
+        else:
+            groups.append(read_records(path, note=note, gap=gap, warn=warn))
     records = [record for group in groups for record in group]
     for record in records:
         record.check_scale()
