@@ -84,17 +84,13 @@ def load_records(
         channels = replace(channels, hold=hold)
     groups: list[list[Record]] = []
     for path in paths:
-        if not is_bag(path):
-            record = laboratory.read(
-                path, channels=channels, hold=hold, resample=resample, warn=warn
-            )
-            groups.append([record])
-        elif resample is not None:
-            raise InputError(f'{path}: the samples of a bag are counted; only files are resampled')
-        elif channels is not None and channels.topics:
-            groups.append(read_mapped(path, channels, note=note, gap=gap, warn=warn))
-        else:
-            groups.append(read_records(path, note=note, gap=gap, warn=warn))
+        if is_bag(path):
+            if resample is not None:
+                raise InputError(f'{path}: bags count their samples; only files are resampled')
+            groups.append(_of_bag(path, channels, note, gap, warn))
+            continue
+        record = laboratory.read(path, channels=channels, hold=hold, resample=resample, warn=warn)
+        groups.append([record])
     records = [record for group in groups for record in group]
     for record in records:
         record.check_scale()
@@ -115,3 +111,11 @@ def load_records(
             'record, in the same order'
         )
     return [replace(r, stiffness=k) for r, k in zip(records, given, strict=True)]
+
+
+def _of_bag(
+    path: Path | str, channels: ChannelMap | None, note: Note, gap: Note | None, warn: Note
+) -> list[Record]:
+    if channels is not None and channels.topics:
+        return read_mapped(path, channels, note=note, gap=gap, warn=warn)
+    return read_records(path, note=note, gap=gap, warn=warn)
