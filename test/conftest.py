@@ -1,7 +1,9 @@
 """Fixtures of every test."""
 
 import os
+import subprocess
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
@@ -9,6 +11,45 @@ import pytest
 os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 
 import numpy as np
+
+# A folder to write to, then a command: everything else is read-only, and nobody has a home.
+READ_ONLY = r"""
+out=$1; shift
+mount --bind "$out" "$out" || exit 77
+for point in $(cut -d' ' -f2 /proc/self/mounts | sort -u); do
+    case $point in
+        /proc* | /sys* | /dev* | "$out") ;;
+        *) mount -o remount,bind,ro "$point" 2>/dev/null ;;
+    esac
+done
+cd "$out"
+touch "$(dirname "$out")/trial" 2>/dev/null && exit 77
+unset HOME XDG_CACHE_HOME XDG_CONFIG_HOME MPLCONFIGDIR ROS_HOME ROS_LOG_DIR NUMBA_CACHE_DIR TMPDIR
+test -z "$HOME_THERE" || export HOME="$HOME_THERE"
+exec "$@"
+"""
+
+
+@pytest.fixture
+def read_only(tmp_path: Path) -> Callable[..., list[str]]:
+    """Return a function: the command line that runs a command where one folder can be written.
+
+    As in a container with a read-only root, or a unit of systemd with ProtectSystem=strict.
+    """
+    (tmp_path / 'out').mkdir()
+    (tmp_path / 'read_only.sh').write_text(READ_ONLY)
+
+    def command(*args: object) -> list[str]:
+        script = [tmp_path / 'read_only.sh', tmp_path / 'out', *args]
+        return ['unshare', '--map-root-user', '--mount', 'sh', *map(str, script)]
+
+    try:
+        done = subprocess.run(command('true'), capture_output=True, text=True, check=False)
+    except OSError as error:
+        pytest.skip(f'no mount namespaces here ({error})')
+    if done.returncode:
+        pytest.skip(f'no mount namespaces here ({done.stderr.strip()})')
+    return command
 
 
 @pytest.fixture

@@ -110,12 +110,17 @@ def dds() -> Check:
 
 def compiled() -> Check:
     """Whether the estimator starts at once, or compiles first."""
+    kept = _python('-c', 'from actuator_glue.jit import STORE; print(STORE.told())')
+    if kept.returncode:
+        return Check('compiled', 'missing', _last(kept.stderr), 'pip install actuator_glue')
     began = time.monotonic()
     code = 'from actuator_glue.workers.warm import warm_windows; warm_windows(swap=False)'
     try:
         done = _python('-c', code, patience=WARM_SECONDS)
     except subprocess.TimeoutExpired:
         text = f'cold: the estimator was not ready after {WARM_SECONDS:g} s'
+        if kept.stdout.strip():
+            text = f'{text}; {kept.stdout.strip()}'
         remedy = 'start the estimator once and wait for "ready", a few minutes (`make setup` does)'
         return Check('compiled', 'advice', text, remedy)
     if done.returncode:

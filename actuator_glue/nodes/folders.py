@@ -6,6 +6,8 @@ import os
 import time
 from pathlib import Path
 
+from actuator_glue.errors import InputError
+
 
 def unnamed(kind: str, suffix: str = '') -> Path:
     """Return a path for a file or bag without a name, `~/.ros/actuator_glue/KIND_DATE-TIME`.
@@ -13,6 +15,15 @@ def unnamed(kind: str, suffix: str = '') -> Path:
     Args:
         kind: what it is.
         suffix: end of its name.
+
+    Raises:
+        InputError: nobody knows of a home folder.
     """
-    home = Path(os.environ.get('ROS_HOME') or '~/.ros').expanduser()
+    try:
+        home = Path(os.environ.get('ROS_HOME') or '~/.ros').expanduser()
+    except RuntimeError as error:
+        raise InputError(
+            f'no home folder is known for a {kind} without a name; name it by a parameter, or let '
+            'ROS_HOME name a folder'
+        ) from error
     return home / 'actuator_glue' / (time.strftime(f'{kind}_%Y_%m_%d-%H_%M_%S') + suffix)

@@ -16,7 +16,7 @@ from actuator_glue_msgs.msg import SampleBlock
 from rclpy.executors import SingleThreadedExecutor
 from rclpy.node import Node
 
-from actuator_glue.nodes import transport
+from actuator_glue.nodes import logs, transport
 from actuator_glue.nodes.topics import SAMPLES
 
 MESSAGES = 100
@@ -27,8 +27,9 @@ ANSWER_SECONDS = 2.0
 def measure() -> dict[str, Any]:
     """Return messages sent and received, discovery time and median latency [s]."""
     contexts = [rclpy.context.Context() for _ in range(2)]
+    args = logs.arranged(None)
     for context in contexts:
-        rclpy.init(context=context)
+        rclpy.init(args=args, context=context)
     talker, listener = (
         Node(f'doctor_{i}', context=c, start_parameter_services=False)
         for i, c in enumerate(contexts)

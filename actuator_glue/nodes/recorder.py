@@ -81,11 +81,16 @@ class RecorderNode(base.SuiteNode):
     def do_activate(self) -> None:
         """Open the bag and subscribe."""
         values = self.parameters.values()
-        self.writer = BagWriter(
-            self._path(values),
-            flush_period=values['flush_period'],
-            max_file_bytes=values['max_file'],
-        )
+        try:
+            self.writer = BagWriter(
+                self._path(values),
+                flush_period=values['flush_period'],
+                max_file_bytes=values['max_file'],
+            )
+        except DiskError as error:
+            if values['bag']:
+                raise
+            raise InputError(f'{error}; name another place with parameter bag') from error
         self._bags += 1
         self.get_logger().info(f'recording to {self.writer.path}')
         self._queue: queue.SimpleQueue[Item | None] = queue.SimpleQueue()

@@ -13,7 +13,7 @@ from rclpy.executors import ExternalShutdownException
 from rclpy.signals import SignalHandlerOptions
 
 from actuator_glue.errors import InputError
-from actuator_glue.nodes import transport
+from actuator_glue.nodes import logs, transport
 from actuator_glue.nodes.base import ERROR, SUCCESS, SuiteNode
 from actuator_glue.nodes.executor import Executor
 from actuator_glue.nodes.signals import Stop
@@ -38,7 +38,7 @@ def together(makes: Sequence[Callable[[], SuiteNode]], args: Sequence[str] | Non
     """
     stop = Stop()
     transport.choose()
-    rclpy.init(args=args, signal_handler_options=SignalHandlerOptions.NO)
+    rclpy.init(args=logs.arranged(args), signal_handler_options=SignalHandlerOptions.NO)
     nodes: list[SuiteNode] = []
     try:
         for make in makes:
