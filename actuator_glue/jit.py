@@ -108,7 +108,7 @@ if STORE.folder is None:
     _tell(STORE.told())
 
 
-class ReadOnlyLocator(UserProvidedCacheLocator):  # type: ignore[misc]  # numba has no types
+class ReadOnlyLocator(UserProvidedCacheLocator):
     """Finds compiled code in a folder that numba cannot write, which it would not look into."""
 
     def ensure_cache_path(self) -> None:
