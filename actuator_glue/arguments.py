@@ -9,6 +9,8 @@ from typing import Literal
 
 from actuator_glue.errors import InputError
 
+_SECONDS = {'s': 1.0, 'min': 60.0, 'h': 3600.0, 'd': 86400.0}
+
 
 def is_number(text: str) -> bool:
     """Whether a text is a number."""
@@ -26,6 +28,18 @@ def number(text: str) -> float:
     if not math.isfinite(float(text)):
         raise argparse.ArgumentTypeError(f'{text!r} is not finite')
     return float(text)
+
+
+def duration(text: str) -> float:
+    """Return a time with its unit, as in 90s, 30min, 24h or 2d, in seconds."""
+    value = text.strip()
+    unit = next((u for u in sorted(_SECONDS, key=len, reverse=True) if value.endswith(u)), '')
+    amount = value.removesuffix(unit).strip()
+    if not unit or not is_number(amount):
+        raise argparse.ArgumentTypeError(
+            f'{text!r} is no time with its unit; give 90s, 30min, 24h or 2d'
+        )
+    return _SECONDS[unit] * number(amount)
 
 
 def number_or_auto(text: str) -> float | Literal['auto']:

@@ -19,7 +19,8 @@ OURS = ('test', 'benchmarks', 'launch', 'scripts')
 EVERY = [*SOURCES, *OUTSIDE, *(p for f in OURS for p in (ROOT.parent / f).rglob('*.py'))]
 
 BOTTOM = {
-    'errors', 'records', 'setups', 'sample_block', 'rate_check', 'jit', 'normal', 'json_value',
+    'errors', 'given', 'records', 'setups', 'sample_block', 'rate_check', 'jit', 'normal',
+    'json_value',
 }  # fmt: skip
 CORE = BOTTOM | {'model', 'inference'}
 READY = CORE | {'hygiene'}
@@ -38,7 +39,8 @@ ARROWS = {
         'records',
     },  # names, imported when used
     'errors': set(),
-    'records': {'errors'},
+    'given': {'errors'},
+    'records': {'errors', 'given'},
     'setups': {'records', 'errors'},
     'sample_block': {'records', 'setups', 'errors'},
     'rate_check': set(),

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from datetime import timedelta
 from pathlib import Path
 from typing import Any, Literal
 
@@ -17,12 +18,14 @@ from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.api.calibration_shaping import sampled
 from actuator_glue.api.callbacks import harmless
 from actuator_glue.api.compilation import compilation
+from actuator_glue.api.given import Records, Stiffness, records_given, seed_given
 from actuator_glue.api.options import chosen
 from actuator_glue.api.prior import check_prior, given_prior
 from actuator_glue.api.tracking import record_tracking
 from actuator_glue.diagnosis.force import check_forces
 from actuator_glue.diagnosis.residual_structure import residual_structure
 from actuator_glue.errors import InputError
+from actuator_glue.given import number, take_numbers
 from actuator_glue.hygiene.clean import clean, initial_state
 from actuator_glue.hygiene.despike import despiked
 from actuator_glue.inference.at_bound import pressed
@@ -34,7 +37,6 @@ from actuator_glue.inference.posterior import Problem
 from actuator_glue.inference.prior_conflict import conflict
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
-from actuator_glue.records import Record
 
 Progress = Callable[[float], None]
 
@@ -51,7 +53,7 @@ class CalibrationOptions:
             the independent samples that the residual is worth (`effective_size`).
         evaluations: likelihood evaluations; with effects as many again where their best fit shows
             that the residual is worth another number of samples.
-        seed: seed of the sampler.
+        seed: seed of the sampler; None for a fresh one, which the result says.
         sampler: 'adaptive' is DREAM(ZS) with an adaptive independence move and an annealed start;
             'published' is DREAM(ZS) as Vrugt (2016) runs it, and needs many times the evaluations.
         initial: state at the first sample, 'rest', 'measured', or 'auto' to look.
@@ -61,7 +63,7 @@ class CalibrationOptions:
             nothing known beside the bounds.
         drift: standard deviation by which the logarithm of each parameter may have moved in an
             hour since (random walk) [h^-1/2].
-        prior_age: time since that calibration [s].
+        prior_age: time since that calibration, a `timedelta` or a number of seconds.
         use_force: the recorded forces are evidence, too; not with 'ar1'.
     """
 
@@ -76,18 +78,24 @@ class CalibrationOptions:
     settle: float | None = None
     prior: Calibration | Path | str | None = None
     drift: float = 0.02
-    prior_age: float = 0.0
+    prior_age: timedelta | float = 0.0
     use_force: bool = False
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, 'effects', tuple(self.effects))
+        effects = (self.effects,) if isinstance(self.effects, str) else tuple(self.effects)
+        bounds = {name: _limits(pair, name) for name, pair in dict(self.bounds).items()}
+        for name, value in (
+            ('effects', effects),
+            ('bounds', bounds),
+            ('seed', seed_given(self.seed)),
+        ):
+            object.__setattr__(self, name, value)
+        take_numbers(self)
         if self.use_force and self.likelihood == 'ar1':
             raise InputError(
                 "the likelihood 'ar1' is one of the displacement alone and takes no force; use "
                 "'glue' or 'gaussian'"
             )
-        if self.seed < 0:
-            raise InputError(f'seed {self.seed} is negative')
         if isinstance(self.shaping_factor, str) and self.shaping_factor != 'auto':
             raise InputError(f"shaping factor {self.shaping_factor!r} is no number, nor 'auto'")
         if self.settle is not None and self.settle < 0.0:
@@ -105,17 +113,21 @@ class CalibrationOptions:
 
 
 def calibrate(
-    records: Sequence[Record] | Record,
+    records: Records,
     options: CalibrationOptions | None = None,
     *,
+    stiffness: Stiffness = None,
     progress: Progress | None = None,
     **changes: Any,
 ) -> Calibration:
     """Draw from the joint posterior of Eq. (2) and effects given records (DREAM(ZS), GLUE).
 
     Args:
-        records: one or several tests of one actuator, each with its specimen stiffness.
+        records: one or several tests of one actuator, each with its specimen stiffness, or the
+            files they are in.
         options: how to calibrate; see CalibrationOptions.
+        stiffness: specimen stiffness [N/m], one for all or one for each; None for what records
+            and files say.
         progress: called with the evaluations made so far.
         changes: options by name that replace those of `options`.
 
@@ -130,7 +142,7 @@ def calibrate(
         >>> posterior.parameters['beta_1'].mean  # doctest: +SKIP
     """
     options = chosen(options or CalibrationOptions(), changes, 'calibrate')
-    tests = [records] if isinstance(records, Record) else list(records)
+    tests = records_given(records, stiffness)
     model = sampled_model(options)
     cleaned, notes = clean(tests)
     if options.use_force:
@@ -218,6 +230,14 @@ def calibrate(
             for record in cleaned
         ),
     )
+
+
+def _limits(pair: Any, name: str) -> tuple[float, float]:
+    try:
+        low, high = pair
+    except (TypeError, ValueError):
+        raise InputError(f'bounds of {name} are {pair!r}; give a lower and an upper one') from None
+    return number(low, f'lower bound of {name}'), number(high, f'upper bound of {name}')
 
 
 def sampled_model(options: CalibrationOptions) -> ModelChoice:

@@ -10,6 +10,7 @@ import numpy as np
 
 from actuator_glue.api import store
 from actuator_glue.api.calibration_parts import CalibratedRecord, FitError, Marginal, RecordForce
+from actuator_glue.api.given import OneRecord, one_record_given
 from actuator_glue.api.result import Result
 from actuator_glue.api.tracking import RecordTracking
 from actuator_glue.diagnosis.residual_structure import ResidualStructure
@@ -213,15 +214,15 @@ class Calibration(Result):
         units = [p.unit for p in self.parameters.values()]
         return posterior_figure(self.posterior, self.names, units)
 
-    def plot_bands(self, record: Record) -> Figure:
+    def plot_bands(self, record: OneRecord) -> Figure:
         """Return a figure of the parameter band and the total predictive band over a record.
 
         Raises:
-            InputError: the record's stiffness is not known.
+            InputError: the record's stiffness is not known, or a file that holds several.
         """
         from actuator_glue.api.calibration_report import bands_figure
 
-        return bands_figure(self, record)[0]
+        return bands_figure(self, one_record_given(record))[0]
 
     def brief(self) -> list[html.Block]:
         """Return problems, moments, error and notes."""

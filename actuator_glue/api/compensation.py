@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from actuator_glue.api.calibration_result import Calibration
+from actuator_glue.api.given import calibration_given, seed_given
 from actuator_glue.api.rths import DRAWS, rths
 from actuator_glue.api.stability import StabilityResult
 from actuator_glue.hybrid.compensator import KINDS
@@ -67,26 +68,27 @@ class Comparison:
 
 def compare_compensators(
     partition: Partition | Path | str,
-    calibration: Calibration,
+    calibration: Calibration | Path | str,
     ground_motion: GroundMotion | Path | str = 'artificial',
     *,
     draws: int = DRAWS,
-    seed: int = 1,
+    seed: int | None = 1,
     **options: Any,
 ) -> Comparison:
     """Return a hybrid test with every compensator, and which of them to use.
 
     Args:
         partition: as `rths` takes it.
-        calibration: posterior of the actuator.
+        calibration: posterior of the actuator, or the file it was saved to.
         ground_motion: as `rths` takes it.
         draws: how many draws run the record with each.
-        seed: of specimens and noise, the same for each.
+        seed: of specimens and noise, the same for each; None for a fresh one.
         options: further ones of `rths`.
 
     Raises:
         InputError: as `rths`.
     """
+    seed, calibration = seed_given(seed), calibration_given(calibration)
     found: dict[str, StabilityResult] = {
         kind: rths(
             partition,

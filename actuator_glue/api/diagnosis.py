@@ -6,12 +6,14 @@ import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, fields
+from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from actuator_glue.api.callbacks import harmless
+from actuator_glue.api.given import Records, Stiffness, records_given, seed_given
 from actuator_glue.api.options import chosen
-from actuator_glue.api.prior import given_prior
+from actuator_glue.api.prior import check_prior, given_prior
 from actuator_glue.api.provenance import provenance
 from actuator_glue.api.result import Result
 from actuator_glue.api.tracking import RecordTracking, record_tracking, tables
@@ -21,6 +23,7 @@ from actuator_glue.diagnosis.result import SCHEMA, DiagnosisData
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.effects import save_effects
 from actuator_glue.errors import InputError
+from actuator_glue.given import take_numbers
 from actuator_glue.hygiene.clean import clean, initial_state
 from actuator_glue.inference.least_squares.decimate import decimated
 from actuator_glue.model.effects import CATALOGUE
@@ -123,7 +126,8 @@ class DiagnosisOptions:
     """How to diagnose; every one has the default of the command line.
 
     Attributes:
-        seed: seed of every random step; the same seed gives the same diagnosis.
+        seed: seed of every random step; the same seed gives the same diagnosis. None for a fresh
+            one, which the result's provenance says.
         jobs: threads for the refits of candidates; the result does not depend on it.
         false_alarms: probability of an addition on a healthy machine.
         prior: an earlier calibration of the actuator, or the file it was saved to: what it knew
@@ -131,7 +135,7 @@ class DiagnosisOptions:
             its drift and age. None for nothing.
         drift: standard deviation by which the logarithm of each parameter may have moved in an
             hour since (random walk) [h^-1/2].
-        prior_age: time since that calibration [s].
+        prior_age: time since that calibration, a `timedelta` or a number of seconds.
         use_force: the recorded force chooses among names that the displacement leaves tied.
     """
 
@@ -140,12 +144,13 @@ class DiagnosisOptions:
     false_alarms: float = 0.01
     prior: Calibration | GivenPrior | Path | str | None = None
     drift: float = 0.02
-    prior_age: float = 0.0
+    prior_age: timedelta | float = 0.0
     use_force: bool = False
 
     def __post_init__(self) -> None:
-        if self.seed < 0:
-            raise InputError(f'seed {self.seed} is negative')
+        object.__setattr__(self, 'seed', seed_given(self.seed))
+        take_numbers(self)
+        check_prior(self.drift, self.prior_age)
         if self.jobs < 1:
             raise InputError(f'jobs {self.jobs} is below 1')
         if not 0.0 < self.false_alarms < 1.0:
@@ -155,20 +160,24 @@ class DiagnosisOptions:
 
 
 def diagnose(
-    records: Sequence[Record] | Record,
-    holdout: Sequence[Record] | Record | None = None,
+    records: Records,
+    holdout: Records | None = None,
     options: DiagnosisOptions | None = None,
     *,
+    stiffness: Stiffness = None,
     progress: Progress | None = None,
     **changes: Any,
 ) -> Diagnosis:
     """Ask whether Eq. (2) explains records and, if not, which effects it lacks.
 
     Args:
-        records: one or several tests of one actuator, each with its specimen stiffness.
+        records: one or several tests of one actuator, each with its specimen stiffness, or the
+            files they are in.
         holdout: record(s) that decide nothing and give the error before and after; without one,
             every fourth block of each record is set aside before any look.
         options: how to diagnose; see DiagnosisOptions.
+        stiffness: specimen stiffness [N/m] of the records, one for all or one for each; None for
+            what they and their files say.
         progress: called with (stage, share of it done in [0, 1]).
         changes: options by name that replace those of `options`.
 
@@ -180,8 +189,8 @@ def diagnose(
             or an option that cannot be used.
     """
     options = chosen(options or DiagnosisOptions(), changes, 'diagnose')
-    given = [records] if isinstance(records, Record) else list(records)
-    held = [holdout] if isinstance(holdout, Record) else list(holdout or ())
+    given = records_given(records, stiffness)
+    held = [] if holdout is None else records_given(holdout, name='holdout')
     with ThreadPoolExecutor(options.jobs) as pool:
         found = core.diagnose(
             given,

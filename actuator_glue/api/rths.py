@@ -10,10 +10,12 @@ import numpy as np
 
 from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.api.effect_cost import effect_costs, margins
+from actuator_glue.api.given import calibration_given, seed_given
 from actuator_glue.api.spread import spread
 from actuator_glue.api.stability import AtFrequency, DelayMargin, StabilityResult
 from actuator_glue.api.virtual_test import VirtualResult, check_criteria, run, summarise
 from actuator_glue.errors import InputError
+from actuator_glue.given import number, whole
 from actuator_glue.hybrid import stability
 from actuator_glue.hybrid.actuator import nonlinear
 from actuator_glue.hybrid.compensator import Compensator
@@ -31,14 +33,14 @@ DRAWS = 1000
 
 def rths(
     partition: Partition | Path | str,
-    calibration: Calibration,
+    calibration: Calibration | Path | str,
     *,
     draws: int = DRAWS,
-    frequencies: Sequence[float] = FREQUENCIES,
+    frequencies: Sequence[float] | float = FREQUENCIES,
     compensator: str = 'none',
     ground_motion: GroundMotion | Path | str | None = None,
     criteria: Mapping[str, float] | None = None,
-    seed: int = 1,
+    seed: int | None = 1,
 ) -> StabilityResult:
     """Return how likely a hybrid test is unstable with a calibrated actuator.
 
@@ -48,7 +50,7 @@ def rths(
 
     Args:
         partition: the hybrid test; a YAML file, or the name of one that comes with the package.
-        calibration: posterior of the actuator.
+        calibration: posterior of the actuator, or the file it was saved to.
         draws: how many of its draws are used, evenly spread over it.
         frequencies: where the actuator's delay and amplitude are told [Hz].
         compensator: 'none', 'inverse' of the posterior mean, 'ats-fixed' (the same within the
@@ -58,7 +60,7 @@ def rths(
         criteria: peaks that must not be exceeded: 'drift' and 'displacement' of any floor [m],
             'force' of the specimen [N].
         seed: of the specimen's draws, where the partition gives it standard deviations, and of
-            the sensors' noise.
+            the sensors' noise; None for a fresh one, which the result says.
 
     Raises:
         InputError: a partition, posterior or option that cannot be used.
@@ -67,8 +69,10 @@ def rths(
         >>> found = rths('benchmark_case_1', posterior)  # doctest: +SKIP
         >>> found.p_unstable.upper  # doctest: +SKIP
     """
-    if seed < 0:
-        raise InputError(f'seed {seed} is negative')
+    seed, draws = seed_given(seed), whole(draws, 'draws')
+    calibration = calibration_given(calibration)
+    frequencies = [number(f, 'frequencies') for f in np.ravel(np.asarray(frequencies, object))]
+    criteria = {n: number(v, f'criterion {n}') for n, v in (criteria or {}).items()}
     if draws < 2:
         raise InputError(f'{draws} draws are no distribution; use at least 2')
     started = time.perf_counter()
@@ -76,7 +80,7 @@ def rths(
         partition = read_partition(partition)
     if ground_motion is not None and not isinstance(ground_motion, GroundMotion):
         ground_motion = read_ground_motion(ground_motion)
-    _check(partition, frequencies, ground_motion, criteria or {})
+    _check(partition, frequencies, ground_motion, criteria)
     curved = nonlinear(calibration.effects)
     if curved and ground_motion is None:
         raise InputError(
@@ -96,7 +100,7 @@ def rths(
             partition, loop.draws, loop.names, loop.effects, specimen, chosen, ground, seed
         )
         motion = ground_motion.name, ground_motion.duration
-        virtual = summarise(run(test), test.time, motion, criteria or {}, effective)
+        virtual = summarise(run(test), test.time, motion, criteria, effective)
     margin, growth = margins(loop, chosen)
     moved = 0.0
     if virtual is not None:
@@ -138,6 +142,7 @@ def rths(
         notes=tuple(_notes(loop, calibration, chosen, by_test)),
         margins_drawn=margin,
         growth_drawn=growth,
+        seed=seed,
     )
 
 

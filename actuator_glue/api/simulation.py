@@ -9,7 +9,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from actuator_glue.api.given import seed_given
 from actuator_glue.errors import InputError
+from actuator_glue.given import number, take_numbers
 from actuator_glue.model import benchmark_plant, commands
 from actuator_glue.model.effects import scale
 from actuator_glue.model.parameters import TABLE_2
@@ -50,6 +52,9 @@ class Command:
     high: float = 10.0
     seed: int = 0
 
+    def __post_init__(self) -> None:
+        take_numbers(self)
+
     def samples(self) -> Array:
         """Return the samples, shape (n,) [m].
 
@@ -85,6 +90,9 @@ class Sensors:
     force_noise: float = 2.0
     bits: int | None = None
 
+    def __post_init__(self) -> None:
+        take_numbers(self)
+
 
 def simulate(
     command: Command | Record | None = None,
@@ -95,7 +103,7 @@ def simulate(
     sensors: Sensors | None = None,
     plant: Literal['paper', 'benchmark'] = 'paper',
     hold: Hold = 'zoh',
-    seed: int | tuple[int, int] = 1,
+    seed: int | tuple[int, int] | None = 1,
 ) -> Record:
     """Simulate one test.
 
@@ -109,7 +117,8 @@ def simulate(
         plant: 'paper' is Eq. (2); 'benchmark' the transfer system of the RTHS benchmark (Silva
             et al. 2020), which has its own specimen.
         hold: how the command runs between its samples.
-        seed: seed of the noise; a pair (seed, number of the test) for one of several tests.
+        seed: seed of the noise; a pair (seed, number of the test) for one of several tests; None
+            for a fresh one, which the record's source says.
 
     Returns:
         Command, measured displacement and force.
@@ -124,7 +133,8 @@ def simulate(
     samples = samples_of(shape)
     rate = shape.rate
     sensors = sensors or Sensors()
-    sequence = np.random.SeedSequence(seed if isinstance(seed, tuple) else (seed, 0))
+    words = seed if isinstance(seed, tuple) else (seed_given(seed), 0)
+    sequence = np.random.SeedSequence(tuple(seed_given(word) for word in words))
     draw = int(sequence.generate_state(1)[0])
     known = check_stiffness(stiffness)
     if plant == 'benchmark':
@@ -165,7 +175,7 @@ def simulate(
         force,
         hold=hold,
         actuator='simulated',
-        source='simulated',
+        source='simulated' if seed is not None else f'simulated with seed {words[0]}',
     )
 
 
@@ -243,6 +253,7 @@ def sizes(effects: Effects = (), theta: ArrayLike | None = None) -> tuple[Struct
                     f'effect {entry.name} has no parameter {name!r}; it has {", ".join(known)}'
                 )
             at, parameter = known[name]
+            value = number(value, f'effect {entry.name}: {name}')
             if not parameter.lower <= value <= parameter.upper:
                 raise InputError(
                     f'effect {entry.name}: {name} = {value:g} {parameter.unit} is outside '

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 from actuator_glue.api.result import Result
 from actuator_glue.api.spread import Spread
 from actuator_glue.api.virtual_test import VirtualResult
+from actuator_glue.given import number
 from actuator_glue.hybrid.margin import Margins, psi
 from actuator_glue.hybrid.stability import Share
 from actuator_glue.records import Array
@@ -71,6 +72,7 @@ class StabilityResult(Result):
         compensator: 'none', or what it is.
         virtual: what the draws did under a ground motion; None where none was given.
         draws: how many were used.
+        seed: of the specimen's draws and the sensors' noise.
         seconds: how long it took.
         problems: why the posterior must not be used as it stands.
         notes: what limits the answer.
@@ -101,10 +103,11 @@ class StabilityResult(Result):
     notes: tuple[str, ...]
     margins_drawn: Array
     growth_drawn: Array
+    seed: int = 1
 
     def go(self, limit: float) -> bool:
         """Whether P(unstable) is at most a limit up to its upper bound, by a usable posterior."""
-        return not self.problems and self.p_unstable.upper <= limit
+        return not self.problems and self.p_unstable.upper <= number(limit, 'limit')
 
     def summary(self) -> str:
         """Return P(unstable) with its interval in one line."""
@@ -140,6 +143,7 @@ class StabilityResult(Result):
             'virtual_test': None if self.virtual is None else self.virtual.to_json(),
             'compensator': self.compensator,
             'draws': self.draws,
+            'seed': self.seed,
             'seconds': self.seconds,
             'problems': list(self.problems),
             'notes': list(self.notes),

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from actuator_glue.errors import InputError
+from actuator_glue.given import whole
 from actuator_glue.hybrid.actuator import actuator, nonlinear
-from actuator_glue.records import Array
+from actuator_glue.records import Array, check_stiffness
 
 if TYPE_CHECKING:
     from actuator_glue.api.calibration_result import Calibration
@@ -25,6 +26,7 @@ def chosen_draw(found: Calibration, draw: str | int) -> Array:
         return np.asarray(draws.mean(axis=0))
     if draw == 'best':
         return found.best
+    draw = whole(draw, 'draw') if not isinstance(draw, str) else draw
     if isinstance(draw, int) and -len(draws) <= draw < len(draws):
         return np.asarray(draws[draw])
     raise InputError(f"draw {draw!r}: use 'mean', 'best', or a number below {len(draws)}")
@@ -42,7 +44,7 @@ def state_space(found: Calibration, stiffness: float, draw: str | int) -> Any:
     if curved:
         raise InputError(f'the model has {", ".join(curved)}, which no transfer function has')
     row = chosen_draw(found, draw)[None]
-    model = actuator(row, found.names, found.effects, np.array([stiffness]))
+    model = actuator(row, found.names, found.effects, np.array([check_stiffness(stiffness)]))
     if 'delay' in found.effects:
         raise InputError(
             f'the model has a delay of {1e3 * float(model.delay[0]):.3g} ms, which is no rational '

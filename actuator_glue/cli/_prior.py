@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from actuator_glue.arguments import number
+from actuator_glue.arguments import duration, number
 
 
 def add_prior(parser: argparse.ArgumentParser) -> None:
@@ -27,13 +27,13 @@ def add_prior(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         '--prior-age',
-        type=number,
+        type=duration,
         default=0.0,
-        metavar='HOURS',
-        help='time since that calibration (default 0)',
+        metavar='TIME',
+        help='time since that calibration with its unit, as 90s, 30min, 24h or 2d (default 0)',
     )
 
 
 def prior_options(args: argparse.Namespace) -> dict[str, Any]:
     """Return the arguments as options of `calibrate` and `diagnose`."""
-    return {'prior': args.prior, 'drift': args.drift, 'prior_age': 3600.0 * args.prior_age}
+    return {'prior': args.prior, 'drift': args.drift, 'prior_age': args.prior_age}

@@ -10,6 +10,7 @@ import scipy
 from numpy.typing import ArrayLike
 
 from actuator_glue.errors import InputError
+from actuator_glue.given import number, take_numbers
 from actuator_glue.records import Array, check_stiffness
 
 _LARGEST = 200  # degrees of freedom
@@ -32,7 +33,10 @@ class Specimen:
     stddev: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        take_numbers(self)
         check_stiffness(self.stiffness, 'experimental')
+        stddev = {n: number(sd, f'standard deviation of {n}') for n, sd in self.stddev.items()}
+        object.__setattr__(self, 'stddev', stddev)
         for name in ('mass', 'damping'):
             if not 0.0 <= getattr(self, name) < np.inf:
                 raise InputError(
@@ -93,6 +97,7 @@ class Partition:
     name: str = 'partition'
 
     def __post_init__(self) -> None:
+        take_numbers(self)
         for name in ('mass', 'damping', 'stiffness'):
             matrix = square(getattr(self, name), f'{self.name}: numerical {name}')
             object.__setattr__(self, name, matrix)

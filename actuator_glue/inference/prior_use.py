@@ -24,6 +24,7 @@ class PriorUse:
         components: normal components it has.
         quality: energy coefficient between its draws and the mixture, 0 for equal.
         p_value: prior predictive p-value of the records (Evans and Moshonov 2006).
+        doubt: structure over noise that the calibration left, where its intervals do not hold.
     """
 
     source: str
@@ -32,6 +33,7 @@ class PriorUse:
     components: int
     quality: float
     p_value: float
+    doubt: str = ''
 
     @property
     def contradicted(self) -> bool:
@@ -53,6 +55,7 @@ class PriorUse:
             f'energy coefficient {self.quality:.3f} against its draws'
             + (f'; above {POOR}, so it describes them poorly' if self.quality > POOR else '')
             + f'; prior predictive p-value of the records {self.p_value:.2g}'
+            + (f'; it left {self.doubt}: its intervals do not hold' if self.doubt else '')
         )
 
 
@@ -62,14 +65,17 @@ class GivenPrior:
 
     Attributes:
         carried: draws, drifted to the time of the records.
-        source, drift, age_s: as in `PriorUse`.
+        source, drift, age_s, doubt: as in `PriorUse`.
     """
 
     carried: Carried
     source: str
     drift: float
     age_s: float
+    doubt: str = ''
 
     def used(self, components: int, quality: float, p_value: float) -> PriorUse:
         """Return how it was used."""
-        return PriorUse(self.source, self.drift, self.age_s, components, quality, p_value)
+        return PriorUse(
+            self.source, self.drift, self.age_s, components, quality, p_value, self.doubt
+        )

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from os import PathLike
 from pathlib import Path
+
+import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.io import laboratory
@@ -74,12 +77,16 @@ def load_records(
         InputError: a path cannot be used, its rate or stroke is none of a servo-hydraulic test, or
             the number of stiffnesses does not fit.
     """
-    if isinstance(paths, (str, Path)):
+    if isinstance(paths, (str, PathLike)) or not isinstance(paths, Iterable):
         paths = [paths]
+    paths = list(paths)
     if not paths:
         raise InputError('no record given')
-    if isinstance(channels, (str, Path)):
-        channels = read_channel_map(channels)
+    for path in paths:
+        if not isinstance(path, (str, PathLike)):
+            raise InputError(f'{type(path).__name__} is no path of a file or bag')
+    if isinstance(channels, (str, PathLike)):
+        channels = read_channel_map(Path(channels))
     if channels is not None and hold is not None:
         channels = replace(channels, hold=hold)
     groups: list[list[Record]] = []
@@ -98,8 +105,8 @@ def load_records(
         records = [replace(record, hold=hold) for record in records]
     if stiffness is None:
         return records
-    given = [stiffness] if isinstance(stiffness, (int, float)) else list(stiffness)
-    given = [check_stiffness(k) for k in given]
+    # One number of any type, or several in whatever holds them.
+    given = [check_stiffness(k) for k in np.ravel(np.asarray(stiffness, dtype=object))]
     if len(given) == 1:
         given = given * len(records)
     elif len(given) == len(paths):

@@ -6,6 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from actuator_glue.cli._prior import prior_options
+from actuator_glue.cli.main import build_parser
+
 # Reference posterior of problem R (1.9 million evaluations, confirmed by importance sampling).
 NAMES = ('beta_1', 'alpha_1_beta_0', 'alpha_2', 'alpha_3')
 MEAN = np.array([133.65, 1.1005e9, 2.4927e5, 0.00592])
@@ -295,3 +298,21 @@ def test_the_other_hold_is_asked_too(run, tmp_path: Path) -> None:
     )
     right = run('calibrate', file, *given, '-', '--hold', 'linear').json
     assert right['structure']['intervals_hold'] is True
+
+
+@pytest.mark.parametrize(
+    ('given', 'seconds'),
+    [('90s', 90.0), ('30min', 1800.0), ('24h', 86400.0), ('2d', 172800.0), ('1.5 h', 5400.0)],
+)
+def test_the_age_of_a_prior_has_a_unit(given: str, seconds: float) -> None:
+    """The same seconds as the API's `prior_age`; a number alone could be hours."""
+    words = ['calibrate', 'r.csv', '--prior-age', given]
+    assert prior_options(build_parser('calibrate').parse_args(words))['prior_age'] == seconds
+
+
+@pytest.mark.parametrize('given', ['24', 'h', '24 hours', 'monday', 'infh'])
+def test_an_age_without_a_unit_is_refused(run, given: str) -> None:
+    """One message that shows how."""
+    done = run('calibrate', 'r.csv', '--prior-age', given)
+    assert done.code == 2 and '--prior-age' in done.err
+    assert '24h' in done.err or 'not finite' in done.err

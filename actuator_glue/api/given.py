@@ -1,0 +1,119 @@
+"""What callers give: records and calibrations, themselves or as files; seeds, or none."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from datetime import timedelta
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+import numpy as np
+
+from actuator_glue.errors import InputError
+from actuator_glue.given import number, whole
+from actuator_glue.io.load import load_records
+from actuator_glue.records import Record
+
+if TYPE_CHECKING:
+    from actuator_glue.api.calibration_result import Calibration
+
+OneRecord: TypeAlias = Record | os.PathLike[str] | str
+Records: TypeAlias = OneRecord | Iterable[OneRecord]
+Stiffness: TypeAlias = float | Sequence[float] | None
+
+
+def records_given(
+    given: Records, stiffness: Stiffness = None, name: str = 'records'
+) -> list[Record]:
+    """Return records that were given themselves, as paths, or as a mixture of both.
+
+    Args:
+        given: one or several.
+        stiffness: specimen stiffness [N/m], one for all or one for each that was given; None for
+            what records and files say.
+        name: of the argument, for messages.
+
+    Raises:
+        InputError: something else was given, or a file cannot be read.
+    """
+    some: list[Any]
+    if isinstance(given, (Record, str, os.PathLike)):
+        some = [given]
+    else:
+        try:
+            some = list(given)
+        except TypeError:
+            some = [given]
+    if not some:
+        raise InputError(f'{name}: no record given')
+    known: list[Any] = [stiffness] * len(some)
+    if np.ndim(stiffness or 0.0) == 1:
+        known = list(np.asarray(stiffness))
+        if len(known) != len(some):
+            raise InputError(f'{len(known)} stiffnesses for {len(some)} {name}: one for each')
+    out: list[Record] = []
+    for one, k in zip(some, known, strict=True):
+        if isinstance(one, Record):
+            out.append(one if k is None else replace(one, stiffness=k))
+        elif isinstance(one, (str, os.PathLike)):
+            out += load_records(os.fspath(one), stiffness=k)
+        else:
+            raise InputError(
+                f'{name}: {type(one).__name__} is no record; give what `load` or `simulate` '
+                'return, the path of a file or bag, or a list of these'
+            )
+    return out
+
+
+def one_record_given(given: OneRecord) -> Record:
+    """Return a record that was given itself or as the path of a file that holds just one.
+
+    Raises:
+        InputError: as `records_given`, or several.
+    """
+    found = records_given(given, name='record')
+    if len(found) != 1:
+        raise InputError(f'{len(found)} records; give one')
+    return found[0]
+
+
+def calibration_given(given: Calibration | os.PathLike[str] | str) -> Calibration:
+    """Return a calibration that was given itself, or the file it was saved to.
+
+    Raises:
+        InputError: something else was given, or the file holds none.
+    """
+    from actuator_glue.api.calibration_result import Calibration
+
+    if isinstance(given, Calibration):
+        return given
+    if isinstance(given, (str, os.PathLike)):
+        return Calibration.load(os.fspath(given))
+    raise InputError(
+        f'{type(given).__name__} is no calibration; give what `calibrate` returns, or the file '
+        'it was saved to'
+    )
+
+
+def seconds(value: object, name: str) -> float:
+    """Return a time [s] that was given as a number of seconds or as a `timedelta`.
+
+    Raises:
+        InputError: as `number`.
+    """
+    return value.total_seconds() if isinstance(value, timedelta) else number(value, name)
+
+
+def seed_given(seed: object) -> int:
+    """Return a seed; for None a fresh one, which the result says.
+
+    Raises:
+        InputError: no whole number, or a negative one.
+    """
+    if seed is None:
+        return int(np.random.SeedSequence().generate_state(1)[0])
+    found = whole(seed, 'seed')
+    if found < 0:
+        raise InputError(f'seed {found} is negative')
+    return found

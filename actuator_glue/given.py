@@ -1,0 +1,86 @@
+"""Numbers as callers give them: of every usual type, or refused with the argument's name."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import fields
+from typing import TYPE_CHECKING, SupportsFloat, cast
+
+import numpy as np
+
+from actuator_glue.errors import InputError
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+
+def number(value: object, name: str) -> float:
+    """Return a number of Python's or numpy's, or an array without axes, as a float.
+
+    Args:
+        value: what was given.
+        name: of the argument, for the message.
+
+    Raises:
+        InputError: something else, or NaN.
+    """
+    if not isinstance(value, (bool, np.bool_, str, bytes)) and getattr(value, 'ndim', 0) == 0:
+        try:
+            found = float(cast(SupportsFloat, value))
+        except (TypeError, ValueError, OverflowError):
+            pass
+        else:
+            if not math.isnan(found):
+                return found
+    raise InputError(f'{name} is {_shown(value)}, which is no number; give one number')
+
+
+def whole(value: object, name: str) -> int:
+    """Return a whole number, whatever its type, as an int; 6e4 is one.
+
+    Raises:
+        InputError: as `number`, or a fraction.
+    """
+    if isinstance(value, int) and not isinstance(value, bool):
+        return value
+    found = number(value, name)
+    if not found.is_integer():
+        raise InputError(f'{name} is {_shown(value)}; give a whole number')
+    return int(found)
+
+
+def take_numbers(options: DataclassInstance, but: Iterable[str] = ()) -> None:
+    """Make the numbers of a frozen dataclass what it declares: floats, ints and truth values.
+
+    Args:
+        options: whose fields are declared as `int`, `float` or `bool`, perhaps `| None` or
+            `| Literal[...]`; others are left alone.
+        but: fields that are left alone, too.
+
+    Raises:
+        InputError: a field that holds none.
+    """
+    for each in fields(options):
+        value, kind = getattr(options, each.name), str(each.type)
+        if each.name in but or (value is None and 'None' in kind):
+            continue
+        if isinstance(value, str) and 'Literal' in kind:
+            continue
+        if kind.startswith('float'):
+            object.__setattr__(options, each.name, number(value, each.name))
+        elif kind.startswith('int'):
+            object.__setattr__(options, each.name, whole(value, each.name))
+        elif kind == 'bool':
+            if not isinstance(value, (bool, np.bool_)):
+                raise InputError(f'{each.name} is {_shown(value)}; give True or False')
+            object.__setattr__(options, each.name, bool(value))
+
+
+def _shown(value: object) -> str:
+    """Return a value for a message, in a few words."""
+    shape = getattr(value, 'shape', ())
+    if shape:
+        return f'an array of shape {shape}'
+    text = repr(value)
+    return text if len(text) < 40 else f'a {type(value).__name__}'

@@ -1,0 +1,215 @@
+"""Paths and numbers of every usual type are taken by every public function, or refused by name."""
+
+from collections.abc import Callable
+from datetime import timedelta
+from decimal import Decimal
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import actuator_glue as ag
+from actuator_glue.api.calibration import CalibrationOptions
+from actuator_glue.api.diagnosis import DiagnosisOptions
+from actuator_glue.api.given import records_given
+from actuator_glue.errors import InputError
+
+# The same number in the types that numpy, pandas and people have.
+SAME: tuple[Callable[[float], Any], ...] = (
+    int, float, np.int64, np.int32, np.float32, np.float64, np.array, Fraction, Decimal,
+)  # fmt: skip
+NONE: tuple[Any, ...] = ('250e3', True, [250e3], np.array([1.0, 2.0]), {}, object(), 1j, np.nan)
+
+
+class Named:
+    """A path of somebody's own kind."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def __fspath__(self) -> str:
+        """Return the path."""
+        return str(self.path)
+
+
+@pytest.fixture(scope='module')
+def record() -> ag.Record:
+    """Six seconds at 100 Hz."""
+    return ag.simulate(ag.Command(rate=100, duration=6, high=5), stiffness=250000, seed=3)
+
+
+@pytest.fixture(scope='module')
+def file(record: ag.Record, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same as a file that says its stiffness."""
+    from actuator_glue.io.export import write
+
+    path = tmp_path_factory.mktemp('given') / 'test.csv'
+    write(path, record, unit='m')
+    return path
+
+
+@pytest.fixture(scope='module')
+def posterior(file: Path) -> ag.Calibration:
+    """A calibration of the file by its name, with a fresh seed."""
+    return ag.calibrate(str(file), evaluations=np.float64(12e3), seed=None, settle=np.float32(0))
+
+
+def test_calibrate_takes_files_and_says_its_fresh_seed(
+    posterior: ag.Calibration, file: Path, record: ag.Record
+) -> None:
+    """The seed that is said gives the same draws again, from the record and from its path."""
+    assert isinstance(posterior.seed, int) and posterior.evaluations <= 12_000
+    for given in ([file], record, (Named(file),), iter([str(file)])):
+        again = ag.calibrate(
+            given, evaluations=12_000, seed=np.uint32(posterior.seed), stiffness=np.array(250e3)
+        )
+        np.testing.assert_array_equal(again.draws, posterior.draws)
+
+
+def test_diagnose_takes_files(
+    file: Path, record: ag.Record, posterior: ag.Calibration, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What is diagnosed is what the file holds, with a fresh seed."""
+    seen: dict[str, Any] = {}
+
+    def diagnosed(records: Any, held: Any, **options: Any) -> None:
+        seen.update(options, records=records, held=held)
+        raise InterruptedError
+
+    monkeypatch.setattr('actuator_glue.api.diagnosis.core.diagnose', diagnosed)
+    age = timedelta(hours=1)
+    with pytest.raises(InterruptedError):
+        ag.diagnose([str(file)], Named(file), seed=None, prior=posterior, prior_age=age)
+    for (given,) in (seen['records'], seen['held']):
+        np.testing.assert_array_equal(given.measured, record.measured)
+    assert type(seen['seed']) is int and seen['prior'].age_s == 3600.0
+    monkeypatch.undo()
+    held = ag.simulate(ag.Command('noise', rate=100, duration=6, high=5), stiffness=250e3, seed=4)
+    with pytest.raises(InputError, match='holds the same samples'):
+        ag.diagnose(record, file)
+    with pytest.raises(InputError, match='holdout: int'):
+        ag.diagnose(record, [held, 3])
+
+
+def test_replay_takes_files(file: Path) -> None:
+    """As records of the same file."""
+    options = {
+        'window': np.int64(3),
+        'hop': Fraction(3, 2),
+        'evaluations': 6e3,
+        'seed': np.int8(3),
+    }
+    a, b = ag.replay(Named(file), **options), ag.replay([file], **options)
+    assert a.windows and a.windows[-1].parameters == b.windows[-1].parameters
+
+
+def test_rths_takes_files(
+    posterior: ag.Calibration, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A calibration by its file, fresh seeds, numbers of numpy's; so does the comparison."""
+    path = posterior.save(str(tmp_path / 'p.npz'))
+    a = ag.rths(
+        'benchmark_case_1', str(path), draws=np.int64(20), seed=None, frequencies=np.array([1])
+    )
+    b = ag.rths('benchmark_case_1', posterior, draws=20.0, seed=a.seed, frequencies=np.float32(1))
+    assert a.p_unstable == b.p_unstable and a.tracking == b.tracking
+    assert a.to_json()['seed'] == a.seed and a.go(np.float32(1.0)) == b.go(1)
+    seen: list[tuple[Any, int]] = []
+
+    def one(partition: str, calibration: Any, *, seed: int, **options: Any) -> ag.StabilityResult:
+        seen.append((calibration, seed))
+        return a
+
+    monkeypatch.setattr('actuator_glue.api.compensation.rths', one)
+    ag.compare_compensators('benchmark_case_1', path, seed=None)
+    assert len({seed for _, seed in seen}) == 1 and type(seen[0][1]) is int
+    np.testing.assert_array_equal(seen[0][0].draws, posterior.draws)
+    assert np.isfinite(posterior.state_space(np.int64(250000), np.int64(3)).A).all()
+    for wrong in (3, None, {}):
+        with pytest.raises(InputError, match='is no calibration'):
+            ag.rths('benchmark_case_1', wrong)
+
+
+@pytest.mark.parametrize('kind', SAME)
+def test_numbers_of_every_type_are_the_same(kind: Callable[[float], Any], file: Path) -> None:
+    """In every public function and class that takes some."""
+    k, usual = kind(250000), ag.Command(rate=200, duration=3, amplitude=1, high=2)
+    made = ag.simulate(
+        ag.Command('sweep', kind(200), kind(3), kind(1), None, kind(2)), stiffness=k
+    )
+    same = ag.simulate(usual, stiffness=250e3)
+    np.testing.assert_array_equal(made.measured, same.measured)
+    assert type(made.stiffness) is float and made.period == 1.0 / 200.0
+    assert ag.Record([0, 1, 2], [0, 1, 2], kind(1), k).rate == 1.0
+    for given in (k, [k], (k,), np.array([k])):
+        assert ag.load_records(file, stiffness=given)[0].stiffness == 250e3
+        assert records_given(file, stiffness=given)[0].stiffness == 250e3
+    assert ag.load(Named(file), stiffness=k).stiffness == 250e3
+    options = CalibrationOptions(
+        evaluations=kind(60000), seed=kind(3), settle=kind(2), drift=kind(1), prior_age=kind(60),
+        bounds={'beta_1': (kind(0), kind(800))}, shaping_factor=kind(256),
+    )  # fmt: skip
+    plain = CalibrationOptions(
+        evaluations=60000, seed=3, settle=2, drift=1, prior_age=60,
+        bounds={'beta_1': (0, 800)}, shaping_factor=256,
+    )  # fmt: skip
+    assert options == plain and type(options.evaluations) is int
+    diagnosis = DiagnosisOptions(seed=kind(3), jobs=kind(2), drift=kind(1), prior_age=kind(60))
+    assert diagnosis == DiagnosisOptions(3, 2, drift=1, prior_age=60)
+    specimen = ag.Specimen(kind(2), kind(3), k, {'mass': kind(1)})
+    assert specimen == ag.Specimen(2.0, 3.0, 250e3, {'mass': 1.0})
+    assert type(specimen.stiffness) is float
+    partition = ag.Partition([[kind(2)]], [[kind(3)]], [[k]], specimen, kind(1000), kind(0))
+    assert partition.rate == 1000.0 and partition.interface == 0
+
+
+@pytest.mark.parametrize('wrong', NONE, ids=repr)
+def test_what_is_no_number_is_refused_by_name(wrong: Any, file: Path) -> None:
+    """One clear error that names the argument, whatever was given."""
+    usual = ag.Command(rate=200, duration=3)
+    calls: dict[str, Callable[[], object]] = {
+        'specimen stiffness': lambda: ag.simulate(usual, stiffness=wrong),
+        'duration': lambda: ag.Command(duration=wrong),
+        'sample period': lambda: ag.Record([0, 1], [0, 1], wrong),
+        'evaluations': lambda: CalibrationOptions(evaluations=wrong),
+        'settle': lambda: CalibrationOptions(settle=wrong),
+        'bound': lambda: CalibrationOptions(bounds={'beta_1': (0.0, wrong)}),
+        'seed': lambda: CalibrationOptions(seed=wrong),
+        'prior_age': lambda: DiagnosisOptions(prior_age=wrong),
+        'jobs': lambda: DiagnosisOptions(jobs=wrong),
+        'hop': lambda: ag.replay(file, hop=wrong),
+        'draws': lambda: ag.rths('benchmark_case_1', 'none.npz', draws=wrong),
+        'mass': lambda: ag.Specimen(wrong, 1.0, 1.0),
+    }
+    for name, call in calls.items():
+        with pytest.raises(InputError, match=name):
+            call()
+
+
+@pytest.mark.parametrize('wrong', [3, None, {'a': 1}, [1.0], b'test.csv'], ids=repr)
+def test_what_is_no_record_is_refused(wrong: Any) -> None:
+    """A message says what may be given."""
+    for call in (ag.calibrate, ag.diagnose, ag.replay, ag.load, ag.load_records):
+        with pytest.raises(InputError, match=r'is no|no such|cannot'):
+            call(wrong)
+
+
+def test_nothing_is_refused(file: Path) -> None:
+    """No record at all."""
+    for call in (ag.calibrate, ag.diagnose, ag.replay, ag.load_records):
+        with pytest.raises(InputError, match='record'):
+            call([])
+    with pytest.raises(InputError, match='2 stiffnesses for 1 records'):
+        ag.calibrate(file, stiffness=[0, 1])
+
+
+def test_effects_are_read_from_and_written_to_any_path(tmp_path: Path) -> None:
+    """The module of effects takes what `open` takes."""
+    parameter = ag.effects.Parameter('bend', '1/m', np.int64(-50), np.float32(50), 'bend', 0)
+    effect = ag.effects.term('bent', 'sensor: y = y + bend*y**2', (parameter,))
+    for path in (tmp_path / 'a.yaml', str(tmp_path / 'b.yaml'), Named(tmp_path / 'c.yaml')):
+        ag.effects.save_effects(path, [effect])
+        (again,) = ag.effects.read_effects(path)
+        assert again.name == 'bent'
