@@ -7,7 +7,13 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from actuator_glue.errors import InputError
-from actuator_glue.io.formats.delimited import DELIMITERS, fields_of, is_number, read_head
+from actuator_glue.io.formats.delimited import (
+    DELIMITERS,
+    fields_of,
+    is_number,
+    is_stamp,
+    read_head,
+)
 from actuator_glue.io.signature import open_text
 from actuator_glue.io.units import units_line
 
@@ -62,7 +68,8 @@ def _first_rows(lines: list[str], delimiter: str | None) -> _Rows | None:
         sometimes = [
             i
             for i, column in enumerate(columns)
-            if any(map(is_number, column)) and all(is_number(e) or not e for e in column)
+            if (any(map(is_number, column)) and all(is_number(e) or not e for e in column))
+            or all(map(is_stamp, column))
         ]
         if len(always) >= 2:
             return _Rows(first, delimiter, sometimes, len(columns))

@@ -33,7 +33,7 @@ _QUANTITY = {
 
 # `command_mm`, `Command [mm]`, `command/mm`, `Command in mm`
 _NAME = re.compile(
-    r'(?P<role>time|command|measured|force)'
+    r'(?P<role>time|command|measured|force)(?:(?<=time)stamp)?'
     r'(?:[\s_/,;:]*(?:in\s+)?[\[(]?\s*(?P<unit>[^\]\)\s]*)\s*[\])]?)?',
     re.IGNORECASE,
 )

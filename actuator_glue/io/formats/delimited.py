@@ -6,6 +6,7 @@ import csv
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from datetime import datetime
 from itertools import islice
 from pathlib import Path
 from typing import Literal, TextIO
@@ -16,7 +17,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
 from actuator_glue.io.formats import Column, FileTable, Format
 from actuator_glue.io.signature import open_text
-from actuator_glue.io.units import EXAMPLE, units_line
+from actuator_glue.io.units import EXAMPLE, bare, units_line
 from actuator_glue.records import Array
 
 _ROWS = 10_000  # rows read or written at a time
@@ -29,6 +30,10 @@ _NUMBER = re.compile(
 )
 # Digits in groups of three, as thousands are written; a decimal fraction may look like it.
 _GROUPED = re.compile(r'[+-]?[1-9]\d{0,2}(?:[.,]\d{3})+', re.ASCII)
+_STAMP = re.compile(
+    r'(?:(\d{4}[-/]\d\d[-/]\d\d)[T ])?(\d{1,2}:\d\d:\d\d)(?:[.,](\d+))?(Z|[+-]\d\d:\d\d)?',
+    re.ASCII,
+)
 _WORD = re.compile(r'"((?:[^"]|"")*)"|(\S+)')
 _QUOTED_FIRST = re.compile(r'\s*"[^"]*"\s*[;,\s]\s*[^"\s]')
 _SPREADSHEET = re.compile(r'"?sep=(.)"?', re.IGNORECASE)  # a first line that says the delimiter
@@ -55,6 +60,7 @@ class TextHead:
         decimal: decimal sign of the samples.
         width: entries of a row.
         least: entries that a row has at least; the last ones may be remarks, and left out.
+        stamps: positions of columns that hold dates or times of day.
         named: entries of the line of names, whether it fits or not.
     """
 
@@ -67,6 +73,7 @@ class TextHead:
     width: int
     least: int
     named: int
+    stamps: frozenset[int] = frozenset()
 
 
 def read_head(
@@ -120,7 +127,10 @@ def read_head(
         units = ['', *units]
     units = [*units, *[''] * (width - len(units))][:width]
     sign = decimal or _decimal([entry for row in table for entry in row])
-    return TextHead(aligned, units, header_lines, delimiter, notes, sign, width, least, len(names))
+    stamps = frozenset(at for at, entry in enumerate(table[0]) if is_stamp(entry))
+    return TextHead(
+        aligned, units, header_lines, delimiter, notes, sign, width, least, len(names), stamps
+    )
 
 
 def _find_names(path: Path, top: list[str], first: int) -> tuple[int, str, dict[str, str]]:
@@ -221,6 +231,26 @@ def is_number(entry: str) -> bool:
     return _NUMBER.fullmatch(entry.strip().replace(',', '.', 1)) is not None
 
 
+def is_stamp(entry: str) -> bool:
+    """Return whether an entry is a date with a time, year first, or a time of day."""
+    return _STAMP.fullmatch(entry.strip()) is not None
+
+
+def _seconds(entry: str) -> float:
+    """Return seconds since 1970 (UTC where no zone is written), or of the day; NaN for neither."""
+    stamp = _STAMP.fullmatch(entry.strip())
+    if stamp is None:
+        return np.nan
+    day, clock, fraction, zone = stamp.groups()
+    try:
+        whole = datetime.fromisoformat(
+            f'{(day or "1970-01-01").replace("/", "-")}T{clock:0>8}{zone or "+00:00"}'
+        )
+    except ValueError:  # 25:00:00
+        return np.nan
+    return whole.timestamp() + float(f'0.{fraction or 0}')
+
+
 def fields_of(line: str, delimiter: str | None) -> list[str]:
     """Return the entries of a line without the quotes about them."""
     if not line.strip(_NOTHING):
@@ -300,6 +330,7 @@ def _block(
     """
     delimiter, lines = head.delimiter, [line for _, line in block]
     plain = head.decimal == '.' and (delimiter is None or len(delimiter) == 1)
+    plain = plain and not head.stamps.intersection(positions)
     if plain and not any('"' in line for line in lines):
         _check_widths(
             path,
@@ -319,9 +350,12 @@ def _block(
             return [np.array(column) for column in table.T]
     rows = [fields_of(line, delimiter) for line in lines]
     _check_widths(path, head, block, [len(row) for row in rows])
+    entries = [[row[at] if at < len(row) else '' for row in rows] for at in positions]
     return [
-        _numbers([row[at] if at < len(row) else '' for row in rows], head.decimal)
-        for at in positions
+        np.array(list(map(_seconds, column)))
+        if at in head.stamps
+        else _numbers(column, head.decimal)
+        for at, column in zip(positions, entries, strict=True)
     ]
 
 
@@ -430,7 +464,10 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
 
     names = head.names or [''] * head.width
     return FileTable(
-        [Column(name, name, unit) for name, unit in zip(names, head.units, strict=True)],
+        [
+            Column(name, bare(name), 's') if at in head.stamps else Column(name, name, unit)
+            for at, (name, unit) in enumerate(zip(names, head.units, strict=True))
+        ],
         head.notes,
         values,
         entry=lambda row, at: entry_at(path, head, row, at),

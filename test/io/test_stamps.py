@@ -1,0 +1,72 @@
+"""Dates and times of day as the clock of a text."""
+
+import datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from actuator_glue.cli.main import main
+from actuator_glue.errors import InputError
+from actuator_glue.io.laboratory import read
+from actuator_glue.io.look import look
+
+COUNT = 400
+COMMAND = np.sin(1e-3 * np.arange(COUNT) ** 2)
+START = datetime.datetime(2024, 5, 3, 9, 59, 58, tzinfo=datetime.UTC)
+DAY = 1_714_694_400  # 2024-05-03 [s]
+
+
+def table(path: Path, form: str, start: datetime.datetime = START, by: str = ',') -> Path:
+    """Write stamps of 5 ms, their thousandths as `form` has them, command and measured."""
+    lines = [by.join(['Timestamp', 'command_mm', 'measured_mm'])]
+    for i in range(COUNT):
+        stamp = start + datetime.timedelta(milliseconds=5 * i)
+        text = stamp.strftime(form).replace('MS', f'{stamp.microsecond // 1000:03d}')
+        lines.append(by.join([text, f'{COMMAND[i]:.6f}', f'{COMMAND[i - 3]:.6f}']))
+    path.write_text('\n'.join(lines) + '\n')
+    return path
+
+
+@pytest.mark.parametrize(
+    ('form', 'by', 'start'),
+    [
+        ('%Y-%m-%dT%H:%M:%S.MS', ',', DAY + 35_998),
+        ('%Y-%m-%d %H:%M:%S.MS', ',', DAY + 35_998),
+        ('%Y/%m/%d %H:%M:%S.MS', '\t', DAY + 35_998),
+        ('%Y-%m-%d %H:%M:%S,MS', ';', DAY + 35_998),
+        ('%Y-%m-%dT%H:%M:%S.MSZ', ',', DAY + 35_998),
+        ('%Y-%m-%dT%H:%M:%S.MS+02:00', ',', DAY + 28_798),
+        ('"%Y-%m-%d %H:%M:%S.MS"', ' ', DAY + 35_998),
+        ('%H:%M:%S.MS', ' ', 35_998),
+        ('%H:%M:%S,MS000', ';', 35_998),
+    ],
+)
+def test_stamps_are_times(tmp_path: Path, form: str, by: str, start: int) -> None:
+    """ISO 8601 with or without a zone, slashes, a decimal comma; times of day; also by `map`."""
+    path = table(tmp_path / 'a.csv', form, by=by)
+    record = read(path)
+    assert record.period == 5e-3
+    assert record.start_ns == pytest.approx(start * 10**9, abs=1000)
+    np.testing.assert_allclose(record.command, np.round(COMMAND, 6) * 1e-3, atol=1e-12)
+    assert look(path).columns[0].unit == 's'
+    assert main(['map', str(path)]) == 0
+
+
+def test_a_stamp_that_is_none_is_told_with_its_line(tmp_path: Path) -> None:
+    """Hours that no day has, a number among stamps; a day that ends is a time that goes back."""
+    path = table(tmp_path / 'a.csv', '%H:%M:%S.MS')
+    for odd in ('25:61:00.000', '36000.5', ''):
+        path.write_text(path.read_text().replace('09:59:58.750', odd))
+        with pytest.raises(InputError, match=f"time is NaN.*line 152: '{odd}'"):
+            read(path)
+        table(tmp_path / 'a.csv', '%H:%M:%S.MS')
+    night = START.replace(hour=23, minute=59, second=59)
+    with pytest.raises(InputError, match='time goes back at sample 200'):
+        read(table(tmp_path / 'a.csv', '%H:%M:%S.MS', night))
+
+
+def test_dates_whose_order_is_open_are_no_clock(tmp_path: Path) -> None:
+    """05/03 is March or May: such a column is no time of itself."""
+    with pytest.raises(InputError, match='Timestamp'):
+        read(table(tmp_path / 'a.csv', '%m/%d/%Y %H:%M:%S.MS'))
