@@ -11,10 +11,15 @@ import numpy as np
 import pytest
 
 import actuator_glue as ag
-from actuator_glue.api.calibration import CalibrationOptions
-from actuator_glue.api.diagnosis import DiagnosisOptions
+from actuator_glue.api.calibration import CalibrationOptions as _Calibration
+from actuator_glue.api.diagnosis import DiagnosisOptions as _Diagnosis
 from actuator_glue.api.given import records_given
 from actuator_glue.errors import InputError
+
+# What numpy's numbers and paths of others are to a type checker is not what is asked here.
+api: Any = ag
+CalibrationOptions: Any = _Calibration
+DiagnosisOptions: Any = _Diagnosis
 
 # The same number in the types that numpy, pandas and people have.
 SAME: tuple[Callable[[float], Any], ...] = (
@@ -37,7 +42,10 @@ class Named:
 @pytest.fixture(scope='module')
 def record() -> ag.Record:
     """Six seconds at 100 Hz."""
-    return ag.simulate(ag.Command(rate=100, duration=6, high=5), stiffness=250000, seed=3)
+    made: ag.Record = api.simulate(
+        api.Command(rate=100, duration=6, high=5), stiffness=250000, seed=3
+    )
+    return made
 
 
 @pytest.fixture(scope='module')
@@ -53,7 +61,9 @@ def file(record: ag.Record, tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope='module')
 def posterior(file: Path) -> ag.Calibration:
     """A calibration of the file by its name, with a fresh seed."""
-    return ag.calibrate(str(file), evaluations=np.float64(12e3), seed=None, settle=np.float32(0))
+    options = {'evaluations': np.float64(12e3), 'settle': np.float32(0)}
+    found: ag.Calibration = api.calibrate(str(file), seed=None, **options)
+    return found
 
 
 def test_calibrate_takes_files_and_says_its_fresh_seed(
@@ -62,7 +72,7 @@ def test_calibrate_takes_files_and_says_its_fresh_seed(
     """The seed that is said gives the same draws again, from the record and from its path."""
     assert isinstance(posterior.seed, int) and posterior.evaluations <= 12_000
     for given in ([file], record, (Named(file),), iter([str(file)])):
-        again = ag.calibrate(
+        again = api.calibrate(
             given, evaluations=12_000, seed=np.uint32(posterior.seed), stiffness=np.array(250e3)
         )
         np.testing.assert_array_equal(again.draws, posterior.draws)
@@ -81,16 +91,18 @@ def test_diagnose_takes_files(
     monkeypatch.setattr('actuator_glue.api.diagnosis.core.diagnose', diagnosed)
     age = timedelta(hours=1)
     with pytest.raises(InterruptedError):
-        ag.diagnose([str(file)], Named(file), seed=None, prior=posterior, prior_age=age)
+        api.diagnose([str(file)], Named(file), seed=None, prior=posterior, prior_age=age)
     for (given,) in (seen['records'], seen['held']):
         np.testing.assert_array_equal(given.measured, record.measured)
     assert type(seen['seed']) is int and seen['prior'].age_s == 3600.0
     monkeypatch.undo()
-    held = ag.simulate(ag.Command('noise', rate=100, duration=6, high=5), stiffness=250e3, seed=4)
+    held = api.simulate(
+        api.Command('noise', rate=100, duration=6, high=5), stiffness=250e3, seed=4
+    )
     with pytest.raises(InputError, match='holds the same samples'):
-        ag.diagnose(record, file)
+        api.diagnose(record, file)
     with pytest.raises(InputError, match='holdout: int'):
-        ag.diagnose(record, [held, 3])
+        api.diagnose(record, [held, 3])
 
 
 def test_replay_takes_files(file: Path) -> None:
@@ -101,7 +113,7 @@ def test_replay_takes_files(file: Path) -> None:
         'evaluations': 6e3,
         'seed': np.int8(3),
     }
-    a, b = ag.replay(Named(file), **options), ag.replay([file], **options)
+    a, b = api.replay(Named(file), **options), api.replay([file], **options)
     assert a.windows and a.windows[-1].parameters == b.windows[-1].parameters
 
 
@@ -110,10 +122,10 @@ def test_rths_takes_files(
 ) -> None:
     """A calibration by its file, fresh seeds, numbers of numpy's; so does the comparison."""
     path = posterior.save(str(tmp_path / 'p.npz'))
-    a = ag.rths(
+    a: ag.StabilityResult = api.rths(
         'benchmark_case_1', str(path), draws=np.int64(20), seed=None, frequencies=np.array([1])
     )
-    b = ag.rths('benchmark_case_1', posterior, draws=20.0, seed=a.seed, frequencies=np.float32(1))
+    b = api.rths('benchmark_case_1', posterior, draws=20.0, seed=a.seed, frequencies=np.float32(1))
     assert a.p_unstable == b.p_unstable and a.tracking == b.tracking
     assert a.to_json()['seed'] == a.seed and a.go(np.float32(1.0)) == b.go(1)
     seen: list[tuple[Any, int]] = []
@@ -123,30 +135,33 @@ def test_rths_takes_files(
         return a
 
     monkeypatch.setattr('actuator_glue.api.compensation.rths', one)
-    ag.compare_compensators('benchmark_case_1', path, seed=None)
+    api.compare_compensators('benchmark_case_1', path, seed=None)
     assert len({seed for _, seed in seen}) == 1 and type(seen[0][1]) is int
     np.testing.assert_array_equal(seen[0][0].draws, posterior.draws)
-    assert np.isfinite(posterior.state_space(np.int64(250000), np.int64(3)).A).all()
-    for wrong in (3, None, {}):
+    space: Any = posterior.state_space
+    assert np.isfinite(space(np.int64(250000), np.int64(3)).A).all()
+    nothing: tuple[Any, ...] = (3, None, {})
+    for wrong in nothing:
         with pytest.raises(InputError, match='is no calibration'):
-            ag.rths('benchmark_case_1', wrong)
+            api.rths('benchmark_case_1', wrong)
 
 
 @pytest.mark.parametrize('kind', SAME)
 def test_numbers_of_every_type_are_the_same(kind: Callable[[float], Any], file: Path) -> None:
     """In every public function and class that takes some."""
-    k, usual = kind(250000), ag.Command(rate=200, duration=3, amplitude=1, high=2)
-    made = ag.simulate(
-        ag.Command('sweep', kind(200), kind(3), kind(1), None, kind(2)), stiffness=k
+    k, usual = kind(250000), api.Command(rate=200, duration=3, amplitude=1, high=2)
+    made = api.simulate(
+        api.Command('sweep', kind(200), kind(3), kind(1), None, kind(2)), stiffness=k
     )
-    same = ag.simulate(usual, stiffness=250e3)
+    same = api.simulate(usual, stiffness=250e3)
     np.testing.assert_array_equal(made.measured, same.measured)
     assert type(made.stiffness) is float and made.period == 1.0 / 200.0
-    assert ag.Record([0, 1, 2], [0, 1, 2], kind(1), k).rate == 1.0
-    for given in (k, [k], (k,), np.array([k])):
-        assert ag.load_records(file, stiffness=given)[0].stiffness == 250e3
+    assert api.Record([0, 1, 2], [0, 1, 2], kind(1), k).rate == 1.0
+    several: tuple[Any, ...] = (k, [k], (k,), np.array([k]))
+    for given in several:
+        assert api.load_records(file, stiffness=given)[0].stiffness == 250e3
         assert records_given(file, stiffness=given)[0].stiffness == 250e3
-    assert ag.load(Named(file), stiffness=k).stiffness == 250e3
+    assert api.load(Named(file), stiffness=k).stiffness == 250e3
     options = CalibrationOptions(
         evaluations=kind(60000), seed=kind(3), settle=kind(2), drift=kind(1), prior_age=kind(60),
         bounds={'beta_1': (kind(0), kind(800))}, shaping_factor=kind(256),
@@ -158,30 +173,30 @@ def test_numbers_of_every_type_are_the_same(kind: Callable[[float], Any], file: 
     assert options == plain and type(options.evaluations) is int
     diagnosis = DiagnosisOptions(seed=kind(3), jobs=kind(2), drift=kind(1), prior_age=kind(60))
     assert diagnosis == DiagnosisOptions(3, 2, drift=1, prior_age=60)
-    specimen = ag.Specimen(kind(2), kind(3), k, {'mass': kind(1)})
-    assert specimen == ag.Specimen(2.0, 3.0, 250e3, {'mass': 1.0})
+    specimen = api.Specimen(kind(2), kind(3), k, {'mass': kind(1)})
+    assert specimen == api.Specimen(2.0, 3.0, 250e3, {'mass': 1.0})
     assert type(specimen.stiffness) is float
-    partition = ag.Partition([[kind(2)]], [[kind(3)]], [[k]], specimen, kind(1000), kind(0))
+    partition = api.Partition([[kind(2)]], [[kind(3)]], [[k]], specimen, kind(1000), kind(0))
     assert partition.rate == 1000.0 and partition.interface == 0
 
 
 @pytest.mark.parametrize('wrong', NONE, ids=repr)
 def test_what_is_no_number_is_refused_by_name(wrong: Any, file: Path) -> None:
     """One clear error that names the argument, whatever was given."""
-    usual = ag.Command(rate=200, duration=3)
+    usual = api.Command(rate=200, duration=3)
     calls: dict[str, Callable[[], object]] = {
-        'specimen stiffness': lambda: ag.simulate(usual, stiffness=wrong),
-        'duration': lambda: ag.Command(duration=wrong),
-        'sample period': lambda: ag.Record([0, 1], [0, 1], wrong),
+        'specimen stiffness': lambda: api.simulate(usual, stiffness=wrong),
+        'duration': lambda: api.Command(duration=wrong),
+        'sample period': lambda: api.Record([0, 1], [0, 1], wrong),
         'evaluations': lambda: CalibrationOptions(evaluations=wrong),
         'settle': lambda: CalibrationOptions(settle=wrong),
         'bound': lambda: CalibrationOptions(bounds={'beta_1': (0.0, wrong)}),
         'seed': lambda: CalibrationOptions(seed=wrong),
         'prior_age': lambda: DiagnosisOptions(prior_age=wrong),
         'jobs': lambda: DiagnosisOptions(jobs=wrong),
-        'hop': lambda: ag.replay(file, hop=wrong),
-        'draws': lambda: ag.rths('benchmark_case_1', 'none.npz', draws=wrong),
-        'mass': lambda: ag.Specimen(wrong, 1.0, 1.0),
+        'hop': lambda: api.replay(file, hop=wrong),
+        'draws': lambda: api.rths('benchmark_case_1', 'none.npz', draws=wrong),
+        'mass': lambda: api.Specimen(wrong, 1.0, 1.0),
     }
     for name, call in calls.items():
         with pytest.raises(InputError, match=name):
@@ -191,25 +206,25 @@ def test_what_is_no_number_is_refused_by_name(wrong: Any, file: Path) -> None:
 @pytest.mark.parametrize('wrong', [3, None, {'a': 1}, [1.0], b'test.csv'], ids=repr)
 def test_what_is_no_record_is_refused(wrong: Any) -> None:
     """A message says what may be given."""
-    for call in (ag.calibrate, ag.diagnose, ag.replay, ag.load, ag.load_records):
+    for call in (api.calibrate, api.diagnose, api.replay, api.load, api.load_records):
         with pytest.raises(InputError, match=r'is no|no such|cannot'):
             call(wrong)
 
 
 def test_nothing_is_refused(file: Path) -> None:
     """No record at all."""
-    for call in (ag.calibrate, ag.diagnose, ag.replay, ag.load_records):
+    for call in (api.calibrate, api.diagnose, api.replay, api.load_records):
         with pytest.raises(InputError, match='record'):
             call([])
     with pytest.raises(InputError, match='2 stiffnesses for 1 records'):
-        ag.calibrate(file, stiffness=[0, 1])
+        api.calibrate(file, stiffness=[0, 1])
 
 
 def test_effects_are_read_from_and_written_to_any_path(tmp_path: Path) -> None:
     """The module of effects takes what `open` takes."""
-    parameter = ag.effects.Parameter('bend', '1/m', np.int64(-50), np.float32(50), 'bend', 0)
-    effect = ag.effects.term('bent', 'sensor: y = y + bend*y**2', (parameter,))
+    parameter = api.effects.Parameter('bend', '1/m', np.int64(-50), np.float32(50), 'bend', 0)
+    effect = api.effects.term('bent', 'sensor: y = y + bend*y**2', (parameter,))
     for path in (tmp_path / 'a.yaml', str(tmp_path / 'b.yaml'), Named(tmp_path / 'c.yaml')):
-        ag.effects.save_effects(path, [effect])
-        (again,) = ag.effects.read_effects(path)
+        api.effects.save_effects(path, [effect])
+        (again,) = api.effects.read_effects(path)
         assert again.name == 'bent'

@@ -21,12 +21,12 @@ from actuator_glue.api.compilation import compilation
 from actuator_glue.api.given import Records, Stiffness, records_given, seed_given
 from actuator_glue.api.options import chosen
 from actuator_glue.api.prior import check_prior, given_prior
-from actuator_glue.api.tracking import record_tracking
+from actuator_glue.api.tracking import records_tracking
 from actuator_glue.diagnosis.force import check_forces
 from actuator_glue.diagnosis.residual_structure import residual_structure
 from actuator_glue.errors import InputError
 from actuator_glue.given import number, take_numbers
-from actuator_glue.hygiene.clean import clean, initial_state
+from actuator_glue.hygiene.clean import clean, common_initial
 from actuator_glue.hygiene.despike import despiked
 from actuator_glue.inference.at_bound import pressed
 from actuator_glue.inference.chains import Chains
@@ -35,7 +35,6 @@ from actuator_glue.inference.least_squares.data import SETTLE
 from actuator_glue.inference.moments import moments
 from actuator_glue.inference.posterior import Problem
 from actuator_glue.inference.prior_conflict import conflict
-from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 
 Progress = Callable[[float], None]
@@ -147,11 +146,7 @@ def calibrate(
     cleaned, notes = clean(tests)
     if options.use_force:
         check_forces(cleaned)
-    initial: Initial = 'measured'
-    if options.initial == 'rest' or (
-        options.initial == 'auto' and all(initial_state(r) == 'rest' for r in cleaned)
-    ):
-        initial = 'rest'
+    initial = common_initial(cleaned) if options.initial == 'auto' else options.initial
     cleaned, found, near = despiked(cleaned, [initial] * len(cleaned))
     notes += found
     settle = options.settle
@@ -225,10 +220,7 @@ def calibrate(
         sources=tuple(CalibratedRecord.of(r) for r in cleaned),
         prior=prior,
         records=tuple(cleaned),
-        tracking=tuple(
-            record_tracking(chains.posterior(), model.names, structure, record, initial)
-            for record in cleaned
-        ),
+        tracking=records_tracking(chains.posterior(), model.names, structure, cleaned),
     )
 
 

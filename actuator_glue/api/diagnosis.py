@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields, replace
 from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -16,7 +16,7 @@ from actuator_glue.api.options import chosen
 from actuator_glue.api.prior import check_prior, given_prior
 from actuator_glue.api.provenance import provenance
 from actuator_glue.api.result import Result
-from actuator_glue.api.tracking import RecordTracking, record_tracking, tables
+from actuator_glue.api.tracking import RecordTracking, ready, records_tracking, tables
 from actuator_glue.diagnosis import diagnose as core
 from actuator_glue.diagnosis.estimate import Json
 from actuator_glue.diagnosis.result import SCHEMA, DiagnosisData
@@ -24,8 +24,6 @@ from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.effects import save_effects
 from actuator_glue.errors import InputError
 from actuator_glue.given import take_numbers
-from actuator_glue.hygiene.clean import clean, initial_state
-from actuator_glue.inference.least_squares.decimate import decimated
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.records import Record
 
@@ -204,19 +202,27 @@ def diagnose(
         )
     values = {f.name: getattr(found, f.name) for f in fields(found)}
     values['provenance'] = provenance([*given, *held], options.seed)
-    return Diagnosis(**values, tracking=_tracking(found, clean(given)[0]))
+    return Diagnosis(**values, tracking=_tracking(found, given))
 
 
 def _tracking(found: DiagnosisData, records: Sequence[Record]) -> tuple[RecordTracking, ...]:
-    """Return how the augmented model follows each fitted record, at the rate that was fitted.
+    """Return how the augmented model follows each fitted record, under the set-up that was taken.
 
     Not where one has its own settings, nor for records that were left out.
     """
     if set(found.names) != set(found.model.names):
         return ()
-    rates = {of['source']: of['fitted_rate_hz'] for of in found.sampling}
-    known = [r for r in records if r.source in rates]
-    fitted = (decimated(r, round(r.rate / rates[r.source])) for r in known)
-    return tuple(
-        record_tracking(found.joint, found.names, found.model, r, initial_state(r)) for r in fitted
-    )
+    fitted = {of['source'] for of in found.sampling}
+    cleaned = ready(records)
+    if found.setup is not None and found.setup.taken:
+        taken = found.setup
+        rows = zip(taken.sources, taken.stiffness, taken.hold, strict=True)
+        under = {source: (k, hold) for source, k, hold in rows}
+        cleaned = [
+            replace(r, stiffness=under[r.source][0], hold=under[r.source][1])
+            if r.source in under
+            else r
+            for r in cleaned
+        ]
+    known = [r for r in cleaned if r.source in fitted]
+    return records_tracking(found.joint, found.names, found.model, known)

@@ -12,7 +12,9 @@ from actuator_glue.api.spread import Spread, spread
 from actuator_glue.hybrid.actuator import actuator, table_of
 from actuator_glue.hybrid.indicators import TargetMotion
 from actuator_glue.hybrid.stability import tracking
-from actuator_glue.inference.least_squares.data import LANES, chunks
+from actuator_glue.hygiene.clean import clean, common_initial, initial_state
+from actuator_glue.hygiene.despike import despiked
+from actuator_glue.inference.least_squares.data import LANES, SETTLE, chunks
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.online.job import WindowResult
@@ -74,6 +76,39 @@ def tables(tracking: Sequence[RecordTracking]) -> list[html.Block]:
     from actuator_glue.report import html
 
     return [html.Table(HEADER, of.rows(), of.title) for of in tracking]
+
+
+def ready(records: Sequence[Record]) -> list[Record]:
+    """Return the samples of records that are calibrated with: cleaned, without impulses.
+
+    Raises:
+        InputError: as `clean`.
+    """
+    cleaned, _ = clean(records)
+    return despiked(cleaned, [common_initial(cleaned)] * len(cleaned))[0]
+
+
+def records_tracking(
+    draws: Array, names: Sequence[str], structure: Structure, records: Sequence[Record]
+) -> tuple[RecordTracking, ...]:
+    """Return how the actuator follows the command of each record, whoever asks.
+
+    Numbers of one record are those of one set of samples: at the rate it was sampled with, without
+    impulses, and without what lets a state that is not known be forgotten.
+
+    Args:
+        draws: shape (m, p), SI units.
+        names: parameter of each column; those of a likelihood are passed over.
+        structure: the model.
+        records: the tests, as `ready` returns them.
+    """
+    out = []
+    for record in records:
+        initial = initial_state(record)
+        settle = 0 if initial == 'rest' else round(SETTLE / record.period)
+        settle = min(settle, len(record) // 2)
+        out.append(record_tracking(draws, names, structure, record, initial, settle))
+    return tuple(out)
 
 
 def record_tracking(

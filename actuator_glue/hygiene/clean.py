@@ -76,6 +76,11 @@ def initial_state(record: Record) -> Initial:
     return 'rest'
 
 
+def common_initial(records: Sequence[Record]) -> Initial:
+    """Return the state in which all of some records start: at rest only where each does."""
+    return 'rest' if all(initial_state(r) == 'rest' for r in records) else 'measured'
+
+
 def clean(
     records: Sequence[Record], holdout: Sequence[Record] = ()
 ) -> tuple[list[Record], list[str]]:

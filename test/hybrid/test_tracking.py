@@ -9,7 +9,7 @@ import pytest
 
 import actuator_glue as ag
 from actuator_glue.api.diagnosis import _tracking
-from actuator_glue.api.tracking import record_tracking
+from actuator_glue.api.tracking import record_tracking, records_tracking
 from actuator_glue.model.structure import Structure
 
 NAMES = ('beta_1', 'alpha_1_beta_0', 'alpha_2', 'alpha_3')
@@ -48,20 +48,55 @@ def ag_sensors() -> object:
 
 
 def test_a_diagnosis_tells_of_the_records_it_was_fitted_to() -> None:
-    """Records from before a change of the machine are left out of the fit, and at its rate."""
+    """Records from before a change of the machine are left out of the fit."""
     theta = np.array([235.0, 5.0e10, 4.23e6, 3.3])
     records = [
-        replace(ag.simulate(theta=theta, stiffness=250e3), source=name)
-        for name in ('before.csv', 'after.csv')
+        replace(ag.simulate(theta=theta, stiffness=250e3, seed=i), source=name)
+        for i, name in enumerate(('before.csv', 'after.csv'))
     ]
     found = SimpleNamespace(
         names=Structure(()).names,
         model=Structure(()),
-        posterior=np.tile(theta, (8, 1)),
+        joint=np.tile(theta, (8, 1)),
+        setup=None,
         sampling=({'source': 'after.csv', 'fitted_rate_hz': records[1].rate / 2},),
     )
     (told,) = _tracking(found, records)
     assert told.source == 'after.csv'
+
+
+def test_a_calibration_and_a_diagnosis_count_the_same_samples(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A record at 1 kHz, of which a diagnosis fits means of three; it starts amid a motion.
+
+    With impulses, which are no motion: the record's own numbers are the same from both, and so
+    are those of equal draws.
+    """
+    record = ag.simulate(ag.Command(duration=12.0, high=8.0), stiffness=250e3, seed=3)
+    measured = record.measured.copy()
+    measured[[5000, 7000, 9000]] += 3e-4
+    given = replace(record, measured=measured, source='a.csv').slice(2100, 12000)
+    theta, seen = np.tile(THETA, (8, 1)), {}
+
+    def recorded(draws: object, *rest: object) -> tuple[()]:
+        seen['calibrate'] = records_tracking(theta, *rest)
+        return ()
+
+    monkeypatch.setattr('actuator_glue.api.calibration.records_tracking', recorded)
+    ag.calibrate(given, evaluations=12_000)
+    (source,) = {r.source for r in seen['calibrate']}
+    found = SimpleNamespace(
+        names=Structure(()).names, model=Structure(()), joint=theta, setup=None,
+        sampling=({'source': given.source, 'fitted_rate_hz': 250.0},),
+    )  # fmt: skip
+    (diagnosed,), (calibrated,) = _tracking(found, [given]), seen['calibrate']
+    assert source == 'a.csv' and set(diagnosed.measured) >= {'fei_delay_s', 'J1_s', 'J2'}
+    assert diagnosed.measured == calibrated.measured
+    assert diagnosed.predicted == calibrated.predicted
+    clean = record.slice(2100, 12000)
+    (whole,) = records_tracking(theta, NAMES, Structure(()), [clean])
+    assert diagnosed.measured['J3'] == pytest.approx(whole.measured['J3'], rel=0.02)
 
 
 def test_calibrate_hands_them_out() -> None:
