@@ -91,7 +91,9 @@ def _windows(found: Replay) -> list[WindowEstimate]:
 
 def brief(found: Replay) -> list[html.Block]:
     """Return the summary, the windows, what differs and what limits the answer."""
-    told = [*(found.compared.differing[:ROWS] if found.compared else ()), *found.notes]
+    told = [*found.notes]
+    if found.compared is not None:
+        told = [*found.compared.differing[:ROWS], *found.compared.unrepeatable[:ROWS], *told]
     return [
         html.Text(found.summary()),
         html.Table(header(found), rows(found), TITLE),

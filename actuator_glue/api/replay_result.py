@@ -83,11 +83,14 @@ class Compared:
         posteriors: how many were compared.
         bands: how many were compared.
         differing: one line for each that differs or is missing.
+        unrepeatable: one line for each window that cannot be repeated to the bit: the bag lacks
+            samples of it, or where it began.
     """
 
     posteriors: int
     bands: int
     differing: tuple[str, ...]
+    unrepeatable: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +103,8 @@ class Replay(Result):
         effects: effects of the last window's model beyond Eq. (2).
         windows: the windows, in order.
         events: what happened besides, one line each.
-        identical: replay and live agree bit by bit; None where nothing was published live.
+        identical: replay and live agree bit by bit in all that can be repeated; None where nothing
+            was published live, or nothing of it can be repeated.
         compared: how that was found; None where nothing was published live.
         data_seconds: length of the usable samples [s].
         seconds: how long the replay took.
@@ -149,6 +153,9 @@ class Replay(Result):
         """Return what came out in one line."""
         said = {None: 'nothing published live to compare with', True: 'identical to live'}
         verdict = said.get(self.identical, 'NOT identical to live')
+        if self.compared is not None and (lost := len(self.compared.unrepeatable)):
+            told = f'{lost} windows cannot be repeated: the bag lacks samples'
+            verdict = told if self.identical is None else f'{verdict}; {told}'
         return f'{len(self.windows)} windows over {self.data_seconds:.1f} s: {verdict}'
 
     def brief(self) -> list[html.Block]:

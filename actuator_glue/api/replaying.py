@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
+from os import PathLike, fspath
 from typing import Any
 
 from actuator_glue.api.callbacks import harmless
+from actuator_glue.api.given import Records, records_given
 from actuator_glue.api.replay_result import (
     Compared,
     Replay,
@@ -19,21 +20,20 @@ from actuator_glue.api.replay_result import (
 )
 from actuator_glue.api.tracking import window_tracking
 from actuator_glue.errors import InputError
+from actuator_glue.given import number, whole
 from actuator_glue.io.bag_reader import decoded, is_bag, summarise
 from actuator_glue.io.bag_samples import topics_of_actuator
-from actuator_glue.io.load import load_records
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.playback import Item, items, stream
 from actuator_glue.online.playback import replay as run
 from actuator_glue.online.replay_comparison import Published, ReplayComparison, compare, published
 from actuator_glue.online.settings import AUTOMATIC, EstimatorSettings
 from actuator_glue.online.stream import Rejected
-from actuator_glue.records import Record
 from actuator_glue.sample_block import Block, check_block
 from actuator_glue.workers.reports import Reports
 
 INPUTS = ('SampleBlock', 'TestSetup')
-RESULTS = ('EstimatorSetup', 'PosteriorMoments', 'PredictionBand')
+RESULTS = ('EstimatorSetup', 'PosteriorMoments', 'PosteriorDraws', 'PredictionBand')
 OVERRIDES = ('window', 'hop', 'settle', 'shaping_factor', 'evaluations', 'seed')
 
 Progress = Callable[[float], None]
@@ -53,10 +53,27 @@ class _Run:
     effects: tuple[str, ...] = ()
     data_seconds: float = 0.0
     tracking: bool = False
+    # Running indices of the first sample of each stretch without a gap, and of the one after it.
+    stretches: list[tuple[int, int]] = field(default_factory=list)
+
+    def took(self, block: Block) -> None:
+        """Count the samples of a block."""
+        self.data_seconds += _usable_seconds(block)
+        first, stop = block.index, block.index + len(block)
+        if self.stretches and self.stretches[-1][1] == first:
+            first = self.stretches.pop()[0]
+        self.stretches.append((first, stop))
+
+    def missing(self, first: int, stop: int) -> str:
+        """Return what is missing of the samples first to stop - 1; empty where nothing is."""
+        if any(begin <= first and stop <= end for begin, end in self.stretches):
+            return ''
+        held = sum(max(0, min(stop, e) - max(first, b)) for b, e in self.stretches)
+        return f'{max(stop - first - held, 1)} of its samples {first} to {stop - 1} are missing'
 
 
 def replay(
-    source: Path | str | Record | Sequence[Record],
+    source: Records,
     *,
     namespace: str | None = None,
     tracking: bool = False,
@@ -66,7 +83,7 @@ def replay(
     """Run the online estimator over recorded samples: the code that runs live, without a clock.
 
     Args:
-        source: a bag, a laboratory file, or records; where a bag holds what a live estimator
+        source: a bag, laboratory files, or records; where a bag holds what a live estimator
             published and no setting is given, both are compared bit by bit.
         namespace: whose samples, where a bag has several actuators.
         tracking: whether each window tells how the actuator followed its command.
@@ -85,6 +102,8 @@ def replay(
     asked = {name: value for name, value in settings.items() if value is not None}
     if asked.get('shaping_factor') == 'auto':
         asked['shaping_factor'] = AUTOMATIC
+    for name, value in asked.items():
+        asked[name] = (whole if name in ('evaluations', 'seed') else number)(value, name)
     under_way = _open(source, namespace, compare_live=not asked)
     under_way.tracking = tracking
     started = time.perf_counter()
@@ -101,21 +120,22 @@ def replay(
         identical=None if comparison is None else comparison.identical,
         compared=None
         if comparison is None
-        else Compared(comparison.windows, comparison.bands, tuple(comparison.differing)),
+        else Compared(
+            comparison.windows,
+            comparison.bands,
+            tuple(comparison.differing),
+            tuple(comparison.unrepeatable),
+        ),
         data_seconds=under_way.data_seconds,
         seconds=time.perf_counter() - started,
         notes=tuple(under_way.notes),
     )
 
 
-def _open(
-    source: Path | str | Record | Sequence[Record], namespace: str | None, compare_live: bool
-) -> _Run:
-    if isinstance(source, (Path, str)) and is_bag(source):
-        return _open_bag(str(source), namespace, compare_live)
-    if isinstance(source, (Path, str)):
-        source = load_records(source)
-    records = [source] if isinstance(source, Record) else list(source)
+def _open(source: Records, namespace: str | None, compare_live: bool) -> _Run:
+    if isinstance(source, (str, PathLike)) and is_bag(fspath(source)):
+        return _open_bag(fspath(source), namespace, compare_live)
+    records = records_given(source, name='source')
     for record in records:
         record.known_stiffness()
     name = records[0].source or 'records' if records else 'no record'
@@ -162,7 +182,7 @@ def _estimate(out: _Run, settings: EstimatorSettings, done: Progress) -> ReplayC
     def counted() -> Iterator[Item]:
         for place, item in enumerate(out.items):
             if isinstance(item, Block):
-                out.data_seconds += _usable_seconds(item)
+                out.took(item)
             done(place / out.total if out.total else 0.0)
             yield item
 
@@ -182,7 +202,7 @@ def _estimate(out: _Run, settings: EstimatorSettings, done: Progress) -> ReplayC
     # Without a live run to hold them against, nobody sees the limits of bands.
     with Reports(limits=live is not None) as reports:
         found = results(reports)
-        comparison = None if live is None else compare(found, live)
+        comparison = None if live is None else compare(found, live, out.missing)
         for _ in found:  # all of them, where nothing was compared
             pass
     return comparison

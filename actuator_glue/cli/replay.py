@@ -13,6 +13,7 @@ from actuator_glue.io.json_file import write_json
 if TYPE_CHECKING:
     from actuator_glue.api.replay_result import Replay
 
+SHOWN = 20  # windows that are named
 SETTINGS = ('window', 'hop', 'settle', 'shaping_factor', 'evaluations', 'seed')
 
 
@@ -87,6 +88,15 @@ def run(args: argparse.Namespace) -> int:
 def _verdict(found: Replay, args: argparse.Namespace) -> None:
     if found.compared is None:
         say('nothing published live with these settings: nothing to compare with', args)
+        return
+    lost = found.compared.unrepeatable
+    if lost:
+        say(f'{len(lost)} windows of the live run cannot be repeated to the bit:', args)
+        for line in lost[:SHOWN]:
+            say(f'  {line}', args)
+        if len(lost) > SHOWN:
+            say(f'  and {len(lost) - SHOWN} more, all in the JSON', args)
+    if found.identical is None:
         return
     verdict = 'identical, bit for bit' if found.identical else 'NOT identical'
     say(

@@ -19,6 +19,7 @@ from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.online.forecast import Prediction
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.knowledge import Known
+from actuator_glue.online.sampling import ARCHIVE, spread
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Preview, structure_effects, structure_name
 from actuator_glue.online.structures import Proposal
@@ -28,7 +29,9 @@ from actuator_glue.sample_block import stamp_ns
 Fields = dict[str, Any]
 Weights: TypeAlias = tuple[tuple[frozenset[str], float], ...]
 _NAN = float('nan')
-DRAWS = 200  # of a window's posterior, in a message
+# Of a window's posterior, in a message: those that the next window begins with, so that a replay
+# can go on where samples are missing.
+DRAWS = ARCHIVE
 
 
 class Head(NamedTuple):
@@ -193,7 +196,7 @@ def draws(result: WindowResult) -> tuple[Head, Fields]:
     """
     assert result.draws is not None and result.ess is not None
     record, posterior = result.window.record, result.draws
-    rows = np.linspace(0, len(posterior) - 1, min(DRAWS, len(posterior))).astype(np.intp)
+    rows = spread(len(posterior), DRAWS)
     fields: Fields = {
         'window': result.window.number,
         'effects': list(result.model.effects),

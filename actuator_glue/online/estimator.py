@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -39,6 +39,45 @@ MAX_FROZEN = 8
 MAX_WAITING = 4
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Begun:
+    """Where a window of a live run began: where the one before it ended.
+
+    Attributes:
+        number: of the window before.
+        archive: points that it ended with, shape (m, p); None where they were not kept.
+        whole: all of these points are there.
+    """
+
+    number: int
+    archive: Array | None
+    whole: bool
+
+
+@dataclass(slots=True)
+class Course:
+    """Whether a replay is where the live run was, window after window.
+
+    Attributes:
+        exact: it is, to the bit.
+    """
+
+    exact: bool = True
+    _last: int | None = None
+
+    def resumes(self, begun: Begun | None) -> bool:
+        """Return whether a window begins with points that were kept, not where the replay is."""
+        if begun is None or (self.exact and begun.number == self._last):
+            return False
+        resumes = begun.archive is not None
+        self.exact = resumes and begun.whole
+        return resumes
+
+    def done(self, number: int) -> None:
+        """Note the window that was computed last."""
+        self._last = number
+
+
 @dataclass(frozen=True, slots=True)
 class Schedule:
     """What a live run did, for a replay to repeat it.
@@ -48,10 +87,13 @@ class Schedule:
             the running index and the acquisition time [ns] of its first sample; all others were
             dropped.
         models: what is carried from each window number on, ascending.
+        begun: where each window began, by its number, for those whose predecessor cannot be
+            computed again.
     """
 
     done: Mapping[tuple[int, int], tuple[int, tuple[int, ...]]]
     models: tuple[tuple[int, ModelChoice | Proposal], ...] = ()
+    begun: Mapping[int, Begun] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
@@ -107,6 +149,7 @@ class Estimator:
         self._waiting: list[Window] = []
         self._carried = carried
         self._applied = 0  # of the schedule's models
+        self._course = Course()
         self._before: _Before | None = None
         self._frozen: list[FrozenPosterior] = []
         self._judged_to: int | None = None
@@ -193,6 +236,9 @@ class Estimator:
         stops: tuple[int | None, ...] = (None,) * len(self._members)
         if self.schedule is not None:
             stops = self.schedule.done[_key(window)][1]
+            self._resume(window, self.schedule.begun.get(window.number))
+            if not self._course.exact or len(stops) != len(self._members):
+                stops = (None,) * len(self._members)
         jobs = [self._job(m, window, stop) for m, stop in zip(self._members, stops, strict=True)]
         ahead = self._ahead.between(window.end, jobs[0].forecast[1], window.record.period)
         shares = structures.weights(self._log_prior, self._evidence).tolist()
@@ -205,6 +251,14 @@ class Estimator:
             proposal=proposal,
         )
         return self.running
+
+    def _resume(self, window: Window, begun: Begun | None) -> None:
+        """Begin where the live run did, where the window before could not be computed again."""
+        if self._course.resumes(begun) and begun is not None and begun.archive is not None:
+            leading = self._members[0]
+            if begun.archive.shape[1] == len(leading.model.names):
+                leading.archive, leading.epoch = begun.archive, window.epoch
+        self._course.done(window.number)
 
     def _job(self, member: _Member, window: Window, stop: int | None) -> Job:
         """Return what one structure has to do for a window."""

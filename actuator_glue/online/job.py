@@ -69,7 +69,8 @@ class WindowResult:
             likeliest first, which is `model`.
         weights: their weights, fixed before the window.
         spent: likelihood evaluations of each.
-        draws: some draws of the mixture, shape (m, p).
+        draws: some draws of the mixture, shape (m, p): where one structure is carried, those that
+            the next window starts from.
     """
 
     window: Window
@@ -246,7 +247,7 @@ def _report(job: Job, fitted: WindowFit, limits: bool) -> WindowResult:
         spent=tuple(
             0 if one.chains is None else one.chains.evaluations for one in (fitted, *fitted.rivals)
         ),
-        draws=drawn,
+        draws=posterior[sampling.spread(len(posterior), sampling.ARCHIVE)],
     )
 
 

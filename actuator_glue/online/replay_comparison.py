@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from copy import copy
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,12 +14,15 @@ import numpy as np
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.online import conversion
-from actuator_glue.online.estimator import Schedule
+from actuator_glue.online.estimator import Begun, Course, Schedule
 from actuator_glue.online.job import WindowResult
+from actuator_glue.online.sampling import ARCHIVE, joined
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.structures import Proposal
-from actuator_glue.records import check_period
+from actuator_glue.records import Array, check_period
 from actuator_glue.sample_block import stamp_ns
+
+_THINNED = 200  # draws in a message, however many the next window began with
 
 
 @dataclass(slots=True)
@@ -30,6 +34,7 @@ class Published:
         models: what is carried from each window number on.
         carried: draws that its priors began with; None where they began from the box.
         posteriors: PosteriorMoments by window number.
+        draws: points that each window ended with, by its number, with their names.
         scored: scored PredictionBands by window number, index and kind, as `_brief` leaves
             them: a long bag's bands do not fit into memory.
     """
@@ -38,6 +43,7 @@ class Published:
     models: list[tuple[int, ModelChoice | Proposal]] = field(default_factory=list)
     carried: Carried | None = None
     posteriors: dict[int, Any] = field(default_factory=dict)
+    draws: dict[int, tuple[tuple[str, ...], Array]] = field(default_factory=dict)
     scored: dict[tuple[int, int, str], Any] = field(default_factory=dict)
 
     def schedule(self) -> Schedule | None:
@@ -49,7 +55,38 @@ class Published:
             last = stamp_ns(message.header)
             start = last - round((message.samples - 1) * message.period * 1e9)
             done[int(message.index), start] = (number, _spent(message))
-        return Schedule(done, tuple(sorted(self.models, key=lambda m: m[0])))
+        return Schedule(done, tuple(sorted(self.models, key=lambda m: m[0])), self.begun())
+
+    def begun(self) -> dict[int, Begun]:
+        """Return where each window began, by its number: where the one before it ended."""
+        found: dict[int, Begun] = {}
+        numbers = sorted(self.posteriors)
+        first = self.posteriors[numbers[0]] if numbers else None
+        usual = self.settings.evaluations if self.settings is not None else 0
+        if first is not None and first.window > 0 and first.evaluations <= usual:
+            # It did not begin from nothing: the one before it was not recorded.
+            found[numbers[0]] = Begun(int(first.window) - 1, None, False)
+        for before, number in pairwise(numbers):
+            ended, begins = self.posteriors[before], self.posteriors[number]
+            if ended.header.frame_id != begins.header.frame_id:
+                continue  # a posterior of one actuator says nothing about the next
+            names, archive = self.draws.get(before, ((), None))
+            # Few of them are all that the window gave, but where an older version thinned them.
+            whole = archive is not None and len(archive) != _THINNED
+            older = found.get(before)
+            if archive is not None and len(archive) < ARCHIVE and older is not None:
+                # A window that was cut short hands on points of the one before it, too.
+                whole = whole and older.whole
+                archive = archive if older.archive is None else joined(archive, older.archive)
+            if len(spent := _spent(begins)) > 1 or tuple(begins.parameter_names) != names:
+                whole = (
+                    False  # of less likely structures, and of another model, no points are kept
+                )
+                archive = archive if len(spent) == 1 else None
+            if getattr(self.settings, 'prior', 'box') != 'box':
+                whole = False  # what was known before it is not kept either
+            found[number] = Begun(before, archive, whole)
+        return found
 
 
 def published(messages: Iterable[tuple[str, Any]]) -> Published:
@@ -68,6 +105,10 @@ def published(messages: Iterable[tuple[str, Any]]) -> Published:
         elif kind == 'PosteriorMoments':
             check_period(message.period, f'posterior of window {message.window}')
             found.posteriors[int(message.window)] = message
+        elif kind == 'PosteriorDraws' and len(message.parameter_names):
+            names = tuple(message.parameter_names)
+            values = np.asarray(message.values, dtype=np.float64)
+            found.draws[int(message.window)] = names, values.reshape(-1, len(names))
         elif kind == 'PredictionBand' and message.scored:
             key = (int(message.window), int(message.index), str(message.kind))
             found.scored[key] = _brief(message)
@@ -89,46 +130,79 @@ class ReplayComparison:
         windows: posteriors compared.
         bands: scored bands compared.
         differing: one line per window or band that differs or is missing.
+        unrepeatable: one line per window that the bag has not all of what it was computed from.
     """
 
     windows: int = 0
     bands: int = 0
     differing: list[str] = field(default_factory=list)
+    unrepeatable: list[str] = field(default_factory=list)
 
     @property
-    def identical(self) -> bool:
-        """Everything was there and equal, and there was something to compare."""
+    def identical(self) -> bool | None:
+        """Whether all that can be repeated is equal; None where nothing of it can be."""
+        if not self.windows and self.unrepeatable and not self.differing:
+            return None
         return self.windows > 0 and not self.differing
 
 
-def compare(results: Iterable[WindowResult], live: Published) -> ReplayComparison:
-    """Hold replayed results against what was published live."""
+def compare(
+    results: Iterable[WindowResult],
+    live: Published,
+    held: Callable[[int, int], str] = lambda first, stop: '',
+) -> ReplayComparison:
+    """Hold replayed results against what was published live.
+
+    Args:
+        results: of the replay, in order.
+        live: what was published.
+        held: says what is missing of the samples from one index up to another; empty for nothing.
+            Asked when all results have come.
+    """
     found = ReplayComparison()
-    seen: set[int] = set()
+    begun, course, seen = live.begun(), Course(), set[int]()
     for result in results:
         number = result.window.number
+        course.resumes(begun.get(number))
+        course.done(number)
         message = live.posteriors.get(number)
         seen.add(number)
         if message is None:
             found.differing.append(f'window {number}: not published live')
-            continue
-        found.windows += 1
-        names = differences(conversion.posterior(result, float('nan'))[1], message)
-        if names:
-            found.differing.append(f'window {number}: posterior differs in {", ".join(names)}')
-        for prediction in result.scored:
-            key = (prediction.number, prediction.index, prediction.kind)
-            if key not in live.scored:
-                found.differing.append(f'window {number}: band {key} was not published live')
-                continue
-            found.bands += 1
-            fields = conversion.prediction(prediction, '')[1]
-            names = differences(fields, live.scored[key])
-            if names:
-                found.differing.append(f'band {key} differs in {", ".join(names)}')
-    missing = sorted(set(live.posteriors) - seen)
-    found.differing += [f'window {number}: not reproduced' for number in missing]
+        elif not course.exact:
+            found.unrepeatable.append(
+                f'window {number}: estimated anew, not to the bit: it began where window '
+                f'{begun[number].number} ended, of which the bag does not have all'
+            )
+        else:
+            _hold(result, message, live, found)
+    for number in sorted(set(live.posteriors) - seen):
+        message = live.posteriors[number]
+        first, stop = int(message.index), int(message.index) + int(message.samples)
+        lacks = held(first, stop)
+        lost = number in begun and begun[number].archive is None
+        lines = found.unrepeatable if lacks or lost else found.differing
+        lines.append(f'window {number}: {lacks or "not reproduced"}')
     return found
+
+
+def _hold(result: WindowResult, message: Any, live: Published, found: ReplayComparison) -> None:
+    """Hold one result against what was published of it."""
+    number = result.window.number
+    found.windows += 1
+    names = differences(conversion.posterior(result, float('nan'))[1], message)
+    if names:
+        found.differing.append(f'window {number}: posterior differs in {", ".join(names)}')
+    for prediction in result.scored:
+        key = (prediction.number, prediction.index, prediction.kind)
+        if key not in live.scored:
+            found.differing.append(f'window {number}: band {key} was not published live')
+            continue
+        found.bands += 1
+        fields = conversion.prediction(prediction, '')[1]
+        names = differences(fields, live.scored[key])
+        if names:
+            found.differing.append(f'band {key} differs in {", ".join(names)}')
 
 
 class _Digest(NamedTuple):

@@ -185,7 +185,7 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> WindowFit:
             past=_past(job, start),
             weight=job.weight,
         ),
-        archive=_archive(posterior[spread(len(posterior), ARCHIVE)], job.archive),
+        archive=joined(posterior[spread(len(posterior), ARCHIVE)], job.archive),
         learned=(
             Carried.thinned(job.model.names, posterior)
             if job.settings.prior == 'sequential'
@@ -287,7 +287,7 @@ def _sampler(job: Job) -> SamplerSettings:
     return replace(base, population=4 * base.steps * job.chains)
 
 
-def _archive(new: Array, old: Array | None) -> Array:
+def joined(new: Array, old: Array | None) -> Array:
     """Points for the next window; few of them, of a window cut short, are joined by older ones."""
     if old is None or len(new) >= ARCHIVE:
         return new
@@ -300,7 +300,8 @@ def _check_excited(record: Record, settle: int, noise: float) -> float:
     if commanded <= EXCITATION * noise or commanded == 0.0 or moved == 0.0:
         raise InputError(
             f'nothing moves: the command varies by {commanded * 1e6:.3g} um rms, the sensor noise '
-            f'is {noise * 1e6:.3g} um; the window calibrates nothing and is left out'
+            f'is {noise * 1e6:.3g} um (or {record.rate:g} Hz are too few samples to tell motion '
+            'from noise); the window calibrates nothing and is left out'
         )
     return moved
 

@@ -11,6 +11,7 @@ from actuator_glue import replay as replayed
 from actuator_glue.hybrid.indicators import TargetMotion
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.io import messages
+from actuator_glue.io.bag_reader import messages as bag_messages
 from actuator_glue.io.bag_records import read_records, write_record
 from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.model import linear
@@ -34,12 +35,13 @@ def put(
 def completed(name: str, fields: conversion.Fields) -> conversion.Fields:
     """Return fields with zeros where nothing was said, as ROS does, and arrays as arrays."""
     kinds = messages.typestore().fielddefs[messages.full_name(name)][1]
-    arrays = {'float64': np.float64, 'bool': np.bool_}
     values = {}
     for field, kind in kinds:
-        value = fields.get(field, 0.0)
-        if kind[0] == 4 and kind[1][0][1][0] in arrays:
-            value = np.asarray(value, arrays[kind[1][0][1][0]])
+        array = kind[0] == 4
+        value = fields.get(field, [] if array else 0.0)
+        base = kind[1][0][1][0] if array else ''
+        if array and base not in ('', 'string'):
+            value = np.asarray(value, np.bool_ if base == 'bool' else base)
         if field != 'header':
             values[field] = value
     return values
@@ -60,6 +62,7 @@ def estimated(short_bag: Path, tmp_path_factory: pytest.TempPathFactory) -> Call
             for topic, kind in (
                 ('/estimator_setup', 'EstimatorSetup'),
                 ('/posterior', 'PosteriorMoments'),
+                ('/posterior_draws', 'PosteriorDraws'),
                 ('/prediction_band', 'PredictionBand'),
             ):
                 writer.add_topic(topic, kind)
@@ -70,6 +73,7 @@ def estimated(short_bag: Path, tmp_path_factory: pytest.TempPathFactory) -> Call
                 head, fields = conversion.posterior(result, 0.1)
                 change(fields)
                 put(writer, '/posterior', 'PosteriorMoments', head, fields)
+                put(writer, '/posterior_draws', 'PosteriorDraws', *conversion.draws(result))
                 for prediction in result.scored:
                     head, fields = conversion.prediction(prediction, record.actuator)
                     change(fields)
@@ -108,6 +112,82 @@ def test_one_other_bit_is_found(run, estimated: Callable[..., Path]) -> None:
     posterior, band = sorted(done.json['compared']['differing'], reverse=True)
     assert posterior == 'window 1: posterior differs in mean'
     assert band.startswith('band (0, ') and band.endswith("'noise') differs in upper")
+
+
+def less(bag: Path, blocks: tuple[int, ...], lacks: str = '', draws: int | None = None) -> Path:
+    """Return a bag that lacks sample blocks by their place, a topic, or some of the draws."""
+    poorer, place = bag.with_name(bag.name + '_less'), 0
+    with BagWriter(poorer) as writer:
+        for found in bag_messages(bag):
+            place += found.type.endswith('/SampleBlock')
+            if (found.type.endswith('/SampleBlock') and place - 1 in blocks) or (
+                found.topic == lacks
+            ):
+                continue
+            content = messages.deserialize(found.type, found.data)
+            if draws is not None and found.type.endswith('/PosteriorDraws'):
+                content.values = content.values[: draws * len(content.parameter_names)]
+            writer.add_topic(found.topic, found.type)
+            writer.write(found.topic, content, found.log_time)
+    return poorer
+
+
+def test_windows_that_are_whole_are_repeated_where_a_block_is_missing(
+    run, estimated: Callable[..., Path]
+) -> None:
+    """A recorder that missed the first block: the draws say where the second window began."""
+    done = run('replay', less(estimated('bag'), (0,)), '--json', '-')
+    assert done.code == 0, done.err
+    compared = done.json['compared']
+    assert done.json['identical'] is True
+    assert compared['posteriors'] == 2 and compared['differing'] == []
+    (lost,) = compared['unrepeatable']
+    assert lost == 'window 0: 64 of its samples 0 to 399 are missing'
+    assert '1 windows of the live run cannot be repeated' in done.err and lost in done.err
+    assert [w['window'] for w in done.json['windows']] == [1, 2]
+
+
+def test_windows_behind_a_gap_are_repeated(run, estimated: Callable[..., Path]) -> None:
+    """Blocks in the middle are missing: the windows with them are named, the others repeated."""
+    found = replayed(less(estimated('bag'), (4, 5)))
+    assert found.identical and found.compared is not None
+    assert [w.window for w in found.windows] == [2]
+    assert found.compared.unrepeatable == (
+        'window 0: 128 of its samples 0 to 399 are missing',
+        'window 1: 128 of its samples 200 to 599 are missing',
+    )
+
+
+@pytest.mark.parametrize('poorer', [{'lacks': '/posterior_draws'}, {'draws': 200}])
+def test_windows_that_began_where_nobody_knows_are_estimated_and_named(
+    run, estimated: Callable[..., Path], poorer: dict[str, Any]
+) -> None:
+    """Without all draws no window behind the missing block is the same to the bit."""
+    done = run('replay', less(estimated('bag'), (0,), **poorer), '--json', '-')
+    assert done.code == 0, done.err
+    assert done.json['identical'] is None
+    assert [w['window'] for w in done.json['windows']] == [1, 2]
+    assert done.json['compared']['differing'] == []
+    told = done.json['compared']['unrepeatable']
+    assert [line.split(':')[0] for line in told] == ['window 1', 'window 2', 'window 0']
+    assert 'began where window 0 ended' in told[0]
+    assert '3 windows of the live run cannot be repeated' in done.err
+
+
+def test_a_bag_that_began_late_is_estimated(run, estimated: Callable[..., Path]) -> None:
+    """The recorder was started when two windows had passed: of them nothing is in the bag."""
+    bag = estimated('bag')
+    poorer = bag.with_name('late')
+    late = read_records(bag)[0].start_ns + 4_100_000_000
+    with BagWriter(poorer) as writer:
+        for found in bag_messages(bag):
+            if found.log_time >= late or found.type.endswith('Setup'):
+                writer.add_topic(found.topic, found.type)
+                writer.write(
+                    found.topic, messages.deserialize(found.type, found.data), found.log_time
+                )
+    found = replayed(poorer)
+    assert found.identical is not False
 
 
 def test_other_settings_are_not_compared(run, estimated: Callable[..., Path]) -> None:
