@@ -84,13 +84,19 @@ def qos_profiles(text: str) -> list[dict[str, Any]]:
 
 @dataclass(slots=True)
 class BagTopic:
-    """One topic of a bag."""
+    """One topic of a bag; `type` is empty where what it carries has no schema."""
 
     name: str
     type: str
     rihs01: str
     qos: list[dict[str, Any]]
     count: int = 0
+    encoding: str = 'cdr'
+
+    @property
+    def key(self) -> tuple[str, str, str]:
+        """What tells it from others: one name may stand for several types."""
+        return self.name, self.type, self.encoding
 
 
 @dataclass(slots=True)
@@ -134,7 +140,7 @@ class Metadata:
                     'topic_metadata': {
                         'name': t.name,
                         'type': t.type,
-                        'serialization_format': 'cdr',
+                        'serialization_format': t.encoding,
                         'offered_qos_profiles': t.qos,
                         'type_description_hash': t.rihs01,
                     },

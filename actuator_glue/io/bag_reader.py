@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, NoReturn
 from actuator_glue.errors import InputError
 from actuator_glue.io import bag_metadata
 from actuator_glue.io.bag_metadata import BagFile, BagTopic
-from actuator_glue.io.mcap_scan import Scan
+from actuator_glue.io.mcap_scan import COMPRESSED, Scan, plain
 from actuator_glue.io.messages import deserialize, full_name
 
 Note = Callable[[str], None]
@@ -71,7 +71,12 @@ def is_bag(path: Path | str) -> bool:
     path = Path(path)
     if path.is_dir():
         return (path / bag_metadata.NAME).exists() or any(path.glob('*.mcap'))
-    return path.suffix == '.mcap'
+    return _is_mcap(path)
+
+
+def _is_mcap(path: Path) -> bool:
+    """Return whether a file is called as one in MCAP format, plain or compressed as a whole."""
+    return path.suffix == '.mcap' or path.suffixes[-2:] == ['.mcap', COMPRESSED]
 
 
 def bag_files(path: Path | str, note: Note = refuse) -> list[Path]:
@@ -106,11 +111,11 @@ def bag_files(path: Path | str, note: Note = refuse) -> list[Path]:
     names = information['relative_file_paths']
     assert isinstance(names, list)
     files = [path / Path(name).name for name in names]
-    foreign = [f.name for f in files if f.suffix != '.mcap']
+    foreign = [f.name for f in files if not _is_mcap(f)]
     if foreign:
         raise InputError(
-            f'{path}: {foreign[0]} is not an uncompressed MCAP file; convert the bag with '
-            '`ros2 bag convert` to storage_id mcap without file compression'
+            f'{path}: {foreign[0]} is not in MCAP format; convert the bag with `ros2 bag convert` '
+            'to storage_id mcap'
         )
     for file in files:
         if not file.exists():
@@ -162,6 +167,7 @@ def messages(
                         bag_metadata.qos_profiles(
                             channel.metadata.get('offered_qos_profiles', '')
                         ),
+                        encoding=channel.message_encoding,
                     )
                     summary.definitions[schema.name] = texts[schema.id]
                 summary.topics[channel.topic].count += 1
@@ -169,10 +175,15 @@ def messages(
             if (types is None or schema.name in types) and (
                 topics is None or channel.topic in topics
             ):
+                try:
+                    data = plain(channel, message)
+                except ValueError as error:
+                    note(f'{file}: topic {channel.topic}: a message is damaged ({error})')
+                    continue
                 yield BagMessage(
                     channel.topic,
                     schema.name,
-                    message.data,
+                    data,
                     message.log_time,
                     message.publish_time,
                     texts[schema.id],

@@ -6,13 +6,16 @@ import errno
 import fcntl
 import io
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 import yaml
+from mcap.data_stream import ReadDataStream
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Metadata, Schema
 from mcap.writer import CompressionType, Writer
 
 from actuator_glue.errors import InputError
@@ -76,8 +79,8 @@ class McapFile:
         self._kept_part = replace(self.part)
         self._failure: DiskError | None = None
         self._raw: io.FileIO | None = None
-        self._schemas: dict[str, int] = {}
-        self._channels: dict[str, int] = {}
+        self._schemas: dict[tuple[str, str, bytes], int] = {}
+        self._channels: dict[tuple[str, str, str], int] = {}
         # Where what was written ends at most, what follows it, and how far room is reserved [B].
         self._bound, self._end, self._reserved = 0, END_BYTES + spare, 0
         try:
@@ -107,21 +110,56 @@ class McapFile:
             DiskError: disk full.
         """
         qos = yaml.safe_dump(topic.qos, sort_keys=False)
+        schema = Schema(1, definition.encode(), 'ros2msg', topic.type)
+        self.add_channel(
+            topic, schema, {'offered_qos_profiles': qos, 'topic_type_hash': topic.rihs01}
+        )
+
+    def add_channel(self, topic: BagTopic, schema: Schema, metadata: Mapping[str, str]) -> None:
+        """Declare a topic once, as another file has it.
+
+        Args:
+            topic: its name, type and encoding.
+            schema: of its type, of any encoding; its id is 0 where there is none.
+            metadata: what the file says of the topic besides.
+
+        Raises:
+            DiskError: disk full.
+        """
         # It is said where it begins and again at the end.
-        said = 1024 + len(topic.name) + len(qos) + len(definition.encode())
+        told = sum(len(k.encode()) + len(v.encode()) for k, v in metadata.items())
+        said = 1024 + len(topic.name) + told + len(schema.data)
         self._end += said + TOPIC_END_BYTES
         self._make_room(said)
+        kind = (schema.name, schema.encoding, schema.data)
         with self._disk():
-            if topic.type not in self._schemas:
-                self._schemas[topic.type] = self._writer.register_schema(
-                    topic.type, 'ros2msg', definition.encode()
-                )
-            self._channels[topic.name] = self._writer.register_channel(
+            if schema.id and kind not in self._schemas:
+                self._schemas[kind] = self._writer.register_schema(*kind)
+            self._channels[topic.key] = self._writer.register_channel(
                 topic.name,
-                'cdr',
-                self._schemas[topic.type],
-                {'offered_qos_profiles': qos, 'topic_type_hash': topic.rihs01},
+                topic.encoding,
+                self._schemas[kind] if schema.id else 0,
+                dict(metadata),
             )
+
+    def add_beside(self, opcode: int, body: bytes) -> None:
+        """Write an attachment or a metadata record as another file has it.
+
+        Raises:
+            DiskError: disk full.
+        """
+        self._make_room(2 * len(body) + MESSAGE_BYTES)
+        self._end += MESSAGE_BYTES + len(body)
+        stream = ReadDataStream(io.BytesIO(body))
+        with self._disk():
+            if opcode == Opcode.METADATA:
+                record = Metadata.read(stream)
+                self._writer.add_metadata(record.name, record.metadata)
+            else:
+                held = Attachment.read(stream)
+                self._writer.add_attachment(
+                    held.create_time, held.log_time, held.name, held.media_type, held.data
+                )
 
     def write(self, message: Message) -> None:
         """Write one serialized message of a declared topic.
@@ -133,7 +171,7 @@ class McapFile:
         self._make_room(int(CHUNK_SHARE * len(message.data)) + MESSAGE_BYTES)
         with self._disk():
             self._writer.add_message(
-                channel_id=self._channels[topic.name],
+                channel_id=self._channels[topic.key],
                 log_time=message.log_time,
                 data=message.data,
                 publish_time=message.publish_time,

@@ -12,7 +12,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, cast
 
 from mcap.data_stream import ReadDataStream
 from mcap.exceptions import McapError
@@ -23,11 +23,15 @@ from mcap.records import Channel, Chunk, Message, Schema
 from actuator_glue.errors import InputError
 from actuator_glue.io.signature import refuse_pipe
 
+COMPRESSED = '.zstd'  # suffix of a file that rosbag2 has compressed as a whole
 _MAGIC = b'\x89MCAP0\r\n'
 _HEAD = struct.Struct('<BQ')
 _MESSAGE = struct.Struct('<HIQQ')  # channel, sequence, log time, publish time; then the data
 _MAX_CHUNK = 1 << 29  # bytes; a chunk that claims more is damaged or hostile
-_UNREADABLE = (McapError, struct.error, ValueError, RuntimeError, OverflowError, MemoryError)
+# The channel says so where what it carries has no schema, as JSON and plain bytes may.
+NO_SCHEMA = Schema(id=0, data=b'', encoding='', name='')
+_ZSTD = b'(\xb5/\xfd'
+UNREADABLE = (McapError, struct.error, ValueError, RuntimeError, OverflowError, MemoryError)
 
 
 @dataclass(slots=True)
@@ -42,6 +46,7 @@ class Scan:
         finished: the file has its footer.
         position: first byte that is not read yet.
         orphans: messages without a known topic.
+        beside: called with each whole attachment and metadata record, opcode and content.
     """
 
     path: Path
@@ -51,6 +56,7 @@ class Scan:
     finished: bool = False
     position: int = 0
     orphans: int = 0
+    beside: Callable[[int, bytes], None] = lambda opcode, body: None
 
     def messages(self, follow: bool = False) -> Iterator[tuple[Schema, Channel, Message]]:
         """Yield schema, channel and message in file order.
@@ -63,11 +69,30 @@ class Scan:
         """
         refuse_pipe(self.path)
         try:
-            size = self.path.stat().st_size
             with self.path.open('rb') as file:
-                yield from self._file(file, size, follow)
+                if self.path.suffix == COMPRESSED:
+                    yield from self._unpacked(file)
+                else:
+                    yield from self._file(file, self.path.stat().st_size, follow)
         except OSError as error:
             raise InputError(f'{self.path}: cannot be read ({error.strerror})') from error
+
+    def _unpacked(self, packed: BinaryIO) -> Iterator[tuple[Schema, Channel, Message]]:
+        """Yield the messages of a file that rosbag2 has compressed as a whole."""
+        import zstandard
+
+        head = packed.read(32)
+        packed.seek(0)
+        size = zstandard.frame_content_size(head) if head.startswith(_ZSTD) else -1
+        if size < 0:
+            raise InputError(
+                f'{self.path}: this is no file that rosbag2 has compressed; unpack it first'
+            )
+        try:
+            with zstandard.ZstdDecompressor().stream_reader(packed) as file:
+                yield from self._file(cast('BinaryIO', file), size, False)
+        except zstandard.ZstdError as error:
+            self.note(f'{self.path}: cut off or damaged ({error}); what comes behind is lost')
 
     def _file(
         self, file: BinaryIO, size: int, follow: bool
@@ -87,6 +112,8 @@ class Scan:
                 self.finished = True
             elif opcode == Opcode.CHUNK or (opcode in _PARSED and whole):
                 body = file.read(min(length, _MAX_CHUNK))
+            elif opcode in _BESIDE and whole:
+                self.beside(opcode, file.read(min(length, _MAX_CHUNK)))
             elif whole:
                 file.seek(length, 1)
             if body and opcode == Opcode.CHUNK:
@@ -109,7 +136,8 @@ class Scan:
                 number, sequence, logged, published = _MESSAGE.unpack_from(body)
                 channel, data = self.channels[number], body[_MESSAGE.size :]
                 message = Message(number, logged, data, published, sequence)
-                return self.schemas[channel.schema_id], channel, message
+                schema = self.schemas[channel.schema_id] if channel.schema_id else NO_SCHEMA
+                return schema, channel, message
             stream = ReadDataStream(BytesIO(body))
             if opcode == Opcode.SCHEMA:
                 schema = Schema.read(stream)
@@ -121,7 +149,7 @@ class Scan:
             if not self.orphans:
                 self.note(f'{self.path}: messages from byte {at} on belong to no known topic')
             self.orphans += 1
-        except _UNREADABLE as error:
+        except UNREADABLE as error:
             self.note(f'{self.path}: damaged record at byte {at} ({error})')
         return None
 
@@ -130,7 +158,7 @@ class Scan:
     ) -> Iterator[tuple[Schema, Channel, Message]]:
         try:
             data = _chunk_data(body, whole)
-        except _UNREADABLE as error:
+        except UNREADABLE as error:
             if whole:
                 self.note(f'{self.path}: damaged chunk at byte {at} ({error}); left out')
                 self._learn_topics()
@@ -154,13 +182,14 @@ class Scan:
         try:
             with self.path.open('rb') as file:
                 summary = make_reader(file).get_summary()
-        except (OSError, *_UNREADABLE):
+        except (OSError, *UNREADABLE):
             return
         if summary is not None:
             self.schemas = summary.schemas | self.schemas
             self.channels = summary.channels | self.channels
 
 
+_BESIDE = frozenset((Opcode.ATTACHMENT, Opcode.METADATA))
 _PARSED = frozenset((Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE))
 
 
@@ -182,6 +211,28 @@ def _chunk_data(body: bytes, whole: bool) -> bytes:
     if chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc:
         raise ValueError('checksum does not agree')
     return data
+
+
+def plain(channel: Channel, message: Message) -> bytes:
+    """Return the data of a message, unpacked where rosbag2 has compressed it.
+
+    CDR begins with a zero byte, so that what begins as zstd does is nothing else.
+
+    Raises:
+        ValueError: it is compressed, but not whole.
+    """
+    data: bytes = message.data
+    if channel.message_encoding != 'cdr' or not data.startswith(_ZSTD):
+        return data
+    import zstandard
+
+    size = zstandard.frame_content_size(data)
+    if not 0 <= size <= _MAX_CHUNK:
+        raise ValueError(f'a compressed message claims {size} bytes')
+    try:
+        return bytes(zstandard.ZstdDecompressor().decompress(data))
+    except zstandard.ZstdError as error:
+        raise ValueError(str(error)) from error
 
 
 def _decompress(chunk: Chunk) -> bytes:

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
+
+from mcap.opcode import Opcode
 
 from actuator_glue.errors import InputError
 from actuator_glue.io import bag_metadata
 from actuator_glue.io.bag_metadata import BagTopic, Metadata
 from actuator_glue.io.bag_reader import Summary, bag_files, messages
 from actuator_glue.io.mcap_file import DiskError, McapFile, Message, disk_error, in_use
+from actuator_glue.io.mcap_scan import COMPRESSED, UNREADABLE, Scan
 
 KEPT = '.cut'  # suffix of the original of a file that was written anew
 MESSAGES_IN_MEMORY = 1000  # while a file is written anew
@@ -44,10 +48,13 @@ def recover(path: Path | str) -> Recovery:
         path: bag folder or lone .mcap.
 
     Raises:
-        InputError: no bag, one that is being recorded, not one whole message, or no room.
+        InputError: no bag, one that is being recorded or compressed as a whole, not one whole
+            message, or no room.
     """
     path = Path(path)
     for file in bag_files(path, lambda _: None):
+        if file.suffix == COMPRESSED:
+            raise InputError(f'{file} is compressed as a whole; unpack it first (zstd -d)')
         if in_use(file):
             raise InputError(f'{file} is being recorded; stop the recorder first')
     recovery = Recovery()
@@ -92,9 +99,7 @@ def _mend(
     recovery.notes.extend(damage)
     part = summary.parts[0]
     for topic in summary.topics.values():
-        known = topics.setdefault(
-            topic.name, BagTopic(topic.name, topic.type, topic.rihs01, topic.qos)
-        )
+        known = topics.setdefault(topic.name, replace(topic, count=0))
         known.count += topic.count
     if part.count:
         metadata.parts.append(part)
@@ -111,13 +116,18 @@ def _rewrite(file: Path, bag: Path, summary: Summary, own: Metadata) -> None:
         temporary.unlink()
     serialized = own.serialized()
     new = McapFile(temporary, bag)
-    topics = {t.name: BagTopic(t.name, t.type, t.rihs01, t.qos) for t in own.topics}
+    scan = Scan(file, lambda _: None, beside=partial(_copy_beside, new))
+    topics: dict[int, BagTopic] = {}
     try:
-        for topic in topics.values():
-            new.add_topic(topic, summary.definitions[topic.type])
-        for found in messages(file, note=lambda _: None):
-            topic = topics[found.topic]
-            new.write(Message(topic, found.data, found.log_time, found.publish_time))
+        # Everything as it is: types of others, what has no schema, compressed messages.
+        for schema, channel, message in scan.messages():
+            topic = topics.get(channel.id)
+            if topic is None:
+                encoding = channel.message_encoding
+                topic = BagTopic(channel.topic, schema.name, '', [], encoding=encoding)
+                topics[channel.id] = topic
+                new.add_channel(topic, schema, channel.metadata)
+            new.write(Message(topic, message.data, message.log_time, message.publish_time))
             if len(new.unsure) >= MESSAGES_IN_MEMORY:
                 new.flush()
         new.finish(serialized)
@@ -131,6 +141,13 @@ def _rewrite(file: Path, bag: Path, summary: Summary, own: Metadata) -> None:
         temporary.replace(file)
     except OSError as error:
         raise disk_error(bag, error) from error
+
+
+def _copy_beside(new: McapFile, opcode: int, body: bytes) -> None:
+    """Copy an attachment or what others say of a file; what rosbag2 says is written anew."""
+    with suppress(*UNREADABLE):
+        if opcode != Opcode.METADATA or b'rosbag2' not in body[:16]:
+            new.add_beside(opcode, body)
 
 
 def _unused(file: Path) -> Path:
