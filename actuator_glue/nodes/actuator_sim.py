@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import time
 from collections.abc import Iterator, Mapping
 from functools import partial
 from pathlib import Path
@@ -20,6 +21,7 @@ from actuator_glue.model.sensor import SensorSpec
 from actuator_glue.model.stream import Stream
 from actuator_glue.model.structure import Structure
 from actuator_glue.nodes import folders, hidden_effects, own_effects, spin, streamer
+from actuator_glue.nodes.beside import Beside
 from actuator_glue.nodes.blocks import BlockPublisher
 from actuator_glue.nodes.pacer import Step
 from actuator_glue.nodes.parameters import Parameters, Spec
@@ -94,9 +96,25 @@ class SimulatorNode(streamer.Streamer):
         """Make the command and the publishers."""
         self._values = self.parameters.values()
         self.command = _command(self._values)
-        # Compiled now: a stream that has begun must not wait for a compiler.
-        self._plant().step(self.command[: self._values['block']])
         self.out = BlockPublisher(self.publisher)
+        # Compiled now: a stream that has begun must not wait for a compiler.
+        plant, block = self._plant(), self.command[: self._values['block']]
+        self._compiling = Beside(self, lambda: plant.step(block))
+        self.get_logger().info('compiling the plant; samples follow when that is done')
+
+    def ready(self) -> bool:
+        """Whether the plant is compiled, too."""
+        return self._compiling.done and super().ready()
+
+    def do_report(self) -> None:
+        """What every stream reports, and whether the plant is compiled."""
+        super().do_report()
+        if not hasattr(self, '_compiling'):
+            return
+        self.health.values['plant'] = 'ready' if self._compiling.done else 'compiling'
+        if self.active and not self._compiling.done:
+            text = 'still compiling: samples follow when that is done'
+            self.health.fault('plant', text, time.monotonic())
 
     def changed(self, names: set[str]) -> None:
         """A new specimen, sensor or effect: the plant goes on from rest with the next block."""

@@ -7,6 +7,7 @@ import sys
 import time
 from collections import deque
 from collections.abc import Mapping
+from datetime import UTC, datetime
 from typing import Any
 
 from actuator_glue_msgs.srv import SetModel
@@ -16,7 +17,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.nodes import configuration, own_effects, spin, topics
 from actuator_glue.nodes.estimator_worker import compute, warm_up
-from actuator_glue.nodes.health import ERROR, Rate
+from actuator_glue.nodes.health import ERROR, Rate, Silence
 from actuator_glue.nodes.latched import Newest
 from actuator_glue.nodes.messages import publish
 from actuator_glue.nodes.now import now_ns
@@ -39,9 +40,18 @@ from actuator_glue.online.stream import (
     structure_name,
 )
 from actuator_glue.online.structures import Proposal
+from actuator_glue.online.trust import (
+    Contradiction,
+    natural_frequency,
+    sampled_too_slowly,
+    trust,
+)
 from actuator_glue.online.windows import WrongRate
 from actuator_glue.setups import from_message
 from actuator_glue.workers.worker import DIED, DONE, FAILED, PROGRESS, Answer
+
+# Windows of which most have to converge.
+JUDGED = 10
 
 
 class EstimatorNode(WorkingNode):
@@ -80,12 +90,16 @@ class EstimatorNode(WorkingNode):
         self.compute: deque[float] = deque(maxlen=200)
         self.latency: deque[float] = deque(maxlen=200)
         self.last: WindowResult | None = None
+        self.contradiction = Contradiction()
+        self.silence = Silence(time.monotonic())
+        self.judged: deque[bool] = deque(maxlen=JUDGED)
         # Before the first samples: what they will be estimated with is known from the start.
         self._announce(None)
         self.listen_when_ready()
 
     def listen(self) -> None:
         """Subscribe: set-ups first, then the samples that they are for."""
+        self.silence = Silence(time.monotonic())
         self._setups = Newest(self, topics.TEST_SETUP, self._setup)
         self.subscribe(topics.PREVIEW, self._preview)
         self.subscribe(topics.SAMPLES, self._block)
@@ -116,6 +130,7 @@ class EstimatorNode(WorkingNode):
         self._setups.settle()
         block = sample_block.from_message(message)
         self.samples.add(len(block))
+        self.silence.heard(time.monotonic())
         if block.index and not self.estimator.tally.blocks:
             self.complain(
                 'start', f'begins anew at sample {block.index}: nothing is known of those before'
@@ -198,13 +213,17 @@ class EstimatorNode(WorkingNode):
         self._next(time.monotonic())
 
     def _finish(self, result: WindowResult, seconds: float) -> None:
-        self._tell(self.estimator.finish(result))
+        events = self.estimator.finish(result)
+        self._tell(events)
         if result.failure:
             return
+        self.contradiction.take(result, [e for e in events if isinstance(e, Contradicted)])
         self.last = result
+        self.judged.append(result.converged)
         self.windows.add()
         actuator = result.window.record.actuator
-        publish(self._out[topics.POSTERIOR], *conversion.posterior(result, seconds))
+        head, fields = conversion.posterior(result, seconds)
+        publish(self._out[topics.POSTERIOR], head, fields | trust(result, self.contradiction))
         publish(self._out[topics.DRAWS], *conversion.draws(result))
         for prediction in (*result.scored, *result.forecast):
             publish(self._out[topics.BAND], *conversion.prediction(prediction, actuator))
@@ -255,6 +274,8 @@ class EstimatorNode(WorkingNode):
         if not hasattr(self, 'estimator'):
             return
         now, tally = time.monotonic(), self.estimator.tally
+        if self.active:
+            self._doubt(now)
         values: dict[str, Any] = {
             'sample rate (1/s)': self.samples.per_second(now),
             'window rate (1/s)': self.windows.per_second(now),
@@ -298,6 +319,31 @@ class EstimatorNode(WorkingNode):
                 or 'none',
             }
         self.health.values.update(values)
+
+    def _doubt(self, now: float) -> None:
+        """Say for as long as it lasts what speaks against the posteriors, or that none come."""
+        if not self.compiling:
+            self.silence.tell(self, topics.SAMPLES.name, now)
+        self.health.values['converged windows'] = f'{sum(self.judged)} of {len(self.judged)}'
+        if len(self.judged) == JUDGED and 2 * sum(self.judged) < JUDGED:
+            self.complain('sampling', f'most of the last {JUDGED} windows have not converged')
+        if self.last is None:
+            return
+        since, window = self.contradiction.since_ns, self.last.window
+        if since is not None:
+            at = datetime.fromtimestamp(since * 1e-9, UTC).strftime('%Y-%m-%d %H:%M:%S UTC')
+            self.health.values['prior contradicted for (s)'] = self.contradiction.lasted(window)
+            self.complain('contradiction', f'samples contradict what was known, since {at}')
+        else:
+            self.health.values.pop('prior contradicted for (s)', None)
+        if sampled_too_slowly(self.last):
+            natural, rate = natural_frequency(self.last), window.record.rate
+            self.complain(
+                'doubt',
+                f'the loop is faster than {rate:g} Hz can show (by the posterior its natural '
+                f'frequency is {natural:.2g} Hz): parameters and intervals say nothing; '
+                'sample ten times as fast',
+            )
 
 
 def main(args: list[str] | None = None) -> int:

@@ -12,7 +12,10 @@ import numpy as np
 from actuator_glue.errors import InputError
 from actuator_glue.hybrid.watch import MarginWatch, Watched
 from actuator_glue.io.partition import read_partition
+from actuator_glue.model.parameters import NAMES
 from actuator_glue.nodes import base, spin, topics
+from actuator_glue.nodes.beside import Beside
+from actuator_glue.nodes.health import Silence
 from actuator_glue.nodes.messages import publish
 from actuator_glue.nodes.parameters import Spec
 from actuator_glue.online.conversion import Head
@@ -78,13 +81,28 @@ class MarginNode(base.SuiteNode):
         self.watch = _watch(self.parameters.values())
         self.windows = 0
         self.last: Watched | None = None
-        self.subscribe(topics.DRAWS, self._take)
+        self._silence = Silence(time.monotonic())
+        compiling = Beside(self, self._compile)
+
+        def look() -> None:
+            if compiling.done:
+                timer.cancel()
+                self._silence.heard(time.monotonic())
+                self.subscribe(topics.DRAWS, self._take)
+
+        timer = self.every(0.1, look)
+
+    def _compile(self) -> None:
+        """Look at draws once that nobody has sent: compiling takes seconds, cold a minute."""
+        draws = np.array([134.0, 1.1e9, 2.5e5, 0.5]) * np.linspace(0.98, 1.02, 64)[:, np.newaxis]
+        _watch(self.parameters.values()).take(draws, list(NAMES), [], 64.0)
 
     def do_report(self) -> None:
         """P(unstable), margin, and the warning for as long as it holds."""
         if not hasattr(self, 'watch'):
             return
         self.health.values |= {'partition': self.watch.partition.name, 'windows': self.windows}
+        self._silence.tell(self, topics.DRAWS.name, time.monotonic())
         if self.last is None:
             return
         p = self.last.p_unstable
@@ -103,6 +121,7 @@ class MarginNode(base.SuiteNode):
 
     def _take(self, message: Any) -> None:
         started = time.monotonic()
+        self._silence.heard(started)
         names, effects = list(message.parameter_names), list(message.effects)
         values = np.asarray(message.values, dtype=np.float64)
         if not names or values.size < 2 * len(names) or values.size % len(names):

@@ -66,6 +66,10 @@ class WorkingNode(base.SuiteNode):
         """Whether the worker is ready."""
         if hasattr(self, 'worker'):
             self.health.values['worker'] = 'compiling' if self.compiling else 'ready'
+            if self.active and self.compiling:
+                # Shown, not logged: the log says it when it begins.
+                text = 'still compiling: samples are not listened to yet'
+                self.health.fault('worker', text, time.monotonic())
 
     def _hand_over(self, answer: Answer) -> None:
         """Called from the listening thread: hand over to the executor."""

@@ -1,9 +1,20 @@
 """What /diagnostics and the log say of faults."""
 
+import time
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
 from builtin_interfaces.msg import Time
 from diagnostic_msgs.msg import DiagnosticStatus
 
-from actuator_glue.nodes.health import LOGGED_PER_SECOND, REMEMBER, Health, Rate
+from actuator_glue.inference.choice import choose_model
+from actuator_glue.inference.prior_conflict import Conflict
+from actuator_glue.nodes import estimator
+from actuator_glue.nodes.health import LOGGED_PER_SECOND, REMEMBER, Health, Rate, Silence
+from actuator_glue.online.job import WindowResult
+from actuator_glue.online.stream import Contradicted, Window
+from actuator_glue.records import Record
 
 
 def values(health, now):
@@ -38,3 +49,121 @@ def test_the_rate_is_of_the_last_reports():
         rate.add(100 if second < 10 else 50)
         last = rate.per_second(float(second))
     assert last == 50.0 and rate.count == 1500
+
+
+class Node:
+    """What a node is for `Silence`."""
+
+    def __init__(self):
+        self.health = Health('/node')
+        self.now = 0.0
+
+    def complain(self, kind, message, level=DiagnosticStatus.WARN):
+        self.health.fault(kind, message, self.now, level)
+
+    def level(self, silence, now):
+        self.now = now
+        silence.tell(self, 'samples', now)
+        return values(self.health, now)[:2]
+
+
+def test_a_minute_of_silence_is_an_error():
+    node, silence = Node(), Silence(100.0)
+    silence.heard(100.0)
+    assert node.level(silence, 105.0) == (DiagnosticStatus.OK, 'active')
+    assert node.level(silence, 115.0) == (DiagnosticStatus.WARN, 'nothing comes on samples')
+    level, message = node.level(silence, 160.0)
+    assert level == DiagnosticStatus.ERROR and 'samples for 30 s and more' in message
+    assert values(node.health, 160.0)[2]['nothing for (s)'] == '60'
+    silence.heard(160.0)
+    assert node.level(silence, 165.0)[0] == DiagnosticStatus.ERROR  # remembered for a while
+    silence.heard(165.0)
+    assert node.level(silence, 161.0 + REMEMBER)[0] == DiagnosticStatus.OK
+
+
+def test_what_has_never_come_is_waited_for():
+    node, silence = Node(), Silence(100.0)
+    assert node.level(silence, 105.0)[0] == DiagnosticStatus.OK
+    assert node.level(silence, 190.0) == (
+        DiagnosticStatus.WARN,
+        'nothing comes on samples yet',
+    )
+
+
+@pytest.fixture
+def node(probe):
+    """An estimator in this process, active; nothing is published to it."""
+    made = estimator.EstimatorNode()
+    made.trigger_configure()
+    made.trigger_activate()
+    yield made
+    made.trigger_shutdown()
+    made.destroy_node()
+
+
+def result(node, number, *, converged=True, beta_1=134.0, rate=200.0, p_value=None):
+    """A window's result with a posterior about a beta_1, alpha_1_beta_0 / alpha_2 = 4400."""
+    rng = np.random.default_rng(number)
+    theta = np.array([beta_1, 1.1e9, 2.5e5, 0.5])
+    draws = theta * np.exp(0.01 * rng.standard_normal((50, 4)))
+    command = np.sin(np.arange(100.0))
+    record = Record(command, command, 1 / rate, 250e3, start_ns=10**18 + number * 10**9)
+    return WindowResult(
+        window=Window(number, record, 0, 0, record),
+        settings=node.settings,
+        model=choose_model(),
+        frozen=SimpleNamespace(draws=draws),
+        converged=converged,
+        rhat=np.ones(4),
+        conflict=None if p_value is None else Conflict(30.0, 3, p_value),
+        prior_dominated=(False,) * 4,
+    )
+
+
+def told(node, *results):
+    """What /diagnostics shows after windows."""
+    for one in results:
+        node.last = one
+        node.judged.append(one.converged)
+        node.compute.append(0.1)
+        node.latency.append(0.1)
+    node.do_report()
+    return values(node.health, time.monotonic())
+
+
+def test_windows_that_do_not_converge_are_a_warning(node):
+    level, _, shown = told(node, *(result(node, n, converged=n % 3 > 0) for n in range(10)))
+    assert 'sampling (last)' not in shown and shown['converged windows'] == '6 of 10'
+    level, message, shown = told(node, *(result(node, n, converged=False) for n in range(4)))
+    assert level == DiagnosticStatus.WARN and 'have not converged' in message
+    assert shown['converged windows'] == '4 of 10'
+
+
+def test_a_rate_too_low_for_the_loop_is_a_warning(node):
+    assert 'doubt (last)' not in told(node, result(node, 0))[2]
+    level, message, _ = told(node, result(node, 1, rate=10.0))
+    assert level == DiagnosticStatus.WARN
+    assert 'faster than 10 Hz can show' in message
+
+
+def test_a_contradicted_prior_is_told_with_its_date_for_as_long_as_it_stands(node):
+    window = result(node, 5, p_value=1e-9)
+    node.contradiction.take(window, [Contradicted(5, 0, 1e-9, 'window 5 contradicts')])
+    level, message, shown = told(node, window)
+    assert level == DiagnosticStatus.WARN
+    assert message == 'samples contradict what was known, since 2001-09-09 01:46:45 UTC'
+    assert float(shown['prior contradicted for (s)']) == pytest.approx(0.495)
+    later = result(node, 9, p_value=1e-9)
+    node.contradiction.take(later, [])
+    shown = told(node, later)[2]
+    assert float(shown['prior contradicted for (s)']) == pytest.approx(4.495)
+    agrees = result(node, 12, p_value=0.5)
+    node.contradiction.take(agrees, [])
+    assert 'prior contradicted for (s)' not in told(node, agrees)[2]
+
+
+def test_a_worker_that_compiles_is_no_health(node):
+    node.worker.ready.clear()
+    level, message, shown = told(node)
+    assert level == DiagnosticStatus.WARN and 'still compiling' in message
+    assert shown['worker'] == 'compiling'
