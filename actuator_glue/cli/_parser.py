@@ -10,16 +10,25 @@ from actuator_glue.arguments import is_number, number
 from actuator_glue.errors import InputError
 
 EPILOG = (
-    'Exit codes: 0 done; 1 the answer is no, where a command asks a question; 2 the input '
+    'Exit codes: 0 done; 1 the answer is no, where a command asks a question; 2 the input\n'
     'cannot be used; 3 a fault of this program.'
 )
+
+
+def examples(epilog: str, commands: Sequence[str]) -> str:
+    """Return the end of a command's help with what is typed for instance, a line each."""
+    lines = [f'  actuator-glue {command}'.replace('%', '%%') for command in commands]
+    return '\n'.join([epilog, '', 'Examples:', *lines])
 
 
 class Parser(argparse.ArgumentParser):
     """Arguments of the program or of one command, in any order."""
 
     def __init__(self, **options: Any) -> None:
-        super().__init__(epilog=EPILOG, **options)
+        # Lines of the epilog stay as they are: examples are copied.
+        super().__init__(
+            epilog=EPILOG, formatter_class=argparse.RawDescriptionHelpFormatter, **options
+        )
         self._within = False
 
     def parse_known_args(  # type: ignore[override]  # an overload for any namespace is left out

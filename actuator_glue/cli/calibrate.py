@@ -21,6 +21,11 @@ from actuator_glue.io.json_file import write_json
 if TYPE_CHECKING:
     from actuator_glue.api.calibration_result import Calibration
 
+EXAMPLES = (
+    'calibrate free.csv clamped.csv --stiffness 0 250e3 --save monday.npz',
+    'calibrate free.csv clamped.csv --stiffness 0 250e3 --effect backlash --report out.html',
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""

@@ -52,6 +52,12 @@ class _Option:
     help: str
 
 
+EXAMPLES = (
+    'completion bash',
+    'completion fish',
+)
+
+
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
     uses = '; '.join(f'{shell}: `{line}`' for shell, line in _USE.items())

@@ -7,6 +7,11 @@ import argparse
 from actuator_glue.cli._records import add_records, load
 from actuator_glue.cli._save import add_out, save
 
+EXAMPLES = (
+    'convert test.csv bag_of_test --stiffness 250e3',
+    'convert bag_of_test test.csv',
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""

@@ -24,6 +24,11 @@ from actuator_glue.records import Record
 if TYPE_CHECKING:
     from actuator_glue.api.diagnosis import Diagnosis
 
+EXAMPLES = (
+    'diagnose free.csv clamped.csv --stiffness 0 250e3 --report report.html',
+    'diagnose free.csv clamped.csv --stiffness 0 250e3 --holdout earthquake.csv --json -',
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""

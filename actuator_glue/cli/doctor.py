@@ -11,6 +11,11 @@ from actuator_glue.io.json_file import write_json
 
 MARKS = {'ok': 'ok     ', 'advice': 'advice ', 'missing': 'MISSING'}
 
+EXAMPLES = (
+    'doctor',
+    'doctor --json -',
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""

@@ -14,6 +14,11 @@ from actuator_glue.io.json_file import write_json
 from actuator_glue.io.units import factor
 from actuator_glue.records import Record
 
+EXAMPLES = (
+    'info test.csv',
+    'info bag_of_test --json -',
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""

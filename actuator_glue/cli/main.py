@@ -1,7 +1,8 @@
 """Entry point of `actuator-glue`: finds the commands beside this file and runs one.
 
-Every `cli/COMMAND.py` has `add_arguments(parser)` and `run(args) -> int`; the first line of its
-docstring is its help. Only the command that runs is imported, and heavy libraries only inside it.
+Every `cli/COMMAND.py` has `add_arguments(parser)`, `run(args) -> int` and two EXAMPLES, with which
+its help ends; the first line of its docstring is its help. Only the command that runs is imported,
+and heavy libraries only inside it.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ from pathlib import Path
 
 from actuator_glue import cli
 from actuator_glue.arguments import claim_outputs
-from actuator_glue.cli._parser import Parser
+from actuator_glue.cli._parser import Parser, examples
 from actuator_glue.errors import InputError
 
 
@@ -49,6 +50,7 @@ def build_parser(chosen: str | None) -> Parser:
         if name == chosen:
             module = importlib.import_module(f'actuator_glue.cli.{file.stem}')
             module.add_arguments(sub)
+            sub.epilog = examples(sub.epilog or '', module.EXAMPLES)
             sub.set_defaults(run=module.run)
     return parser
 

@@ -16,6 +16,11 @@ if TYPE_CHECKING:
     from actuator_glue.io.look import ColumnLook, FileLook
     from actuator_glue.io.propose import Guess, Proposal
 
+EXAMPLES = (
+    'map raw.txt --rate 1000 --out map.yaml',
+    'map recorded_bag',
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
@@ -121,6 +126,15 @@ def _missing(proposal: Proposal) -> str:
         return (
             f'{told}, and no length is made of it silently: where a lever turns a stroke into it, '
             'write the channel map by hand with `unit: mm` and `scale`, the mm per unit of angle '
+            '(docs/howto_your_data.md)'
+        )
+    if 'command' in names:
+        others = ' and '.join(repr(name) for name in proposal.other_commands)
+        instead = f'; {others} commands something else' if others else ''
+        return (
+            'no command in this file: no displacement is called so (command, target, set point, '
+            f'demand, reference, soll), and none is followed by another{instead}. A displacement '
+            'command is needed: record it, or name its column in a channel map written by hand '
             '(docs/howto_your_data.md)'
         )
     return (

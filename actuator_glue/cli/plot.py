@@ -16,6 +16,11 @@ if TYPE_CHECKING:
     from actuator_glue.api.calibration_result import Calibration
     from actuator_glue.report.bag_content import Content
 
+EXAMPLES = (
+    'plot test.csv --out pictures',
+    'plot test.csv --draws monday.npz --format pdf',
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""

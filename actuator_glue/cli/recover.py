@@ -7,6 +7,11 @@ import argparse
 from actuator_glue.cli._output import add_json, say
 from actuator_glue.io.json_file import write_json
 
+EXAMPLES = (
+    'recover cut_off_bag',
+    'recover bag_of_test/bag_of_test_0.mcap',
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""

@@ -16,6 +16,11 @@ if TYPE_CHECKING:
 SHOWN = 20  # windows that are named
 SETTINGS = ('window', 'hop', 'settle', 'shaping_factor', 'evaluations', 'seed')
 
+EXAMPLES = (
+    'replay bag_of_test',
+    'replay test.csv --stiffness 250e3 --window 5 --hop 1',
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""

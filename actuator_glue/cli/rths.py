@@ -14,6 +14,11 @@ from actuator_glue.cli._output import add_json, beside, note, say, table
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
 
+EXAMPLES = (
+    'rths sdof --posterior monday.npz --limit 0.01',
+    'rths benchmark_case_1 --posterior monday.npz --compensator best --report rths.html',
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""

@@ -11,6 +11,11 @@ from actuator_glue.cli._output import add_json, note, progress, say
 from actuator_glue.cli._records import add_reading, load
 from actuator_glue.io.json_file import write_json
 
+EXAMPLES = (
+    'send test.csv --to udp://127.0.0.1:5005',
+    'send test.csv --to tcp://127.0.0.1:5006 --speed 10',
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""

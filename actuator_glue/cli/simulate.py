@@ -21,6 +21,11 @@ if TYPE_CHECKING:
 COMMANDS = ('sweep', 'sine', 'noise', 'earthquake')
 PAUSE = 1_000_000_000  # ns between two tests of one bag
 
+EXAMPLES = (
+    'simulate test.csv --stiffness 0 250e3',
+    'simulate test.csv --duration 20 --effect backlash:backlash=40e-6',
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""

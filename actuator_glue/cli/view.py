@@ -11,6 +11,11 @@ import threading
 from actuator_glue.cli._output import note, say
 from actuator_glue.errors import InputError
 
+EXAMPLES = (
+    'view bag_of_test',
+    'view --live --open',
+)
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Declare the arguments."""
