@@ -4,21 +4,29 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
 from actuator_glue.io.look import ColumnLook, FileLook
 from actuator_glue.io.time_base import uneven
-from actuator_glue.io.units import ANGLES, ROLES
+from actuator_glue.io.units import ANGLES, OF_NO_LENGTH, ROLES
 from actuator_glue.records import SLOWEST_RATE, Array
 
 # Words of the field for each role, in the languages of controllers; whole words or parts.
 _WORDS = {
     'time': r'time|zeit|temps|tiempo|timestamp|^t$|\bsec(onds)?\b',
     'command': r'command|cmd|target|refer|\bref\b|desired|set.?point|demand|soll|input|program',
-    'measured': r'meas|actual|feedback|\bfbk?\b|\bist\b|respon|achieved|lvdt|encoder|output',
+    'measured': r'meas|actual|feedback|\bfbk?\b|\bist|respon|achieved|lvdt|encoder|output|posi|'
+    r'displ',
     'force': r'force|load|kraft|\bcell\b|fuerza|effort',
 }
+# What has a word of these is no displacement, whatever else it is called.
+_NO_LENGTH = re.compile(
+    r'err(or)?\b|deviation|\bdiff|abweichung|veloc|\bvel\b|speed|accel|\bacc\b|press|druck|temp|strain|'
+    r'valve|ventil|spool|servo ?current|flow',
+    re.IGNORECASE,
+)
 _SAMPLES = 200_000  # of a channel that are compared
 _ALIKE = 0.8  # correlation above which one displacement follows another
 _LATEST = 0.25  # s; no actuator follows later
@@ -51,11 +59,13 @@ class Proposal:
         channels: guesses by role; `command` and `measured` may be missing.
         counter: the column that counts samples.
         rate: samples per second, where no column holds times.
+        other_commands: names of columns that are commands, but of no displacement.
     """
 
     channels: dict[str, Guess]
     counter: ColumnLook | None
     rate: float | None
+    other_commands: tuple[str, ...] = ()
 
     @property
     def complete(self) -> bool:
@@ -86,18 +96,14 @@ def propose(found: FileLook, given: float | None = None) -> Proposal:
     if given is not None:
         clock = None
     rate = given or _rate(found, rest, clock)
-    named: dict[str, Guess] = {}
-    for role in ('command', 'measured', 'force'):
-        hits = [
-            c for c in rest if _called(c, role) and all(g.column is not c for g in named.values())
-        ]
-        if len(hits) == 1:
-            named[role] = _guess(hits[0], role, (f'called {hits[0].label.strip()!r}',))
     # Without a rate a lag is told in samples.
-    channels = _displacements(rest, named, rate or 1.0)
+    channels = _displacements(rest, rate or 1.0)
+    channels = _with_force(channels, rest)
     if clock is not None:
         channels = {'time': clock, **channels}
-    return Proposal(channels, counter, None if clock is not None else rate)
+    others = [c for c in rest if _called(c, 'command') and not _may_be(c, 'command')]
+    told = tuple(c.label.strip() for c in others)
+    return Proposal(channels, counter, None if clock is not None else rate, told)
 
 
 def _commonest(columns: list[ColumnLook]) -> int:
@@ -156,70 +162,105 @@ def _guess(column: ColumnLook, role: str, reasons: tuple[str, ...]) -> Guess:
     return Guess(column, likeliest, reasons, (f'unit: {said}',))
 
 
-def _displacements(
-    columns: list[ColumnLook], named: dict[str, Guess], rate: float
-) -> dict[str, Guess]:
+def _may_be(column: ColumnLook, role: str) -> bool:
+    """Return whether nothing that is written about a column speaks against a role.
+
+    What is called a command is never what is measured, and a force never a displacement.
+    """
+    command = _called(column, 'command')
+    if role == 'force':
+        return not command and column.unit not in ROLES['command']
+    force = _called(column, 'force') and column.unit not in ROLES['command']
+    if force or column.unit in OF_NO_LENGTH or _NO_LENGTH.search(_plain(column.label)):
+        return False
+    return not command if role == 'measured' else command or not _called(column, 'measured')
+
+
+def _displacements(columns: list[ColumnLook], rate: float) -> dict[str, Guess]:
     """Return command and measured: by name, or as the two alike of which one follows."""
-    force = named.get('force')
-    free = [c for c in columns if force is None or c is not force.column]
-    free = [c for c in free if c.unit not in ROLES['force'] and not _called(c, 'force')]
-    chosen = dict(named)
-    if {'command', 'measured'} <= set(named):
-        return _with_force(chosen, columns)
+    could = {r: [c for c in columns if _may_be(c, r)] for r in ('command', 'measured')}
+    named = {role: [c for c in found if _called(c, role)] for role, found in could.items()}
+    able = {role: named[role] or found for role, found in could.items()}
+    certain = all(len(found) == 1 for found in named.values())
     best: tuple[tuple[bool, float], float, float, ColumnLook, ColumnLook] | None = None
-    for i, one in enumerate(free):
-        for other in free[i + 1 :]:
-            likeness, lag = follows(_at(one, rate), _at(other, rate), rate)
-            pair = (one, other) if lag >= 0.0 else (other, one)
-            fits = all(g.column in pair for r, g in named.items() if r != 'force')
+    for one, other in combinations(columns, 2):
+        orders = [
+            pair
+            for pair in ((one, other), (other, one))
+            if any(pair[0] is c for c in able['command'])
+            and any(pair[1] is c for c in able['measured'])
+        ]
+        if not orders:
+            continue
+        likeness, lag = follows(_at(one, rate), _at(other, rate), rate)
+        for first, second in orders:
+            late = lag if first is one else -lag
             # A force moves with what is measured; what is measured moves after the command.
-            rank = (abs(lag) > 0.5 / rate, abs(likeness))
-            if fits and rank[1] > _ALIKE and (best is None or rank > best[0]):
-                best = (rank, likeness, abs(lag), *pair)
+            rank = (late > 0.5 / rate, abs(likeness))
+            if (certain or rank[1] > _ALIKE) and (best is None or rank > best[0]):
+                best = (rank, likeness, late, first, second)
     if best is None:
-        return _with_force(chosen, columns)
-    _, likeness, lag, first, second = best
-    if first is _column(named, 'measured') or second is _column(named, 'command'):
-        first, second = second, first
-    return _with_force(_pair(chosen, (first, second), likeness, lag, rate), columns)
+        return {
+            role: _guess(found[0], role, (f'called {found[0].label.strip()!r}',))
+            for role, found in named.items()
+            if len(found) == 1
+        }
+    _, likeness, late, first, second = best
+    return _pair(named, (first, second), likeness, late, rate)
 
 
 def _pair(
-    chosen: dict[str, Guess],
+    named: dict[str, list[ColumnLook]],
     pair: tuple[ColumnLook, ColumnLook],
     likeness: float,
-    lag: float,
+    late: float,
     rate: float,
 ) -> dict[str, Guess]:
-    """Add command and measured, which are alike, where they have no name."""
+    """Return command and measured with why they are taken, and what speaks against it."""
     first, second = pair
-    late = f'{lag:.0f} samples' if rate == 1.0 else f'{1e3 * lag:.3g} ms'
-    told = f'{late}, correlation {likeness:.4f}'
-    either = () if lag > 0.5 / rate else ('which of the two is the command: neither is later',)
-    if 'command' not in chosen:
-        guess = _guess(first, 'command', (f'{_name(second)} follows it by {told}',))
-        chosen['command'] = _unsure(guess, either)
-    if 'measured' not in chosen:
-        guess = _guess(second, 'measured', (f'follows {_name(first)} by {told}',))
-        if likeness < 0.0:
-            either = (*either, 'sign: it moves against the command, so its scale is -1')
-        scale = -1.0 if likeness < 0.0 else 1.0
-        chosen['measured'] = replace(_unsure(guess, either), scale=scale)
+    lag = f'{abs(late):.0f} samples' if rate == 1.0 else f'{1e3 * abs(late):.3g} ms'
+    told = f'{lag}, correlation {likeness:.4f}'
+    chosen = {}
+    for role, column, reason in (
+        ('command', first, f'{_name(second)} follows it by {told}'),
+        ('measured', second, f'follows {_name(first)} by {told}'),
+    ):
+        called = any(column is c for c in named[role])
+        guess = _guess(column, role, (f'called {column.label.strip()!r}' if called else reason,))
+        doubts = []
+        if not called:
+            doubts.append('role: told by what the channel does, not by its name')
+            if abs(late) <= 0.5 / rate:
+                doubts.append('which of the two is the command: neither is later')
+        others = [_name(c) for c in named[role] if c is not column]
+        if others:
+            doubts.append(f'role: {", ".join(others)} may be it as well, by name')
+        chosen[role] = _unsure(guess, tuple(doubts))
+    doubts = []
+    if abs(likeness) < _ALIKE:
+        doubts.append(f'role: it is not like the command (correlation {likeness:.2f})')
+    elif late < -0.5 / rate:
+        doubts.append(f'role: it leads the command by {lag}: are the two swapped?')
+    scale = 1.0
+    if likeness < -_ALIKE:
+        doubts.append('sign: it moves against the command, so its scale is -1')
+        scale = -1.0
+    chosen['measured'] = replace(_unsure(chosen['measured'], tuple(doubts)), scale=scale)
     return chosen
 
 
-def _column(named: dict[str, Guess], role: str) -> ColumnLook | None:
-    return named[role].column if role in named else None
-
-
 def _with_force(chosen: dict[str, Guess], columns: list[ColumnLook]) -> dict[str, Guess]:
-    """Add the only column that has a unit of force, where none is called so."""
-    taken = [guess.column for guess in chosen.values()]
-    units = [c for c in columns if c.unit in ROLES['force'] and all(c is not t for t in taken)]
-    if 'force' not in chosen and len(units) == 1:
-        chosen['force'] = _guess(units[0], 'force', (f'its unit is {units[0].unit}',))
-    order = ('command', 'measured', 'force')
-    return {role: chosen[role] for role in order if role in chosen}
+    """Add the only column that is called a force, or else the only one that has a unit of it."""
+    free = [c for c in columns if all(c is not guess.column for guess in chosen.values())]
+    free = [c for c in free if _may_be(c, 'force')]
+    named = [c for c in free if _called(c, 'force')]
+    units = [c for c in free if c.unit in ROLES['force']]
+    if len(named) == 1:
+        reason = f'called {named[0].label.strip()!r}'
+        return {**chosen, 'force': _guess(named[0], 'force', (reason,))}
+    if len(units) == 1:
+        return {**chosen, 'force': _guess(units[0], 'force', (f'its unit is {units[0].unit}',))}
+    return chosen
 
 
 def _unsure(guess: Guess, what: tuple[str, ...]) -> Guess:

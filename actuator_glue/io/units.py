@@ -21,9 +21,11 @@ ROLES: dict[str, dict[str, float]] = {
 EXAMPLE = 'time_s,command_mm,measured_mm,force_N'
 ANGLES = frozenset(('deg', '°', 'degree', 'degrees', 'rad', 'mrad', 'rev', 'turn', 'turns'))
 # Units of other quantities, so that one which is written is known to be a unit.
-_OTHERS = frozenset(('V', 'mV', 'volt', 'volts', 'mA', '%', 'count', 'counts', 'cnt', 'inc'))
-_OTHERS |= {'bar', 'mbar', 'Pa', 'kPa', 'MPa', 'psi', 'Nm', 'kNm', 'l/min', '°C', 'degC', 'Hz'}
-_OTHERS |= {'m/s', 'mm/s', 'deg/s', 'rad/s', 'rpm', 'g', 'm/s2', 'm/s^2', 'm/s²', 'mm/s2'}
+_RAW = frozenset(('V', 'mV', 'volt', 'volts', 'mA', '%', 'count', 'counts', 'cnt', 'inc'))
+_OTHERS = frozenset(('bar', 'mbar', 'Pa', 'kPa', 'MPa', 'psi', 'Nm', 'kNm', 'l/min', '°C', 'degC'))
+_OTHERS |= {'m/s', 'mm/s', 'deg/s', 'rad/s', 'rpm', 'g', 'm/s2', 'm/s^2', 'm/s²', 'mm/s2', 'Hz'}
+# Of what no scale makes a length.
+OF_NO_LENGTH = _OTHERS.union(_FORCE, _TIME)
 _QUANTITY = {
     'time': 'time',
     'command': 'displacement',
@@ -39,7 +41,7 @@ _NAME = re.compile(
 )
 _BRACKETS = re.compile(r'[\[({<]\s*([^\[\](){}<>]*?)\s*[\])}>]')
 _BETWEEN = re.compile(r'[\s_,;:\[\](){}<>]+')
-_KNOWN = ANGLES.union(_OTHERS, *ROLES.values())
+_KNOWN = ANGLES.union(_RAW, _OTHERS, *ROLES.values())
 _LOWER = {unit.lower() for unit in _KNOWN}
 _PLACE = re.compile(r'[\d:,\s]*')  # in brackets: which column of a matrix
 
