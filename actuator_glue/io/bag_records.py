@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from array import array
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +18,7 @@ from actuator_glue.io import bag_samples
 from actuator_glue.io.bag_metadata import LATCHED
 from actuator_glue.io.bag_reader import (
     TEST_SETUP,
+    BagMessage,
     Note,
     as_published,
     messages,
@@ -26,6 +29,7 @@ from actuator_glue.io.bag_reader import (
 from actuator_glue.io.bag_samples import SAMPLE_BLOCK, BagBlock, BagSetup
 from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.io.messages import header, message
+from actuator_glue.rate_check import disagreement, rate_by_clock
 from actuator_glue.records import Record
 from actuator_glue.sample_block import Block
 from actuator_glue.setups import Setups, StreamSetup
@@ -46,6 +50,9 @@ class _Segment:
     command: array[float] = field(default_factory=lambda: array('d'))
     measured: array[float] = field(default_factory=lambda: array('d'))
     force: array[float] = field(default_factory=lambda: array('d'))
+    # Where each block begins, and its stamp since that of the first [s].
+    begins: array[int] = field(default_factory=lambda: array('q'))
+    stamps: array[float] = field(default_factory=lambda: array('d'))
     next_stamp: int = 0
 
     @property
@@ -53,6 +60,8 @@ class _Segment:
         return self.first.index + len(self.command)
 
     def append(self, block: Block) -> None:
+        self.begins.append(block.index)
+        self.stamps.append((block.stamp_ns - self.first.stamp_ns) * 1e-9)
         self.next_stamp = block.stamp_ns + round(len(block) * block.period * 1e9)
         self.command.frombytes(block.command.tobytes())
         self.measured.frombytes(block.measured.tobytes())
@@ -85,7 +94,19 @@ class _Segment:
         )
 
     def record(self, source: str) -> Record:
-        setup = self.setup
+        """Return the samples as a record.
+
+        Raises:
+            InputError: they cannot be one, or their stamps tell another sample rate.
+        """
+        setup, rate = self.setup, 1.0 / self.first.period
+        found = rate_by_clock(self.begins, self.stamps, rate)
+        if found is not None:
+            told = disagreement(rate, {'the stamps of the samples': found})
+            raise InputError(
+                f'{source}: {told}; one of them is wrong, and with it every result in seconds: '
+                'mend the rate of whoever published the samples, and record again'
+            )
         return Record(
             command=np.array(self.command),
             measured=np.array(self.measured),
@@ -121,10 +142,10 @@ def read_records(
         InputError: no bag, no samples, damage, NaN or absurd samples, a gap or clock jump and
             nobody to be told.
     """
-    setups = _setups(path, note, warn)
+    every, setups = _setups(path, note, warn)
     open_segments: dict[str, _Segment] = {}
     done: list[_Segment] = []
-    for (topic, actuator, block), setup in _governed(path, setups):
+    for (topic, actuator, block), setup in _governed(path, every, setups):
         segment = open_segments.get(topic)
         if segment is not None:
             fault = segment.fault_before(block)
@@ -168,11 +189,10 @@ def _nothing(path: Path | str) -> str:
 
 
 def _governed(
-    path: Path | str, setups: list[tuple[int, BagSetup]]
+    path: Path | str, every: Iterable[BagMessage], setups: list[tuple[int, BagSetup]]
 ) -> Iterator[tuple[BagBlock, StreamSetup | None]]:
     """Yield all samples in their order, each block or part of one with what governs it."""
     governing: dict[str, _Governing] = {}
-    every = as_published(messages(path, types=TYPES, note=lambda _: None))
     for place, raw in enumerate(every):
         if raw.type == SAMPLE_BLOCK:
             found = bag_samples.samples(raw, path)
@@ -182,20 +202,68 @@ def _governed(
                 yield found._replace(block=block), setup
 
 
-def _setups(path: Path | str, note: Note, warn: Note) -> list[tuple[int, BagSetup]]:
-    """Return the usable set-ups with their place among all messages; checks the whole bag.
+def _setups(
+    path: Path | str, note: Note, warn: Note
+) -> tuple[Iterable[BagMessage], list[tuple[int, BagSetup]]]:
+    """Return all messages, and the usable set-ups with their place among them.
 
-    A set-up that cannot be used is left out, as a live node leaves it out.
+    Checks the whole bag. A set-up that cannot be used is left out, as a live node leaves it out.
+    Messages that a file holds in another order than that of their times are put in order.
     """
-    found: list[tuple[int, BagSetup]] = []
-    every = as_published(messages(path, types=TYPES, note=note))
+    order = _Order(path)
+    setups = [*_usable(order.seen(messages(path, types=TYPES, note=note)), path, warn)]
+    again = partial(messages, path, types=TYPES, note=lambda _: None)
+    if order.mixed:
+        every = sorted(again(), key=attrgetter('log_time'))
+        if _counts_on(every, path):
+            return every, [*_usable(every, path, lambda _: None)]
+    return as_published(again()), setups
+
+
+def _counts_on(every: Iterable[BagMessage], path: Path | str) -> bool:
+    """Whether the samples of each topic count on, as they do in the order of their times."""
+    following: dict[str, int] = {}
+    for raw in every:
+        if raw.type == SAMPLE_BLOCK:
+            block = bag_samples.samples(raw, path).block
+            if block.index < following.get(raw.topic, 0):
+                return False
+            following[raw.topic] = block.index + len(block)
+    return True
+
+
+def _usable(
+    every: Iterable[BagMessage], path: Path | str, warn: Note
+) -> Iterator[tuple[int, BagSetup]]:
     for place, raw in enumerate(every):
         if raw.type == TEST_SETUP:
             try:
-                found.append((place, bag_samples.setup(raw, path)))
+                yield place, bag_samples.setup(raw, path)
             except InputError as error:
                 warn(f'{error}; this set-up is not used')
-    return found
+
+
+class _Order:
+    """Whether a file may hold the blocks of a topic in another order than that of their times.
+
+    Where a clock is set back, times are earlier, too: but the samples count on, or anew.
+    """
+
+    def __init__(self, path: Path | str) -> None:
+        self.mixed = False
+        self._path = path
+        self._last: dict[str, BagMessage] = {}
+
+    def seen(self, every: Iterable[BagMessage]) -> Iterator[BagMessage]:
+        """Yield messages as they are, in the order of their publication, and look at them."""
+        for raw in as_published(every):
+            if raw.type == SAMPLE_BLOCK:
+                last = self._last.get(raw.topic)
+                self._last[raw.topic] = raw
+                if last is not None and raw.log_time < last.log_time:
+                    before, now = (bag_samples.samples(m, self._path).block for m in (last, raw))
+                    self.mixed |= now.index < before.index and now.stamp_ns < before.stamp_ns
+            yield raw
 
 
 class _Governing:

@@ -13,11 +13,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 from bag_content import samples, setup
+from mcap.writer import Writer
 
 from actuator_glue.errors import InputError
 from actuator_glue.io import messages
 from actuator_glue.io.bag_records import read_records, write_record
 from actuator_glue.io.bag_writer import BagWriter
+from actuator_glue.io.mcap_scan import Scan
 from actuator_glue.io.recover import recover
 from actuator_glue.records import Record
 
@@ -222,3 +224,77 @@ def test_a_killed_recorder_loses_half_a_second_at_most(tmp_path: Path) -> None:
     # The recorder's loop ran on real time, so stamps tell how much of it was lost.
     lost = stamps[-1] - stamps[min(recovery.messages, len(stamps)) - 1]
     assert lost <= 0.5e9, (lost, last)
+
+
+def slower(record: Record, start: int, stop: int, true: float) -> object:
+    """Return samples of a record whose stamps tell another rate than its period."""
+    block = samples(record, start, stop)
+    stamp = record.start_ns + round(start / true * 1e9)
+    block.header = messages.header(stamp, record.actuator)
+    return block
+
+
+@pytest.mark.parametrize('true', [500.0, 980.0, 1020.0, 2000.0])
+def test_stamps_of_blocks_that_tell_another_rate_are_refused(
+    tmp_path: Path, make_record: Make, true: float
+) -> None:
+    """A rate that was declared wrong: every time constant would be wrong by as much."""
+    record = make_record(5000)
+    with open_bag(tmp_path / 'bag') as writer:
+        for start in range(0, 5000, 20):
+            writer.write('/samples', slower(record, start, start + 20, true), start)
+    with pytest.raises(InputError, match=rf'said to be 1000 Hz, but by the stamps .* {true:g} Hz'):
+        read_records(tmp_path / 'bag')
+
+
+@pytest.mark.parametrize('true', [995.0, 1000.0, 1008.0])
+def test_stamps_that_jitter_and_drift_a_little_are_no_other_rate(
+    tmp_path: Path, make_record: Make, true: float
+) -> None:
+    """Less than one in a hundred, and 3 ms of jitter."""
+    record, late = make_record(5000), np.random.default_rng(3)
+    with open_bag(tmp_path / 'bag') as writer:
+        for start in range(0, 5000, 20):
+            block = slower(record, start, start + 20, true)
+            stamp = record.start_ns + round(start / true * 1e9 + late.exponential(3e6))
+            block.header = messages.header(stamp, record.actuator)
+            writer.write('/samples', block, start)
+    (found,) = read_records(tmp_path / 'bag')
+    assert np.array_equal(found.command, record.command)
+
+
+@pytest.mark.parametrize('mixed', ['turned', 'halves', 'by topic', 'neighbours'])
+def test_messages_out_of_the_order_of_their_times_are_put_in_order(
+    tmp_path: Path, make_record: Make, mixed: str
+) -> None:
+    """As other tools write MCAP: samples, and each set-up from the sample it names."""
+    record = make_record(4000)
+    with open_bag(tmp_path / 'bag') as writer:
+        writer.write('/test_setup', setup(record, 0, 1e5), record.start_ns)
+        for start in range(0, 4000, 100):
+            writer.write('/samples', samples(record, start, start + 100), record.stamp_ns(start))
+        writer.write('/test_setup', setup(record, 2000, 2e5), record.stamp_ns(2000) - 1)
+    (source,) = (tmp_path / 'bag').glob('*.mcap')
+    rows = list(Scan(source, pytest.fail).messages())
+    order = {
+        'turned': rows[::-1],
+        'halves': rows[20:] + rows[:20],
+        'by topic': sorted(rows, key=lambda row: row[1].topic),
+        'neighbours': [row for pair in zip(rows[1::2], rows[::2], strict=True) for row in pair],
+    }[mixed]
+    path = tmp_path / 'mixed.mcap'
+    with path.open('wb') as file:
+        writer = Writer(file)
+        writer.start(profile='ros2', library='somebody')
+        channels: dict[str, int] = {}
+        for schema, channel, message in order:
+            if channel.topic not in channels:
+                kind = writer.register_schema(schema.name, schema.encoding, schema.data)
+                channels[channel.topic] = writer.register_channel(channel.topic, 'cdr', kind)
+            times = message.log_time, message.publish_time
+            writer.add_message(channels[channel.topic], times[0], message.data, times[1])
+        writer.finish()
+    first, second = read_records(path)
+    assert np.array_equal(first.command, record.command[:2000])
+    assert np.array_equal(second.command, record.command[2000:])
+    assert (first.stiffness, second.stiffness) == (1e5, 2e5)
