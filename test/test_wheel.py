@@ -57,8 +57,9 @@ def test_wheel_holds_every_file_of_the_package(wheel: Path) -> None:
             for p in (ROOT / 'msg_defs').glob('*/*')
         }
         | {
-            f'actuator_glue/partitions/{p.name}'
-            for p in (ROOT / 'config/partitions').glob('*.yaml')
+            f'actuator_glue/{folder}/{p.name}'
+            for folder in ('channels', 'layouts', 'partitions')
+            for p in (ROOT / 'config' / folder).glob('*.yaml')
         }
         | {f'actuator_glue/view/assets/{p.name}' for p in (package / 'view/assets').iterdir()}
     )

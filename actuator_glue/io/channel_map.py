@@ -10,7 +10,7 @@ from typing import Literal
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.units import ROLES, factor
-from actuator_glue.io.yaml_file import mapping, number, parse, read_text, whole
+from actuator_glue.io.yaml_file import located, mapping, number, parse, read_text, whole
 from actuator_glue.records import check_stiffness
 
 Column = str | int
@@ -95,16 +95,17 @@ class ChannelMap:
 
 
 def read_channel_map(path: Path | str) -> ChannelMap:
-    """Return the channel map of a YAML file.
+    """Return the channel map of a YAML file, or one that comes with the package by its name.
 
     Raises:
         InputError: no such file, no YAML, unknown or missing entries, wrong kinds or units.
     """
-    path = Path(path)
+    path = located(path, 'channels')
     text = read_text(
         path,
         'channel map',
         '--channels takes the YAML file that describes the columns of a record, not the record',
+        'channels',
     )
     hint = f'; {_QUOTES}' if _BRACKETS.search(text) else ''
     content = parse(text, f'{path}: channel map', hint)

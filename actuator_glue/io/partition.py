@@ -14,9 +14,10 @@ import yaml
 from actuator_glue.errors import InputError
 from actuator_glue.hybrid.partition import Partition, Specimen, modal_damping, square
 from actuator_glue.io.signature import text_encoding
+from actuator_glue.io.yaml_file import located, shipped
 from actuator_glue.records import Array
 
-SHIPPED = Path(__file__).resolve().parent.parent / 'partitions'
+FOLDER = 'partitions'  # of the package, with those that it brings
 _LARGEST = 2_000_000  # bytes
 _STRUCTURE = ('mass', 'damping', 'damping_ratio', 'stiffness')
 _KNOWN = {
@@ -29,20 +30,13 @@ _KNOWN = {
 }  # fmt: skip
 
 
-def shipped() -> list[str]:
-    """Return the names of the partitions that come with the package."""
-    return sorted(p.stem for p in SHIPPED.glob('*.yaml'))
-
-
 def read_partition(given: Path | str) -> Partition:
     """Return the partition of a YAML file, or one that comes with the package by its name.
 
     Raises:
         InputError: no such file or name, no YAML, unknown or missing entries, wrong values.
     """
-    path = Path(given)
-    if str(given) in shipped() and not path.is_file():
-        path = SHIPPED / f'{given}.yaml'
+    path = located(given, FOLDER)
     try:
         if path.stat().st_size > _LARGEST:
             raise InputError(f'{path}: is no partition but a file of {path.stat().st_size} bytes')
@@ -50,7 +44,7 @@ def read_partition(given: Path | str) -> Partition:
     except OSError as error:
         raise InputError(
             f'{path}: partition cannot be read ({error.strerror}); give a YAML file, or one of '
-            f'{", ".join(shipped())}'
+            f'{", ".join(shipped(FOLDER))}'
         ) from error
     except UnicodeDecodeError as error:
         raise InputError(f'{path}: partition is not text in UTF-8') from error

@@ -15,15 +15,36 @@ from actuator_glue.errors import InputError
 from actuator_glue.io.signature import text_encoding
 
 LARGEST = 100_000  # bytes; a map or layout is a page of text
+_PACKAGE = Path(__file__).resolve().parent.parent
 
 
-def read_text(path: Path, what: str, hint: str) -> str:
+def shipped(folder: str) -> list[str]:
+    """Return the names of the files of a folder (layouts, ...) that come with the package."""
+    return sorted(p.stem for p in (_PACKAGE / folder).glob('*.yaml'))
+
+
+def located(given: Path | str, folder: str) -> Path:
+    """Return the file that is meant: the one there is, or else one of the package by its name.
+
+    Args:
+        given: a path, or the name of a file of the package, with or without `.yaml`.
+        folder: of the package where such files are.
+    """
+    path = Path(given)
+    if len(path.parts) == 1 and not path.is_file() and path.stem in shipped(folder):
+        own = _PACKAGE / folder / f'{path.stem}.yaml'
+        return own if path.suffix in ('', own.suffix) else path
+    return path
+
+
+def read_text(path: Path, what: str, hint: str, folder: str) -> str:
     """Return the text of a YAML file.
 
     Args:
         path: the file.
         what: what it is to be, for messages.
         hint: said where it is far too large for that.
+        folder: of the package where such files are.
 
     Raises:
         InputError: no such file, too large, no text.
@@ -34,7 +55,10 @@ def read_text(path: Path, what: str, hint: str) -> str:
             raise InputError(f'{path}: {size / 1e3:.0f} kB are no {what}; {hint}')
         return path.read_text(text_encoding(path))
     except OSError as error:
-        raise InputError(f'{path}: {what} cannot be read ({error.strerror})') from error
+        raise InputError(
+            f'{path}: {what} cannot be read ({error.strerror}); give a YAML file, or one of '
+            f'{", ".join(shipped(folder))}'
+        ) from error
     except UnicodeDecodeError as error:
         raise InputError(f'{path}: {what} is not text in UTF-8') from error
 

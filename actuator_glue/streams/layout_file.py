@@ -8,7 +8,7 @@ from reprlib import repr as brief
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.units import ROLES, factor
-from actuator_glue.io.yaml_file import mapping, number, parse, read_text, whole
+from actuator_glue.io.yaml_file import located, mapping, number, parse, read_text, whole
 from actuator_glue.records import check_stiffness
 from actuator_glue.streams.layout import TYPES, Field, Layout
 
@@ -18,13 +18,14 @@ LARGEST_DATAGRAM = 65_507 - 32  # bytes; UDP over IPv4, room for a signature
 
 
 def read_layout(path: Path | str) -> Layout:
-    """Return the layout of a YAML file.
+    """Return the layout of a YAML file, or one that comes with the package by its name.
 
     Raises:
         InputError: no such file, no YAML, unknown or missing entries, wrong kinds or units.
     """
-    path = Path(path)
-    text = read_text(path, 'layout', 'layout takes the YAML file that describes a stream')
+    path = located(path, 'layouts')
+    hint = 'layout takes the YAML file that describes a stream'
+    text = read_text(path, 'layout', hint, 'layouts')
     return parse_layout(parse(text, f'{path}: layout'), str(path))
 
 

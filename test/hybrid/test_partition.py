@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 import actuator_glue as ag
-from actuator_glue.io.partition import parse_partition, read_partition, shipped
+from actuator_glue.io.partition import parse_partition, read_partition
+from actuator_glue.io.yaml_file import shipped
 
 GOOD: dict[str, Any] = {
     'numerical': {'mass': 1000.0, 'damping': 600.0, 'stiffness': 2e4},
@@ -19,8 +20,8 @@ GOOD: dict[str, Any] = {
 
 def test_shipped_partitions_are_read_by_name() -> None:
     """Each of them, with the damping ratio that its file says."""
-    assert shipped() == [*(f'benchmark_case_{i}' for i in range(1, 5)), 'sdof']
-    for name in shipped():
+    assert shipped('partitions') == [*(f'benchmark_case_{i}' for i in range(1, 5)), 'sdof']
+    for name in shipped('partitions'):
         assert read_partition(name).name == name
     M, C, K = read_partition('benchmark_case_2').whole
     squares, modes = np.linalg.eigh(K / 1100.0)

@@ -17,6 +17,18 @@ MAP = {
 }
 
 
+def test_a_shipped_map_is_found_by_its_name(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Wherever a command is given."""
+    own = read_channel_map(Path(__file__).resolve().parents[2] / 'config/channels/mts.yaml')
+    monkeypatch.chdir(tmp_path)
+    for name in 'mts.yaml', 'mts':
+        assert read_channel_map(name).roles() == own.roles()
+    with pytest.raises(InputError, match=r'No such file.*one of mts'):
+        read_channel_map('mst.yaml')
+
+
 @pytest.mark.parametrize('said', [{'decimal': ','}, {}], ids=['said', 'found'])
 def test_a_map_reads_any_text(tmp_path: Path, said: dict[str, str]) -> None:
     """Column by name and number, scale, offset, header lines, decimal comma."""

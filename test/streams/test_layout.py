@@ -28,6 +28,22 @@ def test_shipped_layouts_can_be_used(path):
     assert Packed(found, found.rate).size > 0
 
 
+@pytest.mark.parametrize('name', ['speedgoat.yaml', 'speedgoat'])
+def test_a_shipped_layout_is_found_by_its_name(name, tmp_path, monkeypatch):
+    """Wherever a node is started; a file of the working folder is meant first."""
+    monkeypatch.chdir(tmp_path)
+    assert read_layout(name).fields == read_layout(ROOT / 'config/layouts/speedgoat.yaml').fields
+    Path(name).write_text((ROOT / 'config/layouts/labview_tcp.yaml').read_text())
+    assert read_layout(name).actuator == 'labview'
+
+
+@pytest.mark.parametrize('name', ['speedgoat.txt', 'nowhere/speedgoat.yaml', 'speedgot'])
+def test_what_is_no_shipped_layout_is_said_with_those_that_are(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=r'No such file.*dspace, labview_tcp, openfresco, speed'):
+        read_layout(name)
+
+
 @pytest.mark.parametrize(
     ('content', 'told'),
     [
