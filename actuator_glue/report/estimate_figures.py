@@ -38,12 +38,15 @@ def bands(content: Content, path: Path) -> Path:
         raise InputError('the estimator published no bands; the run was shorter than a window')
     known = np.flatnonzero(np.isfinite(total.median))
     zooms, titles = _zooms(content.record, int(known[0]), int(known[-1]) + 1)
+    level = float(total.levels[-1])
+    share = content.coverage('total')[f'{level:g}']
     figure = band_at_zooms(
         content.record,
-        Bands(parameter, total, level=float(total.levels[-1])),
+        Bands(parameter, total, level=level),
         zooms,
         zoom_titles=titles,
-        title='Forecast: each band was fixed before its samples were measured',
+        title=f'Forecasts: {100 * share:.1f} % of the samples lie in their total '
+        f'{100 * level:g} % band',
     )
     return style.save(figure, path)
 

@@ -55,8 +55,25 @@ def live(content: Content, path: Path) -> Path:
             color=style.TRUTH,
             va='top',
         )
-    figure.suptitle('Forecasts before and after the model was augmented, live')
+    figure.suptitle(style.fit(_came_to(content, hops), style.WIDTH, size=10))
     return style.save(figure, path)
+
+
+def _came_to(content: Content, hops: Sequence[Any]) -> str:
+    """Say what a run came to: the error of its forecasts before and after its model changed."""
+    changes = _changes(content)
+
+    def middle(start: int, stop: float) -> str:
+        """Return the median rms error of the forecasts that begin between two samples."""
+        chosen = [UM * b.rms_error for b in hops if start <= int(b.index) < stop]
+        return f'{np.median(chosen):.1f} um' if chosen else 'none'
+
+    first = changes[0][0] if changes else np.inf
+    text = f'Forecasts, median rms error: {middle(0, first)} with the first model'
+    if not changes:
+        return f'{text}, which was not changed'
+    start, name = changes[-1]
+    return f'{text}, {middle(start, np.inf)} with {name}'
 
 
 @style.styled
