@@ -15,7 +15,7 @@ from actuator_glue.io.formats import Column, FileTable, format_of
 from actuator_glue.io.resample import resample_evenly
 from actuator_glue.io.signature import refuse_pipe
 from actuator_glue.io.time_base import uniform_period
-from actuator_glue.io.units import ROLES, choose, factor, recognise
+from actuator_glue.io.units import FLOAT32_COUNTS, ROLES, choose, factor, recognise
 from actuator_glue.rate_check import APART, disagreement, rate_by_clock
 from actuator_glue.records import Array, Hold, Record
 
@@ -253,6 +253,12 @@ def _check_counter(counter: Array, path: Path) -> None:
     odd = steps != 1.0
     if odd.any():
         at = int(odd.argmax())
+        if counter[at] >= FLOAT32_COUNTS and np.array_equal(counter, counter.astype(np.float32)):
+            raise InputError(
+                f'{path}: sample numbers beyond {FLOAT32_COUNTS} are stored as float32, which '
+                'cannot count them one by one; leave `sample_number` out of the channel map, or '
+                'save them as float64'
+            )
         raise InputError(
             f'{path}: sample numbers jump from {counter[at]:.0f} to {counter[at + 1]:.0f}; '
             'samples are missing: cut the record there'

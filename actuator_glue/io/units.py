@@ -18,6 +18,8 @@ ROLES: dict[str, dict[str, float]] = {
     'measured': _LENGTH,
     'force': _FORCE,
 }
+# A float32 has no whole number between this one and the next but one.
+FLOAT32_COUNTS = 1 << 24
 EXAMPLE = 'time_s,command_mm,measured_mm,force_N'
 ANGLES = frozenset(('deg', '°', 'degree', 'degrees', 'rad', 'mrad', 'rev', 'turn', 'turns'))
 # Units of other quantities, so that one which is written is known to be a unit.

@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.io.units import ROLES, factor
+from actuator_glue.io.units import FLOAT32_COUNTS, ROLES, factor
 from actuator_glue.records import Array, Hold
 
 TYPES = {
@@ -28,8 +28,6 @@ TYPES = {
     'uint32': 'u4',
     'uint64': 'u8',
 }
-# A float32 has no whole number between this one and the next but one.
-FLOAT32_COUNTS = 1 << 24
 
 
 @dataclass(frozen=True, slots=True)

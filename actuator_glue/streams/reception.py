@@ -10,10 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.errors import InputError
+from actuator_glue.io.units import FLOAT32_COUNTS
 from actuator_glue.rate_check import RateWatch, disagreement, rate_by_steps
 from actuator_glue.records import Array
 from actuator_glue.streams.clock import ClockMap
-from actuator_glue.streams.layout import FLOAT32_COUNTS, TYPES, Layout, Rows
+from actuator_glue.streams.layout import TYPES, Layout, Rows
 from actuator_glue.streams.sequence import Run, Sequence
 
 # What tells the order of samples: a counter, else their times, else that they arrive in order.

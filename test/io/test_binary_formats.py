@@ -443,3 +443,17 @@ def test_a_factor_that_is_no_number_is_refused(tmp_path: Path) -> None:
         file['command'].attrs.update({'units': 'um', 'scale_factor': 'half'})
     with pytest.raises(InputError, match='half'):
         read(tmp_path / 'a.nc')
+
+
+def test_sample_numbers_that_a_float32_cannot_count_are_told_as_such(tmp_path: Path) -> None:
+    """Not as samples that are missing."""
+    for first, told in ((2**24 - 200, 'stored as float32'), (1000, '')):
+        count = (first + np.arange(COUNT)).astype(np.float32)
+        table = pa.table({'n': count, 'u': COMMAND, 'x': MEASURED})
+        pq.write_table(table, tmp_path / 'a.parquet')
+        channels = mapped('u', 'x', rate=RATE, sample_number='n')
+        if told:
+            with pytest.raises(InputError, match=told):
+                read(tmp_path / 'a.parquet', channels=channels)
+        else:
+            assert len(read(tmp_path / 'a.parquet', channels=channels)) == COUNT
