@@ -122,7 +122,7 @@ def check_hold(hold: str, source: str = '') -> Hold:
     return cast('Hold', hold)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Record:
     """One uniformly sampled test, SI units, arrays read-only.
 
@@ -173,6 +173,14 @@ class Record:
 
     def __len__(self) -> int:
         return len(self.command)
+
+    def __repr__(self) -> str:
+        known = 'stiffness not known' if self.stiffness is None else f'{self.stiffness:g} N/m'
+        force = '' if self.force is None else ', with force'
+        return (
+            f'Record({self.source or self.actuator}: {len(self)} samples at {self.rate:.6g} Hz '
+            f'({self.duration:.4g} s), {known}, {self.hold}{force})'
+        )
 
     @property
     def rate(self) -> float:

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 COMPONENTS = 4
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Calibration(Result):
     """A joint posterior, and what forbids or limits its use.
 

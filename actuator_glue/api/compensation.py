@@ -17,7 +17,7 @@ from actuator_glue.hybrid.partition import Partition
 HEADER = ('compensator', 'P(unstable)', 'upper 95 %', 'J1 [ms]', 'J2 median', 'J2 at 95 %')
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Comparison:
     """The same hybrid test with every compensator.
 
@@ -40,6 +40,14 @@ class Comparison:
             f'{_share(_worst(without))}, P(unstable) {chosen.p_unstable.value:.3g} instead of '
             f'{without.p_unstable.value:.3g}'
         )
+
+    def __repr__(self) -> str:
+        """Return the table of compensators and which one to use."""
+        from actuator_glue.report.html import Table, Text
+        from actuator_glue.report.plain import plain
+
+        table = Table(HEADER, self.rows(), 'Compensators')
+        return plain([Text(f'use {self.best}'), table], '`to_json()` has them')
 
     def rows(self) -> list[tuple[str, ...]]:
         """Return a row of text for each compensator, under HEADER."""

@@ -38,8 +38,8 @@ if TYPE_CHECKING:
 Progress = Callable[[str, float], None]
 
 
-@dataclass(frozen=True, slots=True)
-class Diagnosis(DiagnosisData, Result):
+@dataclass(frozen=True, slots=True, repr=False)
+class Diagnosis(Result, DiagnosisData):
     """Verdict, evidence and the augmented model, with its files and pictures.
 
     Attributes:

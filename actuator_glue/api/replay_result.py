@@ -93,7 +93,7 @@ class Compared:
     unrepeatable: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, repr=False)
 class Replay(Result):
     """All windows of a stream, and whether they are what was published live.
 

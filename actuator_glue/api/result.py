@@ -72,6 +72,12 @@ class Result(ABC):
 
         return html.write(Path(path), self.page())
 
+    def __repr__(self) -> str:
+        """Return what came out in a few lines, without arrays."""
+        from actuator_glue.report.plain import plain
+
+        return plain(self.brief(), '`to_json()` has them, `report(path)` shows them')
+
     def _repr_html_(self) -> str:
         """Return what came out, for notebooks."""
         from actuator_glue.report import html

@@ -47,7 +47,7 @@ class DelayMargin:
     sampled: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class StabilityResult(Result):
     """Stability of a hybrid test over the draws of a posterior.
 

@@ -67,7 +67,7 @@ class Specimen:
         }
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Partition:
     """A hybrid test's structure and how its loop is sampled.
 
@@ -133,6 +133,12 @@ class Partition:
                 f'{self.name}: influence has shape {moved}; give one finite number for each of '
                 f'the {len(self.mass)} degrees of freedom'
             )
+
+    def __repr__(self) -> str:
+        return (
+            f'Partition({self.name}: {len(self.mass)} degree(s) of freedom, {self.specimen}, '
+            f'{self.rate:g} Hz)'
+        )
 
     @property
     def period(self) -> float:

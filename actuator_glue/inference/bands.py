@@ -16,7 +16,7 @@ from actuator_glue.records import Array
 COLUMNS_AT_ONCE = 512
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Band:
     """Central bands around a median, one row per level.
 
@@ -31,6 +31,10 @@ class Band:
     lower: Array
     median: Array
     upper: Array
+
+    def __repr__(self) -> str:
+        levels = ', '.join(f'{level:g}' for level in self.levels)
+        return f'Band(levels {levels}; {self.median.size} samples)'
 
     def __len__(self) -> int:
         return len(self.median)

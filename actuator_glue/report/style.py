@@ -89,9 +89,16 @@ def styled(draw: Callable[P, R]) -> Callable[P, R]:
     return within
 
 
+class Drawing(Figure):
+    """A figure that a notebook shows without any spell: it needs no pyplot and no backend."""
+
+    def _repr_png_(self) -> bytes:
+        return png(self)
+
+
 def new_figure(height: float, width: float = WIDTH) -> Figure:
     """Return an empty figure [in]; call it from a `styled` function."""
-    return Figure(figsize=(width, height), layout='constrained')
+    return Drawing(figsize=(width, height), layout='constrained')
 
 
 @styled
@@ -107,8 +114,13 @@ def save(figure: Figure, path: Path) -> Path:
 
 
 @styled
-def data_uri(figure: Figure) -> str:
-    """Return a figure as a PNG data URI, for an HTML page that needs no other file."""
+def png(figure: Figure) -> bytes:
+    """Return a figure as a PNG image."""
     buffer = io.BytesIO()
     figure.savefig(buffer, format='png')
-    return 'data:image/png;base64,' + base64.b64encode(buffer.getvalue()).decode('ascii')
+    return buffer.getvalue()
+
+
+def data_uri(figure: Figure) -> str:
+    """Return a figure as a PNG data URI, for an HTML page that needs no other file."""
+    return 'data:image/png;base64,' + base64.b64encode(png(figure)).decode('ascii')
