@@ -166,7 +166,7 @@ class SlidingWindows:
         rate = 1.0 / block.period
         if abs(rate / self._rate - 1.0) > 1e-4:
             self._rate = rate
-            # Told before the first window, where that is long enough to tell anything.
+            # Told before the first window, where that is so long that a clock can tell anything.
             seconds = max(LEAST_SECONDS, min(0.75 * self.settings.window, _RATE_SECONDS))
             self._watch = RateWatch(rate, seconds=seconds)
         elif self._next is not None and block.index < self._next:

@@ -66,7 +66,8 @@ def test_a_bridge_that_is_told_half_the_rate_says_so(layout, start, probe, tmp_p
 def test_a_foreign_publisher_whose_stamps_disagree(factor, good, start, probe):
     worst, posteriors = levels(probe), []
     probe.create_subscription(PosteriorMoments, 'posterior', posteriors.append, 10)
-    estimator = start('estimator', **QUICK)
+    estimator = start('estimator', **QUICK | {'window': 3.0})
+    probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 200, 'compiled')
     probe.open_stream()
     probe.setup()
     time = np.arange(round(6 * RATE)) / RATE
