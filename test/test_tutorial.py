@@ -1,0 +1,64 @@
+"""The tutorial is run as it stands, and what is shown below its blocks is what they printed."""
+
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / 'scripts'))
+
+import run_tutorial  # noqa: E402
+
+PAGE = """# A page
+
+```sh
+echo one
+echo two
+```
+
+between
+
+```sh
+false
+```
+
+```
+what it printed last year
+```
+"""
+
+
+def test_what_blocks_print_is_written_below_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """In their order, once, however often; exit code 1 is an answer, more ends the run."""
+    page = tmp_path / 'page.md'
+    page.write_text(PAGE)
+    monkeypatch.setattr(sys, 'argv', ['run_tutorial', '--page', str(page), '--write'])
+    for _ in range(2):
+        assert run_tutorial.main() == 0
+        text = page.read_text()
+        assert text.count('```sh') == 2
+        assert '```\n\n```\none\ntwo\n```\n\nbetween' in text
+        assert 'last year' not in text
+    assert '$ echo two' in capsys.readouterr().out
+    page.write_text('```sh\nexit 3\n```\n')
+    with pytest.raises(SystemExit, match='exit code 3'):
+        run_tutorial.main()
+    assert page.read_text() == '```sh\nexit 3\n```\n'
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_the_tutorial_runs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Every block, in an empty folder; it finds what it hid."""
+    folder = str(Path(sys.executable).parent)
+    monkeypatch.setenv('PATH', folder, prepend=':')
+    monkeypatch.setattr(sys, 'argv', ['run_tutorial'])
+    assert run_tutorial.main() == 0
+    said = capsys.readouterr().out
+    assert 'missing: backlash' in said
+    assert said.count('$ actuator-glue calibrate') == 2
