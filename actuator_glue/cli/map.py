@@ -14,7 +14,7 @@ from actuator_glue.io.json_file import write_json
 
 if TYPE_CHECKING:
     from actuator_glue.io.look import ColumnLook, FileLook
-    from actuator_glue.io.propose import Guess, Proposal
+    from actuator_glue.io.propose import Guess, ProposedMap
 
 EXAMPLES = (
     'map raw.txt --rate 1000 --out map.yaml',
@@ -79,7 +79,7 @@ def run(args: argparse.Namespace) -> int:
     return 1 if refused and not plain else 0
 
 
-def map_text(found: FileLook, proposal: Proposal) -> str:
+def map_text(found: FileLook, proposal: ProposedMap) -> str:
     """Return a proposal as YAML, with a comment that says why beside each channel."""
     lines = [f'# Proposed for {found.path.name}; check what is marked CHECK.']
     lines += [f'{name}: {json.dumps(value)}' for name, value in found.layout.items()]
@@ -114,7 +114,7 @@ def _fault(path: str, text: str | None) -> str:
     return ''
 
 
-def _missing(proposal: Proposal) -> str:
+def _missing(proposal: ProposedMap) -> str:
     names = [role for role in ('command', 'measured') if role not in proposal.channels]
     if not names:
         if not proposal.angles:

@@ -52,7 +52,7 @@ class Guess:
 
 
 @dataclass(frozen=True, slots=True)
-class Proposal:
+class ProposedMap:
     """A proposed channel map.
 
     Attributes:
@@ -81,7 +81,7 @@ class Proposal:
         }
 
 
-def propose(found: FileLook, given: float | None = None) -> Proposal:
+def propose(found: FileLook, given: float | None = None) -> ProposedMap:
     """Return which columns are command, measured displacement, force and time.
 
     Args:
@@ -103,7 +103,7 @@ def propose(found: FileLook, given: float | None = None) -> Proposal:
         channels = {'time': clock, **channels}
     others = [c for c in rest if _called(c, 'command') and not _may_be(c, 'command')]
     told = tuple(c.label.strip() for c in others)
-    return Proposal(channels, counter, None if clock is not None else rate, told)
+    return ProposedMap(channels, counter, None if clock is not None else rate, told)
 
 
 def _commonest(columns: list[ColumnLook]) -> int:

@@ -400,7 +400,7 @@ def entry_at(path: Path, head: TextHead, row: int, position: int) -> str:
     entries = [*fields_of(line, head.delimiter), *[''] * head.width]
     said = f'line {number}: {entries[position]!r}'
     if head.decimal == ',' and is_number(entries[position]):
-        return f'{said}, a point where the comma is the decimal sign: save it without thousands'
+        return f'{said} (a point where the comma is decimal: export it without thousands)'
     return said
 
 
