@@ -32,12 +32,18 @@ def run(args: argparse.Namespace) -> int:
     """Print each finding as it is there; 1 where something is missing, advice is none.
 
     Raises:
-        InputError: the JSON cannot be written.
+        InputError: the JSON cannot be written, or no home folder is known.
     """
     from actuator_glue.api.doctor import examine
+    from actuator_glue.errors import InputError
 
+    try:
+        folder = Path(args.bags).expanduser().absolute()
+    except RuntimeError as error:
+        text = f'{args.bags}: no home folder is known; name another folder with --bags'
+        raise InputError(text) from error
     found = []
-    for finding in examine(Path(args.bags).expanduser().absolute()):
+    for finding in examine(folder):
         found.append(finding)
         say(f'{MARKS[finding.verdict]} {finding.name}: {finding.text}', args)
         if finding.remedy:

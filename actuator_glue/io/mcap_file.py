@@ -211,7 +211,8 @@ class McapFile:
             return
         except OSError as error:
             if error.errno != errno.EBADF:
-                raise disk_error(self._bag, error) from error
+                # What was handed to the system may be what the disk has not taken.
+                raise disk_error(self._bag, error, kept=False) from error
 
     def finish(self, serialized_metadata: str) -> None:
         """Write index and end, and wait until the disk has them.

@@ -36,6 +36,28 @@ def test_a_healthy_computer_is_ready(healthy, monkeypatch, capsys, tmp_path):
     assert not list(tmp_path.iterdir())
 
 
+def test_a_computer_without_a_home_is_asked_for_a_folder(healthy, monkeypatch, capsys):
+    def nobody(self):
+        raise RuntimeError('Could not determine home directory.')
+
+    monkeypatch.setattr(Path, 'expanduser', nobody)
+    assert main(['doctor']) == 2
+    assert 'name another folder with --bags' in capsys.readouterr().err
+
+
+def test_code_that_is_kept_nowhere_is_told(monkeypatch):
+    """What is cold then stays cold: the remedy is a folder for it."""
+
+    def answer(*args, **_):
+        if 'warm_windows' in args[-1]:
+            raise doctor.subprocess.TimeoutExpired('python', doctor.WARM_SECONDS)
+        return check('kept in the memory of this process alone; let NUMBA_CACHE_DIR name')()
+
+    monkeypatch.setattr(doctor, '_python', answer)
+    found = doctor.compiled()
+    assert found.verdict == 'advice' and 'let NUMBA_CACHE_DIR name' in found.text
+
+
 def test_what_is_missing_is_named_with_what_to_do(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr(doctor, '_python', check("No module named 'rclpy'", 1))
     code, text, found = examined(monkeypatch, capsys, '--bags', str(tmp_path))

@@ -1,0 +1,68 @@
+"""Every command once where nothing but the working folder can be written and nobody has a home."""
+
+import os
+import subprocess
+import sys
+import textwrap
+from collections.abc import Callable
+
+import pytest
+
+from actuator_glue.cli.main import commands
+
+# In one process, whose start takes longer than most commands: each line's exit code is 0.
+QUICK = """
+completion bash
+simulate rig.csv --stiffness 0 250e3 --duration 6 --rate 200 --seed 1
+simulate bag --stiffness 250e3 --duration 6 --rate 200 --seed 1
+info rig_1.csv bag
+map rig_1.csv
+convert rig_2.csv copy
+recover copy
+calibrate rig_1.csv rig_2.csv --evaluations 12000 --save rig.npz --report rig.html --json rig.json
+plot rig_1.csv --out rig.png
+replay bag --json again.json
+rths sdof --posterior rig.npz --json rths.json
+send rig_2.csv --to udp://127.0.0.1:5999 --speed 100
+"""
+# `view` and `doctor` wait or take long; `diagnose` takes a minute.
+SLOW = """
+simulate rig.csv --stiffness 0 250e3 --duration 6 --rate 200 --seed 1
+diagnose rig_1.csv rig_2.csv --report rig.html --json rig.json
+"""
+RUN = """
+import shlex, sys
+from actuator_glue.cli.main import main
+for line in sys.argv[1].strip().splitlines():
+    code = main(shlex.split(line))
+    print(f'{line}: {code}', flush=True)
+    if code not in (0, 1):
+        sys.exit(code)
+"""
+
+
+def run(read_only: Callable[..., list[str]], lines: str, seconds: float) -> str:
+    done = subprocess.run(
+        read_only(sys.executable, '-c', textwrap.dedent(RUN), lines),
+        env=os.environ | {'PYTHONPATH': os.pathsep.join(p for p in sys.path if p)},
+        capture_output=True,
+        text=True,
+        timeout=seconds,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert 'Traceback' not in done.stderr and 'cannot cache' not in done.stderr
+    return done.stdout
+
+
+def test_each_command_runs(read_only: Callable[..., list[str]]) -> None:
+    run(read_only, QUICK, 240)
+
+
+@pytest.mark.slow
+def test_a_diagnosis_runs(read_only: Callable[..., list[str]]) -> None:
+    run(read_only, SLOW, 900)
+
+
+def test_no_command_is_left_out() -> None:
+    tried = {line.split()[0] for line in (QUICK + SLOW).strip().splitlines()}
+    assert set(commands()) == tried | {'view', 'doctor'}
