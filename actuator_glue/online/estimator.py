@@ -55,7 +55,7 @@ class Begun:
 
 
 @dataclass(slots=True)
-class Course:
+class ReplayPosition:
     """Whether a replay is where the live run was, window after window.
 
     Attributes:
@@ -149,7 +149,7 @@ class Estimator:
         self._waiting: list[Window] = []
         self._carried = carried
         self._applied = 0  # of the schedule's models
-        self._course = Course()
+        self._course = ReplayPosition()
         self._before: _Before | None = None
         self._frozen: list[FrozenPosterior] = []
         self._judged_to: int | None = None

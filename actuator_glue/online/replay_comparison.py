@@ -14,7 +14,7 @@ import numpy as np
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.online import conversion
-from actuator_glue.online.estimator import Begun, Course, Schedule
+from actuator_glue.online.estimator import Begun, ReplayPosition, Schedule
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.sampling import ARCHIVE, joined
 from actuator_glue.online.settings import EstimatorSettings
@@ -160,7 +160,7 @@ def compare(
             Asked when all results have come.
     """
     found = ReplayComparison()
-    begun, course, seen = live.begun(), Course(), set[int]()
+    begun, course, seen = live.begun(), ReplayPosition(), set[int]()
     for result in results:
         number = result.window.number
         course.resumes(begun.get(number))
