@@ -23,8 +23,16 @@ DiagnosisOptions: Any = _Diagnosis
 
 # The same number in the types that numpy, pandas and people have.
 SAME: tuple[Callable[[float], Any], ...] = (
-    int, float, np.int64, np.int32, np.float32, np.float64, np.array, Fraction, Decimal,
-)  # fmt: skip
+    int,
+    float,
+    np.int64,
+    np.int32,
+    np.float32,
+    np.float64,
+    np.array,
+    Fraction,
+    Decimal,
+)
 NONE: tuple[Any, ...] = ('250e3', True, [250e3], np.array([1.0, 2.0]), {}, object(), 1j, np.nan)
 
 
@@ -163,13 +171,23 @@ def test_numbers_of_every_type_are_the_same(kind: Callable[[float], Any], file: 
         assert records_given(file, stiffness=given)[0].stiffness == 250e3
     assert api.load(Named(file), stiffness=k).stiffness == 250e3
     options = CalibrationOptions(
-        evaluations=kind(60000), seed=kind(3), settle=kind(2), drift=kind(1), prior_age=kind(60),
-        bounds={'beta_1': (kind(0), kind(800))}, shaping_factor=kind(256),
-    )  # fmt: skip
+        evaluations=kind(60000),
+        seed=kind(3),
+        settle=kind(2),
+        drift=kind(1),
+        prior_age=kind(60),
+        bounds={'beta_1': (kind(0), kind(800))},
+        shaping_factor=kind(256),
+    )
     plain = CalibrationOptions(
-        evaluations=60000, seed=3, settle=2, drift=1, prior_age=60,
-        bounds={'beta_1': (0, 800)}, shaping_factor=256,
-    )  # fmt: skip
+        evaluations=60000,
+        seed=3,
+        settle=2,
+        drift=1,
+        prior_age=60,
+        bounds={'beta_1': (0, 800)},
+        shaping_factor=256,
+    )
     assert options == plain and type(options.evaluations) is int
     diagnosis = DiagnosisOptions(seed=kind(3), jobs=kind(2), drift=kind(1), prior_age=kind(60))
     assert diagnosis == DiagnosisOptions(3, 2, drift=1, prior_age=60)

@@ -115,7 +115,7 @@ class ResidualStructure(JsonObject):
 
 
 def _um(size: float) -> str:
-    return f'{1e6 * size:.3g} um'
+    return f'{round(1e6 * size, 3):.3g} um'
 
 
 def residual_structure(

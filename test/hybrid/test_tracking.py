@@ -87,9 +87,12 @@ def test_a_calibration_and_a_diagnosis_count_the_same_samples(
     ag.calibrate(given, evaluations=12_000)
     (source,) = {r.source for r in seen['calibrate']}
     found = SimpleNamespace(
-        names=Structure(()).names, model=Structure(()), joint=theta, setup=None,
+        names=Structure(()).names,
+        model=Structure(()),
+        joint=theta,
+        setup=None,
         sampling=({'source': given.source, 'fitted_rate_hz': 250.0},),
-    )  # fmt: skip
+    )
     (diagnosed,), (calibrated,) = _tracking(found, [given]), seen['calibrate']
     assert source == 'a.csv' and set(diagnosed.measured) >= {'fei_delay_s', 'J1_s', 'J2'}
     assert diagnosed.measured == calibrated.measured
