@@ -34,13 +34,14 @@ from actuator_glue.nodes import estimator_worker as worker
 from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.playback import give, stream
 from actuator_glue.online.settings import EstimatorSettings
+from actuator_glue.online.structures import Proposal, Proposed
 from actuator_glue.records import Record
 
 def compiled():
     every = [d for d in gc.get_objects() if isinstance(d, Dispatcher)]
     return {(d.py_func.__name__, str(s)) for d in every for s in d.overloads}
 
-def live(effects=(), stiffness=1e5, hold='zoh', **settings):
+def live(effects=(), stiffness=1e5, hold='zoh', model=None, **settings):
     rate, rng = 250.0, np.random.default_rng(1)
     command = 1e-3 * np.sin(9.0 * np.arange(1000) / rate)
     measured = command + 1e-5 * rng.standard_normal(1000)
@@ -51,7 +52,8 @@ def live(effects=(), stiffness=1e5, hold='zoh', **settings):
         while (job := estimator.next_job()) is not None:
             job = pickle.loads(pickle.dumps(job))  # as it comes through a pipe
             estimator.finish(worker.computed(job, math.inf)[0])
-            estimator.set_model(choose_model(effects))
+            if job.window.number == 0:
+                estimator.set_model(model or choose_model(effects))
 
 worker.warm_up()
 known = compiled()
@@ -59,6 +61,8 @@ assert len(known) > 30
 live(stiffness=0.0, hold='linear')
 live(likelihood='gaussian', prior='sequential')
 live(('drift', 'backlash'), prior='sequential')
+pair = Proposed(choose_model(('backlash',)), 0.6), Proposed(choose_model(), 0.4)
+live(model=Proposal(pair), start_evaluations=8000)
 names = sorted(CATALOGUE) if 'all' in sys.argv else ['hum', 'valve-hysteresis', 'sensor-curve']
 for name in names:
     live((name,))
