@@ -64,20 +64,29 @@ def concluded(found: Diagnosis, records: Sequence[Record], apply: bool | None = 
 def proposed(found: Diagnosis, records: Sequence[Record]) -> Proposal:
     """Return the structures that a diagnosis leaves possible, with what it knows of their sizes.
 
-    The one it tells comes with its posterior, which stands for the middle of the records; those
-    that are tied with it with starting values only, and Eq. (2) alone beside them.
+    The one it tells comes with its posterior, which stands for the middle of the data that it is
+    of; those that are tied with it come without, and Eq. (2) alone beside them.
     """
-    first, last = records[0], records[-1]
-    start, end = first.start_ns, last.stamp_ns(len(last) - 1)
+    start, end = _since(found, records), records[-1].stamp_ns(len(records[-1]) - 1)
     model, draws = _within_bounds(found)
-    carried = Carried.thinned(model.names, draws)
-    main = Proposed(model, _weight(found), Known(carried, (start + end) // 2, end))
+    middle = (start + end) // 2
+    carried = Carried.thinned(model.names, draws).later((middle - start) * 1e-9)
+    main = Proposed(model, _weight(found), Known(carried, middle, end))
     others = [Proposed(choose_model(names), odds * main.weight) for names, odds in _tied(found)]
     others = sorted(others, key=lambda one: -one.weight)[: MOST - 2]
     others = [one for one in others if one.weight >= LEAVES]
     left = 1.0 - main.weight - sum(one.weight for one in others)
     plain = Proposed(choose_model(), max(left, _PLAIN))
     return Proposal((main, *others, plain), found.alarm.threshold)
+
+
+def _since(found: Diagnosis, records: Sequence[Record]) -> int:
+    """Return when the data begin that the sizes found are of [ns]."""
+    if found.onset is not None:
+        for record in records:
+            if record.source == found.onset.source:
+                return record.start_ns + round(found.onset.time * 1e9)
+    return records[0].start_ns
 
 
 def _within_bounds(found: Diagnosis) -> tuple[ModelChoice, Array]:

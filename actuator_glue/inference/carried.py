@@ -15,6 +15,8 @@ from actuator_glue.records import Array
 
 # As many draws as pin a mixture's covariances to a few percent, and still fit into a message.
 DRAWS = 800
+# What gain-drift moves, and how fast; a gain that would reach zero stays above this.
+_GAIN, _DRIFT, _LEAST_GAIN = 'alpha_1_beta_0', 'gain_drift', 1e-3
 # Fewer say nothing about a covariance.
 _FEWEST = 50
 
@@ -79,6 +81,21 @@ class Carried:
         hours = max(seconds, 0.0) / 3600.0
         steps = [drift.rate(name) * np.sqrt(hours) for name in self.names]
         return replace(self, spread=tuple(float(s) for s in np.hypot(self.spread, steps)))
+
+    def later(self, seconds: float) -> Carried:
+        """Return the same as a record that begins so much later [s] has it.
+
+        A gain that drifts counts from the beginning of its record: 1 + r (t + s) is
+        (1 + r s)(1 + r/(1 + r s) t).
+        """
+        if _GAIN not in self.names or _DRIFT not in self.names or seconds == 0.0:
+            return self
+        gain, rate = self.names.index(_GAIN), self.names.index(_DRIFT)
+        draws = self.draws.copy()
+        grown = np.maximum(1.0 + draws[:, rate] * seconds, _LEAST_GAIN)
+        draws[:, gain] *= grown
+        draws[:, rate] /= grown
+        return replace(self, draws=draws)
 
     def widened(self, factor: float) -> Carried:
         """Return the same with `factor` times the variance."""

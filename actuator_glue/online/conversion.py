@@ -232,7 +232,8 @@ def known(message: Any, settings: EstimatorSettings) -> Known:
     names, last = tuple(message.parameter_names), stamp_ns(message.header)
     draws = _array(message.values).reshape(-1, max(len(names), 1))
     middle = last - round(0.5e9 * (settings.window - settings.settle))
-    return Known(Carried(names, draws), middle, last)
+    since = settings.window - 1e-9 * (last - middle)
+    return Known(Carried(names, draws).later(since), middle, last)
 
 
 def prediction(result: Prediction, actuator: str) -> tuple[Head, Fields]:

@@ -17,7 +17,10 @@ _MOST = 1000
 
 @dataclass(frozen=True, slots=True)
 class Known:
-    """A posterior, and the time of its middle and of its last sample [ns]."""
+    """A posterior, and the time of its middle and of its last sample [ns].
+
+    Where a gain drifts, it stands for a record that begins in its middle.
+    """
 
     carried: Carried
     middle_ns: int
@@ -97,7 +100,8 @@ class Knowledge:
         if before:
             self._learned = self._learned[self._learned.index(before[-1]) :]
             known = before[-1]
-            return known.carried.drifted(self._drift, (middle - known.middle_ns) * 1e-9)
+            drifted = known.carried.drifted(self._drift, (middle - known.middle_ns) * 1e-9)
+            return drifted.later((window.record.start_ns - known.middle_ns) * 1e-9)
         if self._first is None:
             return None
         elapsed = (middle - (self.began_ns or start)) * 1e-9
@@ -110,7 +114,8 @@ class Knowledge:
         start, middle, last = self._times(window)
         wanted = self._settings.prior == 'sequential' and start >= self._from_ns
         if wanted and posterior is not None:
-            self._learned.append(Known(posterior, middle, last))
+            there = posterior.later((middle - window.record.start_ns) * 1e-9)
+            self._learned.append(Known(there, middle, last))
             del self._learned[:-_MOST]
         # Windows that share samples share their errors: only separate ones are counted.
         if found is None or (self._tested_ns is not None and start <= self._tested_ns):

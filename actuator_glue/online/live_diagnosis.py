@@ -356,7 +356,7 @@ class Memory:
         if earlier:
             known = earlier[-1]
             age = (first_ns - known.middle_ns) * 1e-9
-            return known.carried.drifted(drift, age), drift, age
+            return known.carried.drifted(drift, age).later(age), drift, age
         if self._carried is None:
             return None
         since = 0 if self._began_ns is None else max(first_ns - self._began_ns, 0)

@@ -163,4 +163,6 @@ def _known(result: WindowResult, settings: EstimatorSettings) -> Known:
     assert result.draws is not None
     start = record.stamp_ns(round(settings.settle / record.period))
     last = record.stamp_ns(len(record) - 1)
-    return Known(Carried(result.model.names, result.draws), (start + last) // 2, last)
+    middle = (start + last) // 2
+    there = Carried(result.model.names, result.draws).later((middle - record.start_ns) * 1e-9)
+    return Known(there, middle, last)

@@ -188,6 +188,25 @@ def test_a_bag_tells_what_was_carried_from_which_window_on():
     assert live.models == [(0, choose_model()), (9, proposal)]
 
 
+def test_a_gain_that_drifts_is_what_a_later_record_has_of_it():
+    """The catalogue counts from the beginning of each record."""
+    lacking = Structure(('gain-drift',))
+    command = noise(RATE, 12.0, 0.2, 8.0, seed=2)
+    whole = Record(command, command, 1.0 / RATE, 250e3)
+    theta = np.array([*THETA, 0.02])
+    first = lacking.simulate(theta, whole)
+    draws = np.tile(theta, (60, 1))
+    after = Carried((*NAMES, 'gain_drift'), draws).later(5.0)
+    cut = replace(whole, measured=first).slice(round(5.0 * RATE), len(command))
+    again = lacking.simulate(after.draws[0], cut, initial='measured')
+    settled = slice(round(2.0 * RATE), None)
+    # The initial state is measured: its transient is not quite gone.
+    assert np.abs(again - cut.measured)[settled].max() < 1e-7
+    assert np.abs(lacking.simulate(theta, cut, initial='measured') - cut.measured).max() > 1e-5
+    plain = Carried(NAMES, draws[:, :4])
+    assert plain.later(5.0) is plain
+
+
 def test_handed_sizes_are_the_prior_of_windows_that_they_have_not_seen():
     """Half a percent of play: far less than a window of 2 s tells by itself."""
     rng = np.random.default_rng(4)
