@@ -21,6 +21,7 @@ def scored(case: Case, given: Streamed, ran: Chain) -> dict[str, Any]:
     weights: list[float] = []
     covered: list[float] = []
     errors: list[float] = []
+    rate = case.drift / case.seconds + given.sizes.get('gain_drift', 0.0)
     truth, proposed = frozenset(case.effects), False
     first = ran.added if case.effects else 0.0
     for result in ran.results:
@@ -36,8 +37,10 @@ def scored(case: Case, given: Streamed, ran: Chain) -> dict[str, Any]:
         if not end >= first or result.moments is None:
             continue
         theta = given.theta.copy()
-        middle = (end - 0.5 * len(result.window.record) / RATE) / case.seconds
-        theta[1] *= 1.0 + case.drift * middle
+        # A model that has the drift itself has the gain at the window's beginning.
+        own = 'gain-drift' in result.model.effects
+        at = end - (1.0 if own else 0.5) * len(result.window.record) / RATE
+        theta[1] *= 1.0 + rate * at
         mean, sd = result.moments.mean[:4], result.moments.stddev[:4]
         known = ~np.array(result.prior_dominated[:4])
         inside += (np.abs(mean - theta) <= 1.96 * sd)[known].tolist()
