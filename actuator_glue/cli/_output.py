@@ -25,7 +25,8 @@ def add_json(parser: argparse.ArgumentParser) -> None:
 def beside(out: str | None, write: Callable[[str], object]) -> int:
     """Write a file that goes beside an answer; what fails is told and ends nothing.
 
-    Call it once the answer is printed.
+    Numbers are written before the answer is printed, so that a reader of it that has gone, as in
+    `| head`, takes nothing from them; pictures after it, as they take their time.
 
     Args:
         out: the file; None where nobody asked for it.

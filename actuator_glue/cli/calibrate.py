@@ -137,10 +137,10 @@ def run(args: argparse.Namespace) -> int:
     records = load(args)
     with progress('calibrating', args.evaluations) as done:
         found = calibrate(records, options, progress=done)
-    _show(found, args)
     content = found.to_json()
     failed = beside(args.json, lambda out: write_json(content, out))
     failed = beside(args.save, found.save) or failed
+    _show(found, args)
     failed = beside(args.report, found.report) or failed
     return failed or (1 if found.problems else 0)
 

@@ -103,12 +103,12 @@ def run(args: argparse.Namespace) -> int:
         )
     command = shlex.join(['actuator-glue', *sys.argv[1:]])
     found = replace(found, provenance={'command': command, **found.provenance})
-    _show(found, args)
     content = found.to_json()
     failed = beside(args.json, lambda out: write_json(content, out))
     if found.learned:
         failed = beside(args.save_effects, found.save_effects) or failed
-    elif args.save_effects is not None:
+    _show(found, args)
+    if args.save_effects is not None and not found.learned:
         note(f'{args.save_effects}: not written, for no term was learned')
     failed = beside(args.report, found.report) or failed
     return failed or (0 if found.complete else 1)

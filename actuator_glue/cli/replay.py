@@ -73,6 +73,7 @@ def run(args: argparse.Namespace) -> int:
             progress=done,
             **settings,
         )
+    write_json(found.to_json(), args.json)
     from actuator_glue.api.replay_report import TITLE, TRACKING, header, rows, tracking_table
 
     table(TITLE, header(found), rows(found), args)
@@ -86,7 +87,6 @@ def run(args: argparse.Namespace) -> int:
         f'{found.seconds:.2f} s ({found.times_real_time:.0f} x real time)',
         args,
     )
-    write_json(found.to_json(), args.json)
     return 1 if found.identical is False else 0
 
 

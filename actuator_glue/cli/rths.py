@@ -133,6 +133,12 @@ def run(args: argparse.Namespace) -> int:
             **options,
         )
     go = not found.problems if args.limit is None else found.go(args.limit)
+    more: dict[str, Any] = {} if args.limit is None else {'limit': args.limit, 'go': go}
+    if compared is not None:
+        more['comparison'] = compared.to_json()
+    content = {**found.to_json(), **more}
+    failed = beside(args.json, lambda out: write_json(content, out))
+    failed = beside(args.save, found.save) or failed
     for line in found.problems:
         say(line, args)
     if args.limit is not None:
@@ -146,12 +152,6 @@ def run(args: argparse.Namespace) -> int:
     table(f'{found.partition}, compensator: {found.compensator}', HEADER, rows(found), args)
     for line in found.notes:
         note(line)
-    more: dict[str, Any] = {} if args.limit is None else {'limit': args.limit, 'go': go}
-    if compared is not None:
-        more['comparison'] = compared.to_json()
-    content = {**found.to_json(), **more}
-    failed = beside(args.json, lambda out: write_json(content, out))
-    failed = beside(args.save, found.save) or failed
     failed = beside(args.report, found.report) or failed
     return failed or (0 if go else 1)
 

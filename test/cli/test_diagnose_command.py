@@ -1,6 +1,8 @@
 """`actuator-glue diagnose`: exit codes, JSON, report."""
 
 import json
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -64,3 +66,14 @@ def test_play_is_diagnosed_with_json_and_report(
     page = report.read_text()
     assert page.count('data:image/png') >= 6
     assert 'missing: backlash' in page
+
+
+def test_a_reader_that_has_gone_takes_nothing_from_the_json(tmp_path: Path) -> None:
+    """`calibrate ... --json FILE | true`: the file is written before anything is printed."""
+    record, out = write(tmp_path / 'a.csv', 0.0, 0.0, 1), tmp_path / 'c.json'
+    line = ['calibrate', record, '--stiffness', '0', '--evaluations', '20000', '--json', str(out)]
+    code = 'import sys; from actuator_glue.cli.main import main; sys.exit(main(sys.argv[1:]))'
+    with subprocess.Popen([sys.executable, '-c', code, *line], stdout=subprocess.PIPE) as running:
+        assert running.stdout is not None
+        running.stdout.close()
+    assert json.loads(out.read_text())['schema'].startswith('actuator_glue.')

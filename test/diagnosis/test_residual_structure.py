@@ -60,7 +60,7 @@ def asked(records: list[Record]) -> ResidualStructure:
 def test_noise_is_noise(
     shape: str, rate: float, duration: float, stiffnesses: tuple[float, ...], rng_seed: int
 ) -> None:
-    """Of 170 machines of all kinds none was told of structure that matters."""
+    """Of 90 machines of all kinds none was told of structure that matters."""
     rng = np.random.default_rng(rng_seed)
     noise = float(10.0 ** rng.uniform(-6.0, -4.5))
     shown = Command(shape, rate, duration, high=2.0 if shape == 'sine' else 10.0, seed=rng_seed)
