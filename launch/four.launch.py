@@ -80,5 +80,5 @@ def nodes(given):
 
 
 def generate_launch_description():
-    """Return the nodes; the last stream's end ends them all, estimator and the like are restarted."""
+    """Return the nodes; the end of the last stream ends them all, estimators start again."""
     return description(ARGUMENTS, nodes)
