@@ -8,7 +8,7 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / 'scripts'))
 
-import run_tutorial  # noqa: E402
+import run_tutorial  # noqa: E402 - it lies in the folder above
 
 PAGE = """# A page
 

@@ -152,7 +152,7 @@ Action: TypeAlias = Look | Carry | Say
 
 
 @dataclass(frozen=True, slots=True)
-class State:
+class LiveState:
     """All that decides what is done next.
 
     Attributes:
@@ -193,12 +193,12 @@ class State:
         return self.coverage >= self.settings.coverage_limit and not self.contradicted
 
 
-def init(settings: LiveSettings) -> State:
+def init(settings: LiveSettings) -> LiveState:
     """Return the state before a stream."""
-    return State(settings)
+    return LiveState(settings)
 
 
-def step(state: State, given: Input) -> tuple[State, tuple[Action, ...]]:
+def step(state: LiveState, given: Input) -> tuple[LiveState, tuple[Action, ...]]:
     """Take one input; return the next state and what to do."""
     told: tuple[Action, ...] = ()
     match given:
@@ -224,7 +224,7 @@ def step(state: State, given: Input) -> tuple[State, tuple[Action, ...]]:
     return state, (*told, Look(reason))
 
 
-def _judged(state: State, given: Judged) -> tuple[State, tuple[Action, ...]]:
+def _judged(state: LiveState, given: Judged) -> tuple[LiveState, tuple[Action, ...]]:
     if given.number < state.since:
         return state, ()
     count = state.settings.coverage_windows
@@ -241,7 +241,7 @@ def _judged(state: State, given: Judged) -> tuple[State, tuple[Action, ...]]:
     return replace(state, broken=True, reason=what), (Say('coverage', what),)
 
 
-def _estimated(state: State, given: Estimated) -> tuple[State, tuple[Action, ...]]:
+def _estimated(state: LiveState, given: Estimated) -> tuple[LiveState, tuple[Action, ...]]:
     rises = given.contradicted and not state.contradicted
     state = replace(state, contradicted=given.contradicted, weights=given.weights)
     if rises:
@@ -250,20 +250,20 @@ def _estimated(state: State, given: Estimated) -> tuple[State, tuple[Action, ...
     return state, ()
 
 
-def _received(state: State, seconds: float) -> State:
+def _received(state: LiveState, seconds: float) -> LiveState:
     """Take how much has come; less than before is another actuator's."""
     if seconds >= state.seconds:
         return replace(state, seconds=seconds)
-    fresh = State(state.settings, running=state.running)
+    fresh = LiveState(state.settings, running=state.running)
     return replace(fresh, seconds=seconds)
 
 
-def _began(state: State) -> State:
+def _began(state: LiveState) -> LiveState:
     """Let go of bands, which are of windows before."""
     return replace(state, coverages=(), broken=False)
 
 
-def _concluded(state: State, given: Concluded) -> tuple[State, tuple[Action, ...]]:
+def _concluded(state: LiveState, given: Concluded) -> tuple[LiveState, tuple[Action, ...]]:
     state = replace(state, running=False, left_open=given.left_open)
     apply = state.settings.apply if given.apply is None else given.apply
     if not apply:
@@ -282,7 +282,7 @@ def _concluded(state: State, given: Concluded) -> tuple[State, tuple[Action, ...
     return _began(state), (*told, Carry(given.proposal, out))
 
 
-def _due(state: State) -> str:
+def _due(state: LiveState) -> str:
     """Return why a diagnosis is due; empty where none is."""
     settings, seconds = state.settings, state.seconds
     if state.running or not settings.automatic or seconds < settings.minimum:

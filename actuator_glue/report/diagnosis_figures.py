@@ -100,9 +100,13 @@ def residual_summary(found: DiagnosisData) -> Figure:
         if np.isfinite([low, high]).all():
             right.plot([at, at], [1e6 * low, 1e6 * high], color=MEASURED, lw=1.2)
         right.annotate(
-            f'{1e6 * rms:.1f}', (at, 1e6 * np.nanmax([rms, high])), (0, 2), ha='center',
-            va='bottom', textcoords='offset points',
-        )  # fmt: skip
+            f'{1e6 * rms:.1f}',
+            (at, 1e6 * np.nanmax([rms, high])),
+            (0, 2),
+            ha='center',
+            va='bottom',
+            textcoords='offset points',
+        )
     right.axhspan(0.0, 1e6 * error.noise_floor, color=NOISE, lw=0, zorder=0.5)
     right.set_xticks(range(len(bars)), [name.replace(', ', ',\n') for name, *_ in bars])
     right.set_xlim(-0.6, len(bars) - 0.4)

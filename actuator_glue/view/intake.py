@@ -200,9 +200,9 @@ def read_bag(path: Path | str, namespace: str | None = None, *, note: Note = ref
     """
     names = {_DIAGNOSTICS if n == 'DiagnosticArray' else full_name(n): n for n in TYPES}
     topics = {'/diagnostics', *topics_of_actuator(path, summarise(path), namespace)}
-    timeline, places = _timeline(as_published(messages(
-        path, types={full_name('SampleBlock')}, topics=topics, note=note
-    )))  # fmt: skip
+    timeline, places = _timeline(
+        as_published(messages(path, types={full_name('SampleBlock')}, topics=topics, note=note))
+    )
     if not 0 < timeline.capacity <= MOST_SAMPLES:
         raise InputError(
             f'{path}: {timeline.samples} samples; a page shows 1 to {MOST_SAMPLES} with the '

@@ -129,9 +129,11 @@ def _left(clean: Array, theta: Array, part: Record) -> float:
 
     def error(logs: Array) -> Array:
         response = linear.simulate(
-            theta * np.exp(np.clip(logs, -3.0, 3.0)), part.command,
-            stiffness=STIFFNESS, period=part.period,
-        )  # fmt: skip
+            theta * np.exp(np.clip(logs, -3.0, 3.0)),
+            part.command,
+            stiffness=STIFFNESS,
+            period=part.period,
+        )
         return np.asarray((clean - response)[100:] / NOISE)
 
     # alpha_2 is open at one stiffness.

@@ -98,8 +98,10 @@ def table(rows: Sequence[dict[str, Any]]) -> str:
     lines.append('')
     if counted:
         inside = sum(row['inside'] * row['windows'] for row in hidden if row['windows'])
-        lines.append(f'- intervals that hold the truth after the first addition: '
-                     f'{inside / counted:.1%} of {counted}')  # fmt: skip
+        lines.append(
+            f'- intervals that hold the truth after the first addition: '
+            f'{inside / counted:.1%} of {counted}'
+        )
     if hidden:
         right = np.mean([row['right'] for row in hidden])
         delays = [row['delay'] for row in hidden if np.isfinite(row['delay'])]

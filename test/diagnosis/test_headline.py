@@ -283,9 +283,13 @@ def test_what_likely_parameters_leave_bears_additions_out(
 
 @pytest.mark.parametrize(
     ('own', 'tied', 'verdict'),
-    [(0.975, 0.0, 'missing-effect'), (0.3, 0.4, 'missing-effect'), (0.3, 0.1, 'unexplained'),
-     (0.003, 0.0, 'unexplained')],
-)  # fmt: skip
+    [
+        (0.975, 0.0, 'missing-effect'),
+        (0.3, 0.4, 'missing-effect'),
+        (0.3, 0.1, 'unexplained'),
+        (0.003, 0.0, 'unexplained'),
+    ],
+)
 def test_a_name_that_is_improbable_is_never_told_as_missing(
     own: float, tied: float, verdict: str
 ) -> None:
@@ -312,9 +316,14 @@ def test_a_name_that_is_improbable_is_never_told_as_missing(
 def test_a_wrong_setup_comes_first() -> None:
     """What to check, and what the verdict under the set-up that was given is worth."""
     setup = WrongSetup(
-        ('a/free.csv', 'a/clamped.csv'), (250e3, 0.0), ('zoh', 'zoh'), ('stiffness',),
-        error=10.1e-6, as_given=240.6e-6, enough=True,
-    )  # fmt: skip
+        ('a/free.csv', 'a/clamped.csv'),
+        (250e3, 0.0),
+        ('zoh', 'zoh'),
+        ('stiffness',),
+        error=10.1e-6,
+        as_given=240.6e-6,
+        enough=True,
+    )
     found = replace(diagnosis('none', 240e-6, 240e-6), setup=setup)
     assert found.summary().startswith(
         'check the set-ups: with specimen stiffnesses exchanged (250000 N/m for free.csv, 0 N/m '

@@ -27,18 +27,23 @@ def run(errors: list[float], changed_at: int | None) -> SimpleNamespace:
     """Return a bag of hops of 100 samples; from one window on the model has backlash."""
     bands = [
         SimpleNamespace(
-            kind='noise', index=100 * i, median=np.zeros(100), rms_error=error,
-            widest_coverage=0.9, widest_level=0.95,
+            kind='noise',
+            index=100 * i,
+            median=np.zeros(100),
+            rms_error=error,
+            widest_coverage=0.9,
+            widest_level=0.95,
         )
         for i, error in enumerate(errors)
-    ]  # fmt: skip
+    ]
     posteriors = [
         SimpleNamespace(
-            index=100 * i, samples=100,
+            index=100 * i,
+            samples=100,
             effects=['backlash'] if changed_at is not None and i >= changed_at else [],
         )
         for i in range(len(errors))
-    ]  # fmt: skip
+    ]
     record = SimpleNamespace(first_index=0, period=1e-3)
     return SimpleNamespace(bands=bands, posteriors=posteriors, record=record)
 

@@ -181,8 +181,9 @@ def test_another_version_of_a_message_is_read() -> None:
 @pytest.mark.parametrize('text', ['', 'no message [', 'Unknown what'])
 def test_a_definition_that_says_nothing_changes_nothing(text: str) -> None:
     """Bytes of our version beside a text that cannot be read are read as ours."""
-    block = messages.message('CommandPreview', header=messages.header(5, 'a'), period=1e-3,
-                             index=7, command=np.ones(3))  # fmt: skip
+    block = messages.message(
+        'CommandPreview', header=messages.header(5, 'a'), period=1e-3, index=7, command=np.ones(3)
+    )
     data = messages.serialize('CommandPreview', block)
     assert messages.deserialize('CommandPreview', data, text).index == 7
 

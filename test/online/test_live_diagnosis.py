@@ -50,8 +50,10 @@ def test_a_break_is_told_once_and_diagnosed_as_soon_as_there_are_enough_data():
     state, actions = run(live.init(SETTINGS), live.Received(12.0), *[live.Judged(0.6)] * 6)
     assert looks(actions) == [] and [a.kind for a in actions] == ['coverage']
     state, actions = run(state, live.Received(19.9), live.Received(20.0), live.Received(20.5))
-    assert looks(actions) == ['the band of parameters and sensor noise covers 60% of '
-                              'the samples: the model lacks something']  # fmt: skip
+    assert looks(actions) == [
+        'the band of parameters and sensor noise covers 60% of '
+        'the samples: the model lacks something'
+    ]
 
 
 def test_a_break_is_told_once_and_armed_again():

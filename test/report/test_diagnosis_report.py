@@ -199,11 +199,14 @@ def test_first_page_says_what_came_out_and_what_to_do() -> None:
     finding = replace(found.effects[0], rivals=rivals, probability=0.7)
     base = {'beta_1': Estimate(128.0, 1.0, 126.0, 130.0, '1/s')}
     found = replace(
-        found, effects=(finding,), base=base, base_before=base,
+        found,
+        effects=(finding,),
+        base=base,
+        base_before=base,
         responses=(Response(250e3, (sine,), 12.3),),
         experiments=(Experiment('a down-sweep', 5e-4, 0.0, 42.0),),
         provenance={'seed': '7', 'sha256 of a.csv': 'abc'},
-    )  # fmt: skip
+    )
     text = re.sub(r'<[^>]+>', ' ', render(page_of(found)))
     assert text.index('removable error removed') < text.index('sham effect of equal size')
     for shown in ('70 %', 'valve-deadband 20 %', '10 %', 'a down-sweep', '42', '126 to 130'):

@@ -74,9 +74,13 @@ def test_calibrate_reports_any_file_name(file: Path, tmp_path: Path) -> None:
     ('error', 'code'), [(RuntimeError('ink'), 0), (InputError('d.html: no ink'), 2)]
 )
 def test_a_report_that_fails_ends_nothing(
-    file: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str], error: Exception, code: int,
-) -> None:  # fmt: skip
+    file: Path,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+    error: Exception,
+    code: int,
+) -> None:
     """The answer is printed, the JSON is there, and it is said what failed."""
 
     def fail(*_: object) -> None:

@@ -49,9 +49,12 @@ class Bag:
         for at in np.arange(round(start * RATE), round(stop * RATE), BLOCK):
             values = 1e-3 * np.sin(np.arange(at, at + BLOCK) / 30.0)
             block = blank(
-                'SampleBlock', period=1 / RATE, index=int(at - round(start * RATE) + index),
-                command=values, measured=values,
-            )  # fmt: skip
+                'SampleBlock',
+                period=1 / RATE,
+                index=int(at - round(start * RATE) + index),
+                command=values,
+                measured=values,
+            )
             self.take(max((at + BLOCK) / RATE, taken), '/samples', 'SampleBlock', block)
 
     def diagnosis(self, at: float, summary: str, *, stamp: float = 0.0) -> None:
@@ -64,10 +67,18 @@ class Bag:
         """A band over a stretch that was received then."""
         count = round((stop - start) * RATE)
         band = blank(
-            'PredictionBand', kind='total', index=round(start * RATE), period=1 / RATE,
-            levels=np.array([0.95]), median=np.zeros(count), lower=np.full(count, -half),
-            upper=np.full(count, half), scored=scored, forecast=True, widest_level=0.95,
-        )  # fmt: skip
+            'PredictionBand',
+            kind='total',
+            index=round(start * RATE),
+            period=1 / RATE,
+            levels=np.array([0.95]),
+            median=np.zeros(count),
+            lower=np.full(count, -half),
+            upper=np.full(count, half),
+            scored=scored,
+            forecast=True,
+            widest_level=0.95,
+        )
         self.take(at, '/prediction_band', 'PredictionBand', band)
 
     def take(self, at: float, topic: str, kind: str, content: Any) -> None:

@@ -121,8 +121,11 @@ def test_no_width_makes_the_chart_grow(width: int, tmp_path: Path) -> None:
         async with Browser() as page:
             await page.call(
                 'Emulation.setDeviceMetricsOverride',
-                width=width, height=900, deviceScaleFactor=1, mobile=width < 1000,
-            )  # fmt: skip
+                width=width,
+                height=900,
+                deviceScaleFactor=1,
+                mobile=width < 1000,
+            )
             await page.open(url)
             await page.until('document.body.dataset.frames > 5')
             first = await page.value(sizes)

@@ -6,6 +6,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import replace
 from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -152,11 +153,11 @@ def test_a_stall_takes_the_time_for_sampling_from_no_other_window(
     monkeypatch.setattr(estimator_worker, 'time', clock)
     monkeypatch.setattr(estimator_worker, 'run', window)
     monkeypatch.setattr(estimator_worker, 'window_tracking', lambda *_: None)
-    job = SimpleNamespace(settings=SimpleNamespace(time_budget=0.8))
+    job: Any = SimpleNamespace(settings=SimpleNamespace(time_budget=0.8))
     estimator_worker._REPORT.forget()
     estimator_worker._TRACKING.forget()
     for _ in range(20):
-        estimator_worker.compute(job, clock.now + 0.8, (5.0,), lambda _: None)  # type: ignore[arg-type]
+        estimator_worker.compute(job, clock.now + 0.8, (5.0,), lambda _: None)
     usual = sampled[3] if 0 not in stalls else sampled[-1]
     assert 0.6 < usual < 0.75
     starved = [n for n, seconds in enumerate(sampled) if seconds < 0.9 * usual]
@@ -164,7 +165,7 @@ def test_a_stall_takes_the_time_for_sampling_from_no_other_window(
     # A computer that has become slow for good is reckoned with.
     stalls.update(range(20, 40))
     for _ in range(8):
-        estimator_worker.compute(job, clock.now + 0.8, (5.0,), lambda _: None)  # type: ignore[arg-type]
+        estimator_worker.compute(job, clock.now + 0.8, (5.0,), lambda _: None)
     assert sampled[-1] < 0.1
 
 
