@@ -94,7 +94,7 @@ def _within_bounds(found: Diagnosis) -> tuple[ModelChoice, Array]:
     structure = found.model
     names = tuple(p.name for p in structure.parameters)
     columns = [found.names.index(name) for name in names]
-    draws = found.posterior[:, columns]
+    draws = found.joint[:, columns]
     lower = np.array([p.lower for p in structure.parameters])
     upper = np.array([p.upper for p in structure.parameters])
     inside = draws[((draws > lower) & (draws < upper)).all(axis=1)]
