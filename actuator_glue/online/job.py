@@ -27,8 +27,9 @@ from actuator_glue.records import Array
 
 # Whether a share of the time budget is spent.
 Expired: TypeAlias = Callable[[float], bool]
-# Share of the time budget within which Eq. (2) alone is sampled beside others.
-_QUICK = 0.3
+# Share of the time budget after which no further structure is begun: half of it is what one with
+# effects takes until it is warm.
+_BEGIN = 0.5
 # Draws whose mean response is the forecast that a structure's weight is judged by.
 _FEW = 32
 # Generations that R-hat and ESS are computed from.
@@ -121,16 +122,16 @@ def run(job: Job, expired: Expired | None = None) -> WindowResult:
 def fit(job: Job, expired: Expired | None = None) -> WindowFit:
     """Do the first part of `run`, all that the next job needs; a window may fail.
 
-    Where several structures are carried, those without effects come first, for they are quick;
-    the likeliest has twice the time of each other one.
+    Where several structures are carried, those without effects come first, for they are quick.
+    The likeliest has all the time that is left then; of the others those that there is still
+    time for: what one of them knew stays as it was.
     """
     jobs = (job, *job.rivals)
-    heavy = [i for i, one in enumerate(jobs) if one.model.effects]
-    share = {i: (place + 2.0) / (len(heavy) + 1.0) for place, i in enumerate(heavy)}
-    found = [WindowFit(job.window, one.model) for one in jobs]
-    for i in sorted(range(len(jobs)), key=lambda i: (i in share, i)):
-        wanted = share.get(i, _QUICK if heavy else 1.0)
-        limit = None if expired is None else partial(expired, wanted)
+    found = [WindowFit(job.window, one.model, failure='no time was left') for one in jobs]
+    for i in sorted(range(len(jobs)), key=lambda i: (bool(jobs[i].model.effects), i)):
+        if i > 0 and _no_time(jobs[i], expired):
+            continue
+        limit = None if expired is None else partial(expired, 1.0)
         found[i] = _fit(jobs[i], limit)
         if found[i].failure and i == 0:
             return found[0]
@@ -154,23 +155,34 @@ def _fit(job: Job, expired: Callable[[], bool] | None) -> WindowFit:
         return WindowFit(job.window, job.model, failure=str(error))
 
 
+def _no_time(job: Job, expired: Expired | None) -> bool:
+    """Whether a structure is passed over in this window, as it was where that is repeated."""
+    if job.stop_at is not None:
+        return job.stop_at == 0
+    return expired is not None and bool(job.model.effects) and expired(_BEGIN)
+
+
 def _errors(job: Job) -> tuple[float, ...]:
-    """Return the mean square error of each structure's forecasts over a window's samples [m^2]."""
+    """Return the mean square error of each structure's forecasts over a window's samples [m^2].
+
+    NaN for one that made none; nothing where no two have.
+    """
     record, models = job.window.recent, [one.model for one in (job, *job.rivals)]
-    squares: list[list[float]] = []
-    for old in job.frozen:
+    squares = np.full((len(job.frozen), len(models)), np.nan)
+    for row, old in zip(squares, job.frozen, strict=True):
         own = {part.model: part for part in (old, *old.beside)}
-        if any(model not in own for model in models):
-            continue
         end, start, stop = (i - record.first_index for i in (old.end, old.start, old.stop))
-        row = []
-        for model in models:
-            part = own[model]
+        for j, part in enumerate(map(own.get, models)):
+            if part is None:
+                continue
             few = replace(part, draws=part.draws[sampling.spread(len(part.draws), _FEW)])
             middle = _respond(few, record.command[end:stop]).mean(axis=0)
-            row.append(float(np.mean((record.measured[start:stop] - middle) ** 2)))
-        squares.append(row)
-    return tuple(np.mean(squares, axis=0).tolist()) if squares else ()
+            row[j] = np.mean((record.measured[start:stop] - middle) ** 2)
+    # Of the same samples only: a forecast that others did not make compares with nothing.
+    whole = squares[~np.isnan(squares).all(axis=1)]
+    if not len(whole):
+        return ()
+    return tuple(whole[-1].tolist())
 
 
 def report(job: Job, fitted: WindowFit, limits: bool = True) -> WindowResult:

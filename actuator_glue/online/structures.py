@@ -165,20 +165,21 @@ def moved(
 
     Args:
         evidence: before them.
-        errors: mean square error of each structure's forecasts [m^2]; NaN where it made none.
+        errors: mean square error of each structure's forecasts [m^2]; one that made none (NaN)
+            keeps its evidence.
         material: smallest error that matters [m].
         seconds: time since the forecasts before.
         memory: time after which a forecast counts 1/e [s].
     """
     squares = np.array(errors, np.float64)
-    if len(squares) < 2 or np.isnan(squares).any() or not material > 0.0:
+    told = np.isfinite(squares)
+    if told.sum() < 2 or not material > 0.0:
         return evidence
-    least = squares.min()
-    if not np.isfinite(least):
-        return evidence
+    excess = np.minimum((squares[told] - squares[told].min()) / material**2, _WORST)
     kept = math.exp(-seconds / memory)
-    excess = np.minimum((squares - least) / material**2, _WORST)
-    return np.asarray(kept * evidence - (1.0 - kept) * COARSE * excess)
+    out = evidence.copy()
+    out[told] = kept * out[told] - (1.0 - kept) * COARSE * excess
+    return out
 
 
 def weights(log_prior: Array, evidence: Array) -> Array:
