@@ -198,7 +198,7 @@ def test_numbers_of_every_type_are_the_same(kind: Callable[[float], Any], file: 
     assert partition.rate == 1000.0 and partition.interface == 0
 
 
-@pytest.mark.parametrize('wrong', NONE, ids=repr)
+@pytest.mark.parametrize('wrong', NONE, ids=lambda wrong: type(wrong).__name__)
 def test_what_is_no_number_is_refused_by_name(wrong: Any, file: Path) -> None:
     """One clear error that names the argument, whatever was given."""
     usual = api.Command(rate=200, duration=3)

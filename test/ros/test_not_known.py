@@ -5,7 +5,7 @@ import math
 import actuator_glue_msgs.msg
 import pytest
 from actuator_glue_msgs.action import Diagnose
-from actuator_glue_msgs.msg import Diagnosis, Effect, TestSetup
+from actuator_glue_msgs import msg
 
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.finding import Finding
@@ -20,7 +20,7 @@ NAMES = sorted(p.stem for p in definition_folder().glob('*.msg') if 'header' in 
 
 @pytest.mark.parametrize(('given', 'known'), [({}, None), ({'specimen_stiffness': 0.0}, 0.0)])
 def test_a_set_up_without_a_stiffness_is_no_free_actuator(given, known):
-    message = TestSetup(actuator='rig', rate=200.0, hold='zoh', **given)
+    message = msg.TestSetup(actuator='rig', rate=200.0, hold='zoh', **given)
     assert from_message(message).stiffness == known
 
 
@@ -51,7 +51,7 @@ def test_real_numbers_that_a_node_does_not_give_are_nan(name):
 
 def test_an_answer_without_a_diagnosis_has_no_errors_of_zero():
     outcome = diagnoser_worker.Outcome(message='no')
-    message = diagnoser_worker.fill_message(Diagnosis(), Head(0, ''), outcome)
+    message = diagnoser_worker.fill_message(msg.Diagnosis(), Head(0, ''), outcome)
     assert math.isnan(message.error_after) and math.isnan(message.noise_floor)
 
 
@@ -62,7 +62,7 @@ def test_an_effect_comes_with_its_limits_and_says_what_is_fixed():
     }
     found = Finding('delay', ('valve',), 0.9, 'command', sizes, 2e-5, 1e-5, 30.0)
     message = diagnoser_worker.effect_message(found)
-    assert isinstance(message, Effect)
+    assert isinstance(message, msg.Effect)
     assert list(message.parameter_names) == ['delay', 'lag']
     assert list(message.mean) == [4e-3, 0.5] and list(message.stddev) == [1e-5, 0.29]
     assert list(message.lower) == [3.98e-3, 0.025] and list(message.upper) == [4.02e-3, 0.975]
