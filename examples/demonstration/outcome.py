@@ -165,9 +165,9 @@ class SessionOutcome:
         posteriors = self.content.posteriors
         if self.truth is None or not posteriors:
             return None
-        first = next(
-            i for i, p in enumerate(posteriors) if list(p.effects) == list(posteriors[-1].effects)
-        )
+        # While others that are on their way out have a share in it, a mean says nothing of drift.
+        carried = [[name for name, _ in conversion.weights(p)] for p in posteriors]
+        first = next(i for i, names in enumerate(carried) if names == carried[-1])
         start, end = posteriors[first], posteriors[-1]
         true = self.truth[-1] - self.truth[first]
         return {

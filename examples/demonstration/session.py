@@ -195,7 +195,13 @@ def _diagnose(outcome: SessionOutcome, folder: Path, display: Display, seed: int
         # The number of stages depends on what is found; the bar never runs full before the end.
         display.advance(stage, min(len(seen) - 1 + share, STAGES - 0.1))
 
-    outcome.diagnosis = diagnose_records([outcome.content.record], seed=seed, progress=tell)
+    known = folder / 'calibration.npz'
+    outcome.diagnosis = diagnose_records(
+        [outcome.content.record],
+        seed=seed,
+        prior=known if known.exists() else None,
+        progress=tell,
+    )
     pictures.residual(outcome.diagnosis, folder / 'diagnosis.png')
     display.advance(stage, STAGES)
 

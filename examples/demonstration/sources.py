@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from actuator_glue.api.simulation import named_effects
 from actuator_glue.records import Array, Hold
 
 # Commands are published this far ahead, so that a forecast precedes its data.
@@ -116,7 +115,7 @@ def simulator(
         f'simulated actuator, {k / 1e3:g} kN/m',
         Truth(np.array(list(TRUTH.values())), growth),
         drift_of,
-        tuple(named_effects('+'.join(hidden))),
+        tuple(word.partition(':')[0] for word in '+'.join(hidden).split('+') if word),
         effect == PROMISED_EFFECT and seconds >= PROMISED_SECONDS,
     )
 
