@@ -13,16 +13,20 @@ from rclpy.qos import DurabilityPolicy, QoSProfile
 
 from actuator_glue.diagnosis.result import SCHEMA
 from actuator_glue.io.bag_reader import decoded
+from actuator_glue.model.parameters import NAMES
+from examples.demonstration import pretests
 
+TRUTH = np.array([134.0, 1.1e9, 2.5e5, 0.5])
 BAGS = Path(__file__).resolve().parents[2] / 'bags'
 
 
 @pytest.mark.slow
 def test_an_undeclared_effect_is_found_and_the_model_goes_on_with_it(start, probe, tmp_path):
-    """The whole issue in one run; everything judged from the bag alone."""
+    """The whole loop in one run, as two short tests tell of it; judged from the bag alone."""
     bag, sealed = tmp_path / 'bag', tmp_path / 'truth.json'
+    path = pretests.calibrate(TRUTH, 250e3, 250.0, 1, tmp_path / 'known.npz', lambda _: None)
     recorder = start('recorder', bag=str(bag))
-    estimator = start('estimator')
+    estimator = start('estimator', prior='sequential', calibration=str(path))
     diagnoser = start('diagnoser', apply=True, minimum=25.0)
     probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 120, 'estimator compiled')
     probe.until(lambda: probe.value('diagnoser', 'state') == 'active', 30)
@@ -34,6 +38,8 @@ def test_an_undeclared_effect_is_found_and_the_model_goes_on_with_it(start, prob
         exit_at_end=True,
         undeclared_effect='backlash:backlash=6e-5',
         sealed_file=str(sealed),
+        specimen_stiffness=250e3,
+        **dict(zip(NAMES, TRUTH.tolist(), strict=True)),
     )
     assert simulator.wait(180) == 0, simulator.text
     probe.for_a_while(2.0)
@@ -46,11 +52,26 @@ def test_an_undeclared_effect_is_found_and_the_model_goes_on_with_it(start, prob
     named = {found.effects[0].name, *found.effects[0].alternatives}
     assert next(iter(json.loads(sealed.read_text())['effects'])) in named
     assert found.error_after < found.error_before
+    assert 'covers' in found.reason
+    prior = json.loads(found.json)['prior']
+    assert prior['source'] == 'the estimator', 'the diagnosis began with nothing'
     assert json.loads(found.json)['schema'] == SCHEMA
     moments = [m for _, m in decoded(bag, ('PosteriorMoments',))]
     assert any(m.effects for m in moments), 'the estimator did not go on with the effect'
     assert all(len(m.mean) > 4 for m in moments if m.effects)
     swapped = next(m.window for m in moments if m.effects)
+    last = moments[-1]
+    assert last.structures[0] == 'backlash' and last.weights[0] == max(last.weights) > 0.5
+    # Sizes were handed back: the first window with the effect knows it already.
+    first = next(m for m in moments if m.effects)
+    assert first.stddev[4] < 0.05 * first.mean[4]
+    inside = [
+        abs(m.mean[j] - TRUTH[j]) <= 1.96 * m.stddev[j]
+        for m in moments
+        if m.window >= swapped
+        for j in range(4)
+    ]
+    assert np.mean(inside) >= 0.9
     bands = [m for _, m in decoded(bag, ('PredictionBand',)) if m.scored and m.kind == m.NOISE]
     before = [m for m in bands if m.window < swapped]
     # The first windows after the change start from the prior of the effect.
