@@ -2,10 +2,9 @@
 
 import math
 
-import actuator_glue_msgs.msg
+import actuator_glue_msgs.msg as msg
 import pytest
 from actuator_glue_msgs.action import Diagnose
-from actuator_glue_msgs import msg
 
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.finding import Finding
@@ -41,7 +40,7 @@ def test_a_goal_without_a_stiffness_has_the_held_out_record_say_it(given, known)
 
 @pytest.mark.parametrize('name', NAMES)
 def test_real_numbers_that_a_node_does_not_give_are_nan(name):
-    kind = getattr(actuator_glue_msgs.msg, name)
+    kind = getattr(msg, name)
     message = fill(kind(), Head(5_000_000_007, 'rig'), {})
     assert (message.header.stamp.sec, message.header.frame_id) == (5, 'rig')
     fields = kind.get_fields_and_field_types().items()
