@@ -313,7 +313,7 @@ def test_the_live_chain_is_held_to_what_it_promises(
     outcome = SessionOutcome(
         'a simulator',
         0,
-        content,  # type: ignore[arg-type]
+        content,  # type: ignore[arg-type]  # stands for a bag's
         ReplayComparison(),
         np.tile(content.truth, (15, 1)),
         hidden=('backlash', 'gain-drift'),
