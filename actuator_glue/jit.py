@@ -148,7 +148,8 @@ def njit(function: Any = None, **options: Any) -> Any:
         return partial(njit, **options)
     kept = options.pop('cache', True)
     compiled = _compile(function, **options)
-    if kept and STORE.folder is not None:
+    # Where nothing is compiled (NUMBA_DISABLE_JIT) the function itself comes back.
+    if kept and STORE.folder is not None and not numba.config.DISABLE_JIT:
         _keep(compiled)
     return compiled
 

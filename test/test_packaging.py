@@ -22,7 +22,7 @@ INTERFACES = sorted(
 )
 MESSAGES = [p for p in INTERFACES if p.suffix == '.msg']
 # Parts of Diagnosis, never published alone.
-PARTS = {'Effect', 'Candidate'}
+PARTS = {'Effect', 'Candidate', 'ModelProposal'}
 PROJECT = tomllib.loads((ROOT / 'pyproject.toml').read_text(encoding='utf-8'))
 NODES = (
     'actuator_sim',

@@ -1,14 +1,18 @@
 """The tutorial is run as it stands, and what is shown below its blocks is what they printed."""
 
+import importlib.util
 import sys
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-sys.path.insert(0, str(ROOT / 'scripts'))
-
-import run_tutorial  # noqa: E402 - it lies in the folder above
+SCRIPT = importlib.util.spec_from_file_location(
+    'run_tutorial', ROOT / 'scripts' / 'run_tutorial.py'
+)
+assert SCRIPT is not None and SCRIPT.loader is not None
+run_tutorial = importlib.util.module_from_spec(SCRIPT)
+SCRIPT.loader.exec_module(run_tutorial)
 
 PAGE = """# A page
 

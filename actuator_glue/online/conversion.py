@@ -52,7 +52,7 @@ def proposal(message: Any) -> ModelChoice | Proposal:
     Raises:
         InputError: settings that cannot be read, or a model that the catalogue does not have.
     """
-    leading = _model_choice(message)
+    leading = model_choice(message)
     try:
         carries = json.loads(message.settings).get('structures')
     except (ValueError, AttributeError) as error:
@@ -60,7 +60,12 @@ def proposal(message: Any) -> ModelChoice | Proposal:
     return leading if carries is None else Proposal.from_json(carries, 'EstimatorSetup')
 
 
-def _model_choice(message: Any) -> ModelChoice:
+def model_choice(message: Any) -> ModelChoice:
+    """Return the model whose parameters an EstimatorSetup lists.
+
+    Raises:
+        InputError: its fields contradict each other, or are not JSON.
+    """
     try:
         values = json.loads(message.settings)
         start, defined = values.get('start') or (), values.get('definitions')

@@ -76,7 +76,7 @@ def test_a_recorded_command_and_an_undeclared_effect(run, tmp_path: Path, short_
         (('--effect', 'backlash:width'), 'PARAMETER=VALUE'),
         (('--effect', 'backlash:backlash=5'), 'bounds of the catalogue, [0, '),
         (('--effect', 'backlash:backlash=-1e-5'), 'bounds of the catalogue, [0, '),
-        (('--effect', 'backlash:backlash=nan'), 'bounds of the catalogue, [0, '),
+        (('--effect', 'backlash:backlash=nan'), 'no number'),
         (('--stiffness', '-1'), 'outside'),
         (('--rate', '5'), '10 Hz'),
         (('--duration', '0'), 'no full sample'),

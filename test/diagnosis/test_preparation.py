@@ -24,7 +24,7 @@ GOOD = Record(U, 0.9 * U, 1 / 256, stiffness=0.0, source='good')
         (replace(GOOD, command=0 * U), 'command is constant'),
         (replace(GOOD, measured=0 * U + 1e-3), 'channel is connected'),
         (replace(GOOD, measured=900 * U), 'units'),
-        (replace(GOOD, command=1e3 * U, measured=900 * U), 'm/s; check the units'),
+        (replace(GOOD, command=1e3 * U, measured=900 * U), 'have 2 m; check the units'),
         (replace(GOOD, command=1e-3 * U, measured=9e-4 * U), 'check the units'),
         (replace(GOOD, measured=-0.9 * U), 'change the sign'),
         (replace(GOOD, measured=np.append(U[8:], np.zeros(8))), 'leads the command by 31 ms'),

@@ -63,7 +63,7 @@ def test_forecasts_are_said_as_they_were(
     drawn: list[Figure], errors: list[float], changed: int | None, title: str
 ) -> None:
     """Better, worse, or with the model that it began with."""
-    pictures.live(run(errors, changed), Path('live.png'))  # type: ignore[arg-type]
+    pictures.live(run(errors, changed), Path('live.png'))  # type: ignore[arg-type] # no whole run
     assert drawn[0].get_suptitle() == f'Forecasts, median rms error: {title}'
 
 

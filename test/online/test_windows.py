@@ -215,7 +215,7 @@ def test_announced_set_ups_are_bounded():
     ('values', 'told'),
     [
         ({'stiffness': -1.0}, 'specimen stiffness -1 N/m is outside'),
-        ({'stiffness': np.nan}, 'specimen stiffness nan'),
+        ({'stiffness': np.nan}, 'specimen stiffness is nan'),
         ({'period': 0.0}, 'sample period 0 s'),
         ({'hold': 'cubic'}, "use 'zoh' or 'linear'"),
         ({'index': -3}, 'running index -3'),
