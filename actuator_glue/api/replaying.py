@@ -22,6 +22,7 @@ from actuator_glue.api.tracking import window_tracking
 from actuator_glue.errors import InputError
 from actuator_glue.given import number, whole
 from actuator_glue.io.bag_reader import decoded, is_bag, summarise
+from actuator_glue.io.bag_records import check_order
 from actuator_glue.io.bag_samples import topics_of_actuator
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.playback import Item, items, stream
@@ -144,6 +145,7 @@ def _open(source: Records, namespace: str | None, compare_live: bool) -> _Run:
 
 def _open_bag(bag: str, namespace: str | None, compare_live: bool) -> _Run:
     summary = summarise(bag)
+    check_order(bag)
     names = topics_of_actuator(bag, summary, namespace)
     topics = [summary.topics[name] for name in names]
     rejected: list[Rejected] = []

@@ -202,6 +202,28 @@ def _governed(
                 yield found._replace(block=block), setup
 
 
+def check_order(path: Path | str) -> None:
+    """Refuse a bag whose file holds messages in another order than that of their times.
+
+    Records are put in order (`read_records`); what repeats a live run takes messages as they came.
+
+    Raises:
+        InputError: with what to do.
+    """
+    order = _Order(path)
+    for _ in order.seen(messages(path, types=TYPES, note=lambda _: None)):
+        if order.mixed:
+            break
+    if not order.mixed:
+        return
+    every = sorted(messages(path, types=TYPES, note=lambda _: None), key=attrgetter('log_time'))
+    if _counts_on(every, path):
+        raise InputError(
+            f'{path}: its messages are not in the order of their times; put the samples in order '
+            f'with `actuator-glue convert {path} OUT`'
+        )
+
+
 def _setups(
     path: Path | str, note: Note, warn: Note
 ) -> tuple[Iterable[BagMessage], list[tuple[int, BagSetup]]]:

@@ -17,7 +17,7 @@ from mcap.writer import Writer
 
 from actuator_glue.errors import InputError
 from actuator_glue.io import messages
-from actuator_glue.io.bag_records import read_records, write_record
+from actuator_glue.io.bag_records import check_order, read_records, write_record
 from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.io.mcap_scan import Scan
 from actuator_glue.io.recover import recover
@@ -294,6 +294,11 @@ def test_messages_out_of_the_order_of_their_times_are_put_in_order(
             times = message.log_time, message.publish_time
             writer.add_message(channels[channel.topic], times[0], message.data, times[1])
         writer.finish()
+    if mixed == 'by topic':  # the samples are in order
+        check_order(path)
+    else:
+        with pytest.raises(InputError, match='not in the order of their times; put the samples'):
+            check_order(path)
     first, second = read_records(path)
     assert np.array_equal(first.command, record.command[:2000])
     assert np.array_equal(second.command, record.command[2000:])

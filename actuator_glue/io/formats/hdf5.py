@@ -27,7 +27,7 @@ from actuator_glue.records import Array
 _MAGIC = b'\x89HDF\r\n\x1a\n'
 _PACKED = 1100  # bytes out of one that deflate makes at most (1032), nearly
 _CLASS, _EMPTY, _OBJECT = 'MATLAB_class', 'MATLAB_empty', 'MATLAB_object_decode'
-_DEEPEST, _MOST_STRUCTS = 64, 100_000  # structs in structs, and in all
+_DEEPEST, _MOST_STRUCTS = 64, 10_000  # structs in structs, and in all
 # Fields of a struct that hold samples, and those beside them that hold their name.
 _FIELDS = ('data', 'values', 'value')
 _NAMES = ('name', 'label')
