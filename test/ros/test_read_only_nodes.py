@@ -3,11 +3,14 @@
 import os
 import signal
 import subprocess
+from pathlib import Path
 
 import pytest
 from ros_nodes import executable
 
 from actuator_glue.nodes import parameter_file
+
+BAGS = Path(__file__).resolve().parents[2] / 'bags'
 
 
 @pytest.fixture
@@ -59,12 +62,14 @@ def test_a_bag_without_a_name_needs_a_home_and_says_so(begin, tmp_path):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize('node', sorted(set(parameter_file.NODES) - {'lab_bridge', 'replay'}))
+@pytest.mark.parametrize('node', sorted(parameter_file.NODES))
 def test_each_node_starts_on_a_read_only_disk(node, begin, probe, tmp_path):
     given = {
         'recorder': {'bag': tmp_path / 'out' / 'bag'},
         'margin': {'partition': 'sdof'},
         'viewer': {'port': 0},
+        'lab_bridge': {'source': 'udp://127.0.0.1:0', 'rate': 500.0, 'specimen_stiffness': 0.0},
+        'replay': {'bag': BAGS / 'free', 'wait_for': 9},
     }
     process = begin(node, *parameters(**given.get(node, {})))
     probe.until(lambda: probe.value(node, 'state') == 'active', 250, 'active')
