@@ -159,6 +159,7 @@ class DiagnosisData:
             'complete': self.complete,
             'effects': [e.to_json() for e in self.effects],
             'error': self.error.to_json(),
+            'searched': [name for name, entry in CATALOGUE.items() if entry.searched],
             'candidates': [c.to_json() for c in self.candidates],
             'coverage': {
                 'before': json_value(self.coverage[0]),

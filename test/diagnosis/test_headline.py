@@ -16,6 +16,7 @@ from actuator_glue.diagnosis.held_out import HeldOutError, Verdict
 from actuator_glue.diagnosis.result import Alarm, DiagnosisData
 from actuator_glue.diagnosis.verdict import against, certainty, conclude, misses, named
 from actuator_glue.diagnosis.wrong_setup import WrongSetup
+from actuator_glue.model.effects import CATALOGUE
 
 NONE = np.empty((0, 4))
 
@@ -188,6 +189,7 @@ def test_the_headline_follows_the_held_out_part(
     assert (content['summary'], content['verdict']) == (says, found.verdict)
     assert code == (0 if complete else 1)
     assert content['complete'] is complete
+    assert len(content['searched']) == sum(e.searched for e in CATALOGUE.values())
 
 
 def test_what_the_parameters_leave_open_contradicts_nothing() -> None:
