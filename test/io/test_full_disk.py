@@ -138,7 +138,7 @@ LIMITED = textwrap.dedent(
     """
     bag = Path(sys.argv[1])
     resource.setrlimit(resource.RLIMIT_FSIZE, (300_000, 2_000_000))
-    writer = BagWriter(bag, flush_period=0.01)
+    writer = BagWriter(bag, flush_period=0.0)
     writer.add_topic('/samples', 'SampleBlock')
     assert 0 < write(writer, range(500)) < 10
     resource.setrlimit(resource.RLIMIT_FSIZE, (2_000_000, 2_000_000))

@@ -64,5 +64,5 @@ def test_the_estimator_feeds_it(start, probe):
     probe.create_subscription(StabilityMargin, 'stability_margin', found.append, 10)
     pairs = windows_of_a_test(start, probe, found)
     assert all(m.header.stamp == p.header.stamp for p, m in pairs)
-    assert all(m.draws == 200 and m.frequency[1] == 5.0 for m in found)
+    assert all(m.draws == 400 and m.frequency[1] == 5.0 for m in found)
     assert estimator.end() == 0 and margin.end() == 0
