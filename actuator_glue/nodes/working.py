@@ -69,7 +69,7 @@ class WorkingNode(base.SuiteNode):
             if self.active and self.compiling:
                 # Shown, not logged: the log says it when it begins.
                 text = 'still compiling: samples are not listened to yet'
-                self.health.fault('worker', text, time.monotonic())
+                self.health.fault('warm-up', text, time.monotonic())
 
     def _hand_over(self, answer: Answer) -> None:
         """Called from the listening thread: hand over to the executor."""

@@ -143,18 +143,17 @@ def node(probe, monkeypatch):
 
 
 def test_an_answer_that_is_lost_does_not_hold_up_the_diagnoser(node, probe, monkeypatch):
-    monkeypatch.setattr(diagnoser_worker, 'augmented', lambda _: SetModel.Request())
+    monkeypatch.setattr(diagnoser_worker, 'requested', lambda _: SetModel.Request())
     # Nobody spins the probe: the request arrives and is never answered.
     probe.create_service(SetModel, 'estimator/set_model', lambda _, answer: answer)
     executor = rclpy.executors.SingleThreadedExecutor()
     executor.add_node(node)
     while not node._model_client.service_is_ready():
         executor.spin_once(0.1)
-    node._request = diagnoser_worker.Request(apply=True)
-    outcome = diagnoser_worker.Outcome(diagnosis=SimpleNamespace())
-    node._apply(outcome)
-    assert node._request is not None
-    while node._request is not None:
+    node._told = outcome = diagnoser_worker.Outcome(diagnosis=SimpleNamespace())
+    node._carry(SimpleNamespace())
+    assert node._swap is not None
+    while node._swap is not None:
         executor.spin_once(0.1)
     assert not outcome.applied
     (told,) = node.health.message(time.monotonic(), Time(), 'active').status
