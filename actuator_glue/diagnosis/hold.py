@@ -71,17 +71,8 @@ def _linearly(
     second = conclude(other, settings, each, tell, fixed=True)
     if _gained(first, second) < settings.nats:
         return None
-    recorded = other.fit.recorded
-    setup = WrongSetup(
-        sources=tuple(r.source or f'record {i + 1}' for i, r in enumerate(recorded)),
-        stiffness=tuple(r.known_stiffness() for r in recorded),
-        hold=tuple(r.hold for r in recorded),
-        changed=('hold',),
-        error=base.rms,
-        as_given=before**0.5,
-        enough=second.decision.verdict == 'none',
-        taken=True,
-    )
+    errors, enough = (before**0.5, base.rms), second.decision.verdict == 'none'
+    setup = WrongSetup.between(prepared.fit, other.fit, errors, enough, taken=True)
     return replace(second, prepared=replace(second.prepared, setup=setup))
 
 

@@ -53,6 +53,40 @@ class WrongSetup(JsonObject):
     enough: bool
     taken: bool = False
 
+    @classmethod
+    def between(
+        cls,
+        given: Data,
+        other: Data,
+        errors: tuple[float, float],
+        enough: bool,
+        taken: bool = False,
+    ) -> WrongSetup:
+        """Return what differs between the set-up of some data and another one of the same.
+
+        Args:
+            given: the data as given.
+            other: the same data under the other set-up.
+            errors: rms errors of Eq. (2), refitted as given and under the other one [m].
+            enough: as the attribute.
+            taken: as the attribute.
+        """
+        was, now = given.recorded, other.recorded
+        changed = {
+            'stiffness': any(a.stiffness != b.stiffness for a, b in zip(was, now, strict=True)),
+            'hold': any(a.hold != b.hold for a, b in zip(was, now, strict=True)),
+        }
+        return cls(
+            sources=tuple(r.source or f'record {i + 1}' for i, r in enumerate(was)),
+            stiffness=tuple(r.known_stiffness() for r in now),
+            hold=tuple(r.hold for r in now),
+            changed=tuple(name for name, is_other in changed.items() if is_other),
+            error=errors[1],
+            as_given=errors[0],
+            enough=enough,
+            taken=taken,
+        )
+
     def sentence(self) -> str:
         """Say what to check, or what was taken instead."""
         parts = []
@@ -101,20 +135,7 @@ def find(data: Data, settings: Thresholds, both_holds: bool = False) -> WrongSet
         return None
     if _nats(parts[best], fit, given) < settings.nats + math.log(len(others)):
         return None
-    was, now = data.recorded, others[best].recorded
-    changed = {
-        'stiffness': any(a.stiffness != b.stiffness for a, b in zip(was, now, strict=True)),
-        'hold': any(a.hold != b.hold for a, b in zip(was, now, strict=True)),
-    }
-    return WrongSetup(
-        sources=tuple(r.source or f'record {i + 1}' for i, r in enumerate(was)),
-        stiffness=tuple(r.known_stiffness() for r in now),
-        hold=tuple(r.hold for r in now),
-        changed=tuple(name for name, is_other in changed.items() if is_other),
-        error=fit.rms,
-        as_given=given.rms,
-        enough=left < material,
-    )
+    return WrongSetup.between(data, others[best], (given.rms, fit.rms), left < material)
 
 
 def _stretches(data: Data) -> Data:
