@@ -115,6 +115,13 @@ def _fault(path: str, text: str | None) -> str:
 
 
 def _missing(proposal: ProposedMap) -> str:
+    if proposal.integrated is not None:
+        one, other = (_called(column) for column in proposal.integrated)
+        return (
+            f'{other} follows the integral of {one}, which is the command of a velocity or of a '
+            'valve: no displacement command in this file. A displacement command is needed: '
+            'record the set point of the position loop'
+        )
     names = [role for role in ('command', 'measured') if role not in proposal.channels]
     if not names:
         if not proposal.angles:
@@ -144,7 +151,11 @@ def _missing(proposal: ProposedMap) -> str:
 
 
 def _name(guess: Guess) -> str:
-    return guess.column.label.strip() or f'column {guess.column.name}'
+    return _called(guess.column)
+
+
+def _called(column: ColumnLook) -> str:
+    return column.label.strip() or f'column {column.name}'
 
 
 def _write(path: Path, text: str) -> None:

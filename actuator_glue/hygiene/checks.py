@@ -11,6 +11,7 @@ import scipy
 
 from actuator_glue.errors import InputError
 from actuator_glue.records import Array, Record
+from actuator_glue.velocity_command import is_velocity
 
 _SMALLEST = 5e-6  # m of command, from end to end: below it is no test of an actuator
 _LEAD = 5e-3  # s by which a measured displacement may lead (a compensated command)
@@ -38,6 +39,7 @@ def check(record: Record, number: int = 1) -> None:
     name = where(record, number)
     record = replace(record, source=name)
     record.known_stiffness()
+    _displaces(record)
     record.check_channels()
     reach = float(np.ptp(record.command))
     speed = float(np.quantile(np.abs(np.diff(record.command)), 0.99)) / record.period
@@ -72,6 +74,20 @@ def refuse_repeats(records: Sequence[Record], held: Sequence[Record] = ()) -> No
         raise InputError(
             f'{names[1]} holds the same samples as {names[0]} and would count twice; give each '
             'record once'
+        )
+
+
+def _displaces(record: Record) -> None:
+    """Refuse a command of velocity or of a valve: no displacement follows from it by Eq. (2).
+
+    Raises:
+        InputError: the measured displacement follows the integral of the command.
+    """
+    if is_velocity(record.command, record.measured, record.rate):
+        raise InputError(
+            f'{record.source}: the measured displacement follows the integral of the command, as '
+            'of a velocity or a valve; a displacement command is needed: record the set point of '
+            'the position loop'
         )
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, replace
-from itertools import combinations
+from itertools import combinations, permutations
 
 import numpy as np
 
@@ -12,14 +12,17 @@ from actuator_glue.io.look import ColumnLook, FileLook
 from actuator_glue.io.time_base import uneven
 from actuator_glue.io.units import ANGLES, OF_NO_LENGTH, ROLES
 from actuator_glue.records import SLOWEST_RATE, Array
+from actuator_glue.velocity_command import is_velocity
 
 # Words of the field for each role, in the languages of controllers; whole words or parts.
 _WORDS = {
     'time': r'time|zeit|temps|tiempo|timestamp|^t$|\bsec(onds)?\b',
-    'command': r'command|cmd|target|refer|\bref\b|desired|set.?point|demand|soll|input|program',
+    'command': r'command|cmd|target|refer|\bref\b|desired|\bdes\b|set.?point|\bsp\b|demand|soll|'
+    r'input|program|f(ü|ue)hrung|vorgabe|consigne',
     'measured': r'meas|actual|feedback|\bfbk?\b|\bist|respon|achieved|lvdt|encoder|output|posi|'
-    r'displ',
-    'force': r'force|load|kraft|\bcell\b|fuerza|effort',
+    r'\bpos\b|displ|\bdisp\b|stroke|kolbenweg|\bweg\b',
+    'force': r'force|load|kraft|\bcell\b|fuerza|effort|torque|moment|belastung|^f[xyz]?\d?$|'
+    r'\blc\d?\b|^([kM] ?)?N$',
 }
 # What has a word of these is no displacement, whatever else it is called.
 _NO_LENGTH = re.compile(
@@ -30,6 +33,7 @@ _NO_LENGTH = re.compile(
 _SAMPLES = 200_000  # of a channel that are compared
 _ALIKE = 0.8  # correlation above which one displacement follows another
 _LATEST = 0.25  # s; no actuator follows later
+_PAIRS = 100  # of columns that are looked at for a command of velocity
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,18 +64,21 @@ class ProposedMap:
         counter: the column that counts samples.
         rate: samples per second, where no column holds times.
         other_commands: names of columns that are commands, but of no displacement.
+        integrated: a command of velocity or of a valve, and what follows its integral.
     """
 
     channels: dict[str, Guess]
     counter: ColumnLook | None
     rate: float | None
     other_commands: tuple[str, ...] = ()
+    integrated: tuple[ColumnLook, ColumnLook] | None = None
 
     @property
     def complete(self) -> bool:
         """Whether command and measured were found, both lengths, and times or a rate."""
         timed = 'time' in self.channels or self.rate is not None
-        return {'command', 'measured'} <= set(self.channels) and timed and not self.angles
+        found = {'command', 'measured'} <= set(self.channels)
+        return found and timed and not self.angles and self.integrated is None
 
     @property
     def angles(self) -> dict[str, Guess]:
@@ -103,7 +110,23 @@ def propose(found: FileLook, given: float | None = None) -> ProposedMap:
         channels = {'time': clock, **channels}
     others = [c for c in rest if _called(c, 'command') and not _may_be(c, 'command')]
     told = tuple(c.label.strip() for c in others)
-    return ProposedMap(channels, counter, None if clock is not None else rate, told)
+    integrated = _integrated(rest, channels, rate or 1.0)
+    return ProposedMap(channels, counter, None if clock is not None else rate, told, integrated)
+
+
+def _integrated(
+    columns: list[ColumnLook], chosen: dict[str, Guess], rate: float
+) -> tuple[ColumnLook, ColumnLook] | None:
+    """Return a command of velocity or of a valve and what it moves, where no command is better."""
+    given = [chosen[role].column for role in ('command', 'measured') if role in chosen]
+    pairs = [(given[0], given[1])] if len(given) == 2 else list(permutations(columns, 2))
+    for one, other in pairs[:_PAIRS]:
+        may = not any(_called(one, r) for r in ('measured', 'force')) or _called(one, 'command')
+        if may and not _called(other, 'command') and not _called(other, 'force'):
+            values = (_at(one, rate), _at(other, rate))
+            if is_velocity(*values, 1000.0 if rate == 1.0 else rate):
+                return one, other
+    return None
 
 
 def _commonest(columns: list[ColumnLook]) -> int:

@@ -5,18 +5,16 @@ from __future__ import annotations
 import re
 
 from actuator_glue.errors import InputError
+from actuator_glue.si import FORCE, LENGTH
 
-_LENGTH = {'m': 1.0, 'cm': 1e-2, 'mm': 1e-3, 'um': 1e-6, 'µm': 1e-6, 'μm': 1e-6, 'in': 0.0254}
-_LENGTH |= {'inch': 0.0254}
-_FORCE = {'N': 1.0, 'kN': 1e3, 'MN': 1e6, 'lbf': 4.4482216152605, 'kip': 4448.2216152605}
 _TIME = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'sec': 1.0, 'µs': 1e-6, 'μs': 1e-6}
 
 # What a column can be, and factors to SI by unit.
 ROLES: dict[str, dict[str, float]] = {
     'time': _TIME,
-    'command': _LENGTH,
-    'measured': _LENGTH,
-    'force': _FORCE,
+    'command': LENGTH,
+    'measured': LENGTH,
+    'force': FORCE,
 }
 # A float32 has no whole number between this one and the next but one.
 FLOAT32_COUNTS = 1 << 24
@@ -27,7 +25,7 @@ _RAW = frozenset(('V', 'mV', 'volt', 'volts', 'mA', '%', 'count', 'counts', 'cnt
 _OTHERS = frozenset(('bar', 'mbar', 'Pa', 'kPa', 'MPa', 'psi', 'Nm', 'kNm', 'l/min', '°C', 'degC'))
 _OTHERS |= {'m/s', 'mm/s', 'deg/s', 'rad/s', 'rpm', 'g', 'm/s2', 'm/s^2', 'm/s²', 'mm/s2', 'Hz'}
 # Of what no scale makes a length.
-OF_NO_LENGTH = _OTHERS.union(_FORCE, _TIME)
+OF_NO_LENGTH = _OTHERS.union(FORCE, _TIME)
 _QUANTITY = {
     'time': 'time',
     'command': 'displacement',
@@ -71,6 +69,11 @@ def factor(role: str, unit: str | None, where: str) -> float:
         what = 'which is not understood'
         if unit in _KNOWN:
             what = f'which is none of {_QUANTITY[role]}'
+        if unit in OF_NO_LENGTH and role == 'command':
+            raise InputError(
+                f'{where} has unit {unit!r}, {what}; a displacement command is needed: record the '
+                'set point of the position loop'
+            )
         raise InputError(
             f'{where} has unit {unit!r}, {what}; use one of {listed} (upper and lower case '
             'matter), or give the factor to one as `scale` in a channel map'

@@ -32,7 +32,9 @@ def roles(found: dict) -> dict[str, str]:
 
 
 COMMANDS = ['Command 2', 'cmd', 'Set Point', 'SetPoint', 'Target', 'x_desired', 'Ref']
-COMMANDS += ['Reference', 'Sollwert', 'Demand pos', 'Commanded displacement']
+COMMANDS += ['Reference', 'Sollwert', 'Demand pos', 'Commanded displacement', 'pos_sp', 'x_des']
+COMMANDS += ['Führungsgröße', 'consigne', 'axis1.setpoint', 'cmd_fb', 'Wegsoll', 'PosDes']
+FORCES = ['Load [kN]', 'force', 'Kraft', 'Actuator Load', 'F [N]', 'F', 'Torque', 'LC1', 'kN']
 
 
 @pytest.mark.parametrize('name', COMMANDS)
@@ -45,7 +47,7 @@ def test_what_is_called_a_command_is_never_measured(tmp_path: Path, name: str) -
     assert any('leads the command by 15.6 ms' in w for w in found['channels']['measured']['check'])
 
 
-@pytest.mark.parametrize('name', ['Load [kN]', 'force', 'Kraft', 'Actuator Load', 'F [N]'])
+@pytest.mark.parametrize('name', FORCES)
 def test_a_force_is_never_a_displacement(tmp_path: Path, name: str) -> None:
     """It follows the command as the displacement does; without one nothing is measured."""
     found = looked(tmp_path, {'Command': COMMAND, name: FORCE})
