@@ -10,8 +10,7 @@ import numpy as np
 from actuator_glue.api.diagnosis import Diagnosis
 from actuator_glue.diagnosis.finding import Finding
 from actuator_glue.diagnosis.verdict import against
-from actuator_glue.errors import InputError
-from actuator_glue.inference.carried import Carried, Drift
+from actuator_glue.inference.carried import FEWEST, Carried, Drift
 from actuator_glue.inference.choice import ModelChoice, choose_model
 from actuator_glue.inference.prior_use import GivenPrior
 from actuator_glue.online.knowledge import Known
@@ -52,13 +51,14 @@ def concluded(found: Diagnosis, records: Sequence[Record], apply: bool | None = 
     )
     why_not = against(found.verdict, found.effects, found.structure, found.error)
     if found.verdict == 'none':
-        return Concluded(Proposal.of(choose_model()), '', left_open, apply)
+        return Concluded(Proposal.of(choose_model()), '', left_open, apply, frozenset())
+    supported = frozenset(found.structure)
     learned = ', '.join(term.name for term in found.learned)
     if learned and not why_not:
         why_not = f'{learned} was learned from these records: no effect of the catalogue'
     if why_not:
-        return Concluded(None, why_not, left_open, apply)
-    return Concluded(proposed(found, records), '', left_open, apply)
+        return Concluded(None, why_not, left_open, apply, supported)
+    return Concluded(proposed(found, records), '', left_open, apply, supported)
 
 
 def proposed(found: Diagnosis, records: Sequence[Record]) -> Proposal:
@@ -69,9 +69,11 @@ def proposed(found: Diagnosis, records: Sequence[Record]) -> Proposal:
     """
     start, end = _since(found, records), records[-1].stamp_ns(len(records[-1]) - 1)
     model, draws = _within_bounds(found)
-    middle = (start + end) // 2
-    carried = Carried.thinned(model.names, draws).later((middle - start) * 1e-9)
-    main = Proposed(model, _weight(found), Known(carried, middle, end))
+    middle, known = (start + end) // 2, None
+    if len(draws) >= FEWEST:
+        carried = Carried.thinned(model.names, draws).later((middle - start) * 1e-9)
+        known = Known(carried, middle, end)
+    main = Proposed(model, _weight(found), known)
     others = [Proposed(choose_model(names), odds * main.weight) for names, odds in _tied(found)]
     others = sorted(others, key=lambda one: -one.weight)[: MOST - 2]
     others = [one for one in others if one.weight >= LEAVES]
@@ -90,7 +92,10 @@ def _since(found: Diagnosis, records: Sequence[Record]) -> int:
 
 
 def _within_bounds(found: Diagnosis) -> tuple[ModelChoice, Array]:
-    """Return the augmented model, where to start with it, and its draws (m, p) inside its box."""
+    """Return the augmented model, where to start with it, and its draws (m, p) inside its box.
+
+    What a record leaves open may reach far beyond the box: that part of it cannot be.
+    """
     structure = found.model
     names = tuple(p.name for p in structure.parameters)
     columns = [found.names.index(name) for name in names]
@@ -98,8 +103,8 @@ def _within_bounds(found: Diagnosis) -> tuple[ModelChoice, Array]:
     lower = np.array([p.lower for p in structure.parameters])
     upper = np.array([p.upper for p in structure.parameters])
     inside = draws[((draws > lower) & (draws < upper)).all(axis=1)]
-    if len(inside) < len(draws) / 2:
-        raise InputError('what was found lies outside the bounds of the catalogue')
+    if not len(inside):
+        return choose_model(found.structure), inside
     start = dict(zip(names, np.median(inside, axis=0).tolist(), strict=True))
     return choose_model(found.structure, start=start), inside
 

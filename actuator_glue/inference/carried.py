@@ -18,7 +18,7 @@ DRAWS = 800
 # What gain-drift moves, and how fast; a gain that would reach zero stays above this.
 _GAIN, _DRIFT, _LEAST_GAIN = 'alpha_1_beta_0', 'gain_drift', 1e-3
 # Fewer say nothing about a covariance.
-_FEWEST = 50
+FEWEST = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,9 +46,9 @@ class Carried:
         draws = self.draws
         if not self.spread:
             object.__setattr__(self, 'spread', (0.0,) * len(self.names))
-        if draws.ndim != 2 or draws.shape[1] != len(self.names) or len(draws) < _FEWEST:
+        if draws.ndim != 2 or draws.shape[1] != len(self.names) or len(draws) < FEWEST:
             raise InputError(
-                f'a prior needs draws ({_FEWEST} or more, {len(self.names)}) of '
+                f'a prior needs draws ({FEWEST} or more, {len(self.names)}) of '
                 f'{", ".join(self.names)}, got shape {draws.shape}'
             )
         if not np.isfinite(draws).all():
@@ -83,19 +83,9 @@ class Carried:
         return replace(self, spread=tuple(float(s) for s in np.hypot(self.spread, steps)))
 
     def later(self, seconds: float) -> Carried:
-        """Return the same as a record that begins so much later [s] has it.
-
-        A gain that drifts counts from the beginning of its record: 1 + r (t + s) is
-        (1 + r s)(1 + r/(1 + r s) t).
-        """
-        if _GAIN not in self.names or _DRIFT not in self.names or seconds == 0.0:
-            return self
-        gain, rate = self.names.index(_GAIN), self.names.index(_DRIFT)
-        draws = self.draws.copy()
-        grown = np.maximum(1.0 + draws[:, rate] * seconds, _LEAST_GAIN)
-        draws[:, gain] *= grown
-        draws[:, rate] /= grown
-        return replace(self, draws=draws)
+        """Return the same as a record that begins so much later [s] has it; see `later`."""
+        draws = later(self.names, self.draws, seconds)
+        return self if draws is self.draws else replace(self, draws=draws)
 
     def widened(self, factor: float) -> Carried:
         """Return the same with `factor` times the variance."""
@@ -137,6 +127,22 @@ class Carried:
             )
         except (KeyError, TypeError, ValueError) as error:
             raise InputError(f'{source}: the carried prior cannot be read ({error})') from error
+
+
+def later(names: tuple[str, ...], draws: Array, seconds: float) -> Array:
+    """Return draws (m, p) as a record that begins so much later [s] has them.
+
+    A gain that drifts counts from the beginning of its record: 1 + r (t + s) is
+    (1 + r s)(1 + r/(1 + r s) t).
+    """
+    if _GAIN not in names or _DRIFT not in names or seconds == 0.0:
+        return draws
+    gain, rate = names.index(_GAIN), names.index(_DRIFT)
+    out = draws.copy()
+    grown = np.maximum(1.0 + out[:, rate] * seconds, _LEAST_GAIN)
+    out[:, gain] *= grown
+    out[:, rate] /= grown
+    return out
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -98,12 +99,27 @@ class Schedule:
 
 @dataclass(slots=True)
 class _Member:
-    """A structure that is carried, and what is kept from its last result."""
+    """A structure that is carried, and what is kept from its last result.
+
+    Attributes:
+        model: the structure.
+        knowledge: what earlier samples say of its parameters.
+        archive: points that its next window starts from.
+        epoch: actuator that they are of.
+        frozen: its last posterior, with which it forecasts where there is no time for it.
+        waited: windows since.
+        before: it was there before those that are carried now: they have to do better.
+        worse: successive windows whose forecasts were worse than of one that was there before.
+    """
 
     model: ModelChoice
     knowledge: Knowledge
     archive: Array | None = None
     epoch: int = -1
+    frozen: FrozenPosterior | None = None
+    waited: int = 0
+    before: bool = False
+    worse: int = 0
 
 
 @dataclass(slots=True)
@@ -167,8 +183,8 @@ class Estimator:
     @property
     def weights(self) -> tuple[tuple[ModelChoice, float], ...]:
         """The structures that are carried and their weights, the likeliest first."""
-        found = structures.weights(self._log_prior, self._evidence).tolist()
-        return tuple((m.model, w) for m, w in zip(self._members, found, strict=True))
+        found = zip(self._members, self._shares().tolist(), strict=True)
+        return tuple((member.model, share) for member, share in found if share > 0.0)
 
     @property
     def tally(self) -> Tally:
@@ -241,14 +257,14 @@ class Estimator:
                 stops = (None,) * len(self._members)
         jobs = [self._job(m, window, stop) for m, stop in zip(self._members, stops, strict=True)]
         ahead = self._ahead.between(window.end, jobs[0].forecast[1], window.record.period)
-        shares = structures.weights(self._log_prior, self._evidence).tolist()
+        shares = self._shares().tolist()
         jobs = [replace(job, weight=share) for job, share in zip(jobs, shares, strict=True)]
         self.running = replace(
             jobs[0],
             ahead=ahead,
             frozen=self._judged(window),
             rivals=tuple(jobs[1:]),
-            proposal=proposal,
+            proposal=None if proposal is None else self.proposal,
         )
         return self.running
 
@@ -283,6 +299,8 @@ class Estimator:
             afresh=afresh,
             stop_at=stop,
             prior=prior,
+            standing=member.frozen if member.epoch == window.epoch else None,
+            waited=member.waited,
         )
 
     def finish(self, result: WindowResult | WindowFit) -> list[Event]:
@@ -300,10 +318,13 @@ class Estimator:
             del self._frozen[:-MAX_FROZEN]
         events: list[Event] = []
         for member, found in zip(self._members, (result, *result.rivals), strict=True):
+            member.waited += 1
             if found.failure:
                 continue
             if found.archive is not None:
-                member.archive, member.epoch = found.archive, window.epoch
+                member.archive, member.epoch, member.waited = found.archive, window.epoch, 0
+            if found.frozen is not None:
+                member.frozen = replace(found.frozen, beside=())
             contradicted = member.knowledge.learn(window, found.learned, found.conflict)
             # What a less likely structure contradicts is its own affair.
             events += contradicted if member is self._members[0] else []
@@ -313,20 +334,40 @@ class Estimator:
         return [*events, *self._weigh(result)]
 
     def _begin(self, proposal: Proposal) -> None:
-        """Carry these structures from now on; what one of them has learned before goes on."""
-        self.proposal, self._pending = proposal, None
-        old = {member.model: member for member in self._members}
-        began = self._members[0].knowledge.began_ns if self._members else None
-        self._members = []
+        """Carry these structures from now on; what one of them has learned before goes on.
+
+        Where there are several, Eq. (2) among them and what led before are what they have to do
+        better than.
+        """
+        self._pending = None
+        led = self._members[0] if self._members else None
+        began = None if led is None else led.knowledge.began_ns
+        old = {frozenset(member.model.effects): member for member in self._members}
+        self._members, told = [], []
         for one in proposal.structures:
-            member = None if one.known is not None else old.get(one.model)
-            if member is None:
+            member = None if one.known is not None else old.get(frozenset(one.model.effects))
+            if member is None or _box(member.model) != _box(one.model):
                 known = Knowledge(self.settings, self._carried, one.known, began)
                 member = _Member(one.model, known)
+            member.before, member.worse = False, 0
             self._members.append(member)
+            told.append(replace(one, model=member.model))
+        self.proposal = replace(proposal, structures=tuple(told))
         self._log_prior = proposal.log_weights
+        if len(self._members) > 1:
+            for member in self._members:
+                member.before = not member.model.effects
+            names = {frozenset(member.model.effects) for member in self._members}
+            if led is not None and frozenset(led.model.effects) not in names:
+                led.before, led.worse = True, 0
+                self._members.append(led)
+                self._log_prior = np.append(self._log_prior, np.log(structures.BEFORE))
         self._evidence = np.zeros(len(self._members))
         self._judged_to = None
+
+    def _shares(self) -> Array:
+        """Return the weights (K,) of all members; 0 of what is only compared with any more."""
+        return structures.weights(self._log_prior, self._evidence)
 
     def _weigh(self, result: WindowResult | WindowFit) -> list[Event]:
         """Move weights by the forecasts that a window has judged; what has none left leaves."""
@@ -343,10 +384,16 @@ class Estimator:
         memory = structures.MEMORY * settings.window
         self._evidence = structures.moved(self._evidence, result.errors, material, since, memory)
         before = self._members[0].model
-        shares = structures.weights(self._log_prior, self._evidence)
+        worse = self._outdone(result.errors, material)
+        shares = self._shares()
+        carried = np.isfinite(self._log_prior)
         order = [int(i) for i in np.argsort(-shares, kind='stable')]
-        kept = [i for i in order if shares[i] >= structures.LEAVES]
-        left = [self._members[i].model for i in order if shares[i] < structures.LEAVES]
+        out = [i for i in order if shares[i] < structures.LEAVES]
+        left = [self._members[i].model for i in out if carried[i]]
+        left = [before, *left] if worse else left
+        # Eq. (2) takes no time and goes on beside others: what they bring is held against it.
+        self._log_prior[out] = -np.inf
+        kept = [i for i in order if i not in out or self._compared(i)]
         self._members = [self._members[i] for i in kept]
         self._log_prior, self._evidence = self._log_prior[kept], self._evidence[kept]
         if not left and self._members[0].model is before:
@@ -361,9 +408,42 @@ class Estimator:
                 now,
                 tuple(model.effects for model in left),
                 f'forecasts up to sample {window.end} weigh {said}'
-                + (f'; no longer carried: {gone}' if gone else ''),
+                + (f'; no longer carried: {gone}' if gone else '')
+                + (f'; {structure_name(before.effects)} made them worse' if worse else ''),
+                worse,
             )
         ]
+
+    def _compared(self, i: int) -> bool:
+        """Whether a structure goes on without weight, for others to be held against."""
+        member = self._members[i]
+        return member.before and not member.model.effects
+
+    def _outdone(self, errors: Sequence[float], material: float) -> bool:
+        """Have the leading structure leave where it makes forecasts worse; return whether it does.
+
+        It does where they were worse than those of what was there before it, by more than what
+        matters, in so many successive windows; that takes its place.
+        """
+        leading = self._members[0]
+        rivals = [
+            (error, i)
+            for i, (member, error) in enumerate(zip(self._members, errors, strict=True))
+            if i > 0 and member.before and np.isfinite(error)
+        ]
+        for member in self._members[1:]:
+            member.worse = 0
+        if not leading.model.effects or not rivals or not np.isfinite(errors[0]):
+            return False
+        least, best = min(rivals)
+        leading.worse = leading.worse + 1 if errors[0] > least + material**2 else 0
+        lasts = max(structures.WORSE, math.ceil(structures.WORSE_SECONDS / self.settings.hop))
+        if leading.worse < lasts:
+            return False
+        self._log_prior[best] = max(self._log_prior[0], self._log_prior[best])
+        self._evidence[best] = max(self._evidence[0], self._evidence[best])
+        self._log_prior[0] = -np.inf
+        return True
 
     def abandon(self, reason: str) -> list[Event]:
         """Give up the running job, whose process has died."""
@@ -402,6 +482,12 @@ class Estimator:
             return None
         self._applied = len(due)
         return Proposal.of(due[-1])
+
+
+def _box(model: ModelChoice) -> dict[str, tuple[float, float]]:
+    """Return the bounds of each parameter, in whatever order they come."""
+    pairs = zip(model.lower, model.upper, strict=True)
+    return dict(zip(model.names, pairs, strict=True))
 
 
 def _key(window: Window) -> tuple[int, int]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import TypeAlias
@@ -30,6 +30,8 @@ Expired: TypeAlias = Callable[[float], bool]
 # Share of the time budget after which no further structure is begun: half of it is what one with
 # effects takes until it is warm.
 _BEGIN = 0.5
+# A structure that has not been sampled in so many windows has the other half.
+PATIENCE = 3
 # Draws whose mean response is the forecast that a structure's weight is judged by.
 _FEW = 32
 # Generations that R-hat and ESS are computed from.
@@ -69,7 +71,8 @@ class WindowResult:
         structures: effects of each structure that the numbers above are a mixture of, the
             likeliest first, which is `model`.
         weights: their weights, fixed before the window.
-        spent: likelihood evaluations of each.
+        spent: likelihood evaluations of each, then of Eq. (2) where they are only held against it.
+        parts: model and posterior of each by itself; None for one that has none yet.
         draws: some draws of the mixture, shape (m, p): where one structure is carried, those that
             the next window starts from.
     """
@@ -102,6 +105,7 @@ class WindowResult:
     structures: tuple[tuple[str, ...], ...] = ()
     weights: tuple[float, ...] = ()
     spent: tuple[int, ...] = ()
+    parts: tuple[tuple[ModelChoice, Moments] | None, ...] = ()
     draws: Array | None = None
 
 
@@ -123,18 +127,31 @@ def fit(job: Job, expired: Expired | None = None) -> WindowFit:
     """Do the first part of `run`, all that the next job needs; a window may fail.
 
     Where several structures are carried, those without effects come first, for they are quick.
-    The likeliest has all the time that is left then; of the others those that there is still
-    time for: what one of them knew stays as it was.
+    The likeliest has all the time that is left then; of the others, who waited longest first,
+    those that there is still time for. Who has waited `PATIENCE` windows has half of the time.
+    One that is not sampled keeps its posterior, and forecasts with it.
     """
     jobs = (job, *job.rivals)
-    found = [WindowFit(job.window, one.model, failure='no time was left') for one in jobs]
-    for i in sorted(range(len(jobs)), key=lambda i: (bool(jobs[i].model.effects), i)):
-        if i > 0 and _no_time(jobs[i], expired):
+    found = [
+        WindowFit(job.window, one.model, frozen=sampling.stands(one), failure='no time was left')
+        for one in jobs
+    ]
+    stepped = [i for i in range(1, len(jobs)) if jobs[i].model.effects]
+    stepped.sort(key=lambda i: (-jobs[i].waited, i))
+    due = stepped[0] if stepped and jobs[stepped[0]].waited >= PATIENCE else None
+    quick = [i for i in range(len(jobs)) if not jobs[i].model.effects]
+    for i in dict.fromkeys((*quick, 0, *stepped)):
+        if i > 0 and i != due and _no_time(jobs[i], expired):
             continue
-        limit = None if expired is None else partial(expired, 1.0)
-        found[i] = _fit(jobs[i], limit)
-        if found[i].failure and i == 0:
-            return found[0]
+        if i > 0 and jobs[i].stop_at == 0:
+            continue
+        share = _BEGIN if i == 0 and due is not None else 1.0
+        sampled = _fit(jobs[i], None if expired is None else partial(expired, share))
+        if i == 0 and sampled.failure:
+            return sampled
+        found[i] = (
+            sampled if i == 0 or _warm(sampled) else replace(sampled, frozen=found[i].frozen)
+        )
     leading, *rivals = found
     if not rivals:
         return leading
@@ -155,10 +172,13 @@ def _fit(job: Job, expired: Callable[[], bool] | None) -> WindowFit:
         return WindowFit(job.window, job.model, failure=str(error))
 
 
+def _warm(fitted: WindowFit) -> bool:
+    """Whether chains have arrived at their posterior: before that they forecast nothing."""
+    return fitted.chains is not None and fitted.chains.annealed
+
+
 def _no_time(job: Job, expired: Expired | None) -> bool:
-    """Whether a structure is passed over in this window, as it was where that is repeated."""
-    if job.stop_at is not None:
-        return job.stop_at == 0
+    """Whether a structure is passed over in this window."""
     return expired is not None and bool(job.model.effects) and expired(_BEGIN)
 
 
@@ -223,7 +243,8 @@ def _report(job: Job, fitted: WindowFit, limits: bool) -> WindowResult:
         return _failed(job, fitted, fitted.failure)
     # R-hat and ESS of very many draws would cost more than the sampling.
     rhat, ess = rhat_and_ess(chains.kept[:: max(1, len(chains.kept) // DIAGNOSED)])
-    posterior = _mixed(job, fitted, chains)
+    each = _each(job, fitted, chains)
+    posterior = _mixed(job, each)
     summary = moments(posterior, *model.bounds)
     drawn = posterior[sampling.spread(len(posterior), settings.draws)]
     scored = [p for old in job.frozen for p in _score(job, old)]
@@ -254,10 +275,14 @@ def _report(job: Job, fitted: WindowFit, limits: bool) -> WindowResult:
         conflict=fitted.conflict,
         rivals=_lean(fitted),
         errors=fitted.errors,
-        structures=tuple(one.model.effects for one in (job, *job.rivals)),
-        weights=tuple(one.weight for one in (job, *job.rivals)),
+        structures=tuple(one.model.effects for one, _ in each),
+        weights=tuple(one.weight for one, _ in each),
         spent=tuple(
             0 if one.chains is None else one.chains.evaluations for one in (fitted, *fitted.rivals)
+        ),
+        parts=tuple(
+            None if draws is None else (one.model, moments(draws, *one.model.bounds))
+            for one, draws in each
         ),
         draws=posterior[sampling.spread(len(posterior), sampling.ARCHIVE)],
     )
@@ -268,12 +293,22 @@ def _lean(fitted: WindowFit) -> tuple[WindowFit, ...]:
     return tuple(replace(one, chains=None) for one in fitted.rivals)
 
 
-def _mixed(job: Job, fitted: WindowFit, chains: Chains) -> Array:
-    """Return draws (m, p) of all structures, each with its weight."""
-    parts = [(job.weight, job.model.names, chains.posterior())]
+def _each(job: Job, fitted: WindowFit, chains: Chains) -> list[tuple[Job, Array | None]]:
+    """Return each structure that has a weight, with draws (m, p); None before it has any."""
+    found: list[tuple[Job, Array | None]] = [(job, chains.posterior())]
     for rival, one in zip(job.rivals, fitted.rivals, strict=True):
-        if one.chains is not None:
-            parts.append((rival.weight, rival.model.names, one.chains.posterior()))
+        if rival.weight == 0.0:
+            continue
+        draws = None if one.frozen is None else one.frozen.draws
+        if one.chains is not None and _warm(one):
+            draws = one.chains.posterior()
+        found.append((rival, draws))
+    return found
+
+
+def _mixed(job: Job, each: Sequence[tuple[Job, Array | None]]) -> Array:
+    """Return draws (m, p) of all structures, each with its weight."""
+    parts = [(one.weight, one.model.names, draws) for one, draws in each if draws is not None]
     rng = np.random.default_rng((job.settings.seed, job.window.record.first_index, 3))
     return pooled(job.model.names, parts, rng)
 

@@ -1,8 +1,9 @@
 """When a stream is diagnosed, and what follows: a state and a step, without clock, ROS or data.
 
 A diagnosis is due when coverage breaks, when the estimator's prior is contradicted, and, while
-names are tied or structure remains, each time that twice as much has been received. What it says
-replaces what was added before: an addition that later data contradict is taken out.
+names are tied, structure remains or one of these alarms stands, each time that twice as much has
+been received. What it says replaces what was added before: an addition that later data contradict
+is taken out, one that they do not support any more is carried beside Eq. (2) until forecasts tell.
 """
 
 from __future__ import annotations
@@ -15,9 +16,10 @@ from typing import TypeAlias
 import numpy as np
 
 from actuator_glue.inference.carried import Carried, Drift
+from actuator_glue.inference.choice import choose_model
 from actuator_glue.online.knowledge import Known
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.structures import Proposal
+from actuator_glue.online.structures import Proposal, Proposed
 
 # The likeliest structure is proposed again where it has less weight than this by now.
 _DOUBTED = 0.5
@@ -109,12 +111,15 @@ class Concluded:
         why_not: why there is no proposal, for people.
         left_open: names are tied, or structure remains.
         apply: the estimator is to carry it; None for what the settings say.
+        supported: effects that the data support, whether they may be carried or not; None where
+            nothing was learned of that.
     """
 
     proposal: Proposal | None = None
     why_not: str = ''
     left_open: bool = False
     apply: bool | None = None
+    supported: frozenset[str] | None = None
 
 
 Input: TypeAlias = Received | Judged | Carries | Estimated | Began | Asked | Concluded
@@ -264,15 +269,20 @@ def _began(state: LiveState) -> LiveState:
 
 
 def _concluded(state: LiveState, given: Concluded) -> tuple[LiveState, tuple[Action, ...]]:
-    state = replace(state, running=False, left_open=given.left_open)
+    # An alarm of meanwhile is of samples that it has mostly seen, or of what is replaced now.
+    state = replace(state, running=False, left_open=given.left_open, reason='')
     apply = state.settings.apply if given.apply is None else given.apply
     if not apply:
         return state, ()
+    leading, weight = state.weights[0] if state.weights else (frozenset(), 1.0)
     if given.proposal is None:
+        doubted = () if given.supported is None else tuple(sorted(leading - given.supported))
+        if doubted:
+            doubt = Say('in doubt', f'{", ".join(doubted)}: {given.why_not}')
+            return _began(state), (doubt, Carry(_evenly(leading)))
         said = (Say('diagnosis', f'the estimator goes on as it is: {given.why_not}'),)
         return state, said if given.why_not else ()
     wanted = frozenset(given.proposal.structures[0].model.effects)
-    leading, weight = state.weights[0] if state.weights else (frozenset(), 1.0)
     if wanted == leading and weight >= _DOUBTED:
         return state, ()
     out = tuple(sorted(leading - wanted))
@@ -282,6 +292,12 @@ def _concluded(state: LiveState, given: Concluded) -> tuple[LiveState, tuple[Act
     return _began(state), (*told, Carry(given.proposal, out))
 
 
+def _evenly(effects: frozenset[str]) -> Proposal:
+    """Return effects and Eq. (2) alone, as likely as each other: forecasts tell which."""
+    both = tuple(sorted(effects)), ()
+    return Proposal(tuple(Proposed(choose_model(names), 0.5) for names in both))
+
+
 def _due(state: LiveState) -> str:
     """Return why a diagnosis is due; empty where none is."""
     settings, seconds = state.settings, state.seconds
@@ -289,8 +305,13 @@ def _due(state: LiveState) -> str:
         return ''
     if state.reason and not seconds < state.looked + settings.pause:
         return state.reason
-    if state.left_open and seconds >= 2.0 * state.looked:
+    # Before the first one there is nothing to look at again.
+    if not seconds >= 2.0 * state.looked:
+        return ''
+    if state.left_open:
         return 'names are tied or structure remains, and there are twice as many data'
+    if state.broken or state.contradicted:
+        return 'the alarm still stands, and there are twice as many data'
     return ''
 
 

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.errors import InputError
-from actuator_glue.inference.carried import Carried
+from actuator_glue.inference.carried import Carried, later
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.inference.convergence import quick_rhat_and_ess
 from actuator_glue.inference.posterior import Problem, Target, sample
-from actuator_glue.inference.predictive import fit_residual
+from actuator_glue.inference.predictive import ResidualModel, fit_residual
 from actuator_glue.inference.prior_conflict import Conflict, conflict
 from actuator_glue.inference.settings import SamplerSettings
 from actuator_glue.inference.state import State
@@ -60,6 +60,8 @@ class Job:
         rivals: what other structures that are carried have to do for the same window.
         weight: weight of the model among them, before the window.
         proposal: what is carried from this window on, where that is new.
+        standing: the structure's last posterior; it forecasts with that where it is not sampled.
+        waited: windows that it has not been sampled in.
     """
 
     window: Window
@@ -74,6 +76,8 @@ class Job:
     rivals: tuple[Job, ...] = ()
     weight: float = 1.0
     proposal: Proposal | None = None
+    standing: FrozenPosterior | None = None
+    waited: int = 0
 
     @property
     def evaluations(self) -> int:
@@ -165,7 +169,6 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> WindowFit:
     best = fitting.simulate(job.model, chains.best[np.newaxis], record)[0]
     residual = (record.measured - best)[settle:]
     rms_error = float(residual.std())
-    start, stop = job.forecast
     return WindowFit(
         window=job.window,
         model=job.model,
@@ -173,27 +176,51 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> WindowFit:
         rms_error=rms_error,
         nrmse=rms_error / moved,
         shaping_factor=shaping,
-        frozen=FrozenPosterior(
-            number=job.window.number,
-            segment=job.window.segment,
-            start=start,
-            stop=stop,
-            model=job.model,
-            draws=posterior[spread(len(posterior), job.settings.draws)],
-            residual=fit_residual(residual, parameters=len(job.model.names)),
-            noise=sensor_noise(residual, record.command[settle:], white),
-            past=_past(job, start),
-            weight=job.weight,
+        frozen=_frozen(
+            job,
+            posterior[spread(len(posterior), job.settings.draws)],
+            fit_residual(residual, parameters=len(job.model.names)),
+            sensor_noise(residual, record.command[settle:], white),
         ),
         archive=joined(posterior[spread(len(posterior), ARCHIVE)], job.archive),
         learned=(
             Carried.thinned(job.model.names, posterior)
-            if job.settings.prior == 'sequential'
+            if job.settings.prior == 'sequential' and chains.annealed
             else None
         ),
         conflict=None if target.prior is None else conflict(target.prior, posterior),
         complete=complete,
     )
+
+
+def _frozen(job: Job, draws: Array, residual: ResidualModel, noise: float) -> FrozenPosterior:
+    """Return draws (m, p) as they forecast from the end of a job's window on."""
+    start, stop = job.forecast
+    return FrozenPosterior(
+        number=job.window.number,
+        segment=job.window.segment,
+        start=start,
+        stop=stop,
+        model=job.model,
+        draws=draws,
+        residual=residual,
+        noise=noise,
+        past=_past(job, start),
+        weight=job.weight,
+    )
+
+
+def stands(job: Job) -> FrozenPosterior | None:
+    """Return what a structure forecasts with that is not sampled in a window: its last posterior.
+
+    None where it has none yet. A gain that drifts has gone on.
+    """
+    old = job.standing
+    if old is None:
+        return None
+    seconds = (job.window.record.start_ns - old.past.start_ns) * 1e-9
+    draws = later(job.model.names, old.draws, seconds)
+    return _frozen(job, draws, old.residual, old.noise)
 
 
 def _past(job: Job, start: int) -> Record:

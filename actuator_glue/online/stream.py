@@ -106,6 +106,7 @@ class Reweighed:
         weights: effects of each structure that is carried, and its weight, the likeliest first.
         left: effects of those that left.
         message: for people.
+        worse: the likeliest has left because it made forecasts worse.
     """
 
     number: int
@@ -113,6 +114,7 @@ class Reweighed:
     weights: tuple[tuple[tuple[str, ...], float], ...]
     left: tuple[tuple[str, ...], ...]
     message: str
+    worse: bool = False
 
 
 def structure_name(effects: Sequence[str]) -> str:

@@ -36,6 +36,11 @@ MOST = 3
 MATERIAL = 0.5
 # No single forecast costs more than this many (error/m)^2: it may have diverged.
 _WORST = 1e3
+# Weight of what led before, beside what is carried in its place: forecasts may bring it back.
+BEFORE = 0.02
+# A structure that leads leaves after so many windows, and so long, of forecasts that were worse
+# than those of what was there before it.
+WORSE, WORSE_SECONDS = 3, 1.0
 
 
 @dataclass(frozen=True, slots=True)
