@@ -185,12 +185,26 @@ def posterior(result: WindowResult, seconds: float) -> tuple[Head, Fields]:
         'structures': [structure_name(effects) for effects in result.structures],
         'weights': list(result.weights),
         'structure_evaluations': list(result.spent),
+        **_if_true(result),
     }
     for name, mean, stddev in zip(result.model.names, moments.mean, moments.stddev, strict=True):
         if name in ('beta_1', 'alpha_1_beta_0', 'alpha_2', 'alpha_3'):
             fields[f'{name}_mean'] = float(mean)
             fields[f'{name}_stddev'] = float(stddev)
     return Head(record.stamp_ns(len(record) - 1), record.actuator), fields
+
+
+def _if_true(result: WindowResult) -> Fields:
+    """Return the fields that tell each structure's own posterior; empty for one that has none."""
+    parts = [part for part in result.parts if part is not None]
+    empty = np.empty(0)
+    return {
+        'structure_sizes': [0 if part is None else len(part[0].names) for part in result.parts],
+        'structure_parameter_names': [name for model, _ in parts for name in model.names],
+        'structure_units': [unit for model, _ in parts for unit in model.units],
+        'structure_mean': np.concatenate([empty, *(one.mean for _, one in parts)]),
+        'structure_stddev': np.concatenate([empty, *(one.stddev for _, one in parts)]),
+    }
 
 
 def draws(result: WindowResult) -> tuple[Head, Fields]:

@@ -145,6 +145,23 @@ def test_bands_are_those_of_the_mixture_and_scored_as_they_were_frozen(ran):
             assert share == pytest.approx(weight[part.model.effects], abs=0.01)
 
 
+def test_each_structure_tells_what_the_parameters_are_if_it_is_true(ran):
+    result = next(r for r in ran[0] if len(r.structures) > 1)
+    told = conversion.posterior(result, 0.0)[1]
+    assert told['structures'] == ['Eq. (2)', 'backlash'] and told['structure_sizes'] == [4, 5]
+    assert told['structure_parameter_names'] == [*NAMES, *NAMES, 'backlash']
+    assert told['structure_units'][-1] == 'm'
+    plain, play = (part[1] for part in result.parts)
+    assert abs(play.mean[-1] - SIZE) < 4.0 * play.stddev[-1] < 1e-5
+    # What Eq. (2) alone makes of lost motion is another lag.
+    assert abs(plain.mean[0] - play.mean[0]) > 3.0 * np.hypot(plain.stddev[0], play.stddev[0])
+    # What is published above them is their mixture: a tenth of 400 draws is 30 to 50.
+    mixed = 0.9 * plain.mean[0] + 0.1 * play.mean[0]
+    assert told['mean'][0] == pytest.approx(mixed, rel=0.02)
+    alone = next(r for r in ran[0] if len(r.structures) == 1)
+    np.testing.assert_array_equal(alone.parts[0][1].mean, alone.moments.mean)
+
+
 def test_a_replay_repeats_weights_and_mixtures_to_the_last_bit(ran):
     found, _, models, _ = ran
     done = {
