@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias, TypeGuard, cast
+from typing import Any, Literal, TypeAlias, TypeGuard, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from actuator_glue.errors import InputError
+from actuator_glue.even_times import uniform_period
 from actuator_glue.given import number
+from actuator_glue.si import FORCE, LENGTH
 
 Array: TypeAlias = NDArray[np.float64]
 Hold: TypeAlias = Literal['zoh', 'linear']
@@ -71,6 +74,53 @@ def _column(values: ArrayLike, name: str, unit: str, limit: float, source: str) 
         )
     column.flags.writeable = False
     return column
+
+
+def _factor(unit: str, known: Mapping[str, float], name: str) -> float:
+    """Return how many SI units one unit is.
+
+    Raises:
+        InputError: a unit that is not known.
+    """
+    if not isinstance(unit, str) or unit not in known:
+        listed = ', '.join(u for u in known if u.isascii())
+        raise InputError(f'{name} {unit!r} is not known; use one of {listed}')
+    return known[unit]
+
+
+def _universal(time: Any) -> Any:
+    """Return a datetime without its zone, that of UTC; one that has none stays as it is."""
+    ahead = time.utcoffset()
+    return time if ahead is None else time.replace(tzinfo=None) - ahead
+
+
+def _clock(time: ArrayLike, source: str) -> tuple[float, int]:
+    """Return the period [s] of times in seconds or as datetimes, and the first one [ns].
+
+    Raises:
+        InputError: no list of times, or none of even steps.
+    """
+    where = source or 'time'
+    column = np.asarray(time)
+    if column.ndim != 1:
+        raise InputError(f'{where}: time must be one-dimensional, got shape {column.shape}')
+    if column.dtype.kind == 'O' and all(hasattr(t, 'utcoffset') for t in column):
+        column = np.array([_universal(t) for t in column], dtype='datetime64[ns]')
+    if column.dtype.kind == 'M':
+        if np.isnat(column).any():
+            raise InputError(f'{where}: time has no date at sample {np.isnat(column).argmax()}')
+        stamps = column.astype('datetime64[ns]').astype(np.int64)
+        first = int(stamps[0]) if len(stamps) else 0
+        return uniform_period(1e-9 * (stamps - first).astype(np.float64), where), first
+    if column.dtype.kind == 'm':
+        column = column / np.timedelta64(1, 's')
+    try:
+        seconds = numbers(column)
+    except (TypeError, ValueError) as error:
+        raise InputError(
+            f'{where}: time is no list of seconds or of datetimes ({error})'
+        ) from error
+    return uniform_period(seconds, where), max(round(float(seconds[0]) * 1e9), 0)
 
 
 def check_stiffness(stiffness: float, source: str = '') -> float:
@@ -170,6 +220,62 @@ class Record:
         check_hold(self.hold, self.source)
         if self.stiffness is not None:
             put(self, 'stiffness', check_stiffness(self.stiffness, self.source))
+
+    @classmethod
+    def from_arrays(
+        cls,
+        time: ArrayLike,
+        command: ArrayLike,
+        measured: ArrayLike,
+        force: ArrayLike | None = None,
+        *,
+        unit: str,
+        force_unit: str = 'N',
+        stiffness: float | None = None,
+        hold: Hold = 'zoh',
+    ) -> Record:
+        """Return the record of a test whose channels are arrays, columns of a table or lists.
+
+        Args:
+            time: when each sample was taken, shape (n,): seconds, or datetimes of numpy or pandas.
+            command: commanded displacement, shape (n,) [unit].
+            measured: measured displacement, shape (n,) [unit].
+            force: measured actuator force, shape (n,) [force_unit]; None where there is none.
+            unit: of both displacements, 'm', 'mm', 'um', 'cm' or 'in'.
+            force_unit: 'N', 'kN', 'MN', 'lbf' or 'kip'.
+            stiffness: specimen stiffness [N/m], 0 for a free actuator; None where not known.
+            hold: how the command runs between its samples, 'zoh' or 'linear'.
+
+        Raises:
+            InputError: times that are not even, a unit that is not known, and as `Record`.
+
+        Example:
+            >>> Record.from_arrays([0.0, 0.01, 0.02], [0, 1, 2], [0, 0, 1], unit='mm')
+            Record(actuator: 3 samples at 100 Hz (0.03 s), stiffness not known, zoh)
+        """
+        length, newton = _factor(unit, LENGTH, 'unit'), _factor(force_unit, FORCE, 'force_unit')
+        period, start_ns = _clock(time, '')
+        channels = {'command': command, 'measured': measured}
+        if force is not None:
+            channels['force'] = force
+        columns = {}
+        for name, values in channels.items():
+            try:
+                column = numbers(values) * (newton if name == 'force' else length)
+            except (TypeError, ValueError) as error:
+                raise InputError(f'{name} is not a list of numbers ({error})') from error
+            if len(column) != np.size(time):
+                raise InputError(f'{name} has {len(column)} samples, time has {np.size(time)}')
+            columns[name] = column
+        return cls(
+            command=columns['command'],
+            measured=columns['measured'],
+            period=period,
+            stiffness=stiffness,
+            force=columns.get('force'),
+            start_ns=start_ns,
+            hold=hold,
+        )
 
     def __len__(self) -> int:
         return len(self.command)

@@ -177,7 +177,7 @@ def _row(column: ColumnLook, found: FileLook) -> tuple[str, ...]:
 def _remark(column: ColumnLook) -> str:
     if column.times is not None:
         return f'{column.rate:.6g} messages/s' if column.rate else ''
-    from actuator_glue.io.time_base import uneven
+    from actuator_glue.even_times import uneven
 
     if column.counts:
         return 'goes up by one'

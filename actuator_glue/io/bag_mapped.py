@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 
 from actuator_glue.errors import InputError
+from actuator_glue.even_times import near_whole_rate
 from actuator_glue.io.bag_reader import Note, refuse, summarise, warn_caller
 from actuator_glue.io.bag_topics import Stamps, TopicSeries, topic_series
 from actuator_glue.io.channel_map import ChannelMap
 from actuator_glue.io.laboratory import in_si
-from actuator_glue.io.time_base import near_whole_rate
 from actuator_glue.records import Array, Hold, Record
 
 # A step of so many periods is a gap, whatever the clock does after it.

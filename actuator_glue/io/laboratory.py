@@ -14,7 +14,7 @@ from actuator_glue.io.channel_map import Channel, ChannelMap, read_channel_map
 from actuator_glue.io.formats import Column, FileTable, format_of
 from actuator_glue.io.resample import resample_evenly
 from actuator_glue.io.signature import refuse_pipe
-from actuator_glue.io.time_base import uniform_period
+from actuator_glue.even_times import uniform_period
 from actuator_glue.io.units import FLOAT32_COUNTS, ROLES, choose, factor, recognise
 from actuator_glue.rate_check import APART, disagreement, rate_by_clock
 from actuator_glue.records import Array, Hold, Record

@@ -8,8 +8,8 @@ from itertools import combinations, permutations
 
 import numpy as np
 
+from actuator_glue.even_times import uneven
 from actuator_glue.io.look import ColumnLook, FileLook
-from actuator_glue.io.time_base import uneven
 from actuator_glue.io.units import ANGLES, OF_NO_LENGTH, ROLES
 from actuator_glue.records import SLOWEST_RATE, Array
 from actuator_glue.velocity_command import is_velocity

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_glue.errors import InputError
-from actuator_glue.io.time_base import span
+from actuator_glue.even_times import span
 from actuator_glue.records import Array
 
 # Of the mean rate of the samples: below, what is faster would be folded into the band; far above

@@ -10,10 +10,10 @@ import pytest
 import actuator_glue as ag
 from actuator_glue.cli.main import main
 from actuator_glue.errors import InputError
+from actuator_glue.even_times import uniform_period
 from actuator_glue.io.channel_map import parse_channel_map
 from actuator_glue.io.load import load_records
 from actuator_glue.io.look import look
-from actuator_glue.io.time_base import uniform_period
 
 COUNT = 6000
 NUMBER = np.arange(COUNT)

@@ -15,12 +15,12 @@ from scipy.io import savemat
 
 from actuator_glue.cli._save import add_out
 from actuator_glue.errors import InputError
+from actuator_glue.even_times import uniform_period
 from actuator_glue.io import formats
 from actuator_glue.io.channel_map import Channel, ChannelMap, parse_channel_map, read_channel_map
 from actuator_glue.io.export import write
 from actuator_glue.io.laboratory import read
 from actuator_glue.io.load import load_records
-from actuator_glue.io.time_base import uniform_period
 from actuator_glue.records import Record
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
 import numpy as np
+from numpy.typing import NDArray
 
 from actuator_glue.errors import InputError
-from actuator_glue.records import Array
+
+Array: TypeAlias = NDArray[np.float64]
 
 # A sample may lie this far off the uniform grid, in periods: rounded time stamps do.
 _TOLERANCE = 0.25
@@ -59,11 +63,12 @@ def uniform_period(time: Array, where: str) -> float:
     if uneven(steps):
         # Stamps rounded to milliseconds lie within one of them of an even clock, jitter does not.
         if not off[at] <= rounding < period:
+            near = _near(1.0 / period)
             raise InputError(
                 f'{where}: samples are not uniform in time: the clock is jittered, its steps are '
-                f'{span(steps)}; a record has even steps: --resample {_near(1.0 / period)} makes '
-                'straight lines between, and tells what that costs; better log with the '
-                "controller's clock"
+                f'{span(steps)}; a record has even steps: --resample {near} (in Python '
+                f'`load(path, resample={near})`) makes straight lines between, and tells what '
+                "that costs; better log with the controller's clock"
             )
         return near_whole_rate(period, len(time), rounding)
     gap = int((steps > 1.5 * typical).argmax())
