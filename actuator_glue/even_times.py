@@ -44,11 +44,14 @@ def uniform_period(time: Array, where: str) -> float:
         at = int(back.argmax())
         how, remedy = 'goes back', 'sort the record, or cut it there'
         if steps[at] == 0.0:
-            how, remedy = (
-                'stands still',
-                'cut the record there; where the times are only rounded, and the rate of the '
-                'controller is known, a channel map says it in place of them',
-            )
+            how, remedy = 'stands still', 'cut the record there'
+            if steps.min() == 0.0 < steps.max():
+                near = near_rate(time)
+                remedy += (
+                    '; where the times are only rounded or those of a log, and the samples are '
+                    f'even, --resample {near} (in Python `load(path, resample={near})`) takes an '
+                    'even clock in place of them'
+                )
         raise InputError(
             f'{where}: time {how} at sample {at + 1} ({time[at]:.9g} s, then '
             f'{time[at + 1]:.9g} s); {remedy}'
@@ -59,18 +62,18 @@ def uniform_period(time: Array, where: str) -> float:
     off -= period * np.arange(len(time))
     np.abs(off, out=off)
     at = int(off.argmax())
-    rounding = _rounding(time)
+    rounded = rounding(time)
     if uneven(steps):
         # Stamps rounded to milliseconds lie within one of them of an even clock, jitter does not.
-        if not off[at] <= rounding < period:
-            near = _near(1.0 / period)
+        if not off[at] <= rounded < period:
+            near = near_rate(time)
             raise InputError(
                 f'{where}: samples are not uniform in time: the clock is jittered, its steps are '
                 f'{span(steps)}; a record has even steps: --resample {near} (in Python '
-                f'`load(path, resample={near})`) makes straight lines between, and tells what '
-                "that costs; better log with the controller's clock"
+                f'`load(path, resample={near})`) makes them even, and tells what that '
+                "costs; better log with the controller's clock"
             )
-        return near_whole_rate(period, len(time), rounding)
+        return near_whole_rate(period, len(time), rounded)
     gap = int((steps > 1.5 * typical).argmax())
     # A step between 1.5 and 1.75 periods may be two rounded stamps; a longer one is a gap.
     if steps[gap] > (1.5 + _TOLERANCE) * typical:
@@ -81,13 +84,14 @@ def uniform_period(time: Array, where: str) -> float:
     if off[at] > _TOLERANCE * period:
         raise InputError(
             f'{where}: samples are not uniform in time: sample {at} is {off[at] / period:.2g} '
-            'periods off an even clock; resample the record'
+            f'periods off an even clock; --resample {near_rate(time)} makes them even'
         )
-    return near_whole_rate(period, len(time), rounding)
+    return near_whole_rate(period, len(time), rounded)
 
 
-def _near(rate: float) -> str:
-    """Return a round number of samples per second near a mean one."""
+def near_rate(time: Array) -> str:
+    """Return a round number of samples per second near the mean one of times [Hz]."""
+    rate = (len(time) - 1) / float(time[-1] - time[0])
     return f'{rate:.2g}' if rate < 100.0 else f'{round(rate, -1):.0f}'
 
 
@@ -112,7 +116,7 @@ def span(steps: Array) -> str:
     return ' to '.join(f'{end:.2g}' if end < 100.0 else f'{end:.0f}' for end in ends) + ' ms'
 
 
-def _rounding(time: Array) -> float:
+def rounding(time: Array) -> float:
     """Return the decimal step to which times are rounded [s]; 0 where they are not."""
     passed = time - time[0]
     for decimals in range(_DECIMALS + 1):

@@ -22,7 +22,7 @@ def add_records(parser: argparse.ArgumentParser) -> None:
 
 
 def add_reading(parser: argparse.ArgumentParser) -> None:
-    """Add --stiffness, --channels, --hold, --resample and --split."""
+    """Add --stiffness, --channels, --hold, --resample, --resample-by and --split."""
     parser.add_argument(
         '--stiffness',
         action='append',
@@ -44,8 +44,15 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
         '--resample',
         type=number,
         metavar='HZ',
-        help='make the jittered clock of a file even by straight lines between its samples; what '
-        'is lost is told beside the record',
+        help='make the jittered clock of a file even; what is lost, and how far its stamps may be '
+        'off, is told beside the record',
+    )
+    parser.add_argument(
+        '--resample-by',
+        choices=('band-limited', 'lines'),
+        default='band-limited',
+        help='how: band-limited keeps more of what is fast, straight lines make no overshoot at '
+        'steps (default band-limited)',
     )
     parser.add_argument(
         '--split',
@@ -69,6 +76,7 @@ def load(args: argparse.Namespace) -> list[Record]:
         channels=args.channels,
         hold=args.hold,
         resample=args.resample,
+        resample_by=args.resample_by,
         gap=note if args.split else None,
         warn=note,
     )

@@ -54,6 +54,7 @@ def run(args: argparse.Namespace) -> int:
                 channels=args.channels,
                 hold=args.hold,
                 resample=args.resample,
+                resample_by=args.resample_by,
                 note=lambda _: None,
                 gap=note if args.split else content['damage'].append,
                 warn=content['warnings'].append,

@@ -10,11 +10,11 @@ from typing import cast
 import numpy as np
 
 from actuator_glue.errors import InputError
+from actuator_glue.even_times import uniform_period
 from actuator_glue.io.channel_map import Channel, ChannelMap, read_channel_map
 from actuator_glue.io.formats import Column, FileTable, format_of
-from actuator_glue.io.resample import resample_evenly
+from actuator_glue.io.resample import By, resample_evenly
 from actuator_glue.io.signature import refuse_pipe
-from actuator_glue.even_times import uniform_period
 from actuator_glue.io.units import FLOAT32_COUNTS, ROLES, choose, factor, recognise
 from actuator_glue.rate_check import APART, disagreement, rate_by_clock
 from actuator_glue.records import Array, Hold, Record
@@ -31,6 +31,7 @@ def read(
     hold: Hold | None = None,
     actuator: str | None = None,
     resample: float | None = None,
+    resample_by: By = 'band-limited',
     warn: Callable[[str], None] = warnings.warn,
 ) -> Record:
     """Return the record of a laboratory file.
@@ -42,9 +43,10 @@ def read(
         stiffness: specimen stiffness [N/m]; None for what map or file say.
         hold: how the command runs between its samples; None for what map or file say, else zoh.
         actuator: name of the actuator; None for what map or file say.
-        resample: samples per second [Hz] to which a jittered clock is made even by straight lines;
-            None where an uneven clock is refused. The record's source tells it, and its command
-            runs straight between samples where nothing else is given.
+        resample: samples per second [Hz] to which a jittered clock is made even; None where an
+            uneven clock is refused. The record's source tells it, and its command runs straight
+            between samples where nothing else is given.
+        resample_by: 'band-limited', or by straight 'lines' between samples.
         warn: called with a line that tells what resampling cost.
 
     Raises:
@@ -76,7 +78,7 @@ def read(
         except InputError:
             if resample is None:
                 raise
-            made = resample_evenly(values, resample, source)
+            made = resample_evenly(values, resample, source, resample_by)
             values, period = made.values, made.period
             warn(f'{path}: {made.told()}')
             source, notes = f'{path} ({made.name()})', {'hold': 'linear', **notes}

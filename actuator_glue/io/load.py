@@ -15,6 +15,7 @@ from actuator_glue.io.bag_mapped import read_mapped
 from actuator_glue.io.bag_reader import Note, is_bag, refuse, warn_caller
 from actuator_glue.io.bag_records import read_records
 from actuator_glue.io.channel_map import ChannelMap, read_channel_map
+from actuator_glue.io.resample import By
 from actuator_glue.records import Hold, Record, check_stiffness
 
 
@@ -25,6 +26,7 @@ def load(
     channels: ChannelMap | Path | str | None = None,
     hold: Hold | None = None,
     resample: float | None = None,
+    resample_by: By = 'band-limited',
 ) -> Record:
     """Return the one record of a bag or laboratory file.
 
@@ -34,12 +36,18 @@ def load(
         channels: channel map for a laboratory file, or one of topics for a bag.
         hold: how the command runs between its samples; None for what the file says.
         resample: samples per second [Hz] to which a jittered clock of a file is made even.
+        resample_by: how: 'band-limited', or by straight 'lines' between samples.
 
     Raises:
         InputError: the file cannot be used, or holds several records.
     """
     found = load_records(
-        path, stiffness=stiffness, channels=channels, hold=hold, resample=resample
+        path,
+        stiffness=stiffness,
+        channels=channels,
+        hold=hold,
+        resample=resample,
+        resample_by=resample_by,
     )
     if len(found) > 1:
         raise InputError(f'{path} holds {len(found)} records; `load_records` returns them all')
@@ -53,6 +61,7 @@ def load_records(
     channels: ChannelMap | Path | str | None = None,
     hold: Hold | None = None,
     resample: float | None = None,
+    resample_by: By = 'band-limited',
     note: Note = refuse,
     gap: Note | None = None,
     warn: Note = warn_caller,
@@ -65,8 +74,9 @@ def load_records(
             None for what the files say. What is given wins over what the files say.
         channels: channel map for the laboratory files, or for bags where it names topics.
         hold: how the command runs between its samples; None for what the files say.
-        resample: samples per second [Hz] to which the jittered clock of a file is made even by
-            straight lines; an even one is left as it is. The record's source tells it.
+        resample: samples per second [Hz] to which the jittered clock of a file is made even; an
+            even one is left as it is. The record's source tells it.
+        resample_by: how: 'band-limited', or by straight 'lines' between samples.
         note: called with one line per damage of a bag; the default raises it.
         gap: called with one line where a bag lacks samples or its clock jumps, and is split
             there; the default raises.
@@ -96,7 +106,14 @@ def load_records(
                 raise InputError(f'{path}: bags count their samples; only files are resampled')
             groups.append(_of_bag(path, channels, note, gap, warn))
             continue
-        record = laboratory.read(path, channels=channels, hold=hold, resample=resample, warn=warn)
+        record = laboratory.read(
+            path,
+            channels=channels,
+            hold=hold,
+            resample=resample,
+            resample_by=resample_by,
+            warn=warn,
+        )
         groups.append([record])
     records = [record for group in groups for record in group]
     for record in records:

@@ -1,109 +1,275 @@
-"""From a jittered clock to even samples, on request, by straight lines; and what that costs."""
+"""From a jittered clock to even samples, on request; what that costs and stamps are worth."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
+import scipy
 
 from actuator_glue.errors import InputError
-from actuator_glue.even_times import span
+from actuator_glue.even_times import near_whole_rate, rounding, span
 from actuator_glue.records import Array
 
-# Of the mean rate of the samples: below, what is faster would be folded into the band; far above
-# there would be samples that nobody measured.
-_LEAST, _MOST = 0.8, 2.0
+By: TypeAlias = Literal['band-limited', 'lines']
+# Times of the samples, a channel, samples per second that are wanted: the channel at even times.
+_Interpolate: TypeAlias = Callable[[Array, Array, float], Array]
+
+# Of the mean rate of the samples. Straight lines fold what is faster into the band below it; far
+# above there would be samples that nobody measured.
+_LEAST: dict[By, float] = {'band-limited': 0.1, 'lines': 0.8}
+_MOST = 2.0
 _LONGEST_STEP = 5.0  # median steps without a sample: beyond it is a gap, not jitter
 _KEPT = 0.95  # share of its amplitude that a sine keeps in the band that is told
+# Stamps that stay within so many steps of an even clock may be those of a log, and the samples
+# even; they are where that leaves less than this share of what is unlike between neighbours.
+_BESIDE = 5.0
+_BETTER = 0.7
+# Times are told to be off where that makes this share of what is unlike between neighbours, and
+# they are off by more than this share of a step.
+_FELT, _EXACT = 0.1, 1e-3
+_LOOK = 20_000  # samples from which band and noise are told
+_WINDOW = ('kaiser', 8.0)  # a ripple of 2e-4; scipy's own has 1e-3
+_APART = 64  # samples between impulses, farther than any of them is felt
 # A parabola's mean square over its step, and its error over two steps at the sample between.
 _WITHIN = np.sqrt(8.0 / 15.0) / 4.0
 
 
 @dataclass(frozen=True, slots=True)
 class Resampled:
-    """Channels at even times, and what straight lines between samples changed.
+    """Channels at even times, and what that changed.
 
     Attributes:
         values: by role, the first sample at the time of the first one measured; without times.
         period: [s].
+        by: how it was done.
         steps: shortest and longest step of the recorded clock, in words.
         band: frequency above which sines lost more than 5 % of their amplitude [Hz].
         error: root mean square of what straight lines miss between samples, by role, in the unit
             of the channel: from each sample and the line between its neighbours; noise counts in.
-        noise: mean share of the variance of white noise that is left, (1 - w)^2 + w^2 for a
-            weight w [1].
+            Empty where no lines were drawn.
+        noise: mean share of the variance of white noise that is left [1].
+        late: root mean square by which stamps were off an even clock, where that was taken in
+            place of them [s]; 0 where the stamps were taken.
+        jitter: root mean square by which the times that were taken may still be off [s].
+        moved: what that is by the velocity of the measured displacement, root mean square [m].
     """
 
     values: dict[str, Array]
     period: float
+    by: By
     steps: str
     band: float
     error: dict[str, float]
     noise: float
+    late: float
+    jitter: float
+    moved: float
 
     def told(self) -> str:
         """Return what was done and lost, in a line."""
+        how = 'by straight lines between' if self.by == 'lines' else 'band-limited, from'
         missed = ', '.join(
             f'{role} {1e6 * error:.3g} um' for role, error in self.error.items() if role != 'force'
         )
-        return (
-            f'{self.name()} by straight lines between samples that are {self.steps} apart: above '
-            f'{self.band:.2g} Hz more than 5 % of an amplitude is lost, between samples the lines '
-            f'miss {missed} (rms), and {100.0 * self.noise:.0f} % of the variance of noise is left'
+        between = f'between samples the lines miss {missed} (rms), ' if missed else ''
+        line = (
+            f'{self.name()} {how} samples that are {self.steps} apart: above {self.band:.2g} Hz '
+            f'more than 5 % of an amplitude is lost, {between}and {100.0 * self.noise:.0f} % of '
+            'the variance of noise is left'
         )
+        if self.late:
+            line += (
+                f'; the samples are even and their stamps are not, by {1e3 * self.late:.2g} ms '
+                '(rms), so that an even clock was taken in place of them'
+            )
+        if self.moved:
+            line += (
+                f'; the times may be off by {1e3 * self.jitter:.2g} ms (rms), which is '
+                f'{1e6 * self.moved:.2g} um of noise at the velocities of this record'
+            )
+        return line
 
     def name(self) -> str:
         """Return what was done, in three words."""
         return f'resampled to {1.0 / self.period:.6g} Hz'
 
 
-def resample_evenly(values: dict[str, Array], rate: float, where: str) -> Resampled:
+def resample_evenly(
+    values: dict[str, Array], rate: float, where: str, by: By = 'band-limited'
+) -> Resampled:
     """Return channels at even times.
+
+    Band-limited is a cubic spline through the samples, and a low-pass without phase where fewer
+    samples are wanted than there are: both channels go through the same, so that what leads from
+    one to the other stays. Straight lines make no overshoot at steps.
 
     Args:
         values: channels by role, each of shape (n,), with `time` [s].
         rate: samples per second that are wanted.
         where: file, for messages.
+        by: how.
 
     Raises:
-        InputError: times that are no numbers, go back or stand still, a gap, or a rate far from
-            that of the samples.
+        InputError: times that are no numbers, go back, or stand still where the samples are not
+            even; a gap; or a rate far from that of the samples.
     """
+    if by not in get_args(By):
+        raise InputError(f'resampling by {by!r} is unknown; use one of {", ".join(get_args(By))}')
     time = values['time']
     steps = np.diff(time)
-    if len(steps) < 2 or not np.isfinite(time).all() or not steps.min() > 0.0:
+    channels = {role: column for role, column in values.items() if role != 'time'}
+    even = _even_clock(time, channels, rate)
+    if len(steps) < 3 or not np.isfinite(time).all() or not (steps.min() > 0.0 or len(even)):
         at = int((~(steps > 0.0)).argmax()) if len(steps) else 0
         raise InputError(
             f'{where}: time does not go up after sample {at}; sort the record, or cut it there'
         )
     typical, mean = float(np.median(steps)), float(steps.mean())
-    spacing = float(np.sqrt(np.sum(steps**3) / np.sum(steps)))  # long steps last longer
     at = int(steps.argmax())
-    if steps[at] > _LONGEST_STEP * typical:
+    if not len(even) and steps[at] > _LONGEST_STEP * typical:
         raise InputError(
             f'{where}: {steps[at]:.4g} s without samples after sample {at}; nobody knows what '
             'happened there: cut the record there before it is resampled'
         )
-    if not _LEAST <= rate * mean <= _MOST:
+    if not _LEAST[by] <= rate * mean <= _MOST:
         raise InputError(
             f'{where}: there are {1.0 / mean:.4g} samples per second; resample to between '
-            f'{_LEAST / mean:.3g} and {_MOST / mean:.3g} Hz, not {rate:g}'
+            f'{_LEAST[by] / mean:.3g} and {_MOST / mean:.3g} Hz, not {rate:g}'
         )
-    even = np.arange(int((time[-1] - time[0]) * rate * (1.0 + 1e-12)) + 1) / rate
-    passed = time - time[0]
-    before = np.clip(np.searchsorted(passed, even, side='right') - 1, 0, len(steps) - 1)
-    weight = (even - passed[before]) / steps[before]
-    channels = {role: column for role, column in values.items() if role != 'time'}
-    # A straight line keeps sinc^2(f T) of a sine: 1 - (pi f T)^2 / 3 of it near 1.
-    band = float(np.sqrt(3.0 * (1.0 - _KEPT))) / (np.pi * spacing)
+    taken = even if len(even) else time - time[0]
+    interpolate = _lines if by == 'lines' else _band_limited
+    jitter = _jitter(taken, channels['measured'])
     return Resampled(
-        values={role: np.interp(even, passed, column) for role, column in channels.items()},
+        values={role: interpolate(taken, column, rate) for role, column in channels.items()},
         period=1.0 / rate,
+        by=by,
         steps=span(steps),
-        band=band,
-        error={role: _WITHIN * _left_out(passed, column) for role, column in channels.items()},
-        noise=float(np.mean((1.0 - weight) ** 2 + weight**2)),
+        band=_band(partial(interpolate, taken[:_LOOK]), taken[:_LOOK], rate),
+        error={role: _WITHIN * _left_out(taken, column) for role, column in channels.items()}
+        if by == 'lines'
+        else {},
+        noise=_noise(partial(interpolate, taken[:_LOOK]), len(taken[:_LOOK]), rate),
+        late=float(np.std(time - time[0] - even)) if len(even) else 0.0,
+        jitter=jitter,
+        moved=jitter * _speed(taken, channels['measured']),
     )
+
+
+def _even_times(time: Array, rate: float) -> Array:
+    return np.asarray(np.arange(int(time[-1] * rate * (1.0 + 1e-12)) + 1) / rate)
+
+
+def _lines(time: Array, column: Array, rate: float) -> Array:
+    return np.asarray(np.interp(_even_times(time, rate), time, column))
+
+
+def _band_limited(time: Array, column: Array, rate: float) -> Array:
+    spline = scipy.interpolate.CubicSpline(time, column)
+    mean = (len(time) - 1) / float(time[-1])
+    if rate > 0.999 * mean:
+        return np.asarray(spline(_even_times(time, rate)))
+    # Twice as many as there are samples, then only what fewer samples can hold.
+    finer = int(np.ceil(2.0 * mean / rate))
+    fine = spline(np.minimum(_even_times(time, rate * finer), time[-1]))
+    return np.asarray(scipy.signal.resample_poly(fine, 1, finer, window=_WINDOW, padtype='line'))
+
+
+def _band(interpolate: Callable[[Array, float], Array], time: Array, rate: float) -> float:
+    """Return the frequency up to which sines keep their amplitude, by sines [Hz]."""
+    top = 0.5 * min(rate, (len(time) - 1) / float(time[-1]))
+    low, high = 0.0, top
+    for _ in range(12):
+        middle = 0.5 * (low + high)
+        wave = 2.0 * np.pi * middle
+        made = [interpolate(part(wave * time), rate) for part in (np.sin, np.cos)]
+        turned = np.exp(-1j * wave * np.arange(len(made[0])) / rate)
+        kept = abs(np.mean((made[1] + 1j * made[0]) * turned))
+        low, high = (middle, high) if kept >= _KEPT else (low, middle)
+    return low
+
+
+def _noise(interpolate: Callable[[Array, float], Array], count: int, rate: float) -> float:
+    """Return the mean variance of interpolated white noise of variance one, by impulses."""
+    total, number, made = 0.0, 0, np.zeros(1)
+    for shift in range(_APART // 8, _APART, _APART // 8):
+        impulses = np.zeros(count)
+        impulses[shift::_APART] = 1.0
+        made = interpolate(impulses, rate)
+        total += float(made @ made)
+        number += int(impulses.sum())
+    return min(total / max(number, 1) * count / len(made), 1.0)
+
+
+def _unlike(time: Array, column: Array) -> tuple[Array, Array]:
+    """Return what each sample is off the cubic through its four neighbours, and the velocity.
+
+    The first in units of one sample's noise: it is divided by the noise that the cubic has.
+    """
+    near = [time[k : len(time) - 4 + k] - time[2:-2] for k in (0, 1, 3, 4)]
+    weights = []
+    for i, own in enumerate(near):
+        others = [other for j, other in enumerate(near) if j != i]
+        weights.append(np.prod([-o / (own - o) for o in others], axis=0))
+    values = [column[k : len(column) - 4 + k] for k in (0, 1, 3, 4)]
+    between = np.sum([w * v for w, v in zip(weights, values, strict=True)], axis=0)
+    size = np.sqrt(1.0 + np.sum(np.square(weights), axis=0))
+    return (column[2:-2] - between) / size, (values[2] - values[1]) / (near[2] - near[1])
+
+
+def _even_clock(time: Array, channels: dict[str, Array], rate: float) -> Array:
+    """Return even times where the samples are even and only their stamps are not; else nothing.
+
+    Such stamps stay beside an even clock, and by it the command is smoother than by them.
+    """
+    if len(time) < 16 or not np.isfinite(time).all() or np.diff(time).min() < 0.0:
+        return np.empty(0)
+    index = np.arange(len(time))
+    period, first = np.polyfit(index, time - time[0], 1)
+    off = time - time[0] - first - period * index
+    # A walk of steps by chance goes away from any clock, a log comes back to its own; whole
+    # seconds are beside theirs by a second at most.
+    rounded = rounding(time)
+    if period <= 0.0 or float(np.abs(off).max()) > max(_BESIDE * period, 1.1 * rounded):
+        return np.empty(0)
+    step = near_whole_rate(float(period), len(time))
+    # The rate that is asked for is the controller's where the stamps cannot tell the two apart.
+    if abs(1.0 / rate - period) * len(time) < max(rounded, period):
+        step = 1.0 / rate
+    even = np.asarray(step * index)
+    column = channels['command']
+    by_even = _smooth(even, column)
+    still = np.diff(time).min() == 0.0
+    return even if still or by_even < _BETTER * _smooth(time, column) else np.empty(0)
+
+
+def _smooth(time: Array, column: Array) -> float:
+    if np.diff(time).min() <= 0.0:
+        return np.inf
+    left, _ = _unlike(time, column)
+    return float(np.sqrt(np.mean(left**2)))
+
+
+def _jitter(time: Array, column: Array) -> float:
+    """Return how far times may be off [s, root mean square]: more is unlike where more moves."""
+    left, velocity = _unlike(time, column)
+    basis = np.column_stack([np.ones(len(left)), velocity**2])
+    scale = basis.max(axis=0)
+    if not scale[1] > 0.0:
+        return 0.0
+    (_, weight), _ = scipy.optimize.nnls(basis / scale, left**2)
+    jitter = float(np.sqrt(weight / scale[1]))
+    share = jitter**2 * float(np.mean(velocity**2)) / float(np.mean(left**2))
+    step = float(time[-1]) / (len(time) - 1)
+    return jitter if share > _FELT and jitter > _EXACT * step else 0.0
+
+
+def _speed(time: Array, column: Array) -> float:
+    """Return the root mean square of the velocity [unit/s]."""
+    return float(np.sqrt(np.mean(_unlike(time, column)[1] ** 2)))
 
 
 def _left_out(time: Array, column: Array) -> float:
