@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from datetime import timedelta
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypedDict, Unpack
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from actuator_glue.api.calibration_shaping import sampled
 from actuator_glue.api.callbacks import harmless
 from actuator_glue.api.compilation import compilation
 from actuator_glue.api.given import Records, Stiffness, records_given, seed_given
-from actuator_glue.api.options import chosen
+from actuator_glue.api.options import chosen, takes
 from actuator_glue.api.prior import check_prior, given_prior
 from actuator_glue.api.tracking import records_tracking
 from actuator_glue.diagnosis.force import check_forces
@@ -111,24 +111,43 @@ class CalibrationOptions:
                 )
 
 
+class CalibrationChanges(TypedDict, total=False):
+    """The options by name, for type checkers; a test holds them to `CalibrationOptions`."""
+
+    effects: tuple[str, ...] | list[str] | str
+    bounds: Mapping[str, tuple[float, float]]
+    likelihood: Literal['glue', 'gaussian', 'ar1']
+    shaping_factor: float | Literal['auto']
+    evaluations: int
+    seed: int | None
+    sampler: Literal['adaptive', 'published']
+    initial: Literal['auto', 'rest', 'measured']
+    settle: float | None
+    prior: Calibration | Path | str | None
+    drift: float
+    prior_age: timedelta | float
+    use_force: bool
+
+
+@takes(CalibrationOptions)
 def calibrate(
     records: Records,
     options: CalibrationOptions | None = None,
     *,
     stiffness: Stiffness = None,
     progress: Progress | None = None,
-    **changes: Any,
+    **changes: Unpack[CalibrationChanges],
 ) -> Calibration:
     """Draw from the joint posterior of Eq. (2) and effects given records (DREAM(ZS), GLUE).
 
     Args:
         records: one or several tests of one actuator, each with its specimen stiffness, or the
             files they are in.
-        options: how to calibrate; see CalibrationOptions.
+        options: those below as one object; None for their defaults.
         stiffness: specimen stiffness [N/m], one for all or one for each; None for what records
             and files say.
         progress: called with the evaluations made so far.
-        changes: options by name that replace those of `options`.
+        changes: options by name.
 
     Returns:
         The posterior: moments, draws, error of the best draw, and what forbids or limits its use.

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.api.given import calibration_given, seed_given
-from actuator_glue.api.rths import DRAWS, rths
+from actuator_glue.api.rths import DRAWS, FREQUENCIES, rths
 from actuator_glue.api.stability import StabilityResult
 from actuator_glue.hybrid.compensator import KINDS
 from actuator_glue.hybrid.ground_motion import GroundMotion
@@ -80,8 +81,9 @@ def compare_compensators(
     ground_motion: GroundMotion | Path | str = 'artificial',
     *,
     draws: int = DRAWS,
+    frequencies: Sequence[float] | float = FREQUENCIES,
+    criteria: Mapping[str, float] | None = None,
     seed: int | None = 1,
-    **options: Any,
 ) -> Comparison:
     """Return a hybrid test with every compensator, and which of them to use.
 
@@ -90,8 +92,9 @@ def compare_compensators(
         calibration: posterior of the actuator, or the file it was saved to.
         ground_motion: as `rths` takes it.
         draws: how many draws run the record with each.
+        frequencies: where the actuator's delay and amplitude are told [Hz].
+        criteria: peaks that must not be exceeded, as `rths` takes them.
         seed: of specimens and noise, the same for each; None for a fresh one.
-        options: further ones of `rths`.
 
     Raises:
         InputError: as `rths`.
@@ -104,8 +107,9 @@ def compare_compensators(
             compensator=kind,
             ground_motion=ground_motion,
             draws=draws,
+            frequencies=frequencies,
+            criteria=criteria,
             seed=seed,
-            **options,
         )
         for kind in KINDS
     }

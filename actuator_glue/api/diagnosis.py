@@ -8,11 +8,11 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, fields, replace
 from datetime import timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar, TypedDict, Unpack
 
 from actuator_glue.api.callbacks import harmless
 from actuator_glue.api.given import Records, Stiffness, records_given, seed_given
-from actuator_glue.api.options import chosen
+from actuator_glue.api.options import chosen, takes
 from actuator_glue.api.prior import check_prior, given_prior
 from actuator_glue.api.provenance import provenance
 from actuator_glue.api.result import Result
@@ -157,6 +157,19 @@ class DiagnosisOptions:
             )
 
 
+class DiagnosisChanges(TypedDict, total=False):
+    """The options by name, for type checkers; a test holds them to `DiagnosisOptions`."""
+
+    seed: int | None
+    jobs: int
+    false_alarms: float
+    prior: Calibration | GivenPrior | Path | str | None
+    drift: float
+    prior_age: timedelta | float
+    use_force: bool
+
+
+@takes(DiagnosisOptions)
 def diagnose(
     records: Records,
     holdout: Records | None = None,
@@ -164,7 +177,7 @@ def diagnose(
     *,
     stiffness: Stiffness = None,
     progress: Progress | None = None,
-    **changes: Any,
+    **changes: Unpack[DiagnosisChanges],
 ) -> Diagnosis:
     """Ask whether Eq. (2) explains records and, if not, which effects it lacks.
 
@@ -173,11 +186,11 @@ def diagnose(
             files they are in.
         holdout: record(s) that decide nothing and give the error before and after; without one,
             every fourth block of each record is set aside before any look.
-        options: how to diagnose; see DiagnosisOptions.
+        options: those below as one object; None for their defaults.
         stiffness: specimen stiffness [N/m] of the records, one for all or one for each; None for
             what they and their files say.
         progress: called with (stage, share of it done in [0, 1]).
-        changes: options by name that replace those of `options`.
+        changes: options by name.
 
     Returns:
         Verdict, additions with their evidence, error before and after, the augmented model.

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import fields, replace
+import inspect
+import re
+from collections.abc import Callable, Mapping
+from dataclasses import MISSING, Field, fields, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from actuator_glue.errors import InputError
@@ -12,6 +14,7 @@ if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
 Options = TypeVar('Options', bound='DataclassInstance')
+Function = TypeVar('Function', bound=Callable[..., Any])
 
 
 def chosen(options: Options, changes: Mapping[str, Any], function: str) -> Options:
@@ -27,3 +30,39 @@ def chosen(options: Options, changes: Mapping[str, Any], function: str) -> Optio
             f'{function} has no option {", ".join(unknown)}; it has {", ".join(known)}'
         )
     return replace(options, **changes)
+
+
+def takes(options: type[DataclassInstance]) -> Callable[[Function], Function]:
+    """Make a function that ends in `**changes` show each option: to `help`, completion, the docs.
+
+    Names, defaults and descriptions are those of the options, told once; type checkers know them
+    by the `TypedDict` that the function unpacks.
+
+    Args:
+        options: a dataclass whose fields are the options, each described under `Attributes:`.
+    """
+
+    def shown(function: Function) -> Function:
+        signature = inspect.signature(function)
+        own = [p for p in signature.parameters.values() if p.kind is not p.VAR_KEYWORD]
+        told = {p.name for p in own}
+        named = [
+            inspect.Parameter(
+                f.name, inspect.Parameter.KEYWORD_ONLY, default=_default(f), annotation=f.type
+            )
+            for f in fields(options)
+            if f.name not in told
+        ]
+        vars(function)['__signature__'] = signature.replace(parameters=[*own, *named])
+        if function.__doc__ and options.__doc__:  # python -OO leaves none
+            attributes = options.__doc__.partition('Attributes:\n')[2].split('\n\n')[0].rstrip()
+            function.__doc__ = re.sub(
+                r'^ *changes: .*$', lambda _: attributes, function.__doc__, flags=re.MULTILINE
+            )
+        return function
+
+    return shown
+
+
+def _default(field: Field[Any]) -> Any:
+    return field.default if field.default_factory is MISSING else field.default_factory()

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from os import PathLike, fspath
-from typing import Any
+from typing import Any, Literal, TypedDict, Unpack
 
 from actuator_glue.api.callbacks import harmless
 from actuator_glue.api.given import Records, records_given
+from actuator_glue.api.options import chosen, takes
 from actuator_glue.api.replay_result import (
     Compared,
     Replay,
@@ -20,7 +21,7 @@ from actuator_glue.api.replay_result import (
 )
 from actuator_glue.api.tracking import window_tracking
 from actuator_glue.errors import InputError
-from actuator_glue.given import number, whole
+from actuator_glue.given import take_numbers
 from actuator_glue.io.bag_reader import decoded, is_bag, summarise
 from actuator_glue.io.bag_records import check_order
 from actuator_glue.io.bag_samples import topics_of_actuator
@@ -35,9 +36,58 @@ from actuator_glue.workers.reports import Reports
 
 INPUTS = ('SampleBlock', 'TestSetup')
 RESULTS = ('EstimatorSetup', 'PosteriorMoments', 'PosteriorDraws', 'PredictionBand')
-OVERRIDES = ('window', 'hop', 'settle', 'shaping_factor', 'evaluations', 'seed')
 
 Progress = Callable[[float], None]
+
+
+@dataclass(frozen=True, slots=True)
+class ReplayOptions:
+    """What of the estimator's settings a replay may change; None for those of the live run.
+
+    Attributes:
+        window: length of a window [s].
+        hop: time from one window to the next [s].
+        settle: start of a window that only lets the initial state be forgotten [s].
+        shaping_factor: G of Eq. (4); 'auto' takes each window's from its own residual.
+        evaluations: likelihood evaluations of a window of Eq. (2), at most.
+        seed: seed of the sampler.
+    """
+
+    window: float | None = None
+    hop: float | None = None
+    settle: float | None = None
+    shaping_factor: float | Literal['auto'] | None = None
+    evaluations: int | None = None
+    seed: int | None = None
+
+    def __post_init__(self) -> None:
+        take_numbers(self)
+
+    def asked(self) -> dict[str, Any]:
+        """Return what is changed, as settings of the estimator.
+
+        Raises:
+            InputError: a shaping factor that is a word but 'auto'.
+        """
+        found = {n: v for n in OVERRIDES if (v := getattr(self, n)) is not None}
+        factor = found.get('shaping_factor')
+        if isinstance(factor, str) and factor != 'auto':
+            raise InputError(f"shaping_factor {factor!r} is no number, nor 'auto'")
+        return found | ({'shaping_factor': AUTOMATIC} if factor == 'auto' else {})
+
+
+OVERRIDES = tuple(f.name for f in fields(ReplayOptions))
+
+
+class ReplayChanges(TypedDict, total=False):
+    """The options by name, for type checkers; a test holds them to `ReplayOptions`."""
+
+    window: float | None
+    hop: float | None
+    settle: float | None
+    shaping_factor: float | Literal['auto'] | None
+    evaluations: int | None
+    seed: int | None
 
 
 @dataclass(slots=True)
@@ -73,13 +123,14 @@ class _Run:
         return f'{max(stop - first - held, 1)} of its samples {first} to {stop - 1} are missing'
 
 
+@takes(ReplayOptions)
 def replay(
     source: Records,
     *,
     namespace: str | None = None,
     tracking: bool = False,
     progress: Progress | None = None,
-    **settings: Any,
+    **changes: Unpack[ReplayChanges],
 ) -> Replay:
     """Run the online estimator over recorded samples: the code that runs live, without a clock.
 
@@ -89,22 +140,12 @@ def replay(
         namespace: whose samples, where a bag has several actuators.
         tracking: whether each window tells how the actuator followed its command.
         progress: called with the share of the messages read.
-        settings: window [s], hop [s], settle [s], shaping_factor ('auto': of each window's
-            residual), evaluations, seed.
+        changes: settings of the estimator by name; None for those of the live run.
 
     Raises:
         InputError: unusable bag, record or setting, or not one window could be estimated.
     """
-    unknown = sorted(set(settings) - set(OVERRIDES))
-    if unknown:
-        raise InputError(
-            f'replay has no setting {", ".join(unknown)}; it has {", ".join(OVERRIDES)}'
-        )
-    asked = {name: value for name, value in settings.items() if value is not None}
-    if asked.get('shaping_factor') == 'auto':
-        asked['shaping_factor'] = AUTOMATIC
-    for name, value in asked.items():
-        asked[name] = (whole if name in ('evaluations', 'seed') else number)(value, name)
+    asked = chosen(ReplayOptions(), changes, 'replay').asked()
     under_way = _open(source, namespace, compare_live=not asked)
     under_way.tracking = tracking
     started = time.perf_counter()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
+from typing import Final
 
 import actuator_glue as ag
 from studies.hybrid import actuators, library
@@ -20,7 +21,7 @@ BOUNDS = {
     'mass': (28.0, 30.0),
     'mass_damping': (3.0, 5.0),
 }
-LIKELIHOOD = 'gaussian'
+LIKELIHOOD: Final = 'gaussian'
 EVALUATIONS = 36_000
 DRAWS = 200
 
