@@ -8,10 +8,10 @@ from typing import Any, get_type_hints
 import pytest
 
 import actuator_glue as ag
-from actuator_glue.api import calibration, diagnosis, replaying
+from actuator_glue.api import calibration_options, diagnosis, replaying
 
 FUNCTIONS = {
-    'calibrate': (calibration.CalibrationOptions, calibration.CalibrationChanges),
+    'calibrate': (calibration_options.CalibrationOptions, calibration_options.CalibrationChanges),
     'diagnose': (diagnosis.DiagnosisOptions, diagnosis.DiagnosisChanges),
     'replay': (replaying.ReplayOptions, replaying.ReplayChanges),
 }

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import actuator_glue as ag
-from actuator_glue.api.calibration import CalibrationOptions as _Calibration
+from actuator_glue.api.calibration_options import CalibrationOptions as _Calibration
 from actuator_glue.api.diagnosis import DiagnosisOptions as _Diagnosis
 from actuator_glue.api.given import records_given
 from actuator_glue.errors import InputError

@@ -7,25 +7,25 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuator_glue.api import tracking
+from actuator_glue.api.calibration_data import CalibrationData
 from actuator_glue.inference.bands import band
 from actuator_glue.inference.predictive import fit_residual, total_band
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record, source_name
 from actuator_glue.report import html
+from actuator_glue.report.posterior_figure import posterior_figure
 from actuator_glue.report.timeseries import Bands, band_at_zooms, even_zooms
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-    from actuator_glue.api.calibration_result import Calibration
 
 ENSEMBLE = 200  # draws that are simulated for a band
 LEVEL = 0.95
 HEADER = ('parameter', 'unit', 'mean', 'sd', 'skew', 'COV', 'R-hat', 'ESS')
 
 
-def bands_figure(found: Calibration, record: Record) -> tuple[Figure, float]:
+def bands_figure(found: CalibrationData, record: Record) -> tuple[Figure, float]:
     """Draw the parameter band and the total predictive band over a record.
 
     Returns:
@@ -53,7 +53,13 @@ def bands_figure(found: Calibration, record: Record) -> tuple[Figure, float]:
     return figure, float(inside.mean())
 
 
-def moment_rows(found: Calibration) -> list[tuple[str, ...]]:
+def posterior(found: CalibrationData) -> Figure:
+    """Draw every parameter's distribution and every pair of them."""
+    units = [p.unit for p in found.parameters.values()]
+    return posterior_figure(found.posterior, found.names, units)
+
+
+def moment_rows(found: CalibrationData) -> list[tuple[str, ...]]:
     """Return a row of text for each parameter, under HEADER."""
     return [
         (
@@ -70,7 +76,7 @@ def moment_rows(found: Calibration) -> list[tuple[str, ...]]:
     ]
 
 
-def moments_title(found: Calibration) -> str:
+def moments_title(found: CalibrationData) -> str:
     """Return the title of the table of moments."""
     g = found.shaping_factor
     how = f'G = {g:.6g}' if g is not None else found.likelihood
@@ -80,7 +86,7 @@ def moments_title(found: Calibration) -> str:
     return f'Posterior moments, {len(found.sources)} record(s){force}, {how}'
 
 
-def error_line(found: Calibration) -> str:
+def error_line(found: CalibrationData) -> str:
     """Return the error of the best draw in one line."""
     share = found.error.nrmse
     percent = '-' if share is None else f'{100 * share:.2f} %'
@@ -91,7 +97,7 @@ def error_line(found: Calibration) -> str:
     return line if found.structure is None else f'{line}; {found.structure.amounts()}'
 
 
-def brief(found: Calibration) -> list[html.Block]:
+def brief(found: CalibrationData) -> list[html.Block]:
     """Return problems, moments, error and notes."""
     blocks: list[html.Block] = [html.Note(line) for line in found.problems]
     blocks.append(html.Table(HEADER, moment_rows(found), moments_title(found)))
@@ -100,9 +106,11 @@ def brief(found: Calibration) -> list[html.Block]:
     return [*blocks, *(html.Note(line) for line in found.notes)]
 
 
-def page(found: Calibration) -> html.Page:
+def page(found: CalibrationData) -> html.Page:
     """Return the report of a calibration."""
-    picture = html.Picture.of(found.plot(), 'Distribution of each parameter, and of each pair.')
+    picture = html.Picture.of(
+        posterior(found), 'Distribution of each parameter, and of each pair.'
+    )
     sections = [html.Section('Posterior', [*brief(found), picture])]
     if found.records:
         pictures = []

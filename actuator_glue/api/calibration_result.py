@@ -1,4 +1,4 @@
-"""The result of a calibration: what is known of each parameter, the draws, files and pictures."""
+"""The result of a calibration: what is known of each parameter, with its files and pictures."""
 
 from __future__ import annotations
 
@@ -9,16 +9,10 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from actuator_glue.api import store
-from actuator_glue.api.calibration_parts import CalibratedRecord, FitError, Marginal, RecordForce
+from actuator_glue.api.calibration_data import CalibrationData
 from actuator_glue.api.given import OneRecord, one_record_given
 from actuator_glue.api.result import Result
-from actuator_glue.api.tracking import RecordTracking
-from actuator_glue.diagnosis.residual_structure import ResidualStructure
-from actuator_glue.inference.at_bound import Pressed
-from actuator_glue.inference.carried import Carried
-from actuator_glue.inference.prior_use import PriorUse
 from actuator_glue.model.effects import CATALOGUE
-from actuator_glue.records import Array, Record
 
 if TYPE_CHECKING:
     import arviz
@@ -27,96 +21,20 @@ if TYPE_CHECKING:
 
     from actuator_glue.report import html
 
-# Normal components of the prior that a calibration makes, at most.
-COMPONENTS = 4
-
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Calibration(Result):
+class Calibration(Result, CalibrationData):
     """A joint posterior, and what forbids or limits its use.
 
-    Attributes:
-        parameters: posterior of each parameter by name.
-        draws: draws after burn-in, shape (steps, chains, p), SI units.
-        log_density: log likelihood of each draw, shape (steps, chains).
-        best: draw of the highest likelihood, shape (p,).
-        error: free-run error of the best draw.
-        structure: what is left of the records beside noise; None where they are too short to tell,
-            and in files of earlier versions.
-        at_bound: parameters that a bound of the prior holds.
-        problems: why the posterior must not be used as it stands; empty where it may.
-        notes: what these records cannot tell, and what was done to them.
-        prior: what was known before, beside the bounds; None where that was nothing.
-        converged: R-hat of every parameter is at most 1.01.
-        effects: effects of the model beyond Eq. (2).
-        likelihood: 'glue', 'gaussian' or 'ar1'.
-        shaping_factor: G of Eq. (4); None with a formal likelihood.
-        automatic_shaping: G is half of the independent samples that the residual is worth.
-        force: how the best draw explains each record's force; empty where that was no evidence.
-        seed: seed of the sampler.
-        sampler: 'adaptive' or 'published', see `CalibrationOptions`.
-        initial: state at a record's first sample, 'rest' or 'measured'.
-        settle: uncounted start of each record [s].
-        evaluations: likelihood evaluations.
-        seconds: how long it took, compilation left out.
-        compile_seconds: compilation, which only the first use of an installation pays.
-        sources: the records, described.
-        records: the records themselves as they were fitted; empty after `load`.
-        tracking: how the actuator follows the command of each record.
+    Its numbers are those of `CalibrationData`: `parameters` by name, `draws`, `problems`, ...
     """
 
     schema: ClassVar[str] = 'actuator_glue.calibration/1'
-
-    parameters: dict[str, Marginal]
-    draws: Array
-    log_density: Array
-    best: Array
-    error: FitError
-    at_bound: tuple[Pressed, ...]
-    problems: tuple[str, ...]
-    notes: tuple[str, ...]
-    converged: bool
-    effects: tuple[str, ...]
-    likelihood: str
-    shaping_factor: float | None
-    seed: int
-    initial: str
-    settle: float
-    evaluations: int
-    seconds: float
-    compile_seconds: float
-    sources: tuple[CalibratedRecord, ...]
-    prior: PriorUse | None = None
-    records: tuple[Record, ...] = ()
-    tracking: tuple[RecordTracking, ...] = ()
-    sampler: str = 'adaptive'
-    automatic_shaping: bool = False
-    force: tuple[RecordForce, ...] = ()
-    structure: ResidualStructure | None = None
 
     @property
     def model_effects(self) -> tuple[str, ...]:
         """Effects of the model beyond Eq. (2)."""
         return self.effects
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Parameters in the order of the draws' columns."""
-        return tuple(self.parameters)
-
-    @property
-    def posterior(self) -> Array:
-        """Draws of all chains, shape (m, p), SI units."""
-        return self.draws.reshape(-1, self.draws.shape[2])
-
-    def carried(self) -> Carried:
-        """Return the draws as a prior for later tests of the same actuator."""
-        from actuator_glue.inference.mixture_density import components
-
-        found = Carried.thinned(self.names, self.posterior)
-        positive = (found.draws > 0.0).all(axis=0)
-        logs = np.where(positive, np.log(np.where(positive, found.draws, 1.0)), found.draws)
-        return replace(found, components=components(logs, COMPONENTS))
 
     @property
     def inference_data(self) -> arviz.InferenceData:
@@ -209,10 +127,9 @@ class Calibration(Result):
 
     def plot(self) -> Figure:
         """Return a figure of every parameter's distribution and every pair of them."""
-        from actuator_glue.report.posterior_figure import posterior_figure
+        from actuator_glue.api.calibration_report import posterior
 
-        units = [p.unit for p in self.parameters.values()]
-        return posterior_figure(self.posterior, self.names, units)
+        return posterior(self)
 
     def plot_bands(self, record: OneRecord) -> Figure:
         """Return a figure of the parameter band and the total predictive band over a record.

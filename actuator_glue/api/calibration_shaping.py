@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuator_glue.api.calibration_options import CalibrationOptions
 from actuator_glue.diagnosis.force import with_forces
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.effective_size import effective_size
@@ -19,9 +19,6 @@ from actuator_glue.model.effects import scale
 from actuator_glue.model.exact import settle_samples
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
-
-if TYPE_CHECKING:
-    from actuator_glue.api.calibration import CalibrationOptions
 
 # Refits of displacement and force, each weighed as its error was before.
 _WEIGHINGS = 3

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from actuator_glue.api.calibration_given import calibration_given
 from actuator_glue.api.calibration_result import Calibration
-from actuator_glue.api.given import calibration_given, seed_given
+from actuator_glue.api.given import seed_given
 from actuator_glue.api.rths import DRAWS, FREQUENCIES, rths
 from actuator_glue.api.stability import StabilityResult
 from actuator_glue.hybrid.compensator import KINDS

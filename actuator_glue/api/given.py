@@ -1,4 +1,4 @@
-"""What callers give: records and calibrations, themselves or as files; seeds, or none."""
+"""What callers give: records, themselves or as files; times; seeds, or none."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from datetime import timedelta
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -14,9 +14,6 @@ from actuator_glue.errors import InputError
 from actuator_glue.given import number, whole
 from actuator_glue.io.load import load_records
 from actuator_glue.records import Record
-
-if TYPE_CHECKING:
-    from actuator_glue.api.calibration_result import Calibration
 
 OneRecord: TypeAlias = Record | os.PathLike[str] | str
 Records: TypeAlias = OneRecord | Iterable[OneRecord]
@@ -76,24 +73,6 @@ def one_record_given(given: OneRecord) -> Record:
     if len(found) != 1:
         raise InputError(f'{len(found)} records; give one')
     return found[0]
-
-
-def calibration_given(given: Calibration | os.PathLike[str] | str) -> Calibration:
-    """Return a calibration that was given itself, or the file it was saved to.
-
-    Raises:
-        InputError: something else was given, or the file holds none.
-    """
-    from actuator_glue.api.calibration_result import Calibration
-
-    if isinstance(given, Calibration):
-        return given
-    if isinstance(given, (str, os.PathLike)):
-        return Calibration.load(os.fspath(given))
-    raise InputError(
-        f'{type(given).__name__} is no calibration; give what `calibrate` returns, or the file '
-        'it was saved to'
-    )
 
 
 def seconds(value: object, name: str) -> float:

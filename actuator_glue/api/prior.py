@@ -7,8 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from actuator_glue.api.calibration_given import calibration_given
 from actuator_glue.api.calibration_result import Calibration
-from actuator_glue.api.given import calibration_given, seconds
+from actuator_glue.api.given import seconds
 from actuator_glue.errors import InputError
 from actuator_glue.inference.carried import Drift
 from actuator_glue.inference.prior_use import GivenPrior

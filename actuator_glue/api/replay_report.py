@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuator_glue.api.replay_data import ReplayData, WindowEstimate
 from actuator_glue.api.tracking import shown
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import source_name
@@ -15,20 +16,18 @@ from actuator_glue.report.timeseries import ParameterCourse, parameters_against_
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from actuator_glue.api.replay_result import Replay, WindowEstimate
-
 
 ROWS = 20  # windows shown to people; JSON has all
 TITLE = 'Posterior mean (SI units) and standard deviation (% of it) of each window'
 TRACKING = 'How the actuator followed each window: median (95 % limits)'
 
 
-def header(found: Replay) -> tuple[str, ...]:
+def header(found: ReplayData) -> tuple[str, ...]:
     """Return the columns of `rows`."""
     return ('window', 'end [s]', *_names(found), 'R-hat', 'rms [um]', 'cover')
 
 
-def rows(found: Replay) -> list[tuple[str, ...]]:
+def rows(found: ReplayData) -> list[tuple[str, ...]]:
     """Return a row of text for each of some windows, evenly chosen where there are many."""
     out = []
     for w in _some(_windows(found)):
@@ -46,7 +45,7 @@ def rows(found: Replay) -> list[tuple[str, ...]]:
     return out
 
 
-def tracking_table(found: Replay) -> tuple[tuple[str, ...], list[tuple[str, ...]]] | None:
+def tracking_table(found: ReplayData) -> tuple[tuple[str, ...], list[tuple[str, ...]]] | None:
     """Return header and rows of the tracking numbers; None where nobody asked for them.
 
     Of each window median and 95 % limits over the draws.
@@ -79,17 +78,17 @@ def _percent(stddev: float, mean: float) -> str:
     return f'{100 * stddev / abs(mean):3.0f}%' if mean else '  -%'
 
 
-def _names(found: Replay) -> list[str]:
+def _names(found: ReplayData) -> list[str]:
     return list(found.windows[-1].parameters)
 
 
-def _windows(found: Replay) -> list[WindowEstimate]:
+def _windows(found: ReplayData) -> list[WindowEstimate]:
     """Return the windows of the last one's model: the parameters of others are others."""
     names = _names(found)
     return [w for w in found.windows if list(w.parameters) == names]
 
 
-def brief(found: Replay) -> list[html.Block]:
+def brief(found: ReplayData) -> list[html.Block]:
     """Return the summary, the windows, what differs and what limits the answer."""
     told = [*found.notes]
     if found.compared is not None:
@@ -102,9 +101,11 @@ def brief(found: Replay) -> list[html.Block]:
     ]
 
 
-def page(found: Replay) -> html.Page:
+def page(found: ReplayData) -> html.Page:
     """Return the report of a replay."""
-    picture = html.Picture.of(found.plot(), 'Every parameter, with two standard deviations.')
+    picture = html.Picture.of(
+        parameters_figure(found), 'Every parameter, with two standard deviations.'
+    )
     events = [html.Text(line) for line in dict.fromkeys(found.events)]
     sections = [html.Section('Windows', [*brief(found), picture])]
     if events:
@@ -112,7 +113,7 @@ def page(found: Replay) -> html.Page:
     return html.Page(f'Replay of {source_name(found.bag)}', found.summary(), sections)
 
 
-def parameters_figure(found: Replay) -> Figure:
+def parameters_figure(found: ReplayData) -> Figure:
     """Draw every parameter's mean and two standard deviations against time."""
     names, windows = _names(found), _windows(found)
     known = {p.name: p for p in Structure(found.effects).parameters}

@@ -11,14 +11,14 @@ from typing import Any, Literal, TypedDict, Unpack
 from actuator_glue.api.callbacks import harmless
 from actuator_glue.api.given import Records, records_given
 from actuator_glue.api.options import chosen, takes
-from actuator_glue.api.replay_result import (
+from actuator_glue.api.replay_data import (
     Compared,
-    Replay,
     ScoredBand,
     WindowError,
     WindowEstimate,
     WindowParameter,
 )
+from actuator_glue.api.replay_result import Replay
 from actuator_glue.api.tracking import window_tracking
 from actuator_glue.errors import InputError
 from actuator_glue.given import take_numbers

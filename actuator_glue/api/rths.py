@@ -8,11 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
+from actuator_glue.api.calibration_given import calibration_given
 from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.api.effect_cost import effect_costs, margins
-from actuator_glue.api.given import calibration_given, seed_given
+from actuator_glue.api.given import seed_given
 from actuator_glue.api.spread import spread
-from actuator_glue.api.stability import AtFrequency, DelayMargin, StabilityResult
+from actuator_glue.api.stability import StabilityResult
+from actuator_glue.api.stability_data import AtFrequency, DelayMargin
 from actuator_glue.api.virtual_test import VirtualResult, check_criteria, run, summarise
 from actuator_glue.errors import InputError
 from actuator_glue.given import number, whole

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from actuator_glue.api.stability_data import StabilityData
 from actuator_glue.api.virtual_test import CRITERIA
 from actuator_glue.report import html, style
 
@@ -13,7 +14,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from actuator_glue.api.spread import Spread
-    from actuator_glue.api.stability import StabilityResult
     from actuator_glue.api.virtual_test import VirtualResult
     from actuator_glue.hybrid.stability import Share
 
@@ -21,7 +21,7 @@ HEADER = ('quantity', 'unit', 'mean', 'sd', '2.5 %', '97.5 %')
 
 
 @style.styled
-def stability_figure(found: StabilityResult) -> Figure:
+def stability_figure(found: StabilityData) -> Figure:
     """Draw the draws' margins and growth rates, the stability limit at zero."""
     figure = style.new_figure(2.8)
     left, right = figure.subplots(1, 2)
@@ -38,7 +38,7 @@ def stability_figure(found: StabilityResult) -> Figure:
     return figure
 
 
-def rows(found: StabilityResult) -> list[tuple[str, ...]]:
+def rows(found: StabilityData) -> list[tuple[str, ...]]:
     """Return a row of text for each distribution over the draws, under HEADER."""
 
     def row(name: str, unit: str, of: Spread, scale: float = 1.0) -> tuple[str, ...]:
@@ -70,7 +70,7 @@ def _shown(name: str) -> tuple[str, str, float]:
     return {'J2': 'J2, rms of tracking', 'J3': 'J3, peak of tracking'}.get(name, name), '%', 100.0
 
 
-def lines(found: StabilityResult) -> list[str]:
+def lines(found: StabilityData) -> list[str]:
     """Return margin, virtual test and sensitivity, a line each."""
     out = [_margin(found)]
     if found.virtual is not None:
@@ -96,7 +96,7 @@ def _probability(of: Share) -> str:
     return f'{of.value:.4g} ({100 * of.level:g} % interval {of.lower:.3g} to {of.upper:.3g})'
 
 
-def _margin(found: StabilityResult) -> str:
+def _margin(found: StabilityData) -> str:
     margin = found.delay_margin
     if not np.isfinite(margin.pure_delay):
         return 'no pure delay makes this loop unstable'
@@ -128,7 +128,7 @@ def response_figure(found: VirtualResult) -> Figure:
     return figure
 
 
-def brief(found: StabilityResult) -> list[html.Block]:
+def brief(found: StabilityData) -> list[html.Block]:
     """Return problems, summary, the distributions over the draws and notes."""
     return [
         *(html.Note(line) for line in found.problems),
@@ -139,10 +139,12 @@ def brief(found: StabilityResult) -> list[html.Block]:
     ]
 
 
-def page(found: StabilityResult) -> html.Page:
+def page(found: StabilityData) -> html.Page:
     """Return the report."""
     pictures = [
-        html.Picture.of(found.plot(), 'Each draw of the posterior; the line is the limit.')
+        html.Picture.of(
+            stability_figure(found), 'Each draw of the posterior; the line is the limit.'
+        )
     ]
     if found.virtual is not None and found.virtual.indicators:
         picture = response_figure(found.virtual)

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from actuator_glue.api.calibration_data import CalibrationData
 from actuator_glue.errors import InputError
 from actuator_glue.given import whole
 from actuator_glue.hybrid.actuator import actuator, nonlinear
 from actuator_glue.records import Array, check_stiffness
 
-if TYPE_CHECKING:
-    from actuator_glue.api.calibration_result import Calibration
 
-
-def chosen_draw(found: Calibration, draw: str | int) -> Array:
+def chosen_draw(found: CalibrationData, draw: str | int) -> Array:
     """Return the parameters of the mean, the best, or a numbered draw, (p,).
 
     Raises:
@@ -32,7 +30,7 @@ def chosen_draw(found: Calibration, draw: str | int) -> Array:
     raise InputError(f"draw {draw!r}: use 'mean', 'best', or a number below {len(draws)}")
 
 
-def state_space(found: Calibration, stiffness: float, draw: str | int) -> Any:
+def state_space(found: CalibrationData, stiffness: float, draw: str | int) -> Any:
     """Return x/u under a specimen stiffness [N/m] as `control.StateSpace`.
 
     Raises:

@@ -119,7 +119,8 @@ def run(args: argparse.Namespace) -> int:
     """
     load_effects(args)
 
-    from actuator_glue.api.calibration import CalibrationOptions, calibrate
+    from actuator_glue.api.calibration import calibrate
+    from actuator_glue.api.calibration_options import CalibrationOptions
 
     options = CalibrationOptions(
         effects=tuple(args.effect),

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
+from actuator_glue.diagnosis.alarm import Alarm
 from actuator_glue.diagnosis.completeness import Decision
 from actuator_glue.diagnosis.measured.measurement import Measured
-from actuator_glue.diagnosis.result import Alarm
 from actuator_glue.diagnosis.score import splits_of
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.inference.least_squares.data import Data

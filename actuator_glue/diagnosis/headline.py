@@ -3,17 +3,42 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
+from typing import Protocol
 
+from actuator_glue.diagnosis.alarm import Alarm
+from actuator_glue.diagnosis.finding import Finding
+from actuator_glue.diagnosis.held_out import HeldOutError, Verdict
+from actuator_glue.diagnosis.learned.term import LearnedTerm
+from actuator_glue.diagnosis.onset.onset import Onset
 from actuator_glue.diagnosis.verdict import LIKELY, excuse, likely, misses
+from actuator_glue.diagnosis.wrong_setup import WrongSetup
+from actuator_glue.json_value import Json
 from actuator_glue.records import source_name
 
-if TYPE_CHECKING:
-    from actuator_glue.diagnosis.finding import Finding
-    from actuator_glue.diagnosis.result import DiagnosisData
+
+class Told(Protocol):
+    """What the line is made of; the attributes are those of `DiagnosisData`."""
+
+    @property
+    def verdict(self) -> Verdict: ...
+    @property
+    def effects(self) -> Sequence[Finding]: ...
+    @property
+    def learned(self) -> Sequence[LearnedTerm]: ...
+    @property
+    def error(self) -> HeldOutError: ...
+    @property
+    def alarm(self) -> Alarm: ...
+    @property
+    def remaining(self) -> Json: ...
+    @property
+    def onset(self) -> Onset | None: ...
+    @property
+    def setup(self) -> WrongSetup | None: ...
 
 
-def _named(effect: Finding, found: DiagnosisData) -> str:
+def _named(effect: Finding, found: Told) -> str:
     equations = [term.numbers for term in found.learned if term.name == effect.name]
     if equations:
         term = f'a learned term {effect.name} ({equations[0]})'
@@ -35,7 +60,7 @@ def _share(probability: float) -> str:
     return f'{100 * probability:.2g} %'
 
 
-def _noise(found: DiagnosisData) -> str:
+def _noise(found: Told) -> str:
     """Say how large the noise is, by itself or beside the error, and what is known to make it."""
     floor = found.error.noise_floor
     parts = [f'{1e6 * (e.noise or 0.0):.1f} um by {e.name}' for e in found.effects if e.noise]
@@ -46,7 +71,7 @@ def _noise(found: DiagnosisData) -> str:
     return f'{text} ({", ".join(parts)})' if parts else text
 
 
-def _errors(found: DiagnosisData, named: bool) -> str:
+def _errors(found: Told, named: bool) -> str:
     """Say the held-out error; first the one that the verdict is of, where there are two."""
     error = found.error
 
@@ -61,7 +86,7 @@ def _errors(found: DiagnosisData, named: bool) -> str:
     return f'{change(other.before, other.after)} {other.how} ({best} {other.otherwise})'
 
 
-def headline(found: DiagnosisData) -> str:
+def headline(found: Told) -> str:
     """Return the verdict in one line, never more than the held-out part bears out.
 
     What is wrong with the set-up that was given comes first.
@@ -71,7 +96,7 @@ def headline(found: DiagnosisData) -> str:
     return _verdict(found)
 
 
-def _verdict(found: DiagnosisData) -> str:
+def _verdict(found: Told) -> str:
     names = ', '.join(_named(e, found) for e in found.effects if e.noise is None)
     enough = 'the model is enough'
     if found.onset is not None:

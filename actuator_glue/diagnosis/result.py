@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import asdict, dataclass, field
 
 import numpy as np
 
+from actuator_glue.diagnosis.alarm import Alarm
 from actuator_glue.diagnosis.estimate import Estimate, Json
 from actuator_glue.diagnosis.finding import Candidate, Finding
 from actuator_glue.diagnosis.headline import headline
@@ -19,37 +19,12 @@ from actuator_glue.diagnosis.table import Row
 from actuator_glue.diagnosis.wrong_setup import WrongSetup
 from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.inference.prior_use import PriorUse
-from actuator_glue.json_value import JsonObject, json_value
+from actuator_glue.json_value import json_value
 from actuator_glue.model.effects import CATALOGUE, Effect
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 
 SCHEMA = 'actuator_glue.diagnosis/1'
-
-
-@dataclass(frozen=True, slots=True)
-class Alarm(JsonObject):
-    """Why (or why not) the model of Eq. (2) is not enough.
-
-    Attributes:
-        raised: significant and material.
-        structured: rms of the part of the residual that is a function of the command [m].
-        threshold: materiality threshold for it [m].
-        noise: rms of the rest [m].
-        p_value: of the structure under the fitted base model with its own coloured noise.
-        false_alarms: probability of any addition on a healthy machine, as asked for.
-        nats: evidence that an addition must have for it.
-        tests: further statistics shown to people (whiteness, harmonics, drift, ...).
-    """
-
-    raised: bool
-    structured: float
-    threshold: float
-    noise: float
-    p_value: float
-    false_alarms: float = math.nan
-    nats: float = math.nan
-    tests: dict[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,10 +10,11 @@ import pytest
 from actuator_glue.api import diagnosis as module
 from actuator_glue.cli.main import main
 from actuator_glue.diagnosis.advice import contradicted, zeros
+from actuator_glue.diagnosis.alarm import Alarm
 from actuator_glue.diagnosis.finding import Finding, Rival
 from actuator_glue.diagnosis.headline import headline
 from actuator_glue.diagnosis.held_out import HeldOutError, Verdict
-from actuator_glue.diagnosis.result import Alarm, DiagnosisData
+from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.diagnosis.verdict import against, certainty, conclude, misses, named
 from actuator_glue.diagnosis.wrong_setup import WrongSetup
 from actuator_glue.model.effects import CATALOGUE

@@ -1,0 +1,99 @@
+"""What a calibration found: what is known of each parameter, the draws, what limits their use."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from actuator_glue.api.calibration_parts import CalibratedRecord, FitError, Marginal, RecordForce
+from actuator_glue.api.tracking import RecordTracking
+from actuator_glue.diagnosis.residual_structure import ResidualStructure
+from actuator_glue.inference.at_bound import Pressed
+from actuator_glue.inference.carried import Carried
+from actuator_glue.inference.prior_use import PriorUse
+from actuator_glue.records import Array, Record
+
+# Normal components of the prior that a calibration makes, at most.
+COMPONENTS = 4
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class CalibrationData:
+    """A joint posterior, and what forbids or limits its use.
+
+    Attributes:
+        parameters: posterior of each parameter by name.
+        draws: draws after burn-in, shape (steps, chains, p), SI units.
+        log_density: log likelihood of each draw, shape (steps, chains).
+        best: draw of the highest likelihood, shape (p,).
+        error: free-run error of the best draw.
+        structure: what is left of the records beside noise; None where they are too short to tell,
+            and in files of earlier versions.
+        at_bound: parameters that a bound of the prior holds.
+        problems: why the posterior must not be used as it stands; empty where it may.
+        notes: what these records cannot tell, and what was done to them.
+        prior: what was known before, beside the bounds; None where that was nothing.
+        converged: R-hat of every parameter is at most 1.01.
+        effects: effects of the model beyond Eq. (2).
+        likelihood: 'glue', 'gaussian' or 'ar1'.
+        shaping_factor: G of Eq. (4); None with a formal likelihood.
+        automatic_shaping: G is half of the independent samples that the residual is worth.
+        force: how the best draw explains each record's force; empty where that was no evidence.
+        seed: seed of the sampler.
+        sampler: 'adaptive' or 'published', see `CalibrationOptions`.
+        initial: state at a record's first sample, 'rest' or 'measured'.
+        settle: uncounted start of each record [s].
+        evaluations: likelihood evaluations.
+        seconds: how long it took, compilation left out.
+        compile_seconds: compilation, which only the first use of an installation pays.
+        sources: the records, described.
+        records: the records themselves as they were fitted; empty after `load`.
+        tracking: how the actuator follows the command of each record.
+    """
+
+    parameters: dict[str, Marginal]
+    draws: Array
+    log_density: Array
+    best: Array
+    error: FitError
+    at_bound: tuple[Pressed, ...]
+    problems: tuple[str, ...]
+    notes: tuple[str, ...]
+    converged: bool
+    effects: tuple[str, ...]
+    likelihood: str
+    shaping_factor: float | None
+    seed: int
+    initial: str
+    settle: float
+    evaluations: int
+    seconds: float
+    compile_seconds: float
+    sources: tuple[CalibratedRecord, ...]
+    prior: PriorUse | None = None
+    records: tuple[Record, ...] = ()
+    tracking: tuple[RecordTracking, ...] = ()
+    sampler: str = 'adaptive'
+    automatic_shaping: bool = False
+    force: tuple[RecordForce, ...] = ()
+    structure: ResidualStructure | None = None
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Parameters in the order of the draws' columns."""
+        return tuple(self.parameters)
+
+    @property
+    def posterior(self) -> Array:
+        """Draws of all chains, shape (m, p), SI units."""
+        return self.draws.reshape(-1, self.draws.shape[2])
+
+    def carried(self) -> Carried:
+        """Return the draws as a prior for later tests of the same actuator."""
+        from actuator_glue.inference.mixture_density import components
+
+        found = Carried.thinned(self.names, self.posterior)
+        positive = (found.draws > 0.0).all(axis=0)
+        logs = np.where(positive, np.log(np.where(positive, found.draws, 1.0)), found.draws)
+        return replace(found, components=components(logs, COMPONENTS))
