@@ -65,7 +65,7 @@ LIBRARIES = {
     'zstandard': Names('zstandard', None),
 }
 # Libraries of the extra `lab`, each asked for where a file needs it.
-OPTIONAL = {'aiohttp', 'h5py', 'nptdms', 'openpyxl', 'pyarrow', 'pylsl'}
+OPTIONAL = {'aiohttp', 'h5py', 'nptdms', 'openpyxl', 'pandas', 'pyarrow', 'pylsl'}
 # Options of pytest that pyproject.toml and Makefile use; nothing imports these plug-ins.
 PLUGINS = {'pytest_timeout', 'xdist'}
 

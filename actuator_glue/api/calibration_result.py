@@ -10,6 +10,7 @@ import numpy as np
 
 from actuator_glue.api import store
 from actuator_glue.api.calibration_data import CalibrationData
+from actuator_glue.api.frame import frame
 from actuator_glue.api.given import OneRecord, one_record_given
 from actuator_glue.api.result import Result
 from actuator_glue.model.effects import CATALOGUE
@@ -18,6 +19,7 @@ if TYPE_CHECKING:
     import arviz
     import control
     from matplotlib.figure import Figure
+    from pandas import DataFrame
 
     from actuator_glue.report import html
 
@@ -54,6 +56,37 @@ class Calibration(Result, CalibrationData):
             }
         data.posterior.attrs |= {'likelihood': self.likelihood, 'effects': list(self.effects)}
         return data
+
+    def to_dataframe(self) -> DataFrame:
+        """Return a table of the parameters, a row for each by its name, in SI units.
+
+        Columns: `unit`, `mean`, `stddev`, `lower` and `upper` (95 % interval), `best`,
+        `skewness`, `cov`, `rhat`, `ess`, `prior_lower`, `prior_upper`, `prior_dominated`.
+
+        Raises:
+            InputError: pandas is not installed.
+        """
+        ends = np.quantile(self.posterior, (0.025, 0.975), axis=0).T
+        rows = [
+            {
+                'parameter': name,
+                'unit': p.unit,
+                'mean': p.mean,
+                'stddev': p.stddev,
+                'lower': lower,
+                'upper': upper,
+                'best': p.best,
+                'skewness': p.skewness,
+                'cov': p.cov,
+                'rhat': p.rhat,
+                'ess': p.ess,
+                'prior_lower': p.bounds[0],
+                'prior_upper': p.bounds[1],
+                'prior_dominated': p.prior_dominated,
+            }
+            for (name, p), (lower, upper) in zip(self.parameters.items(), ends, strict=True)
+        ]
+        return frame(rows, 'parameter')
 
     def to_json(self) -> dict[str, Any]:
         """Return the object of schema `actuator_glue.calibration/1` (draws left out)."""

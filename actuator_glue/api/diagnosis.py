@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass, fields, replace
 from datetime import timedelta
 from pathlib import Path
-from typing import TYPE_CHECKING, ClassVar, TypedDict, Unpack
+from typing import TYPE_CHECKING, Any, ClassVar, TypedDict, Unpack
 
 from actuator_glue.api.callbacks import harmless
+from actuator_glue.api.frame import frame
 from actuator_glue.api.given import Records, Stiffness, records_given, seed_given
 from actuator_glue.api.options import chosen, takes
 from actuator_glue.api.prior import check_prior, given_prior
@@ -18,7 +20,7 @@ from actuator_glue.api.provenance import provenance
 from actuator_glue.api.result import Result
 from actuator_glue.api.tracking import RecordTracking, ready, records_tracking, tables
 from actuator_glue.diagnosis import diagnose as core
-from actuator_glue.diagnosis.estimate import Json
+from actuator_glue.diagnosis.estimate import Estimate, Json
 from actuator_glue.diagnosis.result import SCHEMA, DiagnosisData
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.effects import save_effects
@@ -30,6 +32,7 @@ from actuator_glue.records import Record
 if TYPE_CHECKING:
     import arviz
     from matplotlib.figure import Figure
+    from pandas import DataFrame
 
     from actuator_glue.api.calibration_result import Calibration
     from actuator_glue.inference.prior_use import GivenPrior
@@ -58,6 +61,31 @@ class Diagnosis(Result, DiagnosisData):
             'tracking': [asdict(of) for of in self.tracking],
             **({'definitions': own} if own else {}),
         }
+
+    def to_dataframe(self) -> DataFrame:
+        """Return a table of the sizes, a row for each parameter by its name, in SI units.
+
+        Columns: `effect` (empty for Eq. (2)'s own), `probability` of that effect (NaN for a
+        learned term), `alternatives` that these records cannot tell from it, `unit`, `mean`,
+        `stddev`, `lower` and `upper` (95 % interval), `identified`, and of Eq. (2)'s parameters
+        `before`: the mean without any addition.
+
+        Raises:
+            InputError: pandas is not installed.
+        """
+        rows = [
+            _row('', n, p) | {'before': _mean(self.base_before, n)} for n, p in self.base.items()
+        ]
+        for effect in self.effects:
+            rows += [
+                _row(effect.name, name, p)
+                | {
+                    'probability': effect.probability,
+                    'alternatives': ', '.join(effect.alternatives),
+                }
+                for name, p in effect.parameters.items()
+            ]
+        return frame(rows, 'parameter')
 
     def save_effects(self, path: Path | str) -> Path:
         """Write the learned terms as a file of effects and return its path.
@@ -117,6 +145,27 @@ class Diagnosis(Result, DiagnosisData):
         from actuator_glue.report.diagnosis_report import page
 
         return page(self, tables(self.tracking))
+
+
+def _row(effect: str, name: str, size: Estimate) -> dict[str, Any]:
+    """Return the columns of one size that every one has."""
+    return {
+        'parameter': name,
+        'effect': effect,
+        'probability': math.nan,
+        'alternatives': '',
+        'unit': size.unit,
+        'mean': size.mean,
+        'stddev': size.stddev,
+        'lower': size.lower,
+        'upper': size.upper,
+        'identified': size.identified,
+        'before': math.nan,
+    }
+
+
+def _mean(sizes: Mapping[str, Estimate], name: str) -> float:
+    return sizes[name].mean if name in sizes else math.nan
 
 
 @dataclass(frozen=True, slots=True)

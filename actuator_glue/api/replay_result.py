@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
+from actuator_glue.api.frame import frame
 from actuator_glue.api.replay_data import ReplayData
 from actuator_glue.api.result import Result
 from actuator_glue.model.effects import CATALOGUE
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+    from pandas import DataFrame
 
     from actuator_glue.report import html
 
@@ -37,6 +40,34 @@ class Replay(Result, ReplayData):
             **CATALOGUE.definitions(self.effects),
             'times_real_time': self.times_real_time,
         }
+
+    def to_dataframe(self) -> DataFrame:
+        """Return a table of the windows, a row for each by its number, in SI units.
+
+        Columns: `end_s`, `samples`, `converged`, `evaluations`, `rms_m` and `nrmse` of the best
+        draw, `coverage` of the last total band that ended in the window (widest level; NaN where
+        none did), and of each parameter NAME `NAME_mean`, `NAME_stddev`, `NAME_rhat`, `NAME_ess`.
+
+        Raises:
+            InputError: pandas is not installed.
+        """
+        rows: list[dict[str, Any]] = []
+        for w in self.windows:
+            inside = [b.coverage[-1] for b in w.bands if b.kind == 'total' and b.coverage]
+            row: dict[str, Any] = {
+                'window': w.window,
+                'end_s': w.end_s,
+                'samples': w.samples,
+                'converged': w.converged,
+                'evaluations': w.evaluations,
+                'rms_m': w.error.rms_m,
+                'nrmse': w.error.nrmse,
+                'coverage': inside[-1] if inside else math.nan,
+            }
+            for name, p in w.parameters.items():
+                row |= {f'{name}_{of}': getattr(p, of) for of in ('mean', 'stddev', 'rhat', 'ess')}
+            rows.append(row)
+        return frame(rows, 'window')
 
     def plot(self) -> Figure:
         """Return a figure of every parameter against time, with two standard deviations."""
