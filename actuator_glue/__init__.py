@@ -33,9 +33,12 @@ if TYPE_CHECKING:
     from actuator_glue.api.simulation import Command as Command
     from actuator_glue.api.simulation import simulate as simulate
     from actuator_glue.api.stability import StabilityResult as StabilityResult
+    from actuator_glue.campaigns.campaign import CampaignResult as CampaignResult
+    from actuator_glue.campaigns.campaign import campaign as campaign
     from actuator_glue.errors import InputError as InputError
     from actuator_glue.hybrid.partition import Partition as Partition
     from actuator_glue.hybrid.partition import Specimen as Specimen
+    from actuator_glue.io.join import join as join
     from actuator_glue.io.load import load as load
     from actuator_glue.io.load import load_records as load_records
     from actuator_glue.records import Record as Record
@@ -43,6 +46,7 @@ if TYPE_CHECKING:
 # Public name: the module that holds it, and its name there ('' for the module itself).
 _PUBLIC = {
     'Calibration': ('api.calibration_result', 'Calibration'),
+    'CampaignResult': ('campaigns.campaign', 'CampaignResult'),
     'Command': ('api.simulation', 'Command'),
     'Diagnosis': ('api.diagnosis', 'Diagnosis'),
     'InputError': ('errors', 'InputError'),
@@ -52,9 +56,11 @@ _PUBLIC = {
     'Specimen': ('hybrid.partition', 'Specimen'),
     'StabilityResult': ('api.stability', 'StabilityResult'),
     'calibrate': ('api.calibration', 'calibrate'),
+    'campaign': ('campaigns.campaign', 'campaign'),
     'compare_compensators': ('api.compensation', 'compare_compensators'),
     'diagnose': ('api.diagnosis', 'diagnose'),
     'effects': ('effects', ''),
+    'join': ('io.join', 'join'),
     'load': ('io.load', 'load'),
     'load_records': ('io.load', 'load_records'),
     'replay': ('api.replaying', 'replay'),

@@ -175,6 +175,12 @@ def laboratory(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         for file in files:
             write(tmp_path / f'{file}.csv', record)
     write(tmp_path / 'test.mat', load(tmp_path / 'test.csv'))
+    for file, columns in (('command', (0, 1)), ('response', (0, 2))):
+        rows = [
+            line.split(',') for line in (tmp_path / 'test.csv').read_text('utf-8').splitlines()
+        ]
+        kept = [','.join(row[i] for i in columns) for row in rows if len(row) > max(columns)]
+        (tmp_path / f'{file}.csv').write_text('\n'.join(kept) + '\n')
     lines = (tmp_path / 'raw.csv').read_text('utf-8').splitlines()
     rows = [line.split(',')[1:] for line in lines if line[0].isdigit()]
     text = '\n'.join(['Logger', 'a,b,f', *(','.join(row) for row in rows)]) + '\n'

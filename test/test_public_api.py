@@ -14,6 +14,7 @@ from actuator_glue.cli.main import main
 
 NAMES = {
     'Calibration',
+    'CampaignResult',
     'Command',
     'Diagnosis',
     'InputError',
@@ -23,9 +24,11 @@ NAMES = {
     'Specimen',
     'StabilityResult',
     'calibrate',
+    'campaign',
     'compare_compensators',
     'diagnose',
     'effects',
+    'join',
     'load',
     'load_records',
     'replay',

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
 
@@ -21,6 +22,28 @@ from actuator_glue.records import Array, Hold, Record
 
 # A channel "at rest" may move by this share of its range: noise does, a test does not.
 _REST_SHARE = 0.1
+_NEEDED = ('time', 'command', 'measured')
+
+
+@dataclass(frozen=True, slots=True)
+class Channels:
+    """Channels of a file and what it says besides.
+
+    Attributes:
+        values: by role, times among them where a column holds them, each of shape (n,) [SI].
+        period: time between samples [s] where no column of times says it.
+        start_ns: time from which the times count [ns], 0 where nothing says it.
+        stiffness: specimen stiffness [N/m]; None where nothing says it.
+        hold: how the command runs between its samples; None where nothing says it.
+        actuator: its name.
+    """
+
+    values: dict[str, Array]
+    period: float | None
+    start_ns: int
+    stiffness: float | None
+    hold: str | None
+    actuator: str
 
 
 def read(
@@ -52,24 +75,9 @@ def read(
     Raises:
         InputError: the file cannot be used; the message says what, where and what to do.
     """
-    path = Path(path)
-    if not path.exists():
-        raise InputError(f'{path}: there is no such file')
-    refuse_pipe(path)
-    if path.is_dir():
-        raise InputError(f'{path}: this is a folder, and no bag in MCAP format')
-    if isinstance(channels, (str, Path)):
-        channels = read_channel_map(channels)
-    notes: dict[str, str] = {}
-    if channels is not None:
-        values, period, start_ns = _mapped(path, channels)
-        said = {'hold': channels.hold, 'actuator': channels.actuator}
-        notes = {name: text for name, text in said.items() if text is not None}
-        stiffness = channels.stiffness if stiffness is None else stiffness
-    else:
-        values, notes, period, start_ns = _by_name(path)
-        if stiffness is None:
-            stiffness = _noted_stiffness(notes, path)
+    found = channels_of(path, channels)
+    values, period = found.values, found.period
+    said_hold = found.hold
     first = float(values['time'][0]) if 'time' in values else 0.0
     source = str(path)
     if period is None:
@@ -81,23 +89,63 @@ def read(
             made = resample_evenly(values, resample, source, resample_by)
             values, period = made.values, made.period
             warn(f'{path}: {made.told()}')
-            source, notes = f'{path} ({made.name()})', {'hold': 'linear', **notes}
+            source, said_hold = f'{path} ({made.name()})', said_hold or 'linear'
     elif resample is not None:
         raise InputError(f'{path}: no column of times is used, so there is nothing to resample')
     for column in values.values():
         column.flags.writeable = False  # nobody else has them: the record need not copy them
     # Record refuses another.
-    chosen = cast('Hold', hold or notes.get('hold', 'zoh'))
+    chosen = cast('Hold', hold or said_hold or 'zoh')
     return Record(
         command=values['command'],
         measured=values['measured'],
         force=values.get('force'),
         period=period,
-        stiffness=stiffness,
-        start_ns=max(start_ns + round(first * 1e9), 0),
+        stiffness=found.stiffness if stiffness is None else stiffness,
+        start_ns=max(found.start_ns + round(first * 1e9), 0),
         hold=chosen,
-        actuator=actuator or notes.get('actuator', 'actuator'),
+        actuator=actuator or found.actuator,
         source=source,
+    )
+
+
+def channels_of(
+    path: Path | str,
+    channels: ChannelMap | Path | str | None,
+    *,
+    needed: tuple[str, ...] = _NEEDED,
+) -> Channels:
+    """Return the channels of a laboratory file and what it says besides.
+
+    Args:
+        path: a file of any format.
+        channels: channel map; None where the names of the columns say what they are.
+        needed: roles that must be there; of a file that is only a part of a test fewer.
+
+    Raises:
+        InputError: the file cannot be used; the message says what, where and what to do.
+    """
+    path = Path(path)
+    if not path.exists():
+        raise InputError(f'{path}: there is no such file')
+    refuse_pipe(path)
+    if path.is_dir():
+        raise InputError(f'{path}: this is a folder, and no bag in MCAP format')
+    if isinstance(channels, (str, Path)):
+        channels = read_channel_map(channels)
+    if channels is not None:
+        values, period, start_ns = _mapped(path, channels, needed)
+        return Channels(
+            values, period, start_ns, channels.stiffness, channels.hold, channels.actuator
+        )
+    values, notes, period, start_ns = _by_name(path, needed)
+    return Channels(
+        values,
+        period,
+        start_ns,
+        _noted_stiffness(notes, path),
+        notes.get('hold'),
+        notes.get('actuator', 'actuator'),
     )
 
 
@@ -109,14 +157,18 @@ def _noted_stiffness(notes: dict[str, str], path: Path) -> float | None:
         raise InputError(f'{path}: stiffness_N_per_m = {text!r} is not a number') from error
 
 
-def _by_name(path: Path) -> tuple[dict[str, Array], dict[str, str], float | None, int]:
+def _by_name(
+    path: Path, needed: tuple[str, ...]
+) -> tuple[dict[str, Array], dict[str, str], float | None, int]:
     """Return channels in SI units by the names of their columns, notes, period and start [ns].
 
     There is no period where times say it.
     """
     table = format_of(path).read(path, None)
     labels, units = [c.label for c in table.columns], [c.unit for c in table.columns]
-    columns = choose(labels, units, str(path), timed=table.period is not None)
+    if table.period is not None:
+        needed = tuple(role for role in needed if role != 'time')
+    columns = choose(labels, units, str(path), needed)
     raw = table.values([at for at, _ in columns.values()])
     _check_numbers(raw, {role: at for role, (at, _) in columns.items()}, table, path)
     scales = [scale for _, scale in columns.values()]
@@ -129,21 +181,40 @@ def _by_name(path: Path) -> tuple[dict[str, Array], dict[str, str], float | None
     return values, notes, None if 'time' in values else period, start_ns
 
 
-def _mapped(path: Path, channels: ChannelMap) -> tuple[dict[str, Array], float | None, int]:
+def _mapped(
+    path: Path, channels: ChannelMap, needed: tuple[str, ...]
+) -> tuple[dict[str, Array], float | None, int]:
     """Return channels in SI units, rest offsets removed, the period and the start [ns].
 
     There is no period where times say it.
     """
-    roles = channels.roles()
     table = format_of(path).read(path, channels)
+    roles = channels.roles() if needed == _NEEDED else _parts(channels, needed, table)
     raw, counter = _raw(path, channels, roles, table)
     if counter is not None:
         _check_counter(counter, path)
-    values = in_si(raw, channels, str(path))
+    values = in_si(raw, channels, str(path), roles)
     if channels.rate is not None:
         _check_rate(channels.rate, values.get('time'), table, path)
         return values, 1.0 / channels.rate, table.start_ns
     return values, None, table.start_ns
+
+
+def _parts(channels: ChannelMap, needed: tuple[str, ...], table: FileTable) -> dict[str, Channel]:
+    """Return the channels of a map that a file has, which is only a part of a test.
+
+    A number of a column says nothing of the file it is meant for: it is of what is needed there,
+    and a force is beside what is measured.
+    """
+    names = {name for column in table.columns for name in (column.name, column.label)}
+    own = {*needed, 'force'} if 'measured' in needed else set(needed)
+    return {
+        role: channel
+        for role, channel in channels.roles().items()
+        if channel.column in names
+        or (isinstance(channel.column, int) and role in own)
+        or role in needed
+    }
 
 
 def _check_rate(rate: float, time: Array | None, table: FileTable, path: Path) -> None:
@@ -176,14 +247,19 @@ def _check_rate(rate: float, time: Array | None, table: FileTable, path: Path) -
         )
 
 
-def in_si(raw: dict[str, Array], channels: ChannelMap, source: str) -> dict[str, Array]:
+def in_si(
+    raw: dict[str, Array],
+    channels: ChannelMap,
+    source: str,
+    roles: dict[str, Channel] | None = None,
+) -> dict[str, Array]:
     """Return channels in SI units, scaled, offsets at rest removed, by their role.
 
     Raises:
         InputError: a channel is not at rest where its map says so.
     """
     values = {}
-    for role, channel in channels.roles().items():
+    for role, channel in (channels.roles() if roles is None else roles).items():
         where = f'{source}: {role}'
         column = raw[role] * channel.scale + channel.offset
         if channel.remove_rest_offset:

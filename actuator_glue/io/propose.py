@@ -146,12 +146,19 @@ def _plain(label: str) -> str:
 def _clock(columns: list[ColumnLook]) -> Guess | None:
     """Return the column of times: it is called so and goes up, or goes on evenly, not by one."""
     even = [c for c in columns if c.rate is not None and not c.counts]
-    named = [c for c in columns if _called(c, 'time')]
+    # What is in seconds and goes up all the time is a clock, whatever it is called.
+    named = [
+        c
+        for c in columns
+        if _called(c, 'time') or (c.unit in ROLES['time'] and c.steps is not None)
+    ]
     best = [c for c in named if c.steps is not None] or even or named
     if not best:
         return None
     column = next((c for c in best if c.rate is not None), best[0])
-    reasons = [f'called {column.label.strip()!r}'] if column in named else []
+    reasons = [f'called {column.label.strip()!r}'] if _called(column, 'time') else []
+    if not reasons and column.unit in ROLES['time']:
+        reasons = [f'in {column.unit}']
     if column.steps is not None:
         even_clock = column.rate is not None and not uneven(column.steps)
         reasons.append('goes on evenly' if even_clock else 'goes on, in uneven steps')

@@ -137,7 +137,7 @@ def _is_number(text: str) -> bool:
 
 
 def choose(
-    names: list[str], units: list[str], where: str, *, timed: bool = False
+    names: list[str], units: list[str], where: str, needed: tuple[str, ...]
 ) -> dict[str, tuple[int, float]]:
     """Return position and factor to SI of every column that has a role.
 
@@ -145,7 +145,7 @@ def choose(
         names: column names, unit included.
         units: what the file gives as the unit of each column; holds where the name has none.
         where: file, for messages.
-        timed: the file says its period, so that times may be missing.
+        needed: roles that must be there.
 
     Raises:
         InputError: a unit is missing or unknown, a role is there twice or a needed one not.
@@ -159,8 +159,8 @@ def choose(
         if role in found:
             raise InputError(f'{where}: two columns are called {role}; keep one')
         found[role] = (position, factor(role, unit or stated, f'{where}: column {name.strip()!r}'))
-    for role in ('time', 'command', 'measured'):
-        if role not in found and not (timed and role == 'time'):
+    for role in needed:
+        if role not in found:
             raise InputError(
                 f'{where}: no column for {role}; the columns are '
                 f'{", ".join(n.strip() for n in names)}. Name them as in {EXAMPLE}, or describe '

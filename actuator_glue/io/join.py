@@ -1,0 +1,374 @@
+"""Two files of one test, the command in one and the response in the other, as one record."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, TypeAlias, get_args
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from actuator_glue.errors import InputError
+from actuator_glue.even_times import uniform_period
+from actuator_glue.io.bag_reader import warn_caller
+from actuator_glue.io.channel_map import ChannelMap, read_channel_map
+from actuator_glue.io.laboratory import Channels, channels_of
+from actuator_glue.io.resample import By as ResampleBy
+from actuator_glue.io.resample import resample_evenly
+from actuator_glue.records import Array, Hold, Record
+
+By: TypeAlias = Literal['time', 'correlation']
+Spectrum: TypeAlias = NDArray[np.complex128]
+
+_ABSOLUTE = 10**17  # ns: times that count from 1970 are beyond it, those of a test never
+_SHORTEST = 64  # samples that both files must have in common
+_ALIKE = 0.5  # correlation below which two files are not of one test
+_AS_ALIKE = 0.98  # of the highest peak: another one as high fits as well
+_COARSE = 200.0  # Hz at which files are laid beside each other first
+_EXPLAINED = 0.9  # share of a response that must follow from the command to tell its time
+_LATEST = 0.25  # s; no actuator follows later
+_LEAD = 5e-3  # s by which a response may lead, as of a compensated command
+_MOST = 1 << 18  # samples by which the fine time is told
+_POWER = 1e-4  # of the strongest line of the command: weaker ones tell nothing
+_WIDE = 0.15  # spread of the command's frequencies over their mean: a sine tells no dead time
+_LINES = 1500  # of the spectrum, the strongest, that are fitted
+
+
+@dataclass(frozen=True, slots=True)
+class _Late:
+    """By how much one channel is later than another.
+
+    Attributes:
+        seconds: [s].
+        deviation: standard deviation of it [s]; infinite where only one frequency is excited.
+        explained: share of the second that the first explains by it [1].
+    """
+
+    seconds: float
+    deviation: float
+    explained: float
+
+
+def join(
+    command_file: Path | str,
+    response_file: Path | str,
+    *,
+    by: By = 'time',
+    channels: ChannelMap | Path | str | None = None,
+    stiffness: float | None = None,
+    hold: Hold | None = None,
+    resample: float | None = None,
+    resample_by: ResampleBy = 'band-limited',
+    warn: Callable[[str], None] = warn_caller,
+) -> Record:
+    """Return the record of a test whose command is in one file and whose response in another.
+
+    The record has the samples of the response; the command is taken at their times: straight
+    between its samples, or held where `hold` is 'zoh'.
+
+    Where the clocks differ, `by='correlation'` lays one file beside the other: by a channel that
+    both have, or else by the dynamics that Eq. (2) allows between command and response - a second
+    order without dead time, so that dead time in the loop is taken for a difference of the clocks.
+
+    Args:
+        command_file: with times and the command.
+        response_file: with times, the measured displacement and perhaps the force.
+        by: 'time' where both files have the same clock, else 'correlation'.
+        channels: channel map that names the columns of both files; None where the names of the
+            columns say what they are.
+        stiffness: specimen stiffness [N/m]; None for what the map or the response says.
+        hold: how the command runs between its samples; None for straight between them.
+        resample: samples per second [Hz] to which a jittered clock of the response is made even.
+        resample_by: how: 'band-limited', or by straight 'lines'.
+        warn: called with a line that tells how the files were joined and how sure that is.
+
+    Raises:
+        InputError: a file or channel that cannot be used, no times in common, clocks that cannot
+            be the same, or files that are not alike.
+
+    Example:
+        >>> join('cmd.csv', 'daq.csv', by='correlation', stiffness=0.0)  # doctest: +SKIP
+    """
+    if by not in get_args(By):
+        raise InputError(f'joining by {by!r} is unknown; use one of {", ".join(get_args(By))}')
+    if isinstance(channels, (str, Path)):
+        channels = read_channel_map(channels)
+    command = _part(command_file, channels, 'command')
+    response = _part(response_file, channels, 'measured')
+    times = command.values['time'], response.values['time']
+    where = f'{command_file} and {response_file}'
+    if by == 'time':
+        between, told = _by_time(command, response, where)
+    else:
+        between, told = _by_correlation(command, response, where)
+    if np.diff(times[0]).min() <= 0.0:
+        raise InputError(f'{command_file}: time does not go up; sort the file, or cut it there')
+    at = times[1] - times[1][0] + between  # on the clock of the command
+    passed = times[0] - times[0][0]
+    inside = (at >= passed[0]) & (at <= passed[-1])
+    if np.count_nonzero(inside) < _SHORTEST:
+        raise InputError(
+            f'{where}: {np.count_nonzero(inside)} samples of the response lie in the times of the '
+            'command; where the clocks differ, join by correlation'
+        )
+    values = {r: v[inside] for r, v in response.values.items() if r in ('measured', 'force')}
+    held = hold == 'zoh'
+    values['command'] = _at(passed, command.values['command'], at[inside], held)
+    source = f'{response_file} (command of {Path(command_file).name})'
+    values['time'] = times[1][inside]
+    first = round((float(values['time'][0]) - float(times[1][0])) * 1e9)
+    try:
+        period = uniform_period(values['time'], str(response_file))
+    except InputError:
+        if resample is None:
+            raise
+        made = resample_evenly(values, resample, str(response_file), resample_by)
+        values, period = made.values, made.period
+        warn(f'{response_file}: {made.told()}')
+        source = f'{source} ({made.name()})'
+    how = 'held' if held else 'straight between its samples'
+    warn(f'{where}: {told}; the command is taken {how} at the times of the response')
+    said = response.stiffness if response.stiffness is not None else command.stiffness
+    return Record(
+        command=values['command'],
+        measured=values['measured'],
+        force=values.get('force'),
+        period=period,
+        stiffness=said if stiffness is None else stiffness,
+        start_ns=max(_first_ns(response) + first, 0),
+        hold=hold or 'linear',
+        actuator=response.actuator,
+        source=source,
+    )
+
+
+def _part(path: Path | str, channels: ChannelMap | None, role: str) -> Channels:
+    """Return the channels of one of both files, with times.
+
+    Raises:
+        InputError: as `channels_of`, or times that are no numbers.
+    """
+    found = channels_of(path, channels, needed=('time', role))
+    if found.period is not None and 'time' not in found.values:
+        count = len(found.values[role])
+        found.values['time'] = np.arange(count, dtype=np.float64) * found.period
+    for name, values in found.values.items():
+        if not np.isfinite(values).all():
+            at = int((~np.isfinite(values)).argmax())
+            raise InputError(f'{path}: {name} is NaN or infinite at sample {at}')
+    if len(found.values['time']) < _SHORTEST:
+        raise InputError(f'{path}: {len(found.values["time"])} samples; too few to be joined')
+    return found
+
+
+def _first_ns(part: Channels) -> int:
+    return part.start_ns + round(float(part.values['time'][0]) * 1e9)
+
+
+def _at(time: Array, column: Array, at: Array, held: bool) -> Array:
+    if not held:
+        return np.asarray(np.interp(at, time, column))
+    # A stamp that is printed a little early is still that of its own sample.
+    before = np.searchsorted(time, at + 1e-6 * float(time[-1]) / len(time), side='right') - 1
+    return column[np.clip(before, 0, len(column) - 1)]
+
+
+def _by_time(command: Channels, response: Channels, where: str) -> tuple[float, str]:
+    """Return when the response begins on the command's clock [s after its first], and words.
+
+    Raises:
+        InputError: one clock counts from 1970 and the other does not, or the response leads.
+    """
+    firsts = _first_ns(command), _first_ns(response)
+    if (firsts[0] > _ABSOLUTE) != (firsts[1] > _ABSOLUTE):
+        raise InputError(
+            f'{where}: one counts its times from a date and the other does not; join by '
+            'correlation'
+        )
+    between = (firsts[1] - firsts[0]) * 1e-9
+    try:
+        apart = between - _coarse(command, response, 'command', 'measured', where)
+    except InputError:  # a test that repeats, or is cut: its times are believed
+        return between, 'joined by their times'
+    if not -_LEAD - _LATEST <= apart <= 2.0 * _LATEST:
+        raise InputError(
+            f'{where}: by their times the response is {apart:.2f} s behind the command, as no '
+            'actuator is: their clocks differ; join by correlation'
+        )
+    late = _late(command, response, 'command', 'measured', between)
+    if late is None or not np.isfinite(late.deviation) or late.explained < _EXPLAINED:
+        return between, 'joined by their times'
+    told = f'joined by their times, by which {_said(late)} of the response are dead time'
+    return between, told
+
+
+def _by_correlation(command: Channels, response: Channels, where: str) -> tuple[float, str]:
+    """Return when the response begins on the command's clock [s after its first], and words.
+
+    Raises:
+        InputError: not alike, or alike at several places.
+    """
+    shared = next((r for r in ('command', 'measured') if _both(command, response, r)), None)
+    roles = (shared, shared) if shared else ('command', 'measured')
+    coarse = _coarse(command, response, *roles, where)
+    late = _late(command, response, *roles, coarse, same=shared is not None)
+    if late is None or not np.isfinite(late.deviation):
+        raise InputError(f'{where}: too few samples or frequencies in common; join by time')
+    seconds = coarse - late.seconds
+    by = f'{shared}, which both hold' if shared else 'correlation'
+    told = (
+        f'joined by {by}: the response begins {seconds:.4f} s after the command, '
+        f'+- {_milli(late.deviation)} ms'
+    )
+    if not shared:
+        told += (
+            ' if nothing in the loop is dead time: a delay would be taken for a difference of the '
+            'clocks, and is not known from these files'
+        )
+    return seconds, told
+
+
+def _both(one: Channels, other: Channels, role: str) -> bool:
+    return role in one.values and role in other.values
+
+
+def _said(late: _Late) -> str:
+    return f'{1e3 * late.seconds:.3g} +- {_milli(late.deviation)} ms'
+
+
+def _milli(seconds: float) -> str:
+    return f'{1e3 * seconds:.2g}'
+
+
+def _on(part: Channels, role: str, rate: float) -> Array:
+    """Return a channel at so many samples per second, from its first sample on, less its mean."""
+    time = part.values['time'] - part.values['time'][0]
+    grid = np.arange(0.0, float(time[-1]), 1.0 / rate)
+    values = np.interp(grid, time, part.values[role])
+    return np.asarray(values - values.mean())
+
+
+def _rate(part: Channels) -> float:
+    time = part.values['time']
+    return (len(time) - 1) / float(time[-1] - time[0])
+
+
+def _coarse(command: Channels, response: Channels, one: str, other: str, where: str) -> float:
+    """Return by how much the second file begins after the first, by correlation [s].
+
+    At least half of the shorter one lies within the other.
+
+    Raises:
+        InputError: not alike, or alike at several places.
+    """
+    rate = min(_COARSE, _rate(command), _rate(response))
+    a, b = _on(command, one, rate), _on(response, other, rate)
+    cross = scipy.signal.correlate(a, b, method='fft')  # of a later than b by so many samples
+    ones = [np.ones(len(v)) for v in (a, b)]
+    power = scipy.signal.correlate(a**2, ones[1], method='fft') * scipy.signal.correlate(
+        ones[0], b**2, method='fft'
+    )
+    lags = np.arange(-(len(b) - 1), len(a))
+    common = np.minimum(lags + len(b), len(a)) - np.maximum(lags, 0)
+    likeness = np.abs(cross) / np.sqrt(np.maximum(power, 1e-9 * float(power.max())))
+    likeness[common < 0.5 * min(len(a), len(b))] = 0.0
+    at = int(likeness.argmax())
+    if likeness[at] < _ALIKE:
+        raise InputError(
+            f'{where}: {one} and {other} are not alike anywhere (correlation {likeness[at]:.2f}): '
+            'they are not of one test, or not what they are called'
+        )
+    peaks, _ = scipy.signal.find_peaks(likeness, height=_AS_ALIKE * likeness[at])
+    others = peaks[np.abs(peaks - at) > 0.05 * rate]
+    if len(others):
+        apart = np.abs(lags[others] - lags[at]) / rate
+        raise InputError(
+            f'{where}: the test repeats itself: {one} and {other} are as alike '
+            f'{apart.min():.3g} s apart; join by time, or by a test that does not repeat'
+        )
+    return float(lags[at]) / rate
+
+
+def _late(
+    command: Channels,
+    response: Channels,
+    one: str,
+    other: str,
+    between: float,
+    *,
+    same: bool = False,
+) -> _Late | None:
+    """Return by how much the second channel is late where its file begins `between` s later.
+
+    Args:
+        command: file of the first channel.
+        response: file of the second channel.
+        one: role of the first channel.
+        other: role of the second channel.
+        between: when the second file begins on the clock of the first [s after its first].
+        same: the channels are of one quantity; else what leads from one to the other is a second
+            order, and a time.
+    """
+    rate = min(_rate(command), _rate(response))
+    a, b = _on(command, one, rate), _on(response, other, rate)
+    shift = round(between * rate)
+    left = between - shift / rate  # what no whole sample takes
+    a, b = a[max(shift, 0) :], b[max(-shift, 0) :]
+    count = min(len(a), len(b), _MOST)
+    if count < _SHORTEST:
+        return None
+    window = scipy.signal.windows.tukey(count, 0.1)
+    first, second = (
+        np.asarray(np.fft.rfft((v[:count] - v[:count].mean()) * window)) for v in (a, b)
+    )
+    size = np.abs(first)
+    if not size.max() > 0.0 or not np.abs(second).max() > 0.0:
+        return None
+    strong = np.argsort(-size)[:_LINES]
+    strong = strong[size[strong] ** 2 > _POWER * size.max() ** 2]
+    u, y = first[strong], second[strong]
+    omega = np.asarray(2.0 * np.pi * np.fft.rfftfreq(count, 1.0 / rate)[strong])
+    found = [_fitted(u, y, omega, start) for start in ((None,) if same else (3.0, 10.0, 40.0))]
+    seconds, deviation, cost = min(found, key=lambda f: f[2])
+    if same:
+        return _Late(seconds + left, deviation, 1.0 - 2.0 * cost)
+    mean = float(np.average(omega, weights=np.abs(u) ** 2))
+    spread = float(np.sqrt(np.average((omega - mean) ** 2, weights=np.abs(u) ** 2)))
+    # Whether the command is held or runs straight is half a sample.
+    deviation = np.hypot(deviation, 0.5 / _rate(command)) if spread > _WIDE * mean else np.inf
+    return _Late(seconds + left, float(deviation), 1.0 - 2.0 * cost)
+
+
+def _fitted(u: Array, y: Array, omega: Array, start: float | None) -> tuple[float, float, float]:
+    """Return the time between two spectra [s], its standard deviation, and the sum of squares.
+
+    Args:
+        u: spectrum of the first, shape (n,).
+        y: spectrum of the second, shape (n,).
+        omega: angular frequencies [rad/s], shape (n,).
+        start: of a second order, where the search begins [rad/s]; None for a factor alone.
+    """
+    scale = float(np.linalg.norm(y))
+
+    def model(p: Array) -> Spectrum:
+        s = 1j * omega
+        if start is None:
+            return np.asarray(p[1] * np.exp(-s * p[0]))
+        gain, first, zeroth = np.exp(p[1:4])
+        return np.asarray(gain / (s * s + first * s + zeroth) * np.exp(-s * p[0]))
+
+    def residual(p: Array) -> Array:
+        left = (y - model(p) * u) / scale
+        return np.concatenate([left.real, left.imag])
+
+    guess = [0.0, float(np.linalg.norm(y) / np.linalg.norm(u))]
+    if start is not None:
+        guess = [0.0, *np.log([guess[1] * start**2, 2.0 * start, start**2]).tolist()]
+    fit = scipy.optimize.least_squares(residual, guess, x_scale=[1e-2, *[1.0] * (len(guess) - 1)])
+    freedom = max(len(fit.fun) - len(guess), 1)
+    jacobian = np.asarray(fit.jac, dtype=np.float64)
+    spread = np.linalg.pinv(jacobian.T @ jacobian) * 2.0 * fit.cost / freedom
+    return float(fit.x[0]), float(np.sqrt(spread[0, 0])), float(fit.cost)
