@@ -76,6 +76,7 @@ def test_simulate_and_calibrate(own: str, tmp_path: Path) -> None:
     assert 'bent-sensor' in CATALOGUE, 'the draws say what they are of'
 
 
+@pytest.mark.slow
 def test_diagnose_and_report(own: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The diagnosis names it among the whole catalogue; the report shows its equation."""
     effects.load_effects(own)

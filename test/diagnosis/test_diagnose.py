@@ -51,6 +51,7 @@ def test_a_healthy_machine_is_left_alone() -> None:
     assert found.error.after == pytest.approx(1e-5, rel=0.1)
 
 
+@pytest.mark.slow
 def test_friction_that_may_fall_with_velocity_has_an_alternative() -> None:
     """Coulomb friction: Stribeck friction at a ratio of one is it, and is not excluded.
 

@@ -86,9 +86,8 @@ def test_no_harmonic_of_a_sinusoidal_test_is_hum(hertz: float, rng_seed: int) ->
     assert (line.frequency if line else 0.0) == pytest.approx(hertz, abs=0.01)
 
 
-@pytest.mark.parametrize(
-    ('command', 'amplitude'), [(0, 12e-6), pytest.param(1, 0.0, marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(('command', 'amplitude'), [(0, 12e-6), (1, 0.0)])
 def test_a_line_of_the_missing_effect_is_no_hum(
     command: int, amplitude: float, rng_seed: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:

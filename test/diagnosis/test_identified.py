@@ -123,7 +123,10 @@ def test_draws_in_one_place_of_the_ridge_know_nothing_of_it() -> None:
     assert identified(space, draws, ridge).tolist() == [True, False, False, False]
 
 
-@pytest.mark.parametrize(('theta', 'k'), [(STIFF_OIL, 250e3), (STIFF_BOTH, 6.15e6)])
+@pytest.mark.parametrize(
+    ('theta', 'k'),
+    [(STIFF_OIL, 250e3), pytest.param(STIFF_BOTH, 6.15e6, marks=pytest.mark.slow)],
+)
 def test_no_narrow_interval_is_told_along_the_ridge(
     theta: np.ndarray, k: float, rng_seed: int
 ) -> None:

@@ -68,7 +68,12 @@ def told(search: Search, trial: Trial) -> tuple[str, dict[str, tuple[float, floa
     return term.numbers, term.excited
 
 
-@pytest.mark.parametrize('name', KINDS)
+QUICK = ('learned-command-play', 'learned-force-friction')
+
+
+@pytest.mark.parametrize(
+    'name', [k if k in QUICK else pytest.param(k, marks=pytest.mark.slow) for k in KINDS]
+)
 def test_a_machine_is_described_at_its_place(name: str, rng_seed: int) -> None:
     """Of all forms, screened and refitted as a diagnosis does, the right one leaves the noise.
 
@@ -107,6 +112,7 @@ def test_lost_motion_has_one_size(rng_seed: int) -> None:
     assert _plainer(selection, share).effects == ('learned-feedback-play',)
 
 
+@pytest.mark.slow
 def test_a_reading_that_settles_is_described(rng_seed: int) -> None:
     """Gain of the transducer, 10 % with a time constant of 8 s; ten deviations are allowed."""
     rng = np.random.default_rng(rng_seed)
@@ -121,7 +127,9 @@ def test_a_reading_that_settles_is_described(rng_seed: int) -> None:
     assert best.fit.rms < 1.1 * NOISE
 
 
-@pytest.mark.parametrize('kind', ['a frame', 'a notch', 'a peak'])
+@pytest.mark.parametrize(
+    'kind', ['a frame', *(pytest.param(k, marks=pytest.mark.slow) for k in ('a notch', 'a peak'))]
+)
 def test_a_resonance_is_described(kind: str, rng_seed: int) -> None:
     """Of the transducer, of any frequency that is excited; a loop that is linear has it as well.
 

@@ -204,6 +204,7 @@ def payload_beside_a_skewed_clock(seed: int) -> Data:
     return Data.whole(records)
 
 
+@pytest.mark.slow
 def test_what_was_not_tried_is_screened_beside_the_members(rng_seed: int) -> None:
     """Damping is tried, which with Eq. (2) alone looks like others; nothing is tried again."""
     found = selection(payload_beside_a_skewed_clock(rng_seed))

@@ -222,7 +222,10 @@ with Nodes() as nodes:
 
 
 @pytest.mark.ros
-@pytest.mark.parametrize('numbers', [(signal.SIGTERM,) * 2, (signal.SIGHUP, signal.SIGINT)])
+@pytest.mark.parametrize(
+    'numbers',
+    [(signal.SIGTERM,) * 2, pytest.param((signal.SIGHUP, signal.SIGINT), marks=pytest.mark.slow)],
+)
 def test_whoever_is_ended_ends_its_nodes(tmp_path: Path, numbers: list[signal.Signals]) -> None:
     """A node must not outlive the process that started it, however and often that is told."""
     _need_nodes()

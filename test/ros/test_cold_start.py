@@ -2,9 +2,11 @@
 
 import time
 
+import pytest
 from rcl_interfaces.srv import ListParameters
 
 
+@pytest.mark.slow
 def test_a_cold_simulator_answers_and_ends(start, probe, tmp_path, monkeypatch):
     """No service answered for 167 s and Ctrl-C took 33 s, while a plant was compiled."""
     monkeypatch.setenv('NUMBA_CACHE_DIR', str(tmp_path / 'nothing'))

@@ -71,9 +71,9 @@ print(sorted(compiled() - known))
 """
 
 
-@pytest.mark.parametrize(
-    'which', ['some', pytest.param('all', marks=[pytest.mark.slow, pytest.mark.timeout(900)])]
-)
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@pytest.mark.parametrize('which', ['some', 'all'])
 def test_a_live_stream_has_nothing_left_to_compile(which: str) -> None:
     """Eight band kernels were compiled in the stream of a cold launch: 320 s to a posterior."""
     done = subprocess.run(
