@@ -46,7 +46,7 @@ def uniform_period(time: Array, where: str) -> float:
         if steps[at] == 0.0:
             how, remedy = 'stands still', 'cut the record there'
             if steps.min() == 0.0 < steps.max():
-                near = near_rate(time)
+                near = f'{(len(time) - 1) / float(time[-1] - time[0]):.4g}'
                 remedy += (
                     '; where the times are only rounded or those of a log, and the samples are '
                     f'even, --resample {near} (in Python `load(path, resample={near})`) takes an '

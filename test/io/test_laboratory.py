@@ -148,7 +148,7 @@ def test_time_base_takes_rounded_and_skewed_clocks() -> None:
     assert uniform_period(1e9 + count * 5e-3, 'x') == 5e-3
     skewed = uniform_period(count * 1e-3 * (1 + 20e-6), 'x')
     assert skewed == pytest.approx(1e-3 * (1 + 20e-6), rel=1e-9)
-    with pytest.raises(InputError, match='channel map'):
+    with pytest.raises(InputError, match='--resample 1024'):
         uniform_period(np.round(count / 1024, 3), 'x')
 
 
