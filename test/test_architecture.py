@@ -42,6 +42,7 @@ EVERYTHING = READY | {
 ARROWS = {
     '__init__': {
         'api',
+        'campaigns',
         'effects',
         'errors',
         'hybrid',
@@ -83,11 +84,21 @@ ARROWS = {
         'hybrid',
     },
     'streams': {'records', 'rate_check', 'errors', 'io'},
-    'view': {'records', 'sample_block', 'setups', 'errors', 'io', 'interfaces'},
+    'view': {
+        'records',
+        'sample_block',
+        'setups',
+        'errors',
+        'io',
+        'interfaces',
+        'online',
+        'report',
+    },
     'workers': CORE | {'online'},
     'api': EVERYTHING,
     'nodes': EVERYTHING | {'api'},
-    'cli': EVERYTHING | {'api', 'arguments'},
+    'campaigns': EVERYTHING | {'api'},
+    'cli': EVERYTHING | {'api', 'arguments', 'campaigns'},
 }
 # All below io but jit, which keeps compiled code in files.
 PURE = (

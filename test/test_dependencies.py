@@ -37,6 +37,7 @@ LIBRARIES = {
     'colcon_core': Names('colcon-core', None),
     'colcon_python_setup_py': Names('colcon-python-setup-py', None),
     'control': Names('control', 'python-control-pip'),
+    'distributed': Names('distributed', 'python3-distributed'),
     'h5py': Names('h5py', 'python3-h5py'),
     'hypothesis': Names('hypothesis', 'python3-hypothesis'),
     'jinja2': Names('jinja2', 'python3-jinja2'),
@@ -56,6 +57,7 @@ LIBRARIES = {
     'pytest_timeout': Names('pytest-timeout', 'python3-pytest-timeout'),
     'rich': Names('rich', 'python3-rich'),
     'rosbags': Names('rosbags', 'python3-rosbags-pip'),
+    'ruptures': Names('ruptures', None),
     'scipy': Names('scipy', 'python3-scipy'),
     'scoringrules': Names('scoringrules', None),
     'sklearn': Names('scikit-learn', 'python3-sklearn'),
@@ -66,6 +68,8 @@ LIBRARIES = {
 }
 # Libraries of the extra `lab`, each asked for where a file needs it.
 OPTIONAL = {'aiohttp', 'h5py', 'nptdms', 'openpyxl', 'pandas', 'pyarrow', 'pylsl'}
+# Libraries of the extra `campaign`.
+CAMPAIGN = {'distributed', 'pandas', 'pyarrow', 'ruptures'}
 # Options of pytest that pyproject.toml and Makefile use; nothing imports these plug-ins.
 PLUGINS = {'pytest_timeout', 'xdist'}
 
@@ -83,7 +87,7 @@ def imported(*folders: str) -> set[str]:
     return found - OURS - set(sys.stdlib_module_names) - {'_typeshed'}
 
 
-RUN = imported('actuator_glue', 'launch') - OPTIONAL
+RUN = imported('actuator_glue', 'launch') - OPTIONAL - CAMPAIGN
 TEST = (imported('test') | PLUGINS) - RUN
 
 
@@ -117,20 +121,21 @@ def test_studies_and_examples_need_nothing_more() -> None:
 
 def test_pip_installs_what_the_tests_import() -> None:
     """The extra `test`: what is not needed at run time already."""
-    expected = {LIBRARIES[m].pip for m in TEST - OPTIONAL if m in LIBRARIES}
-    expected.add('actuator_glue')  # with its extra `lab`
+    expected = {LIBRARIES[m].pip for m in TEST - OPTIONAL - CAMPAIGN if m in LIBRARIES}
+    expected.add('actuator_glue')  # with its extras `campaign` and `lab`
     assert pip_names(PROJECT['optional-dependencies']['test']) == expected
 
 
-def test_the_extra_lab_is_what_single_files_need() -> None:
-    """Each of its libraries is named by a source, as an import or to `library`."""
+@pytest.mark.parametrize(('extra', 'modules'), [('lab', OPTIONAL), ('campaign', CAMPAIGN)])
+def test_an_extra_is_what_single_files_need(extra: str, modules: set[str]) -> None:
+    """Each of its libraries is named by a source, as an import or by name."""
     sources = ' '.join(p.read_text('utf-8') for p in (ROOT / 'actuator_glue').rglob('*.py'))
     assert all(
         f"'{module}'" in sources or re.search(rf'(import|from) {module}', sources)
-        for module in OPTIONAL
+        for module in modules
     )
-    expected = {LIBRARIES[m].pip for m in OPTIONAL}
-    assert pip_names(PROJECT['optional-dependencies']['lab']) == expected
+    expected = {LIBRARIES[m].pip for m in modules}
+    assert pip_names(PROJECT['optional-dependencies'][extra]) == expected
 
 
 def test_rosdep_installs_what_the_package_imports() -> None:
@@ -164,13 +169,14 @@ LICENCES = {
 
 
 def test_the_security_page_tells_the_licence_of_what_is_installed() -> None:
-    """Every library of the package and of its extra `lab`; all but one are permissive."""
+    """Every library of the package and its extras for users; all but one are permissive."""
     page = (ROOT / 'docs' / 'security.md').read_text(encoding='utf-8')
     told = {}
     for line in page.partition('| licence |')[2].partition('\n\n')[0].splitlines()[2:]:
         licence, names = (cell.strip() for cell in line.strip('|').split('|'))
         told |= dict.fromkeys(re.sub(r'\(.*?\)', '', names).replace(' ', '').split(','), licence)
-    installed = [*PROJECT['dependencies'], *PROJECT['optional-dependencies']['lab']]
+    extras = PROJECT['optional-dependencies']
+    installed = [*PROJECT['dependencies'], *extras['lab'], *extras['campaign']]
     assert set(told) == pip_names(installed)
     for name, licence in told.items():
         known = metadata(name)

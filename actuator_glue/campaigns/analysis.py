@@ -1,0 +1,199 @@
+"""The row of one group of records: calibrated, diagnosed, tracked, and its hybrid test judged."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from actuator_glue.campaigns.grouping import Task
+from actuator_glue.errors import InputError
+from actuator_glue.model.parameters import NAMES
+from actuator_glue.records import Array, Record, source_name
+
+if TYPE_CHECKING:
+    from actuator_glue.api.calibration_result import Calibration
+    from actuator_glue.api.diagnosis import Diagnosis
+    from actuator_glue.api.tracking import RecordTracking
+
+# Between entries of one cell.
+BETWEEN = '; '
+Row = dict[str, Any]
+
+
+def analysed(task: Task, keep: Path, key: str) -> Row:
+    """Return the numbers of one group's row.
+
+    Depends on nothing but the files and the recipe: the same to the bit wherever it runs.
+
+    Args:
+        task: the files, and what is asked for.
+        keep: folder of the campaign, for draws and reports where they are asked for.
+        key: name of such files.
+
+    Raises:
+        InputError: a record or option that cannot be used.
+    """
+    from actuator_glue.api.calibration import calibrate
+
+    records = [(r, m.held_out) for m in task.members for r in m.records()]
+    fitted = [r for r, held_out in records if not held_out]
+    held = [r for r, held_out in records if held_out]
+    if not fitted:
+        raise InputError(f'{task.group}: every record is held out; none is left to fit')
+    for record in fitted:
+        record.known_stiffness()
+    wanted = task.analysis
+    found = calibrate(fitted, **wanted['calibrate'])
+    row = {**_described(task, fitted), **_calibrated(found)}
+    stiffest = source_name(max(fitted, key=Record.known_stiffness).source)
+    row |= _tracked(found.tracking, stiffest)
+    if wanted['draws']:
+        _whole(keep / 'draws' / f'{key}.npz', found.save)
+        row['draws'] = f'draws/{key}.npz'
+    left = found.structure is not None and not found.structure.intervals_hold
+    if wanted['diagnose'] == 'always' or (wanted['diagnose'] == 'structure' and left):
+        diagnosis = _diagnosed(fitted, held, wanted)
+        row |= _told(diagnosis) | _tracked(diagnosis.tracking, stiffest)
+        if wanted['reports']:
+            _whole(keep / 'reports' / f'{key}.html', diagnosis.report)
+            row['report'] = f'reports/{key}.html'
+    if wanted.get('partition') is not None:
+        row |= _judged(found, wanted)
+    return row
+
+
+def _whole(path: Path, write: Any) -> None:
+    """Have a file written whole or not at all."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    temporary = path.with_name(f'part-{path.name}')
+    write(temporary)
+    temporary.replace(path)
+
+
+def _described(task: Task, records: Sequence[Record]) -> Row:
+    """Return what the records say of themselves where neither names nor a table did."""
+    first = min(records, key=lambda r: r.start_ns)
+    started = task.started
+    if started is None and first.start_ns > 0:
+        moment = datetime.fromtimestamp(first.start_ns * 1e-9, UTC).replace(tzinfo=None)
+        started = moment.isoformat(timespec='seconds')
+    if started is None and task.day is not None:
+        started = f'{task.day}T00:00:00'
+    return {
+        'actuator': task.actuator or first.actuator,
+        'day': task.day or (None if started is None else started[:10]),
+        'specimen': task.specimen,
+        'started': started,
+        'records': len(records),
+        'stiffness_n_per_m': BETWEEN.join(f'{r.known_stiffness():g}' for r in records),
+        'duration_s': sum(r.duration for r in records),
+    }
+
+
+def _calibrated(found: Calibration) -> Row:
+    left = found.structure
+    doubt = left is not None and not left.intervals_hold
+    row: Row = {
+        'verdict': 'structure' if doubt else 'none',
+        'effects': BETWEEN.join(found.effects),
+        'error_before_m': found.error.rms_m,
+        'error_after_m': found.error.rms_m,
+        'noise_m': None if left is None else left.noise_m,
+        'structure_m': None if left is None else left.structure_m,
+        'converged': found.converged,
+        'problems': BETWEEN.join(found.problems),
+        'evaluations': found.evaluations,
+        'seed': found.seed,
+    }
+    row |= _quantiles(found.posterior, found.names)
+    row['pooling'] = pooling(found.posterior, found.names)
+    return row
+
+
+def _diagnosed(
+    records: Sequence[Record], held: Sequence[Record], wanted: Mapping[str, Any]
+) -> Diagnosis:
+    from actuator_glue.api.diagnosis import diagnose
+
+    seed = wanted['calibrate'].get('seed', 1)
+    return diagnose(records, held or None, seed=seed, jobs=1, false_alarms=wanted['false_alarms'])
+
+
+def _told(found: Diagnosis) -> Row:
+    row: Row = {
+        'verdict': found.verdict,
+        'headline': found.summary(),
+        'effects': BETWEEN.join(e.name for e in found.effects),
+        'alternatives': BETWEEN.join(', '.join(e.alternatives) or '-' for e in found.effects),
+        'probabilities': BETWEEN.join(f'{e.probability:.3f}' for e in found.effects),
+        'error_before_m': found.error.before,
+        'error_after_m': found.error.after,
+        'noise_m': found.alarm.noise,
+    }
+    row |= _quantiles(found.posterior, found.names)
+    row['pooling'] = pooling(found.posterior, found.names)
+    return row
+
+
+def _quantiles(draws: Array, names: Sequence[str]) -> Row:
+    """Return mean and 95 % limits of each column of draws (m, p)."""
+    lower, upper = np.quantile(draws, (0.025, 0.975), axis=0)
+    row: Row = {}
+    for i, name in enumerate(names):
+        row[f'{name}_mean'] = float(draws[:, i].mean())
+        row[f'{name}_lower'], row[f'{name}_upper'] = float(lower[i]), float(upper[i])
+    return row
+
+
+def pooling(draws: Array, names: Sequence[str]) -> dict[str, Any] | None:
+    """Return mean and covariance of the logarithms of Eq. (2)'s parameters, for `pooled`.
+
+    The first stage of a two-stage meta-analysis: what one test says, as a normal distribution.
+
+    Args:
+        draws: shape (m, p), SI units.
+        names: of the columns; effects' are left out.
+    """
+    columns = [i for i, name in enumerate(names) if name in NAMES]
+    some = draws[:, columns]
+    some = some[(some > 0.0).all(axis=1)]
+    if len(some) < 0.5 * len(draws):
+        return None
+    logs = np.log(some)
+    return {
+        'names': [names[i] for i in columns],
+        'mean': logs.mean(axis=0).tolist(),
+        'covariance': np.atleast_2d(np.cov(logs, rowvar=False)).tolist(),
+    }
+
+
+def _tracked(tracking: Sequence[RecordTracking], source: str) -> Row:
+    """Return the tracking numbers of one record; nothing where there are none of it."""
+    row: Row = {}
+    for of in (t for t in tracking if t.source == source):
+        for name, spread in of.predicted.items():
+            row[f'{name}_mean'] = spread.mean
+            row[f'{name}_lower'], row[f'{name}_upper'] = spread.lower, spread.upper
+        row |= {f'{name}_measured': value for name, value in of.measured.items()}
+    return row
+
+
+def _judged(found: Calibration, wanted: Mapping[str, Any]) -> Row:
+    """Return P(unstable) and delay margin of the recipe's hybrid test."""
+    from actuator_glue.api.rths import rths
+    from actuator_glue.io.partition import parse_partition
+
+    partition = parse_partition(wanted['partition'], wanted['partition_name'])
+    stable = rths(partition, found)
+    row: Row = {
+        'p_unstable': stable.p_unstable.value,
+        'p_unstable_upper': stable.p_unstable.upper,
+    }
+    if stable.margin_s is not None:
+        row['margin_s_mean'] = stable.margin_s.mean
+        row['margin_s_lower'], row['margin_s_upper'] = stable.margin_s.lower, stable.margin_s.upper
+    return row
