@@ -18,6 +18,7 @@ class Row(JsonObject):
     Attributes:
         effects: beside Eq. (2); none for Eq. (2) alone.
         parameters: of the refit, by name, physical units.
+        units: of these.
         error: rms error of the refit over the fitting part [m].
         left_out: rms error of all blocks of the fitting part, each under parameters refitted
             without it, by one Gauss-Newton step [m].
@@ -26,6 +27,7 @@ class Row(JsonObject):
 
     effects: tuple[str, ...]
     parameters: dict[str, float]
+    units: dict[str, str]
     error: float
     left_out: float
     chosen: bool
@@ -45,6 +47,7 @@ def rows(
         Row(
             effects=model.effects,
             parameters=dict(zip(model.names, map(float, fit.theta), strict=True)),
+            units={p.name: p.unit for p in model.parameters},
             error=fit.rms,
             left_out=scorer.left_out_error(fit),
             chosen=set(model.effects) == set(chosen),

@@ -1,4 +1,4 @@
-"""Samples and events of a test in bounded memory: the newest replace the oldest."""
+"""Samples, trends and events of a test in bounded memory."""
 
 from __future__ import annotations
 
@@ -11,9 +11,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from actuator_glue.view.logbook import Logbook
+from actuator_glue.view.trends import Trends
+
 Samples = NDArray[np.float32]
-ROWS = ('command', 'measured', 'lower', 'median', 'upper')
-_BAND = slice(ROWS.index('lower'), ROWS.index('upper') + 1)
+# What is kept: motion and band in mm, the force in kN.
+_KEPT = ('command', 'measured', 'force', 'lower', 'median', 'upper')
+_SCALE = {'command': 1e3, 'measured': 1e3, 'force': 1e-3}
+_BAND = slice(_KEPT.index('lower'), _KEPT.index('upper') + 1)
+# What follows from it: command minus measured [mm], and about the band's median [um].
+ROWS = (*_KEPT, 'error', 'residual', 'residual_lower', 'residual_upper')
 _EVENTS = 2000  # of a kind that are kept of a live system
 
 
@@ -23,7 +30,7 @@ class Curves:
 
     Attributes:
         times: shape (n,) [s] since the test began.
-        rows: shape (len(ROWS), n) [mm]; NaN where there is nothing.
+        rows: shape (len(ROWS), n); NaN where there is nothing.
     """
 
     times: NDArray[np.float64]
@@ -31,15 +38,20 @@ class Curves:
 
 
 class History:
-    """Rings of samples by their place in the test, and the last events of each kind.
+    """Rings of samples by their place in the test, trends, and the last events of each kind.
 
-    Memory is taken once. Places count samples since the test began; a stream that begins again
+    Memory is taken once: the newest samples replace the oldest, trends of the whole test get
+    coarser. Places count samples since the test began; a stream that begins again
     goes on at the next place, or where a bag says that it did. What is said now belongs to the
     place that is measured, or to the place at which a bag received it.
 
     Args:
         capacity: samples that are kept.
         events: how many of a kind are kept; None for all.
+
+    Attributes:
+        trends: numbers of each window.
+        log: what happened.
     """
 
     def __init__(self, capacity: int, events: int | None = _EVENTS) -> None:
@@ -48,8 +60,10 @@ class History:
         self.measured_to = 0  # place after the last measured sample
         self.known_to = 0  # place of the last sample, or of what was said after it
         self.version = 0
+        self.trends = Trends()
+        self.log = Logbook()
         self._most = events
-        self._ring = np.full((len(ROWS), capacity), np.nan, dtype=np.float32)
+        self._ring = np.full((len(_KEPT), capacity), np.nan, dtype=np.float32)
         self._since = np.zeros(capacity, dtype=np.int32)  # place at which a band was known
         self._front = 0  # place after the last one written, forecasts included
         self._shift = 0  # place of a running index
@@ -65,7 +79,10 @@ class History:
     def add_samples(
         self, index: int, period: float, rows: Mapping[str, Any], place: int | None = None
     ) -> None:
-        """Take measured samples [m] from a running index on; `place` is that of the first."""
+        """Take measured samples [m, N] from a running index on; `place` is that of the first.
+
+        A force that there is none of may be empty.
+        """
         if period != self.period:
             self._restart(index, period, told=place is None)
         elif index < self._next or index - self._next > self.capacity:
@@ -74,9 +91,11 @@ class History:
             self._shift = place - index
         count = len(rows['measured'])
         places = self._room(index, count)
-        for row, name in enumerate(ROWS[: _BAND.start]):
-            values = np.asarray(rows[name][count - len(places) :], dtype=np.float64)
-            self._ring[row, places % self.capacity] = 1e3 * values
+        for row, name in enumerate(_KEPT[: _BAND.start]):
+            values = np.asarray(rows.get(name, ()), dtype=np.float64)
+            if len(values) == count:
+                kept = _SCALE[name] * values[count - len(places) :]
+                self._ring[row, places % self.capacity] = kept
         self._next = index + count
         self.measured_to = self._next + self._shift
         self.known_to = max(self.known_to, self.measured_to)
@@ -94,7 +113,7 @@ class History:
             again: told before, and now with its score: what was fixed first stays.
         """
         if self.period and abs(index + self._shift - self.measured_to) < self.capacity:
-            limits = np.array([rows[name] for name in ROWS[_BAND]], dtype=np.float64)
+            limits = np.array([rows[name] for name in _KEPT[_BAND]], dtype=np.float64)
             at = self._room(index, limits.shape[1]) % self.capacity
             limits = 1e3 * limits[:, limits.shape[1] - len(at) :]
             if again:
@@ -133,14 +152,20 @@ class History:
         self.version += 1
 
     def state(self, place: int) -> dict[str, Any]:
-        """Return the last event of each kind before a place; by whose it is, where several are."""
+        """Return the last event of each kind before a place; by whose it is, where several are.
+
+        `at` in each is when it became known [s].
+        """
         found: dict[str, Any] = {}
         for (kind, of), events in self._events.items():
-            last = next((text for at, text in reversed(events) if at <= place), None)
-            if last is not None and of:
-                found.setdefault(kind, {})[of] = json.loads(last)
-            elif last is not None:
-                found[kind] = json.loads(last)
+            last = next((event for event in reversed(events) if event[0] <= place), None)
+            if last is None:
+                continue
+            content = json.loads(last[1]) | {'at': last[0] * self.period}
+            if of:
+                found.setdefault(kind, {})[of] = content
+            else:
+                found[kind] = content
         return found
 
     def curves(self, start: int, stop: int, points: int) -> Curves:
@@ -154,6 +179,7 @@ class History:
         places = np.arange(start, max(stop, start))
         rows = self._ring[:, places % self.capacity]
         rows[_BAND, self._since[places % self.capacity] > known] = np.nan
+        rows = _with_errors(rows)
         many = -(-len(places) // max(points // 2, 1))
         if many > 2:
             whole = len(places) // many * many
@@ -173,6 +199,9 @@ class History:
             last = events[-1][1]
             events.clear()
             events.append((0, last))
+        if told:
+            self.trends.clear()
+            self.log.clear()
         self.known_to = max((events[-1][0] for events in self._events.values()), default=0)
 
     def _room(self, index: int, count: int) -> NDArray[np.intp]:
@@ -187,13 +216,21 @@ class History:
         return np.arange(max(start, self.oldest, 0), stop)
 
 
+def _with_errors(rows: Samples) -> Samples:
+    """Return rows of `ROWS` from those that are kept."""
+    command, measured, _, lower, median, upper = rows
+    about = [1e3 * (of - median) for of in (measured, lower, upper)]
+    return np.vstack([rows, command - measured, *about])
+
+
 def _extremes(rows: Samples) -> Samples:
     """Return least and greatest value of stretches, shape (rows, stretches, samples), in pairs."""
     nothing = np.isnan(rows).all(axis=2)
     least = np.where(np.isnan(rows), np.inf, rows).min(axis=2)
     greatest = np.where(np.isnan(rows), -np.inf, rows).max(axis=2)
     least[nothing] = greatest[nothing] = np.nan
-    lower, upper = ROWS.index('lower'), ROWS.index('upper')
-    greatest[lower], least[upper] = least[lower], greatest[upper]
+    for of in ('', 'residual_'):
+        lower, upper = ROWS.index(f'{of}lower'), ROWS.index(f'{of}upper')
+        greatest[lower], least[upper] = least[lower], greatest[upper]
     pairs: Samples = np.stack([least, greatest], axis=2).reshape(len(ROWS), -1)
     return pairs

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import threading
 from array import array
 from collections import deque
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -26,8 +25,11 @@ from actuator_glue.io.bag_samples import topics_of_actuator
 from actuator_glue.io.messages import deserialize, full_name
 from actuator_glue.sample_block import Block, from_message
 from actuator_glue.setups import known_stiffness
+from actuator_glue.view.explanations import Explanation, diagnosed, explanations, number, said
 from actuator_glue.view.history import History
+from actuator_glue.view.logbook import REMEMBERED
 from actuator_glue.view.timeline import Timeline
+from actuator_glue.view.trends import TrendColumn
 
 _DIAGNOSTICS = 'diagnostic_msgs/msg/DiagnosticArray'
 # Types that are shown, and what takes them.
@@ -40,7 +42,7 @@ TYPES = {
     'Diagnosis': 'diagnosis',
     'DiagnosticArray': 'health',
 }
-# Live: a quarter of an hour at 1 kHz, 20 MB. A bag: all of it, up to 1.3 GB.
+# Live: a quarter of an hour at 1 kHz, 30 MB. A bag: all of it, up to 2 GB.
 LIVE_SAMPLES = 1 << 20
 MOST_SAMPLES = 1 << 26
 _WINDOWS = 20  # scored windows over which the coverage is told
@@ -66,6 +68,7 @@ class Intake:
         self.lock = threading.Lock()
         self._coverage: deque[tuple[float, int]] = deque(maxlen=_WINDOWS)
         self._nodes: set[str] = set()
+        self._explained = ''
         self._place: int | None = None
 
     def take(self, kind: str, message: Any, place: int | None = None) -> None:
@@ -80,6 +83,11 @@ class Intake:
             self._place = place
             getattr(self, f'_take_{TYPES[kind]}')(message)
 
+    @property
+    def _at(self) -> int:
+        """Place at which what is taken was known."""
+        return self.history.measured_to if self._place is None else self._place
+
     def _tell(self, kind: str, content: dict[str, Any], of: str = '') -> None:
         self.history.add_event(kind, content, self._place, of=of)
 
@@ -87,37 +95,53 @@ class Intake:
         block = shown(message)
         if block is not None:
             rows = {'command': block.command, 'measured': block.measured}
+            if block.force is not None:
+                rows['force'] = block.force
             self.history.add_samples(block.index, block.period, rows, self._place)
 
     def _take_setup(self, setup: Any) -> None:
         content = {
             'actuator': setup.actuator or setup.header.frame_id,
             'stiffness': known_stiffness(setup.specimen_stiffness),
-            'rate': _number(setup.rate),
+            'rate': number(setup.rate),
             'source': setup.source,
         }
         self._tell('setup', content)
 
     def _take_posterior(self, posterior: Any) -> None:
-        columns = zip(
+        columns = list(zip(
             posterior.parameter_names, posterior.units, posterior.mean, posterior.stddev,
             posterior.prior_dominated, strict=False,
-        )  # fmt: skip
-        rows = [
-            {'name': n, 'unit': u, 'mean': _number(m), 'sd': _number(s), 'prior': bool(p)}
-            for n, u, m, s, p in columns
-        ]
+        ))  # fmt: skip
+        carried = explanations(posterior)
         content = {
             'window': int(posterior.window),
-            'parameters': rows,
-            'effects': list(posterior.effects),
-            'rhat': _number(posterior.rhat_max),
-            'ess': _number(posterior.ess_min),
+            'parameters': [said(n, u, m, s) | {'prior': bool(p)} for n, u, m, s, p in columns],
+            'structures': [one.told() for one in carried],
+            'rhat': number(posterior.rhat_max),
+            'ess': number(posterior.ess_min),
             'converged': bool(posterior.converged),
-            'nrmse': _number(posterior.nrmse),
-            'seconds': _number(posterior.seconds),
+            'nrmse': number(posterior.nrmse),
+            'seconds': number(posterior.seconds),
+            'doubts': list(getattr(posterior, 'doubts', ())),
         }
         self._tell('posterior', content)
+        row = {TrendColumn('weight', one.name): one.weight for one in carried}
+        for name, unit, mean, sd, prior in columns:
+            row[TrendColumn('mean', name, unit)] = float(mean)
+            row[TrendColumn('sd', name, unit)] = float(sd)
+            row[TrendColumn('prior', name, unit)] = float(prior)
+        self.history.trends.add(self._at, row)
+        self._explain(carried)
+
+    def _explain(self, carried: Sequence[Explanation]) -> None:
+        """Put into the log that others are carried, or that another one is the likeliest."""
+        others = ', '.join(sorted(one.name for one in carried))
+        explained = f'{carried[0].name}; {others}'
+        if explained != self._explained:
+            shares = ', '.join(f'{one.name} {one.weight * 100:.0f} %' for one in carried)
+            self.history.log.news(self._at, 'explanations', shares)
+        self._explained = explained
 
     def _take_band(self, band: Any) -> None:
         if band.kind != 'total' or not len(band.levels):
@@ -134,41 +158,41 @@ class Intake:
         self._coverage.append((float(band.widest_coverage), count))
         shares, weights = zip(*self._coverage, strict=True)
         content = {
-            'level': _number(band.widest_level),
-            'last': _number(band.widest_coverage),
-            'mean': _number(np.average(shares, weights=weights)),
+            'level': number(band.widest_level),
+            'last': number(band.widest_coverage),
+            'mean': number(np.average(shares, weights=weights)),
             'windows': len(self._coverage),
-            'width': _number(band.widest_width),
+            'width': number(band.widest_width),
             'forecast': bool(band.forecast),
         }
         self._tell('coverage', content)
 
     def _take_response(self, response: Any) -> None:
         content = {
-            'frequency': _number(response.headline_frequency),
-            'amplitude': _number(response.headline_amplitude),
-            'phase': _number(response.headline_phase),
-            'delay': _number(response.headline_delay),
+            'frequency': number(response.headline_frequency),
+            'amplitude': number(response.headline_amplitude),
+            'phase': number(response.headline_phase),
+            'delay': number(response.headline_delay),
         }
         self._tell('response', content)
 
     def _take_diagnosis(self, found: Any) -> None:
-        content = {
-            'verdict': found.verdict,
-            'summary': found.summary,
-            'effects': [effect.name for effect in found.effects],
-            'advice': list(found.advice),
-        }
-        self._tell('diagnosis', content)
+        self._tell('diagnosis', diagnosed(found))
+        why = f' ({found.reason})' if getattr(found, 'reason', '') else ''
+        self.history.log.news(self._at, 'diagnosis', found.summary + why)
 
     def _take_health(self, array: Any) -> None:
+        remembered = round(REMEMBERED / self.history.period) if self.history.period else 0
         for status in array.status[:_NODES]:
             if status.name in self._nodes or len(self._nodes) < _NODES:
                 self._nodes.add(status.name)
                 level = status.level
-                number = level[0] if isinstance(level, bytes) else int(level)
-                content = {'level': str(number), 'message': status.message}
-                self._tell('health', content, of=status.name)
+                worst = level[0] if isinstance(level, bytes) else int(level)
+                values = {item.key: item.value for item in getattr(status, 'values', ())}
+                self._tell('health', {'level': worst, 'message': status.message}, of=status.name)
+                self.history.log.health(
+                    self._at, remembered, status.name, worst, status.message, values
+                )
 
 
 def shown(message: Any) -> Block | None:
@@ -178,11 +202,6 @@ def shown(message: Any) -> Block | None:
     """
     block = from_message(message)
     return block if len(block.measured) == len(block) > 0 and block.period > 0.0 else None
-
-
-def _number(value: Any) -> float | None:
-    """Return what JSON can hold."""
-    return float(value) if math.isfinite(value) else None
 
 
 def read_bag(path: Path | str, namespace: str | None = None, *, note: Note = refuse) -> Intake:

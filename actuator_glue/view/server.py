@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 from actuator_glue.errors import InputError
-from actuator_glue.view.frames import Wanted, frame, parse_wanted
+from actuator_glue.view.frames import Frames, Wanted, parse_wanted
 from actuator_glue.view.intake import Intake
 
 try:
@@ -28,6 +28,7 @@ _FILES = {
     '/': ('page.html', 'text/html'),
     '/page.js': ('page.js', 'text/javascript'),
     '/page.css': ('page.css', 'text/css'),
+    '/charts.js': ('charts.js', 'text/javascript'),
     '/uplot.js': ('uplot.js', 'text/javascript'),
     '/uplot.css': ('uplot.css', 'text/css'),
 }
@@ -152,6 +153,7 @@ class _Page:
     def __init__(self, intake: Intake, socket: web.WebSocketResponse) -> None:
         self.wanted = Wanted()
         self._intake = intake
+        self._frames = Frames(intake)
         self._socket = socket
 
     async def send(self) -> None:
@@ -167,7 +169,7 @@ class _Page:
             if now != shown and not still:
                 shown = now
                 begin = loop.time()
-                content = frame(self._intake, self.wanted)
+                content = self._frames.next(self.wanted)
                 # A quarter of an hour of samples takes longer: never more than a fifth of a core.
                 due = max(due, loop.time() + _SHARE * (loop.time() - begin))
                 try:

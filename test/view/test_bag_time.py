@@ -34,7 +34,9 @@ def blank(name: str, **given: Any) -> Any:
             filled[field] = '' if base == 'string' else 0.0 if 'float' in base else 0
         else:
             base = kind[1][0][1][0]
-            filled[field] = np.empty(0, base) if 'float' in base or 'int' in base else []
+            filled[field] = (
+                [] if base == 'string' or kind[1][0][0] == Nodetype.NAME else np.empty(0, base)
+            )
     return messages.message(name, **filled | given)
 
 
@@ -101,8 +103,10 @@ def seen(made: Intake, at: float | None) -> tuple[dict[str, Any], dict[str, np.n
     """Return head and rows of the frame that a slider at a time gives."""
     data = frame(made, Wanted(at, 5.0, 4000))
     (length,) = struct.unpack_from('<I', data)
-    rows = np.frombuffer(data[4 + length :], '<f4').reshape(1 + len(ROWS), -1)
-    return json.loads(data[4 : 4 + length]), dict(zip(['time', *ROWS], rows, strict=True))
+    head = json.loads(data[4 : 4 + length])
+    numbers = np.frombuffer(data[4 + length :], '<f4')
+    rows = numbers[: (1 + len(ROWS)) * head['count']].reshape(1 + len(ROWS), -1)
+    return head, dict(zip(['time', *ROWS], rows, strict=True))
 
 
 def known(made: Intake, at: float | None) -> str:
@@ -188,6 +192,37 @@ def test_a_set_up_and_what_a_node_says_have_their_time(tmp_path: Path) -> None:
     made = bag.read(tmp_path / 'bag')
     told = [seen(made, at)[0]['state']['setup']['stiffness'] for at in (1.0, 11.9, 12.1)]
     assert told == [1e5, 1e5, 2e5]
+
+
+def test_weights_and_alarms_of_later_are_not_known_before(tmp_path: Path) -> None:
+    """In whatever order the bag holds them: trends and log end at the time that is shown."""
+    bag = Bag()
+    bag.samples(0.0, 20.0)
+    for at, play in ((12.0, 0.9), (6.0, 0.2), (9.0, 0.6)):
+        told = blank(
+            'PosteriorMoments',
+            structures=['backlash', 'Eq. (2)'],
+            weights=np.array([play, 1.0 - play]),
+        )
+        bag.take(at, '/posterior', 'PosteriorMoments', told)
+    bag.diagnosis(8.0, 'found')
+    made = bag.read(tmp_path / 'bag', sort=False)
+
+    def shown(at: float) -> tuple[int, list[str]]:
+        head = seen(made, at)[0]
+        return head['trends']['count'], [entry['of'] for entry in head['log']]
+
+    assert shown(5.9) == (0, [])
+    assert shown(7.9) == (1, ['explanations'])
+    assert shown(8.1) == (1, ['diagnosis', 'explanations'])
+    assert shown(20.0)[0] == 3
+    # Sure since then, not since it was first carried.
+    first = seen(made, 20.0)[0]['state']['posterior']['structures'][0]
+    assert (first['weight'], first['since'], first['leads']) == (
+        0.9,
+        pytest.approx(6.0, abs=0.05),
+        pytest.approx(9.0, abs=0.05),
+    )
 
 
 def test_samples_of_another_rate_are_told(tmp_path: Path) -> None:

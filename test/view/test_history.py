@@ -5,10 +5,10 @@ import struct
 
 import numpy as np
 import pytest
-from stream import RATE, band, block, feed, intake, posterior
+from stream import RATE, band, block, carried, feed, intake, posterior
 
 from actuator_glue.errors import InputError
-from actuator_glue.view.frames import Wanted, frame, parse_wanted
+from actuator_glue.view.frames import Frames, Wanted, frame, parse_wanted
 from actuator_glue.view.history import ROWS, History
 
 
@@ -16,9 +16,34 @@ def decode(data: bytes) -> tuple[dict, np.ndarray]:
     """Return JSON and rows of a frame."""
     (length,) = struct.unpack_from('<I', data)
     head = json.loads(data[4 : 4 + length])
-    rows = np.frombuffer(data[4 + length :], '<f4').reshape(1 + len(ROWS), -1)
+    numbers = np.frombuffer(data[4 + length :], '<f4')
+    rows = numbers[: (1 + len(ROWS)) * head['count']].reshape(1 + len(ROWS), -1)
     assert head['rows'] == ['time', *ROWS]
     return head, rows
+
+
+def row(rows: np.ndarray, name: str) -> np.ndarray:
+    """Return a row of a frame."""
+    return rows[1 + ROWS.index(name)]
+
+
+def trends(data: bytes) -> dict[str, np.ndarray]:
+    """Return times, weights and parameters (mean, standard deviation, prior) of a frame."""
+    head, _ = decode(data)
+    told = head['trends']
+    columns = np.frombuffer(data, '<f4', offset=len(data) - _size(told))
+    columns = columns.reshape(-1, told['count']) if told['count'] else np.empty((99, 0))
+    found = {'time': columns[0]}
+    for i, name in enumerate(told['weights'], 1):
+        found[name] = columns[i]
+    for i, one in enumerate(told['parameters']):
+        start = 1 + len(told['weights']) + 3 * i
+        found[one['name']] = columns[start : start + 3]
+    return found
+
+
+def _size(told: dict) -> int:
+    return 4 * told['count'] * (1 + len(told['weights']) + 3 * len(told['parameters']))
 
 
 def test_a_frame_is_what_was_measured() -> None:
@@ -27,9 +52,15 @@ def test_a_frame_is_what_was_measured() -> None:
     assert (head['stop'], head['newest'], head['count']) == (12.0, 12.0, 1000)
     expected = block(11000, 1000)
     np.testing.assert_allclose(head['start'] + rows[0], np.arange(11000, 12000) / RATE, atol=1e-6)
-    np.testing.assert_allclose(rows[1], expected.command * 1e3, atol=1e-6)
-    np.testing.assert_allclose(rows[2], expected.measured * 1e3, atol=1e-6)
-    np.testing.assert_allclose(rows[5] - rows[3], 0.8, atol=1e-5)
+    command, measured = expected.command * 1e3, expected.measured * 1e3
+    np.testing.assert_allclose(row(rows, 'command'), command, atol=1e-6)
+    np.testing.assert_allclose(row(rows, 'measured'), measured, atol=1e-6)
+    np.testing.assert_allclose(row(rows, 'force'), expected.force * 1e-3, atol=1e-6)
+    np.testing.assert_allclose(row(rows, 'upper') - row(rows, 'lower'), 0.8, atol=1e-5)
+    np.testing.assert_allclose(row(rows, 'error'), command - measured, atol=1e-6)
+    np.testing.assert_allclose(row(rows, 'residual'), 0.0, atol=1e-3)
+    np.testing.assert_allclose(row(rows, 'residual_lower'), -400.0, atol=1e-2)
+    np.testing.assert_allclose(row(rows, 'residual_upper'), 400.0, atol=1e-2)
     assert head['state']['posterior']['parameters'][0]['mean'] == 123.4
     assert head['state']['setup']['stiffness'] == 250e3
 
@@ -42,6 +73,58 @@ def test_the_past_has_its_own_state() -> None:
     assert head['stop'] == 3.0
     assert head['state']['posterior']['window'] == 2
     assert decode(frame(made, Wanted()))[0]['state']['posterior']['window'] == 99
+
+
+def test_a_force_that_is_not_measured_is_nothing() -> None:
+    """All else is there."""
+    made = intake(0.0)
+    silent = block(0, 100)
+    silent.force = ()
+    made.take('SampleBlock', silent)
+    _, rows = decode(frame(made, Wanted(None, 0.1, 4000)))
+    assert np.isnan(row(rows, 'force')).all() and np.isfinite(row(rows, 'error')).all()
+
+
+def test_weights_over_the_whole_test_and_since_when() -> None:
+    """What was carried, its share, since when it is, and since when it is above one half."""
+    data = frame(intake(90.0), Wanted())
+    found = trends(data)
+    told = [carried(window) for window in range(90)]
+    np.testing.assert_allclose(found['time'], np.arange(1, 91), atol=1e-3)
+    for name, column in (('Eq. (2)', 'Eq2'), ('backlash', 'backlash')):
+        expected = [weights.get(column, np.nan) for weights in told]
+        np.testing.assert_allclose(found[name], expected, atol=1e-6)
+    np.testing.assert_allclose(found['beta_1'][:, -1], [123.4, 2.5, 0.0], atol=1e-4)
+    state = decode(data)[0]['state']
+    play, friction = state['posterior']['structures']
+    first = next(i for i, weights in enumerate(told) if weights.get('backlash', 0.0) > 0.5)
+    assert (play['name'], play['since'], play['leads']) == ('backlash', 21.0, first + 1.0)
+    assert (friction['since'], friction['leads']) == (21.0, None)
+    size = play['parameters'][1]
+    assert [size[key] for key in ('word', 'unit', 'mean', 'sd')] == ['backlash', 'um', 40.0, 1.0]
+
+
+def test_what_a_page_has_of_trends_is_not_sent_again() -> None:
+    """New ones are, and where the page goes back those of that time."""
+    made = intake(30.0)
+    frames = Frames(made)
+    first, again = (decode(frames.next(Wanted()))[0] for _ in range(2))
+    assert first['trends']['count'] == 30 and 'trends' not in again and 'log' not in again
+    feed(made, 30_000, 1000)
+    assert decode(frames.next(Wanted()))[0]['trends']['count'] == 31
+    back = frames.next(Wanted(12.5, 5.0, 100))
+    assert trends(back)['time'].max() == pytest.approx(12.0)
+    assert set(trends(back)) == {'time', 'Eq. (2)', 'beta_1'}
+
+
+def test_an_older_posterior_carries_one_structure() -> None:
+    """Messages that tell no structures are of the effects of their model."""
+    made = intake(1.0)
+    old = posterior(1)
+    del old.structures, old.weights
+    made.take('PosteriorMoments', old)
+    (one,) = decode(frame(made, Wanted()))[0]['state']['posterior']['structures']
+    assert (one['name'], one['weight'], one['parameters']) == ('backlash', 1.0, [])
 
 
 def test_decimation_keeps_peaks_and_the_band_outside() -> None:
@@ -66,11 +149,11 @@ def test_a_gap_is_empty_and_a_new_stream_goes_on() -> None:
     made = intake(1.0)
     made.take('SampleBlock', block(1100, 50))
     head, rows = decode(frame(made, Wanted(None, 0.15, 4000)))
-    assert np.isnan(rows[2, :100]).all()
-    assert np.isfinite(rows[2, 100:]).all()
+    assert np.isnan(row(rows, 'measured')[:100]).all()
+    assert np.isfinite(row(rows, 'measured')[100:]).all()
     made.take('SampleBlock', block(0, 50))
     head, rows = decode(frame(made, Wanted(None, 0.05, 4000)))
-    np.testing.assert_allclose(rows[2], block(0, 50).measured * 1e3, atol=1e-6)
+    np.testing.assert_allclose(row(rows, 'measured'), block(0, 50).measured * 1e3, atol=1e-6)
     assert head['newest'] == 1.2
     slow = block(0, 50)
     slow.period = 0.01
@@ -84,15 +167,20 @@ def test_an_hour_takes_no_more_than_a_minute() -> None:
     """Rings are filled over and over; events are bounded; what is kept is right."""
     made = intake(60.0, capacity=1 << 15)
     before = made.history._ring.nbytes
-    feed(made, 60_000, 3_540_000)
+    feed(made, 60_000, 3_540_000, size=500)
     assert made.history._ring.nbytes == before
     # What lasts is kept once, what changes as long as the samples that it belongs to.
     kept = {kind: len(events) for (kind, _), events in made.history._events.items()}
     assert kept['health'] == kept['response'] == 1 and 30 < kept['posterior'] < 40
     head, rows = decode(frame(made, Wanted(None, 1.0, 4000)))
     assert (head['newest'], head['oldest']) == (3600.0, pytest.approx(3600.0 - 32.768))
-    np.testing.assert_allclose(rows[2], block(3_599_000, 1000).measured * 1e3, atol=1e-6)
-    assert len(frame(made, Wanted(None, 1e6, 4000))) < 200_000
+    np.testing.assert_allclose(
+        row(rows, 'measured'), block(3_599_000, 1000).measured * 1e3, atol=1e-6
+    )
+    assert len(frame(made, Wanted(None, 1e6, 4000))) < 300_000
+    # Of the whole hour, coarser: what it explained by is known from its beginning.
+    found = trends(frame(made, Wanted()))
+    assert (found['time'][0], found['time'][-1]) == (1.0, 3600.0) and len(found['time']) <= 601
 
 
 def test_a_band_of_another_stream_does_no_harm() -> None:

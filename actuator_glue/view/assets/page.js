@@ -1,140 +1,264 @@
 'use strict';
-// The page holds nothing but what it shows: whatever is scrolled to is asked of the server.
+// The page holds nothing but what it shows: whatever is moved to is asked of the server.
 const $ = (id) => document.getElementById(id);
+const SPANS = [0.1, 0.2, 0.5, 1, 2, 5, 10, 30, 60, 300, 900];
 const wanted = {stop: null, span: 10, points: 1500};
-let socket = null, chart = null, last = null, shown = null, playing = null, asked = '';
-const measured = '#12324f', band = 'rgba(66, 133, 190, 0.35)', edge = 'rgba(66, 133, 190, 0.8)';
-
-const line = (label, stroke, width, dash) =>
-  ({label, stroke, width, dash, points: {show: false}, spanGaps: false,
-    value: (_, v) => v == null ? '' : v.toFixed(4)});
+let socket = null, last = null, playing = null, asked = '', log = [];
+const course = {start: 0, stop: 1};
 
 // What is measured is drawn last, so that no band hides it.
-const DRAWN = ['time', 'lower', 'median', 'upper', 'command', 'measured'];
-
-function bandName(head) {
-  const told = head.state.coverage;
-  const level = told && told.level != null ? `${digits(100 * told.level, 3)} % band` : 'band';
-  return told && told.forecast ? `${level}, fixed before the data` : level;
-}
-
-function draw(data) {
-  const box = $('chart').getBoundingClientRect();
-  const legend = chart && chart.root.querySelector('.u-legend');
-  const size = {
-    width: Math.max(Math.floor(box.width), 100),
-    height: Math.max(Math.floor(box.height - (legend ? legend.offsetHeight : 60)), 100),
-  };
-  shown = data;
-  if (!chart) {
-    chart = new uPlot({
-      ...size,
-      scales: {x: {time: false, auto: false, range: () => [last.start, last.stop]}},
-      axes: [{label: 'time [s]'}, {label: 'displacement [mm]'}],
-      legend: {live: true, markers: {fill: (u, i) => i === 1 ? band : u.series[i].stroke(u, i)}},
-      // The two limits of the band are one thing: one name, shown and hidden together.
-      hooks: {setSeries: [(u, i, to) => { if (i === 1 && to.show != null) u.setSeries(3, {show: to.show}); }]},
-      cursor: {drag: {x: false, y: false}},
-      series: [
-        {label: 'time [s]', value: (_, v) => v == null ? '' : v.toFixed(3)},
-        {...line('band', edge, 0.6), value: (u, v, _, i) =>
-          v == null ? '' : `${v.toFixed(4)} to ${u.data[3][i].toFixed(4)}`},
-        line('median of the forecast', edge, 0.8, [2, 3]), line('upper limit', edge, 0.6),
-        line('command', '#9aa5b1', 1, [4, 3]), line('measured', measured, 1.4),
-      ],
-      bands: [{series: [3, 1], fill: band}],
-    }, data, $('chart'));
-    draw(data);  // now the legend has a height
-  } else {
-    if (chart.width !== size.width || chart.height !== size.height) chart.setSize(size);
-    chart.setData(data);
-    text(chart.root.querySelectorAll('.u-label')[1], bandName(last));
-  }
-}
+const shown = () => [last.start, last.stop];
+const mm = (v) => v == null ? '-' : `${v.toFixed(4)} mm`;
+const um = (v) => v == null ? '-' : `${v.toFixed(1)} um`;
+const edge = stroke(COLOR.edge, 0.6), median = stroke(COLOR.edge, 0.8, [2, 3]);
+const BAND = {label: 'band', color: COLOR.band, series: [1, 3]};
+const panels = {
+  motion: [['lower', 'median', 'upper', 'command', 'measured'], new Panel($('samples'), {
+    title: 'displacement [mm]', axis: true, x: shown, sync: 'samples',
+    keys: [BAND, {label: 'its median', color: COLOR.edge, line: true, dash: true, series: [2]},
+      {label: 'command', color: COLOR.command, line: true, dash: true, series: [4]},
+      {label: 'measured', color: COLOR.measured, line: true, series: [5]}],
+    series: [edge, median, edge, stroke(COLOR.command, 0.8, [4, 3]), stroke(COLOR.measured, 1.4)],
+    bands: [{series: [3, 1], fill: COLOR.band}],
+    readout: (u, i) => `${u.data[0][i].toFixed(3)} s: ${mm(u.data[5][i])}, command ${mm(u.data[4][i])}`,
+  })],
+  residual: [['residual_lower', 'residual_upper', 'residual'], new Panel($('samples'), {
+    title: 'residual [um]', x: shown, sync: 'samples',
+    keys: [{...BAND, series: [1, 2]},
+      {label: 'measured less the median', color: COLOR.measured, line: true, series: [3]}],
+    series: [edge, edge, stroke(COLOR.measured, 1)], bands: [{series: [2, 1], fill: COLOR.band}],
+    readout: (u, i) => u.data[3][i] == null ? '' :
+      `${um(u.data[3][i])}, band ${um(u.data[1][i])} to ${um(u.data[2][i])}`,
+  })],
+  error: [['error'], new Panel($('samples'), {
+    title: 'tracking error [mm]', x: shown, sync: 'samples',
+    keys: [{label: 'command less measured', color: COLOR.command, line: true, series: [1]}],
+    series: [stroke(COLOR.command, 1.2)], readout: (u, i) => mm(u.data[1][i]),
+  })],
+  force: [['force'], new Panel($('samples'), {
+    title: 'force [kN]', x: shown, sync: 'samples',
+    keys: [{label: 'measured', color: COLOR.force, line: true, series: [1]}],
+    series: [stroke(COLOR.force, 1.2)],
+    readout: (u, i) => u.data[1][i] == null ? '' : `${digits(u.data[1][i], 4)} kN`,
+  })],
+};
+const whole = () => [course.start, course.stop];
+const weights = new Weights($('weights'), {x: whole, log: () => log, shown});
+const trends = new Map();
 
 function take(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
   const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
   // Frames that were on their way when the page was held.
-  if (wanted.stop !== null && head.stop > wanted.stop + 1e-6) return;
-  const data = head.rows.map((_, i) =>
-    new Float32Array(buffer, 4 + length + 4 * i * head.count, head.count));
+  const late = wanted.stop !== null && head.stop > wanted.stop + 1e-6;
+  let at = 4 + length;
+  const row = (count) => {
+    const found = new Float32Array(buffer, at, count);
+    at += 4 * count;
+    return found;
+  };
+  const data = head.rows.map(() => row(head.count));
+  const before = last;
   last = head;
+  if (head.trends) takeTrends(head, row);
+  if (late) { last = before || head; return; }
+  course.stop = Math.max(head.newest, course.start + 1e-3);
   const times = Array.from(data[0], (t) => t + head.start);
   // NaN is no gap to uPlot, null is.
-  const row = (name) => Array.from(data[head.rows.indexOf(name)], (v) => v === v ? v : null);
-  draw([times, ...DRAWN.slice(1).map(row)]);
+  const rows = Object.fromEntries(head.rows.map((name, i) => [name, data[i]]));
+  for (const [names, panel] of Object.values(panels)) {
+    const curves = names.map((name) => Array.from(rows[name], (v) => v === v ? v : null));
+    const nothing = names[0] === 'force' && curves[0].every((v) => v === null);
+    if (panel.figure.hidden !== nothing) panel.figure.hidden = nothing;
+    if (!nothing) panel.show([times, ...curves]);
+  }
+  for (const name of ['motion', 'residual']) text(panels[name][1].keys[0], bandName(head.state));
+  // The whole test grows even where nothing new is known.
+  if (!head.trends && weights.chart && moved(before, head)) for (const one of [weights, ...trends.values()]) one.draw();
   tell(head);
   document.body.dataset.frames = Number(document.body.dataset.frames || 0) + 1;
   document.body.dataset.stop = head.stop;
+}
+
+// Whether the pictures of the whole test change by a pixel.
+function moved(before, head) {
+  const pixel = (course.stop - course.start) / (weights.box.clientWidth || 500);
+  const far = (one, other) => Math.abs(one - other) > pixel;
+  if (moved.drawn && !far(moved.drawn.stop, head.stop) && !far(moved.drawn.start, head.start) &&
+      !far(moved.drawn.newest, head.newest)) return false;
+  moved.drawn = {start: head.start, stop: head.stop, newest: head.newest};
+  return true;
+}
+
+function takeTrends(head, row) {
+  const {count, weights: names, parameters} = head.trends;
+  log = head.log;
+  const times = Array.from(row(count));
+  const rows = names.map(() => row(count));
+  course.start = 0;
+  course.stop = Math.max(head.newest, 1e-3);
+  weights.take(times, names, rows, head.stop);
+  if (parameters.length && !trends.size) $('trends').replaceChildren();
+  const told = new Set();
+  for (const {name, word, unit} of parameters) {
+    const [mean, sd, prior] = [row(count), row(count), row(count)];
+    told.add(name);
+    if (!trends.has(name)) trends.set(name, new Trend($('trends'), word, whole));
+    const trend = trends.get(name), value = (v) => v === v ? v : null;
+    trend.show([times,
+      Array.from(mean, (v, i) => value(v + 2 * sd[i])), Array.from(mean, (v, i) => value(v - 2 * sd[i])),
+      Array.from(mean, (v, i) => prior[i] > 0 ? null : value(v)),
+      Array.from(mean, (v, i) => prior[i] > 0 ? value(v) : null)]);
+    text(trend.now, mean[count - 1] === mean[count - 1]
+      ? `${digits(mean[count - 1], 4)} \u00b1 ${digits(sd[count - 1], 2)} ${unit}` : 'not carried now');
+  }
+  for (const [name, trend] of trends) if (!told.has(name)) { trend.remove(); trends.delete(name); }
+  tellLog();
 }
 
 function text(place, value) {
   const element = typeof place === 'string' ? $(place) : place;
   if (element.textContent !== value) element.textContent = value;
 }
-const digits = (v, n) => v == null ? '-' :
-  v && (Math.abs(v) < 1e-3 || Math.abs(v) >= 1e5) ? v.toExponential(n - 1) : String(Number(v.toPrecision(n)));
+// What a part of the page shows is made anew only where it changes.
+function fill(id, key, made) {
+  const element = $(id), told = JSON.stringify(key);
+  if (element.told === told) return;
+  element.told = told;
+  element.replaceChildren(...made());
+}
+const seconds = (t) => `${t.toFixed(1)} s`;
+const percent = (share) => share == null ? '-' : `${digits(100 * share, share > 0.995 ? 4 : 2)} %`;
 
 function tell(head) {
   const s = head.state;
   text('title', head.title);
   text('setup', !s.setup ? '' : `${s.setup.actuator}, specimen ${s.setup.stiffness == null
     ? 'stiffness not known' : `${digits(s.setup.stiffness / 1e3, 4)} kN/m`}`);
+  text('span', wanted.span < 60 ? `${wanted.span} s` : `${wanted.span / 60} min`);
   text('clock', `${head.stop.toFixed(2)} s of ${head.newest.toFixed(2)} s`);
   const slider = $('time');
   slider.min = Math.min(head.oldest + wanted.span, head.newest);
   slider.max = head.newest;
   if (wanted.stop === null) slider.value = head.newest;
   else if (playing) slider.value = wanted.stop;
-  if (s.posterior) parameters(s.posterior);
-  if (s.coverage) text('coverage', `${digits(100 * s.coverage.mean, 3)} % inside the ` +
+  explained(s.posterior);
+  diagnosed(s.diagnosis);
+  fill('parameters', s.posterior || null, () => parameters(s.posterior));
+  text('fit', fitted(s.posterior));
+  $('fit').className = !s.posterior ? '' : s.posterior.converged && !s.posterior.doubts.length ? 'good' : 'warn';
+  text('whose', s.posterior && s.posterior.structures.length > 1 ? 'all explanations, by their weights' : '');
+  text('coverage', !s.coverage ? 'no scored band yet' : `${digits(100 * s.coverage.mean, 3)} % inside the ` +
     `${digits(100 * s.coverage.level, 3)} % band over ${s.coverage.windows} window(s), last ` +
     `${digits(100 * s.coverage.last, 3)} %; mean width ${digits(1e3 * s.coverage.width, 3)} mm` +
     (s.coverage.forecast ? '; fixed before the data' : ''));
-  if (s.response) text('response', `at ${digits(s.response.frequency, 3)} Hz: delay ` +
+  text('response', !s.response ? 'no frequency response yet' :
+    `at ${digits(s.response.frequency, 3)} Hz: delay ` +
     `${digits(1e3 * s.response.delay, 3)} ms, amplitude ${digits(s.response.amplitude, 4)}, ` +
     `phase ${digits(s.response.phase * 180 / Math.PI, 3)}\u00b0`);
-  if (s.diagnosis) text('diagnosis', [s.diagnosis.summary, ...s.diagnosis.advice].join(' - '));
-  if (s.health) health(s.health);
+  const nodes = Object.entries(s.health || {}).sort();
+  fill('health', nodes.map(([name, node]) => [name, node.level, node.message]), () => nodes.length
+    ? nodes.map(([name, node]) => make('li', {className: level(node.level), textContent: `${name}: ${node.message}`}))
+    : [make('li', {textContent: 'nothing heard yet'})]);
+  brief(s);
+}
+
+const level = (number) => ['good', 'warn', 'bad'][number] || 'bad';
+
+// The answer in a line, at the top of a phone.
+function brief(s) {
+  const [first] = s.posterior ? s.posterior.structures : [];
+  const lasting = log.filter((entry) => entry.level > 0 && entry.stop == null);
+  const parts = [];
+  if (first) parts.push(`${first.name} ${percent(first.weight)}` + (first.leads == null ? '' : ` since ${seconds(first.leads)}`));
+  if (s.coverage) parts.push(`forecasts ${digits(100 * s.coverage.mean, 3)} % inside`);
+  parts.push(lasting.length ? `${lasting.length} alarm(s)` : 'no alarm');
+  text('brief', parts.join(' \u00b7 '));
+  $('brief').className = lasting.length ? 'warn' : 'good';
+}
+
+const size = (p) => `${p.word} ${digits(p.mean, 4)}` + (p.limits
+  ? ` (${digits(p.limits[0], 4)} to ${digits(p.limits[1], 4)})`
+  : p.sd == null ? '' : ` \u00b1 ${digits(p.sd, 2)}`) + (p.unit ? ` ${p.unit}` : '');
+
+function sizes(of) {
+  const items = of.flatMap((p, i) => [...(i ? [', '] : []), make('span', {textContent: size(p)})]);
+  return make('p', {className: 'sizes'}, ...items);
+}
+
+// Which explanation, how sure, since when, and what the parameters are if it is true.
+function explained(posterior) {
+  if (!posterior) return fill('explanations', null, () => [make('p', {textContent: 'no posterior yet'})]);
+  fill('explanations', [posterior.structures, weights.names], () => posterior.structures.flatMap((one) => {
+    const swatch = make('span', {className: 'swatch'});
+    swatch.style.setProperty('--swatch', weights.colors[weights.names.indexOf(one.name)] || OTHERS);
+    const since = [one.since == null ? '' : `carried since ${seconds(one.since)}`,
+      one.leads == null || one.leads === one.since ? '' : `above one half since ${seconds(one.leads)}`].filter(Boolean).join(', ');
+    const found = [make('p', {className: 'share'}, swatch,
+      make('span', {}, one.name, make('small', {textContent: since ? ` \u2013 ${since}` : ''})),
+      make('b', {textContent: percent(one.weight)}))];
+    if (one.parameters.length && posterior.structures.length > 1) {
+      const told = sizes(one.parameters);
+      told.prepend('if true: ');
+      found.push(told);
+    }
+    return found;
+  }));
+}
+
+function diagnosed(found) {
+  text('diagnosis', !found ? 'none yet' : `${seconds(found.at)}: ${found.summary}` + (found.reason ? ` \u2013 ${found.reason}` : ''));
+  fill('tied', found ? found.effects : [], () => (found ? found.effects : []).flatMap((effect) =>
+    [effect, ...effect.tied].flatMap((one, i) => {
+      const line = make('p', {className: 'share'}, make('span', {}, i ? `or ${one.name}` : one.name),
+        make('b', {textContent: one.probability == null ? '' : percent(one.probability)}));
+      const told = one.sizes.length ? [sizes(one.sizes)] : [];
+      if (told.length) told[0].prepend('if true: ');
+      return [line, ...told];
+    })));
+  const tests = found ? found.experiments : [], advice = found ? found.advice : [];
+  fill('next', tests, () => tests.map((test, i) => make('p', {},
+    make('b', {textContent: i ? 'or ' : 'Next experiment: '}), test)));
+  fill('advice', advice, () => advice.map((line) => make('li', {textContent: line})));
+  if ($('more').hidden !== !advice.length) $('more').hidden = !advice.length;
 }
 
 function cells(row, values, tag) {
-  for (const value of values) {
-    const cell = document.createElement(tag);
-    cell.textContent = value;
-    row.append(cell);
-  }
+  for (const value of values) row.append(make(tag, {textContent: value}));
   return row;
 }
 
 function parameters(posterior) {
-  const rows = [cells(document.createElement('tr'), ['', 'mean', '\u00b1 s. d.', 'unit'], 'th')];
+  if (!posterior) return [make('tbody', {}, cells(make('tr'), ['no posterior yet'], 'td'))];
+  const rows = [cells(make('tr'), ['', 'mean', '\u00b1 s. d.', 'unit'], 'th')];
   for (const p of posterior.parameters) {
-    const row = cells(document.createElement('tr'), [p.name, digits(p.mean, 4), digits(p.sd, 3), p.unit], 'td');
+    const row = cells(make('tr'), [p.word, digits(p.mean, 4), digits(p.sd, 3), p.unit], 'td');
     if (p.prior) { row.className = 'prior'; row.title = 'little more than the prior'; }
     rows.push(row);
   }
-  $('parameters').tBodies[0].replaceChildren(...rows);
-  const fit = $('fit');
-  fit.className = posterior.converged ? 'good' : 'warn';
-  text('fit', `window ${posterior.window}: R-hat ${digits(posterior.rhat, 4)}, ESS ` +
-    `${digits(posterior.ess, 3)}, error ${digits(100 * posterior.nrmse, 3)} % of the spread, ` +
-    `${digits(posterior.seconds, 3)} s` +
-    (posterior.effects.length ? `; with ${posterior.effects.join(', ')}` : ''));
+  return [make('tbody', {}, ...rows)];
 }
 
-function health(nodes) {
-  $('health').replaceChildren(...Object.entries(nodes).sort().map(([name, node]) => {
-    const item = document.createElement('li');
-    item.className = ['good', 'warn', 'bad'][Number(node.level)] || 'bad';
-    item.textContent = `${name}: ${node.message}`;
-    return item;
-  }));
+function fitted(posterior) {
+  return !posterior ? '' : `window ${posterior.window}: R-hat ${digits(posterior.rhat, 4)}, ESS ` +
+    `${digits(posterior.ess, 3)}, error ${digits(100 * posterior.nrmse, 3)} % of the spread, ` +
+    `${digits(posterior.seconds, 3)} s` +
+    (posterior.doubts.length ? `; doubtful: ${posterior.doubts.join(', ')}` : '') +
+    (posterior.parameters.some((p) => p.prior) ? '; grey: little more than the prior' : '');
+}
+
+function tellLog() {
+  fill('log', log, () => log.length ? log.map((entry) => {
+    const time = make('time', {textContent: seconds(entry.start)});
+    time.addEventListener('click', () => goTo(entry.start));
+    const end = !entry.level ? '' : entry.stop == null ? ', lasts' :
+      entry.stop > entry.start ? ` to ${seconds(entry.stop)}` : '';
+    return make('li', {className: entry.level ? level(entry.level) : ''}, time, `${end} ${entry.of}: ${entry.text}`);
+  }) : [make('li', {textContent: 'nothing yet'})]);
 }
 
 function ask() {
-  wanted.points = Math.round(2 * Math.min($('chart').clientWidth || 700, 1600));
+  wanted.points = Math.round(2 * Math.min(panels.motion[1].box.clientWidth || 700, 1600));
   const request = JSON.stringify(wanted);
   if (socket && socket.readyState === WebSocket.OPEN && request !== asked) {
     asked = request;
@@ -160,16 +284,52 @@ function follow(on) {
   ask();
 }
 
-$('run').addEventListener('click', () => follow($('run').textContent !== 'Pause'));
-$('span').addEventListener('change', () => { wanted.span = Number($('span').value); ask(); });
-$('time').addEventListener('input', () => {
-  const place = Number($('time').value);
+// Show what was known at a time [s].
+function goTo(time) {
+  if (!last) return;
   if ($('run').textContent === 'Pause') follow(false);
-  wanted.stop = place;
+  wanted.stop = Math.min(Math.max(time, Number($('time').min)), last.newest);
+  $('time').value = wanted.stop;
   ask();
-});
+}
 
-new ResizeObserver(() => { if (shown) draw(shown); ask(); }).observe($('chart'));
+// Show the next smaller (-1) or larger (1) stretch; of what stands still, that at a share of the
+// picture stays where it is.
+function zoom(step, share) {
+  const span = SPANS[Math.min(Math.max(SPANS.indexOf(wanted.span) + step, 0), SPANS.length - 1)];
+  if (wanted.stop !== null && share != null) {
+    const time = wanted.stop - (1 - share) * wanted.span;
+    wanted.stop = Math.min(time + (1 - share) * span, last.newest);
+    $('time').value = wanted.stop;
+  }
+  wanted.span = span;
+  ask();
+}
+const move = (spans) => goTo((wanted.stop === null ? last.newest : wanted.stop) + spans * wanted.span);
+
+$('run').addEventListener('click', () => follow($('run').textContent !== 'Pause'));
+$('closer').addEventListener('click', () => zoom(-1, 0.5));
+$('wider').addEventListener('click', () => zoom(1, 0.5));
+$('time').addEventListener('input', () => goTo(Number($('time').value)));
+for (const [, panel] of Object.values(panels)) gestures(panel.box, move, zoom);
+$('course').addEventListener('click', (event) => {
+  const box = event.target.closest('.chart');
+  if (!box || !last) return;
+  goTo(course.start + (course.stop - course.start) * across(event, box));
+});
+const KEYS = {
+  ' ': () => follow($('run').textContent !== 'Pause'),
+  ArrowLeft: () => move(-0.1), ArrowRight: () => move(0.1),
+  '+': () => zoom(-1, 0.5), '=': () => zoom(-1, 0.5), '-': () => zoom(1, 0.5),
+  Home: () => goTo(0), End: () => last && last.live ? follow(true) : goTo(Infinity),
+};
+document.addEventListener('keydown', (event) => {
+  if (!KEYS[event.key] || event.ctrlKey || event.metaKey || event.altKey || !last) return;
+  if (event.target.closest('button') && event.key === ' ') return;  // presses that button
+  event.preventDefault();
+  KEYS[event.key]();
+});
+new ResizeObserver(ask).observe($('samples'));
 
 function connect() {
   socket = new WebSocket(`ws://${location.host}/socket`);
