@@ -37,7 +37,7 @@ LIBRARIES = {
     'colcon_core': Names('colcon-core', None),
     'colcon_python_setup_py': Names('colcon-python-setup-py', None),
     'control': Names('control', 'python-control-pip'),
-    'distributed': Names('distributed', 'python3-distributed'),
+    'distributed': Names('distributed', None),
     'h5py': Names('h5py', 'python3-h5py'),
     'hypothesis': Names('hypothesis', 'python3-hypothesis'),
     'jinja2': Names('jinja2', 'python3-jinja2'),

@@ -18,7 +18,7 @@ from actuator_glue.campaigns.cluster import connected
 from actuator_glue.campaigns.grouping import Task, tasks_of
 from actuator_glue.campaigns.progress_file import Progress, ProgressFile
 from actuator_glue.campaigns.recipe import Recipe, read_recipe
-from actuator_glue.campaigns.rows import RESULTS, Rows, content, fingerprint, key_of, needed
+from actuator_glue.campaigns.rows import RESULTS, RowFolder, content, fingerprint, key_of, needed
 from actuator_glue.campaigns.worker_task import carry_out, row_of
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
@@ -100,13 +100,13 @@ def campaign(
     if not isinstance(recipe, Recipe):
         recipe = Recipe() if recipe is None else read_recipe(recipe)
     tasks = tasks_of(given, recipe)
-    rows = Rows(Path(out).resolve())
+    rows = RowFolder(Path(out).resolve())
     try:
         rows.folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise InputError(f'{out}: no folder can be made ({error.strerror})') from error
     _write_provenance(rows.folder, recipe, len(tasks), scheduler, analysis)
-    run = _Run(rows, recipe, analysis, again, progress or _untold)
+    run = _CampaignRun(rows, recipe, analysis, again, progress or _untold)
     return run.through(tasks, scheduler, workers)
 
 
@@ -132,8 +132,8 @@ def _write_provenance(
 
 
 @dataclass(frozen=True, slots=True)
-class _Run:
-    rows: Rows
+class _CampaignRun:
+    rows: RowFolder
     recipe: Recipe
     analysis: str
     again: bool

@@ -34,7 +34,7 @@ _GB = 1 << 30
 
 
 @dataclass(frozen=True, slots=True)
-class Limits:
+class RecordLimits:
     """What one group may take.
 
     Attributes:
@@ -60,7 +60,7 @@ class RecordProcess:
         self.analysis, self.memory_gb = analysis, memory_gb
         self._process: subprocess.Popen[bytes] | None = None
 
-    def row(self, task: Task, folder: Path, key: str, limits: Limits) -> Row:
+    def row(self, task: Task, folder: Path, key: str, limits: RecordLimits) -> Row:
         """Return what the analysis makes of a task, or a row that says why there is nothing."""
         process = self._started()
         assert process.stdin is not None

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 RESULTS = 'results.parquet'
 _FOLDER = 'rows'
-# Rows that become one table at a time.
+# RowFolder that become one table at a time.
 _CHUNK = 5000
 Row = dict[str, Any]
 
@@ -78,7 +78,7 @@ def _digest(value: Any) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
 
 
-class Rows:
+class RowFolder:
     """The rows in the folder of a campaign.
 
     Whoever writes a row writes all of it to a file of its own and renames that: a task that runs

@@ -11,8 +11,8 @@ from typing import Any
 from actuator_glue import __version__
 from actuator_glue.campaigns.analysis import BETWEEN
 from actuator_glue.campaigns.grouping import Task
-from actuator_glue.campaigns.record_process import Limits, RecordProcess
-from actuator_glue.campaigns.rows import Row, Rows, content, fingerprint, key_of
+from actuator_glue.campaigns.record_process import RecordLimits, RecordProcess
+from actuator_glue.campaigns.rows import Row, RowFolder, content, fingerprint, key_of
 
 # The process of each of a worker's threads.
 _OF_THREAD = threading.local()
@@ -33,7 +33,7 @@ def carry_out(
     Returns:
         The row's key, whether it failed, and whether it was computed now.
     """
-    task, rows = Task.from_json(value), Rows(folder)
+    task, rows = Task.from_json(value), RowFolder(folder)
     hashes = content(task)
     key = key_of(task, hashes)
     known = rows.read(key)
@@ -42,7 +42,7 @@ def carry_out(
             rows.write(key, {**known, 'fingerprint': fingerprint(task)})
         return key, bool(known['failure']), False
     started = time.perf_counter()
-    found = _process(analysis, limits[1]).row(task, Path(folder), key, Limits(*limits))
+    found = _process(analysis, limits[1]).row(task, Path(folder), key, RecordLimits(*limits))
     rows.write(key, row_of(task, key, hashes, found, time.perf_counter() - started))
     return key, bool(found.get('failure')), True
 

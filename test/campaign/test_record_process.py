@@ -12,9 +12,9 @@ import pytest
 
 from actuator_glue.campaigns.grouping import Task, tasks_of
 from actuator_glue.campaigns.recipe import Recipe
-from actuator_glue.campaigns.record_process import Limits, RecordProcess
+from actuator_glue.campaigns.record_process import RecordLimits, RecordProcess
 
-LIMITS = Limits(20.0, 1.0)
+LIMITS = RecordLimits(20.0, 1.0)
 
 
 @pytest.fixture
@@ -54,7 +54,7 @@ def test_a_record_has_so_much_time(process: RecordProcess, tmp_path: Path) -> No
     """And no more; the next one begins at once."""
     process.row(task(tmp_path, 'well'), tmp_path, 'k', LIMITS)
     begin = time.monotonic()
-    row = process.row(task(tmp_path, 'sleep 60'), tmp_path, 'k', Limits(0.3, 1.0))
+    row = process.row(task(tmp_path, 'sleep 60'), tmp_path, 'k', RecordLimits(0.3, 1.0))
     assert row == {'failure': 'took longer than 0.3 s'}
     assert time.monotonic() - begin < 5.0
     assert process.row(task(tmp_path, 'well'), tmp_path, 'k', LIMITS)['size'] == 4
@@ -69,10 +69,10 @@ def test_it_ends_with_its_parent(tmp_path: Path) -> None:
         'from pathlib import Path\n'
         'from actuator_glue.campaigns.grouping import tasks_of\n'
         'from actuator_glue.campaigns.recipe import Recipe\n'
-        'from actuator_glue.campaigns.record_process import Limits, RecordProcess\n'
+        'from actuator_glue.campaigns.record_process import RecordLimits, RecordProcess\n'
         f'task = tasks_of([{str(path)!r}], Recipe())[0]\n'
         'process = RecordProcess("tiny_analysis:tiny", 1.0)\n'
-        f'order = (task, Path({str(tmp_path)!r}), "k", Limits(99.0, 1.0))\n'
+        f'order = (task, Path({str(tmp_path)!r}), "k", RecordLimits(99.0, 1.0))\n'
         'threading.Thread(target=process.row, args=order, daemon=True).start()\n'
         'while process._process is None: time.sleep(0.01)\n'
         'print(process._process.pid, flush=True)\n'

@@ -1,0 +1,211 @@
+"""Campaigns on dask.distributed: every row once, whatever ends on the way."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from distributed import LocalCluster
+from tiny_analysis import ANALYSIS
+
+import actuator_glue as ag
+from actuator_glue.campaigns.progress_file import Progress, read_progress
+from actuator_glue.campaigns.recipe import Recipe
+from actuator_glue.campaigns.rows import RowFolder, read_results
+from actuator_glue.cli.main import main
+
+Start = Callable[..., subprocess.Popen[str]]
+# What tells how and when, and no number of a record.
+OF_THE_RUN = {'seconds', 'finished', 'process'}
+
+
+@pytest.fixture
+def start() -> Iterator[Start]:
+    """Return a function that starts Python with some arguments; what still runs is ended."""
+    running: list[subprocess.Popen[str]] = []
+
+    def begin(*args: object) -> subprocess.Popen[str]:
+        process = subprocess.Popen([sys.executable, *map(str, args)], text=True)
+        running.append(process)
+        return process
+
+    yield begin
+    for process in running:
+        process.kill()
+        process.wait()
+
+
+@pytest.fixture
+def scheduler(start: Start, tmp_path: Path) -> str:
+    """Address of a scheduler in a process of its own."""
+    place = tmp_path / 'scheduler.json'
+    start(
+        '-m', 'distributed.cli.dask_scheduler', '--scheduler-file', place,
+        '--host', '127.0.0.1', '--port', '0', '--no-dashboard',
+    )  # fmt: skip
+    until(lambda: place.exists() and place.read_text('utf-8').endswith('}'))
+    return str(json.loads(place.read_text('utf-8'))['address'])
+
+
+def until(true: Callable[[], bool], seconds: float = 60.0) -> None:
+    """Wait for something to be true."""
+    end = time.monotonic() + seconds
+    while not true():
+        assert time.monotonic() < end, 'it does not come'
+        time.sleep(0.02)
+
+
+def add_worker(start: Start, scheduler: str) -> subprocess.Popen[str]:
+    """Start a worker without a nanny: what ends is gone."""
+    return start(
+        '-m', 'distributed.cli.dask_worker', scheduler, '--no-nanny', '--nthreads', '1',
+        '--no-dashboard', '--host', '127.0.0.1',
+    )  # fmt: skip
+
+
+@pytest.mark.slow
+def test_a_killed_worker_and_a_killed_client_cost_no_row(
+    start: Start, scheduler: str, records: Path, tmp_path: Path
+) -> None:
+    """Scheduler, workers and client are processes of their own; at the end every row is once."""
+    for path in records.rglob('*.csv'):
+        path.write_text(f'sleep 0.3 {path.stem}')
+    out = tmp_path / 'out'
+    first = add_worker(start, scheduler)
+    client = start(
+        '-c',
+        'import sys, actuator_glue as ag\n'
+        'ag.campaign(sys.argv[1], sys.argv[2], scheduler=sys.argv[3], analysis=sys.argv[4])',
+        records, out, scheduler, ANALYSIS,
+    )  # fmt: skip
+    made = RowFolder(out)
+    until(lambda: len(list(made.all())) >= 2)
+    client.send_signal(signal.SIGKILL)
+    client.wait()
+    before = dict(made.all())
+    assert len(before) < 12
+    add_worker(start, scheduler)
+
+    def kill(now: Progress) -> None:
+        if now.computed >= 1:
+            first.send_signal(signal.SIGKILL)
+
+    found = ag.campaign(records, out, scheduler=scheduler, analysis=ANALYSIS, progress=kill)
+    first.wait(timeout=10.0)
+    rows = dict(made.all())
+    assert len(rows) == 12 and len(found.table) == 12
+    assert sorted(found.table['group']) == sorted(
+        p.relative_to(records).as_posix() for p in records.rglob('*.csv')
+    )
+    # What was made before the kills was not made again.
+    assert all(rows[key] == row for key, row in before.items())
+    assert found.progress.known >= len(before)
+    assert (found.progress.state, found.progress.done, found.progress.failed) == (
+        'finished', 12, 0,
+    )  # fmt: skip
+
+
+@pytest.mark.slow
+def test_one_and_two_workers_make_the_same_rows(records: Path, tmp_path: Path) -> None:
+    """To the bit, what the record that crashes leaves included."""
+    (records / 'north' / 'broken.csv').write_text('crash')
+    one = ag.campaign(records, tmp_path / 'one', workers=1, analysis=ANALYSIS)
+    two = ag.campaign(records, tmp_path / 'two', workers=2, analysis=ANALYSIS)
+    columns = [c for c in one.table if c not in OF_THE_RUN]
+    assert one.table[columns].equals(two.table[columns])
+    assert list(two.failures['group']) == ['north/broken.csv']
+
+
+@pytest.fixture(scope='module')
+def here() -> Iterator[str]:
+    """Address of a scheduler and two workers in this process: they start in a moment."""
+    with LocalCluster(
+        processes=False, n_workers=2, threads_per_worker=1, dashboard_address=None
+    ) as cluster:
+        yield cluster.scheduler_address
+
+
+def test_only_what_changed_is_made_again(here: str, records: Path, tmp_path: Path) -> None:
+    """Another content, another recipe, a failure where that is asked for; never twice."""
+    broken, new = records / 'north' / 'broken.csv', records / 'south' / 'new.csv'
+    broken.write_text('crash')
+    told: list[Progress] = []
+
+    def run(given: Path = records, recipe: Recipe | None = None, again: bool = False) -> Progress:
+        return ag.campaign(
+            given,
+            tmp_path / 'out',
+            recipe,
+            scheduler=here,
+            analysis=ANALYSIS,
+            again=again,
+            progress=told.append,
+        ).progress
+
+    first = run()
+    assert (first.known, first.computed, first.failed) == (0, 13, 1)
+    assert (told[0].done, told[-1].state) == (0, 'finished')
+    assert read_progress(tmp_path / 'out') == told[-1]
+    table = read_results(tmp_path / 'out')
+    failure = table.loc[table['failure'] != '', 'failure'].item()
+    assert failure == 'its process was ended by signal 11 SIGSEGV'
+    broken.write_text('mended')
+    new.write_text('new')
+    second = run()
+    assert (second.known, second.computed, second.failed) == (12, 2, 0)
+    assert list(read_results(tmp_path / 'out')['failure']) == [''] * 14
+    os.utime(new, (1.0, 1.0))  # the same content at another time
+    third = run()
+    assert (third.known, third.computed) == (14, 0)
+    assert run(new, Recipe(diagnose='never')).computed == 1
+    broken.write_text('refuse')
+    assert run().failed == 1
+    assert run(again=True).computed == 1
+    assert len(read_results(tmp_path / 'out')) == 15  # one file was given by itself
+
+
+def test_a_campaign_is_watched_from_elsewhere(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Its last state, time left, and when nothing has been heard of it."""
+    now = time.time()
+    content = {'state': 'running', 'total': 100, 'known': 20, 'computed': 30, 'failed': 2}
+    stale = {**content, 'started': now - 900.0, 'updated': now - 600.0, 'left_s': 7300.0}
+    (tmp_path / 'progress.json').write_text(json.dumps(stale))
+    assert main(['campaign', '--watch', str(tmp_path)]) == 1
+    line = capsys.readouterr().out
+    assert 'running: 50 of 100 groups, 2 failed, 20 known before, 2 h 01 min left' in line
+    assert 'no news for 10 min: it was killed' in line
+    (tmp_path / 'progress.json').write_text(json.dumps({**content, 'state': 'finished'}))
+    assert main(['campaign', '--watch', str(tmp_path)]) == 0
+    assert main(['campaign', '--watch', str(tmp_path / 'nowhere')]) == 2
+    assert 'no campaign has run' in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ('args', 'said'),
+    [
+        ([], 'give records and --out DIR'),
+        (['records', '--watch', 'x'], 'give it alone'),
+        (['records', '--out', 'x', '--workers', '2', '--scheduler', 'y'], 'has its own'),
+        (['records', '--out', 'x', '--workers', '0'], 'workers 0 is below 1'),
+        (['nowhere', '--out', 'x'], 'no such file'),
+        (['records', '--out', 'records/north/north_2026-03-01_free.csv'], 'no folder'),
+    ],
+)
+def test_what_cannot_be_run_is_told(
+    args: list[str],
+    said: str,
+    records: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    """In one line, before anything is started."""
+    monkeypatch.chdir(records.parent)
+    assert main(['campaign', *args]) == 2
+    assert said in capsys.readouterr().err
