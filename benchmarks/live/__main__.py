@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import argparse
 import json
+import subprocess
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from actuator_glue.arguments import Folder
 from actuator_glue.online.live_diagnosis import LiveSettings
 from benchmarks.live.cases import Case, all_cases, few, streamed
 from benchmarks.live.chain import chain
-from benchmarks.live.score import scored, table
+from benchmarks.live.score import scored
+from benchmarks.live.table import page
 
 
 def one(case: Case) -> dict[str, Any]:
@@ -27,6 +31,26 @@ def one(case: Case) -> dict[str, Any]:
     return row | {'seconds': time.perf_counter() - began, 'said': ran.said}
 
 
+def commit() -> str:
+    """Return the commit that is run; empty outside a repository."""
+    command = ['git', 'describe', '--always', '--dirty', '--abbrev=10']
+    return subprocess.run(command, capture_output=True, text=True, check=False).stdout.strip()
+
+
+def ran(cases: Sequence[Case], jobs: int, minutes: float) -> Iterator[dict[str, Any]]:
+    """Yield rows as they come; none is begun later than so many minutes after the start."""
+    end = time.monotonic() + 60.0 * minutes
+    left = list(reversed(cases))
+    with ProcessPoolExecutor(jobs) as pool:
+        running = {pool.submit(one, left.pop()) for _ in range(min(jobs, len(left)))}
+        while running:
+            done = next(as_completed(running))
+            running.remove(done)
+            if left and time.monotonic() < end:
+                running.add(pool.submit(one, left.pop()))
+            yield done.result()
+
+
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command and return its exit code."""
     parser = argparse.ArgumentParser(prog='python -m benchmarks.live', description=__doc__)
@@ -35,19 +59,33 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument('--seconds', type=float, default=120.0, help='of each of the few')
     parser.add_argument('--seed', type=int, default=1000)
     parser.add_argument('--jobs', type=int, default=1)
+    parser.add_argument(
+        '--minutes',
+        type=float,
+        default=float('inf'),
+        help='begin no further stream after that; they come in an order drawn by the seed, so '
+        'that those that were run are a fair sample of all',
+    )
+    parser.add_argument(
+        '--page', type=Path, metavar='FILE.md', help='write the page of rows in --out; run nothing'
+    )
     args = parser.parse_args(argv)
-    cases = few(args.seed, args.seconds) if args.few else all_cases(args.seed)
     folder = Path(args.out)
+    file = folder / 'streams.jsonl'
+    cases = few(args.seed, args.seconds) if args.few else all_cases(args.seed)
+    if args.page is not None:
+        rows = [json.loads(line) for line in file.read_text().splitlines()]
+        args.page.write_text(page(rows, len(cases)))
+        return 0
+    cases = [cases[i] for i in np.random.default_rng(args.seed).permutation(len(cases))]
     folder.mkdir(parents=True, exist_ok=True)
-    rows: list[dict[str, Any]] = []
-    with (folder / 'streams.jsonl').open('w') as file, ProcessPoolExecutor(args.jobs) as pool:
-        for done in as_completed([pool.submit(one, case) for case in cases]):
-            rows.append(done.result())
-            file.write(json.dumps(rows[-1]) + '\n')
-            file.flush()
-    text = table(rows)
-    (folder / 'streams.md').write_text(text)
-    print(text)
+    rows, at = [], commit()
+    with file.open('w') as lines:
+        for row in ran(cases, args.jobs, args.minutes):
+            rows.append(row | {'commit': at})
+            lines.write(json.dumps(rows[-1]) + '\n')
+            lines.flush()
+    print(page(rows, len(cases)))
     return 0
 
 

@@ -107,7 +107,6 @@ def streamed(case: Case) -> Streamed:
 
 def _sized(case: Case, theta: Array, rest: Record) -> tuple[Structure, Array]:
     """Return effects of a size of which a refitted Eq. (2) leaves the ratio wanted."""
-    part = rest.slice(0, round(20.0 * RATE))
     structure, typical = sizes(case.effects, theta)
     neutral = structure.neutral(theta)
     lower = np.array([p.lower for p in structure.parameters])
@@ -119,7 +118,7 @@ def _sized(case: Case, theta: Array, rest: Record) -> tuple[Structure, Array]:
     low, high = np.log(1e-3), np.log(30.0)
     for _ in range(12):
         middle = 0.5 * (low + high)
-        left = _left(structure.simulate(scaled(np.exp(middle)), part), theta, part)
+        left = _left(structure.simulate(scaled(np.exp(middle)), rest), theta, rest)
         low, high = (middle, high) if left < case.ratio * NOISE else (low, middle)
     return structure, scaled(np.exp(0.5 * (low + high)))
 

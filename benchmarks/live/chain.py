@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -38,7 +39,8 @@ class Chain:
         added: when an effect was carried first [s].
         removed: when one was taken out again [s].
         proposals: time and effects of each proposal's structures.
-        looks: how many diagnoses there were.
+        looks: how long each diagnosis took [s].
+        material: smallest forecast error that matters, by window [m].
     """
 
     results: list[WindowResult] = field(default_factory=list)
@@ -47,7 +49,8 @@ class Chain:
     added: float = np.nan
     removed: list[float] = field(default_factory=list)
     proposals: list[tuple[float, tuple[tuple[str, ...], ...]]] = field(default_factory=list)
-    looks: int = 0
+    looks: list[float] = field(default_factory=list)
+    material: list[float] = field(default_factory=list)
 
 
 def chain(
@@ -55,20 +58,21 @@ def chain(
     carried: Carried | None,
     wanted: live.LiveSettings,
     settings: EstimatorSettings = SETTINGS,
-    takes: float = 8.0,
     seed: int = 1,
 ) -> Chain:
     """Run a stream through estimator and diagnosis.
+
+    Windows have all the time that they want; while a diagnosis computes, as long as its processor
+    time says, the stream goes on.
 
     Args:
         record: what is streamed.
         carried: what a calibration knows; None for nothing.
         wanted: when to diagnose.
         settings: of the estimator.
-        takes: time that a diagnosis takes, in which the stream goes on [s].
         seed: of the diagnoses.
     """
-    loop = _Loop(carried, wanted, settings, takes, seed)
+    loop = _Loop(carried, wanted, settings, seed)
     for item in stream(record, round(BLOCK * record.rate)):
         if isinstance(item, StreamSetup):
             loop.estimator.setup(item)
@@ -86,13 +90,12 @@ class _Loop:
         carried: Carried | None,
         wanted: live.LiveSettings,
         settings: EstimatorSettings,
-        takes: float,
         seed: int,
     ) -> None:
         self.out = Chain()
         self.estimator = Estimator(settings, choose_model(), carried=carried)
         self.collector = Collector(KEPT)
-        self._settings, self._takes, self._seed = settings, takes, seed
+        self._settings, self._seed = settings, seed
         self._state, self._memory = live.init(wanted), live.Memory()
         self._memory.setup(settings, carried)
         self._waiting: list[tuple[float, live.Concluded]] = []
@@ -117,6 +120,7 @@ class _Loop:
 
     def _estimated(self, result: WindowResult, told: list[Event]) -> None:
         self.out.results.append(result)
+        self.out.material.append(self.estimator.proposal.material)
         self.out.said += [(self._now, event.message) for event in told]
         for prediction in result.scored:
             if prediction.kind == 'noise' and prediction.coverage is not None:
@@ -132,9 +136,9 @@ class _Loop:
         out, now = self.out, self._now
         for action in actions:
             if isinstance(action, live.Look):
-                out.looks += 1
                 out.said.append((now, f'looks: {action.reason}'))
-                self._waiting.append((now + self._takes, self._look()))
+                found = self._look()
+                self._waiting.append((now + out.looks[-1], found))
             elif isinstance(action, live.Carry):
                 self.estimator.set_model(action.proposal)
                 carried = tuple(one.model.effects for one in action.proposal.structures)
@@ -152,7 +156,9 @@ class _Loop:
     def _look(self) -> live.Concluded:
         records = self.collector.records()
         known = given(self._memory.before(records[0].start_ns))
+        began = time.process_time()
         found = diagnose(records, seed=self._seed, jobs=1, prior=known)
+        self.out.looks.append(time.process_time() - began)
         self.out.said.append((self._now, found.summary()))
         return concluded(found, records)
 

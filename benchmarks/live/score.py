@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from actuator_glue.online.job import WindowResult
+from actuator_glue.online.structures import MATERIAL
 from benchmarks.live.cases import NOISE, RATE, Case, Streamed
 from benchmarks.live.chain import Chain
 
@@ -21,10 +22,13 @@ def scored(case: Case, given: Streamed, ran: Chain) -> dict[str, Any]:
     weights: list[float] = []
     covered: list[float] = []
     errors: list[float] = []
+    worse = longest = 0
     rate = case.drift / case.seconds + given.sizes.get('gain_drift', 0.0)
     truth, proposed = frozenset(case.effects), False
     first = ran.added if case.effects else 0.0
-    for result in ran.results:
+    for result, material in zip(ran.results, ran.material, strict=True):
+        worse = worse + 1 if made_worse(result, material) else 0
+        longest = max(longest, worse)
         end = result.window.end / RATE
         for band in result.scored:
             if band.kind == 'total' and band.coverage is not None:
@@ -60,54 +64,18 @@ def scored(case: Case, given: Streamed, ran: Chain) -> dict[str, Any]:
         'removed': ran.removed,
         'proposals': [[at, [list(s) for s in what]] for at, what in ran.proposals],
         'looks': ran.looks,
+        'worse': longest,
     }
 
 
-def table(rows: Sequence[dict[str, Any]]) -> str:
-    """Return the streams and their summary as a table for people."""
-    head = (
-        'hidden',
-        'ratio',
-        'calibration',
-        'first added after break [s]',
-        'truth inside',
-        'true weight at end (least)',
-        'largest weight at end',
-        'forecasts covered',
-        'error/noise',
-        'looks',
-    )
-    lines = ['| ' + ' | '.join(head) + ' |', '|' + '---|' * len(head)]
-    for row in sorted(rows, key=lambda r: r['seed']):
-        cells = (
-            ' + '.join(row['effects']) or 'nothing',
-            f'{row["ratio"]:g}' if row['effects'] else '',
-            'yes' if row['calibrated'] else 'no',
-            f'{row["delay"]:.0f}',
-            f'{row["inside"]:.0%}',
-            f'{row["true_weight"]:.2f} ({row["true_least"]:.2f})',
-            ' + '.join(row['leading']) or 'Eq. (2)',
-            f'{row["coverage"]:.1%}',
-            f'{row["error"]:.2f}',
-            str(row['looks']),
-        )
-        lines.append('| ' + ' | '.join(cells) + ' |')
-    hidden = [row for row in rows if row['effects']]
-    healthy = [row for row in rows if not row['effects']]
-    counted = sum(row['windows'] for row in hidden)
-    lines.append('')
-    if counted:
-        inside = sum(row['inside'] * row['windows'] for row in hidden if row['windows'])
-        lines.append(
-            f'- intervals that hold the truth after the first addition: '
-            f'{inside / counted:.1%} of {counted}'
-        )
-    if hidden:
-        right = np.mean([row['right'] for row in hidden])
-        delays = [row['delay'] for row in hidden if np.isfinite(row['delay'])]
-        median = f'{np.median(delays):.0f} s' if delays else 'none'
-        lines.append(f'- true structure has the largest weight at the end: {right:.0%}')
-        lines.append(f'- first addition after the coverage broke, median: {median}')
-    added = sum(bool(np.isfinite(row['added'])) for row in healthy)
-    lines.append(f'- healthy machines with an addition: {added} of {len(healthy)}')
-    return '\n'.join(lines) + '\n'
+def made_worse(result: WindowResult, material: float) -> bool:
+    """Whether the leading structure's forecasts were worse than Eq. (2)'s by what matters [m]."""
+    if not result.errors or not result.model.effects:
+        return False
+    material = MATERIAL * result.noise if np.isnan(material) else material
+    plain = [
+        error
+        for error, rival in zip(result.errors[1:], result.rivals, strict=True)
+        if not rival.model.effects and np.isfinite(error)
+    ]
+    return bool(plain) and result.errors[0] > min(plain) + material**2
