@@ -15,6 +15,9 @@ from actuator_glue.records import Array
 # combination is identified, the ratio lies between 0.3 and 1; where a test identifies a parameter
 # it is below 0.05.
 PRIOR_DOMINATED = 0.25
+# Share of a parameter's variance that may be that of parameters which the data do not tell. Their
+# truth may lie three standard deviations off, in a corner of the box: a tenth is one of its own.
+_BORNE = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -26,7 +29,8 @@ class Moments:
         stddev: standard deviation (divisor m).
         skewness: third standardised moment (divisor m).
         cov: coefficient of variation, stddev / |mean|; infinite for a mean of zero.
-        prior_dominated: True where the draws are about as wide as the prior.
+        prior_dominated: True where the draws are about as wide as the prior, or move with those of
+            a parameter of which they are: what the data tell is then a combination of both.
         best: the draw of the largest log likelihood; None where none was given.
     """
 
@@ -78,6 +82,25 @@ def moments(
         stddev=stddev,
         skewness=skewness,
         cov=cov,
-        prior_dominated=stddev > PRIOR_DOMINATED * prior,
+        prior_dominated=_dominated(centred, variance, stddev > PRIOR_DOMINATED * prior),
         best=None if log_density is None else draws[int(np.argmax(log_density))],
     )
+
+
+def _dominated(centred: Array, variance: Array, wide: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Return which parameters are as wide as their prior, or move with one that is.
+
+    Args:
+        centred: draws less their means, (p, m).
+        variance: of each, (p,).
+        wide: which are about as wide as their prior, (p,).
+    """
+    if not wide.any() or wide.all():
+        return wide
+    scale = np.sqrt(np.where(variance > 0.0, variance, 1.0))
+    unit = centred / scale[:, np.newaxis]
+    # One by one: what two of them are worth together, their ratio, the data may well tell.
+    share = ((unit[wide] @ unit[~wide].T / unit.shape[1]) ** 2).max(axis=0)
+    found = wide.copy()
+    found[~wide] = share > _BORNE
+    return found
