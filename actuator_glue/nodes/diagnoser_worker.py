@@ -36,7 +36,7 @@ SPECS = (
     Spec('apply', False, 'have the estimator go on with the augmented model'),
     Spec('coverage_limit', 0.8, 'coverage of the noise band that raises the alarm', '1', 0.0, 1.0),
     Spec('coverage_windows', 5, 'windows the coverage is averaged over', '1', 1, 1000, True),
-    Spec('minimum', 20.0, 'data needed before a diagnosis by itself', 's', 5.0, 3600.0),
+    Spec('minimum', 15.0, 'data needed before a diagnosis by itself', 's', 5.0, 3600.0),
     Spec('pause', 10.0, 'least new data between diagnoses by itself', 's', 0.0, 86_400.0),
     Spec('keep', 180.0, 'samples kept for a diagnosis', 's', 10.0, 3600.0, True),
     Spec('seed', 1, 'seed of diagnoses by itself', '1', 0, 2**53),

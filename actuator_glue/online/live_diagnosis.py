@@ -23,6 +23,9 @@ from actuator_glue.online.structures import Proposal, Proposed
 
 # The likeliest structure is proposed again where it has less weight than this by now.
 _DOUBTED = 0.5
+# Over so many times as many bands, half of what they may lack of their level is a break, too: an
+# error of the noise's own size that never goes.
+_LASTING, _LEVEL = 4, 0.95
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +35,8 @@ class LiveSettings:
     Attributes:
         automatic: diagnose without being asked.
         apply: have the estimator carry what was found.
-        coverage_limit: mean coverage of the noise band below which it has broken.
+        coverage_limit: mean coverage of the noise band below which it has broken; half as far
+            below 95 % where it lasts four times as long.
         coverage_windows: successive bands the mean is taken over.
         minimum: data needed before a diagnosis [s].
         pause: data that must have come since the diagnosis before began [s].
@@ -42,7 +46,7 @@ class LiveSettings:
     apply: bool = False
     coverage_limit: float = 0.8
     coverage_windows: int = 5
-    minimum: float = 20.0
+    minimum: float = 15.0
     pause: float = 10.0
 
 
@@ -189,13 +193,23 @@ class LiveState:
     @property
     def coverage(self) -> float:
         """Mean coverage of the last bands; NaN before there are enough."""
-        full = len(self.coverages) >= self.settings.coverage_windows
-        return float(np.mean(self.coverages)) if full else math.nan
+        count = self.settings.coverage_windows
+        return (
+            float(np.mean(self.coverages[-count:])) if len(self.coverages) >= count else math.nan
+        )
+
+    @property
+    def lasting(self) -> bool:
+        """Whether coverage has been low for long, though not as low."""
+        limit = 0.5 * (self.settings.coverage_limit + _LEVEL)
+        full = len(self.coverages) >= _LASTING * self.settings.coverage_windows
+        return full and float(np.mean(self.coverages)) < limit
 
     @property
     def trusted(self) -> bool:
         """Whether bands have been judged, and nothing speaks against what is known now."""
-        return self.coverage >= self.settings.coverage_limit and not self.contradicted
+        fair = self.coverage >= self.settings.coverage_limit and not self.lasting
+        return fair and not self.contradicted
 
 
 def init(settings: LiveSettings) -> LiveState:
@@ -232,15 +246,16 @@ def step(state: LiveState, given: Input) -> tuple[LiveState, tuple[Action, ...]]
 def _judged(state: LiveState, given: Judged) -> tuple[LiveState, tuple[Action, ...]]:
     if given.number < state.since:
         return state, ()
-    count = state.settings.coverage_windows
-    state = replace(state, coverages=(*state.coverages, given.coverage)[-count:])
-    broken = state.coverage < state.settings.coverage_limit
+    most = _LASTING * state.settings.coverage_windows
+    state = replace(state, coverages=(*state.coverages, given.coverage)[-most:])
+    broken = state.coverage < state.settings.coverage_limit or state.lasting
     if math.isnan(state.coverage) or broken == state.broken:
         return state, ()
     if not broken:
         return replace(state, broken=False), ()
+    covers = float(np.mean(state.coverages)) if state.lasting else state.coverage
     what = (
-        f'the band of parameters and sensor noise covers {state.coverage:.0%} of the samples: '
+        f'the band of parameters and sensor noise covers {covers:.0%} of the samples: '
         'the model lacks something'
     )
     return replace(state, broken=True, reason=what), (Say('coverage', what),)
