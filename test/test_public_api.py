@@ -129,6 +129,14 @@ def test_a_diagnosis_is_kept_and_shown(
     ends = np.quantile(again.posterior, [0.025, 0.975], axis=0).T
     for name, (low, high) in zip(again.names, ends, strict=True):
         assert (told[name].lower, told[name].upper) == (low, high)
+    assert set(found.inference_data.groups()) == {'posterior', 'observed_data', 'constant_data'}
+    table = again.to_dataframe()
+    assert table.loc['beta_1', 'mean'] == told['beta_1'].mean
+    predicted = again.predict(record)
+    assert predicted.inside == pytest.approx(0.95, abs=0.02)
+    assert predicted.problems == (() if found.complete else (found.summary(),))
+    assert len(again.plot_bode(record).axes) == 3
+    assert again.save_mat(tmp_path / 'diagnosis.mat').stat().st_size > 1000
     with pytest.raises(ag.InputError, match='holds'):
         ag.Calibration.load(tmp_path / 'diagnosis.npz')
 

@@ -9,7 +9,7 @@ from typing import Unpack
 import numpy as np
 
 from actuator_glue.api import judgement
-from actuator_glue.api.calibration_error import fit_error, force_errors
+from actuator_glue.api.calibration_error import fit_error, force_errors, left_over
 from actuator_glue.api.calibration_options import CalibrationChanges, CalibrationOptions
 from actuator_glue.api.calibration_parts import CalibratedRecord, Marginal, RecordForce
 from actuator_glue.api.calibration_result import Calibration
@@ -148,6 +148,7 @@ def calibrate(
         prior=prior,
         records=tuple(cleaned),
         tracking=records_tracking(chains.posterior(), model.names, structure, cleaned),
+        residual=left_over(model, chains.best, cleaned, initial, settle),
     )
 
 

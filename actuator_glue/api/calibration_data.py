@@ -11,6 +11,7 @@ from actuator_glue.api.tracking import RecordTracking
 from actuator_glue.diagnosis.residual_structure import ResidualStructure
 from actuator_glue.inference.at_bound import Pressed
 from actuator_glue.inference.carried import Carried
+from actuator_glue.inference.predictive import ResidualModel
 from actuator_glue.inference.prior_use import PriorUse
 from actuator_glue.records import Array, Record
 
@@ -50,6 +51,8 @@ class CalibrationData:
         sources: the records, described.
         records: the records themselves as they were fitted; empty after `load`.
         tracking: how the actuator follows the command of each record.
+        residual: what the best draw leaves, as noise of which neighbouring samples are correlated;
+            None where too few samples are left, and in files of earlier versions.
     """
 
     parameters: dict[str, Marginal]
@@ -78,6 +81,7 @@ class CalibrationData:
     automatic_shaping: bool = False
     force: tuple[RecordForce, ...] = ()
     structure: ResidualStructure | None = None
+    residual: ResidualModel | None = None
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from actuator_glue.api.calibration_parts import FitError, RecordError, RecordForce
+from actuator_glue.api.ensemble import residual_of
 from actuator_glue.inference.choice import ModelChoice
+from actuator_glue.inference.predictive import ResidualModel
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.force_errors import ForceErrors
 from actuator_glue.model.structure import Structure
@@ -26,6 +28,17 @@ def fit_error(
         for r, e, y in zip(records, residuals, measured, strict=True)
     )
     return FitError(whole.rms_m, whole.nrmse, tuple(each))
+
+
+def left_over(
+    model: ModelChoice, best: Array, records: list[Record], initial: Initial, settle: float
+) -> ResidualModel | None:
+    """Return the residual of the best draw as a model of noise; None of too few samples."""
+    structure = Structure(model.effects)
+    counts = [round(settle / r.period) for r in records]
+    count = len(structure.names)
+    errors = structure.errors(records, counts, initial)
+    return residual_of(errors.residuals(best[:count]), count)
 
 
 def force_errors(

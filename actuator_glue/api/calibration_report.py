@@ -8,6 +8,7 @@ import numpy as np
 
 from actuator_glue.api import tracking
 from actuator_glue.api.calibration_data import CalibrationData
+from actuator_glue.api.ensemble import evenly, simulated
 from actuator_glue.inference.bands import band
 from actuator_glue.inference.predictive import fit_residual, total_band
 from actuator_glue.model.exact import Initial
@@ -20,7 +21,6 @@ from actuator_glue.report.timeseries import Bands, band_at_zooms, even_zooms
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-ENSEMBLE = 200  # draws that are simulated for a band
 LEVEL = 0.95
 HEADER = ('parameter', 'unit', 'mean', 'sd', 'skew', 'COV', 'R-hat', 'ESS')
 
@@ -36,17 +36,15 @@ def bands_figure(found: CalibrationData, record: Record) -> tuple[Figure, float]
     """
     structure = Structure(found.effects)
     count = len(structure.names)
-    draws = found.posterior
-    rows = np.linspace(0, len(draws) - 1, min(ENSEMBLE, len(draws))).astype(np.intp)
     initial: Initial = 'rest' if found.initial == 'rest' else 'measured'
-    simulated = structure.simulate(draws[rows, :count], record, initial=initial)
+    moved = simulated(evenly(found.posterior), found.names, structure, record, initial)
     best = structure.simulate(found.best[:count], record, initial=initial)
     residual = fit_residual(record.measured - best, parameters=count)
-    total = total_band(np.random.default_rng(0), simulated, residual, (LEVEL,))
+    total = total_band(np.random.default_rng(0), moved, residual, (LEVEL,))
     inside = (record.measured >= total.lower[0]) & (record.measured <= total.upper[0])
     figure = band_at_zooms(
         record,
-        Bands(band(simulated, (LEVEL,)), total, level=LEVEL),
+        Bands(band(moved, (LEVEL,)), total, level=LEVEL),
         even_zooms(record),
         title=source_name(record.source),
     )

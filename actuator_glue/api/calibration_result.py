@@ -12,8 +12,10 @@ from actuator_glue.api import store
 from actuator_glue.api.calibration_data import CalibrationData
 from actuator_glue.api.frame import frame
 from actuator_glue.api.given import OneRecord, one_record_given
+from actuator_glue.api.posterior_model import Drawn, PosteriorModel
 from actuator_glue.api.result import Result
 from actuator_glue.model.effects import CATALOGUE
+from actuator_glue.model.structure import Structure
 
 if TYPE_CHECKING:
     import arviz
@@ -25,7 +27,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Calibration(Result, CalibrationData):
+class Calibration(Result, PosteriorModel, CalibrationData):
     """A joint posterior, and what forbids or limits its use.
 
     Its numbers are those of `CalibrationData`: `parameters` by name, `draws`, `problems`, ...
@@ -38,24 +40,36 @@ class Calibration(Result, CalibrationData):
         """Effects of the model beyond Eq. (2)."""
         return self.effects
 
+    def drawn(self) -> Drawn:
+        """Return the draws and their model, for predictions."""
+        stiffness = dict.fromkeys(
+            r.stiffness_n_per_m for r in self.sources if r.stiffness_n_per_m is not None
+        )
+        return Drawn(
+            self.posterior,
+            self.names,
+            tuple(p.unit for p in self.parameters.values()),
+            Structure(self.effects),
+            self.residual,
+            self.records,
+            tuple(stiffness),
+            self.problems,
+        )
+
     @property
     def inference_data(self) -> arviz.InferenceData:
-        """The draws for arviz: posterior, log likelihood, bounds and units as attributes."""
-        import arviz as az
+        """The draws for arviz, with what they say of the records.
 
-        data = az.from_dict(
-            posterior={n: self.draws[:, :, i].T for i, n in enumerate(self.names)},
-            sample_stats={'lp': self.log_density.T},
-        )
-        for name, marginal in self.parameters.items():
-            data.posterior[name].attrs |= {
-                'unit': marginal.unit,
-                'prior': 'uniform',
-                'lower': marginal.bounds[0],
-                'upper': marginal.bounds[1],
-            }
-        data.posterior.attrs |= {'likelihood': self.likelihood, 'effects': list(self.effects)}
-        return data
+        `posterior`: every draw, bounds and units as attributes. `sample_stats`: log likelihood.
+        Where the records are known, that is not after `load`, of some 200 draws and 2000 samples
+        of each record: `posterior_predictive` (simulated measurements), `observed_data`,
+        `constant_data` (command, stiffness) and `log_likelihood`, whose terms are seconds of the
+        records: neighbouring samples are correlated. They add up to the log likelihood of a draw
+        up to a constant.
+        """
+        from actuator_glue.api.inference_groups import groups
+
+        return groups(self)
 
     def to_dataframe(self) -> DataFrame:
         """Return a table of the parameters, a row for each by its name, in SI units.

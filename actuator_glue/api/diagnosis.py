@@ -12,9 +12,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypedDict, Unpack
 
 from actuator_glue.api.callbacks import harmless
+from actuator_glue.api.ensemble import residual_of
 from actuator_glue.api.frame import frame
 from actuator_glue.api.given import Records, Stiffness, records_given, seed_given
 from actuator_glue.api.options import chosen, takes
+from actuator_glue.api.posterior_model import Drawn, PosteriorModel
 from actuator_glue.api.prior import check_prior, given_prior
 from actuator_glue.api.provenance import provenance
 from actuator_glue.api.result import Result
@@ -42,7 +44,7 @@ Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Diagnosis(Result, DiagnosisData):
+class Diagnosis(Result, PosteriorModel, DiagnosisData):
     """Verdict, evidence and the augmented model, with its files and pictures.
 
     Attributes:
@@ -105,17 +107,53 @@ class Diagnosis(Result, DiagnosisData):
         """Effects of the augmented model."""
         return self.structure
 
+    def drawn(self) -> Drawn:
+        """Return the draws under the structure that is told, for predictions.
+
+        Raises:
+            InputError: a record has settings of its own, which no other test has.
+        """
+        if set(self.names) != set(self.model.names) or not len(self.joint):
+            raise InputError(
+                'a record has settings of its own in this model, so that it tells nothing of '
+                'other tests: diagnose the records apart'
+            )
+        known = dict(self.base)
+        for effect in self.effects:
+            known |= effect.parameters
+        left = [
+            (t.measured - t.after)[part]
+            for t in self.traces
+            if t.held_out
+            for part in t.stretches()
+        ]
+        return Drawn(
+            self.joint,
+            self.names,
+            tuple(known[n].unit if n in known else '' for n in self.names),
+            self.model,
+            residual_of(left, len(self.names)),
+            (),
+            tuple(dict.fromkeys(t.stiffness for t in self.traces)),
+            () if self.complete else (self.summary(),),
+        )
+
     @property
     def inference_data(self) -> arviz.InferenceData:
         """Draws of the augmented model for arviz, one chain.
 
-        Bounds, units and what drew them are attributes. Draws of importance sampling are
-        independent but for those that are equal: `effective_draws` says what they are worth.
+        `posterior`: bounds, units and what drew them are attributes. Draws of importance sampling
+        are independent but for those that are equal: `effective_draws` says what they are worth.
+        `observed_data` and `constant_data`: of each part of a record, fitted or held out, the
+        displacement; its time, command, stiffness, and the simulations before and after.
         """
         import arviz as az
 
+        from actuator_glue.api.inference_groups import traces
+
         draws = {n: self.posterior[None, :, i] for i, n in enumerate(self.names)}
         data = az.from_dict(posterior=draws)
+        data.add_groups(traces(self.traces))
         data.posterior.attrs.update({k: v for k, v in self.sampler.items() if v is not None})
         known = dict(self.base)
         for effect in self.effects:

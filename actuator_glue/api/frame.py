@@ -11,11 +11,12 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 
-def frame(rows: Sequence[Mapping[str, Any]], index: str) -> DataFrame:
-    """Return rows as a table.
+def frame(content: Sequence[Mapping[str, Any]] | Mapping[str, Any], index: str) -> DataFrame:
+    """Return rows or columns as a table.
 
     Args:
-        rows: values by column; columns that a row lacks are empty in it.
+        content: columns by name, or rows, each with its values by column; columns that a row
+            lacks are empty in it.
         index: the column by which rows are called.
 
     Raises:
@@ -27,4 +28,4 @@ def frame(rows: Sequence[Mapping[str, Any]], index: str) -> DataFrame:
         raise InputError(
             "a table needs pandas; install it with `pip install 'actuator_glue[lab]'`"
         ) from error
-    return pandas.DataFrame(rows).set_index(index)
+    return pandas.DataFrame(content).set_index(index)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
@@ -46,6 +47,12 @@ class Trace:
     upper_before: Array
     lower_after: Array
     upper_after: Array
+
+    def stretches(self) -> list[slice]:
+        """Return the stretches that have no gap: what is held out leaves gaps."""
+        step = np.diff(self.time)
+        edges = np.flatnonzero(step > 1.5 * float(np.median(step))) + 1
+        return [slice(a, b) for a, b in pairwise([0, *edges.tolist(), len(self.time)])]
 
 
 @dataclass(frozen=True, slots=True)

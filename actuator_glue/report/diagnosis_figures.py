@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-
 import numpy as np
 import scipy
 from matplotlib.axes import Axes
@@ -29,14 +27,6 @@ NOISE = '#dddddd'
 _POINTS = 4000  # per line: more cannot be seen
 _SECONDS = 4.0  # of each periodogram that is averaged
 _SMOOTH = 0.02  # s, so that loops are seen through the noise
-
-
-def stretches(trace: Trace) -> list[slice]:
-    """Return the stretches of a trace that have no gap: what is held out leaves gaps."""
-    step = np.diff(trace.time)
-    edges = np.flatnonzero(step > 1.5 * float(np.median(step))) + 1
-    bounds = [0, *edges.tolist(), len(trace.time)]
-    return [slice(a, b) for a, b in pairwise(bounds)]
 
 
 def moved(found: DiagnosisData) -> bool:
@@ -69,7 +59,7 @@ def _lines(trace: Trace, *columns: Array) -> Array:
     step = max(1, len(trace.time) // _POINTS)
     table = np.column_stack(columns)
     gap = np.full((1, len(columns)), np.nan)
-    parts = [piece for part in stretches(trace) for piece in (table[part][::step], gap)]
+    parts = [piece for part in trace.stretches() for piece in (table[part][::step], gap)]
     return np.vstack(parts).T
 
 
@@ -136,7 +126,7 @@ def residuals_in_time(found: DiagnosisData) -> Figure:
 def _density(trace: Trace, residual: Array) -> tuple[Array, Array]:
     """Return frequencies [Hz] and the amplitude density of a residual, its gaps left out."""
     rate = 1.0 / float(np.median(np.diff(trace.time)))
-    parts = stretches(trace)
+    parts = trace.stretches()
     size = min(max(p.stop - p.start for p in parts), round(_SECONDS * rate))
     used = [p for p in parts if p.stop - p.start >= size]
     found = [scipy.signal.welch(residual[p], rate, nperseg=size) for p in used]
@@ -167,7 +157,7 @@ def residuals_in_frequency(found: DiagnosisData) -> Figure:
 
 def _slow_part(trace: Trace) -> slice:
     """Return a part of a record with slow, large motion: loops show best there."""
-    parts = stretches(trace)
+    parts = trace.stretches()
     longest = max(p.stop - p.start for p in parts)
     length = min(max(50, len(trace.time) // 10), longest)
     windows = [
@@ -185,7 +175,7 @@ def _smooth(trace: Trace, values: Array) -> Array:
     size = max(1, round(_SMOOTH / float(np.median(np.diff(trace.time)))))
     weights = np.ones(size)
     means = []
-    for part in stretches(trace):
+    for part in trace.stretches():
         count = np.convolve(np.ones(part.stop - part.start), weights, mode='same')
         means.append(np.convolve(values[part], weights, mode='same')[: len(count)] / count)
     return np.concatenate(means)
@@ -296,7 +286,7 @@ def bands(found: DiagnosisData) -> Figure:
 def _differing(trace: Trace, seconds: float) -> slice:
     """Return the stretch of a duration, without a gap, in which both models differ most."""
     wanted = max(10, round(seconds / float(np.median(np.diff(trace.time)))))
-    parts = stretches(trace)
+    parts = trace.stretches()
     length = min(wanted, max(p.stop - p.start for p in parts))
     total = np.cumsum(np.append(0.0, (trace.before - trace.after) ** 2))
     starts = [np.arange(p.start, p.stop - length + 1) for p in parts]

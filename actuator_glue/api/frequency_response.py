@@ -1,0 +1,244 @@
+"""Frequency response of a calibrated actuator: gain, phase and delay with 95 % bands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+import scipy
+from numpy.typing import ArrayLike
+
+from actuator_glue.errors import InputError
+from actuator_glue.hybrid.actuator import actuator, table_of
+from actuator_glue.hybrid.linear_system import Complex
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Array, Record
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+DEFAULT = (0.1, 30.0, 200)  # Hz: from, to, how many
+_BANDS = 120  # of equal ratio, from one line of the spectrum to the highest
+_TAPER = 0.05  # share of a record that fades in and out
+_COHERENT = 0.95  # what of the measured displacement the command must explain
+_EXCITED = 1e-3  # share of the command's greatest density
+
+
+class Limits(NamedTuple):
+    """Median and 95 % band over the draws, shape (f,) each."""
+
+    median: Array
+    lower: Array
+    upper: Array
+
+
+class Measured(NamedTuple):
+    """What a record shows at the frequencies that it excited, shape (g,) each."""
+
+    frequency: Array
+    gain: Array
+    phase: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class FrequencyResponse:
+    """Displacement over command, Eq. (2a) with the linear effects of the model.
+
+    Attributes:
+        frequency: shape (f,) [Hz].
+        gain: displacement over command [1].
+        phase: lead of the displacement [degrees].
+        delay: -phase over angular frequency [s].
+        stiffness: of the specimen [N/m].
+        left_out: effects of the model that no linear response has.
+        measured: of the record, where one was given: cross spectrum over the command's spectrum
+            in narrow bands that the command moved in, and explains 95 % of the displacement in.
+    """
+
+    frequency: Array
+    gain: Limits
+    phase: Limits
+    delay: Limits
+    stiffness: float
+    left_out: tuple[str, ...] = ()
+    measured: Measured | None = None
+
+    def __repr__(self) -> str:
+        low, high = self.frequency[[0, -1]]
+        rest = f', without {", ".join(self.left_out)}' if self.left_out else ''
+        return (
+            f'FrequencyResponse({low:.3g} to {high:.3g} Hz, {self.stiffness:g} N/m: gain '
+            f'{self.gain.median[0]:.4g} to {self.gain.median[-1]:.4g}, delay '
+            f'{1e3 * self.delay.median[0]:.3g} to {1e3 * self.delay.median[-1]:.3g} ms{rest})'
+        )
+
+
+def frequency_response(
+    draws: Array,
+    names: Sequence[str],
+    structure: Structure,
+    stiffness: float,
+    frequencies: ArrayLike | None = None,
+) -> FrequencyResponse:
+    """Return the continuous response x/u of draws.
+
+    Args:
+        draws: shape (m, p), SI units.
+        names: parameter of each column; those of a likelihood are passed over.
+        structure: the model.
+        stiffness: of the specimen [N/m].
+        frequencies: shape (f,) [Hz]; None for 0.1 to 30 Hz.
+
+    Raises:
+        InputError: frequencies that are not positive.
+    """
+    hertz = _positive(np.geomspace(*DEFAULT) if frequencies is None else frequencies)
+    response = _response(draws, names, structure, stiffness, hertz)
+    return _limits(response, hertz, structure, stiffness)
+
+
+def recorded_response(
+    draws: Array,
+    names: Sequence[str],
+    structure: Structure,
+    record: Record,
+    frequencies: ArrayLike | None = None,
+) -> FrequencyResponse:
+    """Return the response that draws expect between the samples of a record, and the record's own.
+
+    A command that is held from sample to sample lags by half a period more: that is in both.
+
+    Args:
+        draws: shape (m, p), SI units.
+        names: parameter of each column; those of a likelihood are passed over.
+        structure: the model.
+        record: the test; its stiffness must be known.
+        frequencies: shape (f,) [Hz]; None for those that the record excited.
+
+    Raises:
+        InputError: frequencies that are not positive, or a record that excites none.
+    """
+    measured = measured_response(record)
+    if frequencies is None:
+        highest = min(1.5 * float(measured.frequency[-1]), 0.45 * record.rate)
+        frequencies = np.geomspace(float(measured.frequency[0]), highest, DEFAULT[2])
+    hertz = _positive(frequencies)
+    stiffness = record.known_stiffness()
+    held = np.sinc(hertz * record.period) ** (2 if record.hold == 'linear' else 1)
+    if record.hold == 'zoh':
+        held = held * np.exp(-1j * np.pi * hertz * record.period)
+    response = _response(draws, names, structure, stiffness, hertz) * held
+    return _limits(response, hertz, structure, stiffness, measured)
+
+
+def _positive(frequencies: ArrayLike) -> Array:
+    hertz = np.atleast_1d(np.asarray(frequencies, dtype=np.float64))
+    if hertz.ndim != 1 or not hertz.size or not ((hertz > 0.0) & np.isfinite(hertz)).all():
+        raise InputError('frequencies must be positive numbers [Hz]')
+    return np.sort(hertz)
+
+
+def _response(
+    draws: Array, names: Sequence[str], structure: Structure, stiffness: float, hertz: Array
+) -> Complex:
+    """Return what the recording transducer shows over the command, (m, f)."""
+    table = table_of(draws, names, structure)
+    linear = actuator(
+        table, structure.names, structure.entries, np.full(len(table), float(stiffness))
+    )
+    s = np.broadcast_to(2j * np.pi * hertz, (len(table), len(hertz)))
+    seen = np.broadcast_to(linear.shown, linear.system.C.shape)
+    answer = linear.system._replace(C=seen).response(s)
+    return np.asarray(answer * np.exp(-s * linear.delay[:, None]))
+
+
+def _limits(
+    response: Complex,
+    hertz: Array,
+    structure: Structure,
+    stiffness: float,
+    measured: Measured | None = None,
+) -> FrequencyResponse:
+    phase = np.unwrap(np.angle(response), axis=1)
+    # No actuator leads its command by half a turn at the lowest frequency.
+    phase -= 2.0 * np.pi * np.rint(phase[:, :1] / (2.0 * np.pi))
+    return FrequencyResponse(
+        frequency=hertz,
+        gain=_over_draws(np.abs(response)),
+        phase=_over_draws(np.degrees(phase)),
+        delay=_over_draws(-phase / (2.0 * np.pi * hertz)),
+        stiffness=float(stiffness),
+        left_out=tuple(e.name for e in structure.entries if not e.linear),
+        measured=measured,
+    )
+
+
+def _over_draws(values: Array) -> Limits:
+    lower, median, upper = np.quantile(values, (0.025, 0.5, 0.975), axis=0)
+    return Limits(median, lower, upper)
+
+
+def measured_response(record: Record) -> Measured:
+    """Return gain and phase [degrees] of a record at the frequencies that its command excited.
+
+    Raises:
+        InputError: the displacement follows the command at no frequency.
+    """
+    taper = scipy.signal.windows.tukey(len(record), _TAPER)
+    hertz = np.fft.rfftfreq(len(record), record.period)[1:]
+    u, x = (
+        np.fft.rfft(taper * (channel - channel.mean()))[1:]
+        for channel in (record.command, record.measured)
+    )
+    edges = np.geomspace(hertz[0], hertz[-1], 1 + _BANDS)
+    lines = np.minimum(np.searchsorted(edges, hertz, side='right') - 1, _BANDS - 1)
+
+    def within(values: Array) -> Array:
+        return np.asarray(np.bincount(lines, values, _BANDS), dtype=np.float64)
+
+    cross = u.conj() * x
+    power, answer = within(np.abs(u) ** 2), within(np.abs(x) ** 2)
+    count = np.bincount(lines, minlength=_BANDS)
+    with np.errstate(all='ignore'):
+        response = (within(cross.real) + 1j * within(cross.imag)) / power
+        coherence = np.abs(response) ** 2 * power / answer
+        middle = within(hertz * np.abs(u) ** 2) / power
+        density = power / count
+    # One line agrees with itself, whatever it is.
+    used = (count >= 2) & (coherence >= _COHERENT) & (density >= _EXCITED * np.nanmax(density))
+    if used.sum() < 2:
+        raise InputError(
+            f'{record.source or "the record"}: the displacement follows the command at no '
+            'frequency; a response needs a command that moves over a band, as a sweep does'
+        )
+    turns = np.unwrap(np.angle(response[used]))
+    turns -= 2.0 * np.pi * np.rint(turns[0] / (2.0 * np.pi))
+    return Measured(middle[used], np.abs(response[used]), np.degrees(turns))
+
+
+def bode_figure(responses: Sequence[tuple[str, FrequencyResponse]]) -> Figure:
+    """Return a figure of responses side by side, each under its title."""
+    from actuator_glue.report.bode_figure import Bode, bode
+
+    return bode(
+        [
+            Bode(
+                title,
+                of.frequency,
+                of.gain,
+                of.phase,
+                of.delay,
+                None if of.measured is None else of.measured,
+            )
+            for title, of in responses
+        ]
+    )
+
+
+def title(of: FrequencyResponse, name: str = '') -> str:
+    """Return what a picture of a response is of."""
+    told = f'{name}: ' if name else ''
+    told += 'free' if of.stiffness == 0.0 else f'k = {of.stiffness / 1e3:g} kN/m'
+    return f'{told}, linear part' if of.left_out else told

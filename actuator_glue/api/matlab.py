@@ -1,0 +1,102 @@
+"""A posterior as a .mat file: draws, and Eq. (2a) as MATLAB's `tf` takes it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+
+from actuator_glue.errors import InputError
+from actuator_glue.model.parameters import NAMES
+from actuator_glue.records import Array
+
+
+class Exported(NamedTuple):
+    """What goes into the file.
+
+    Attributes:
+        draws: shape (m, p), SI units.
+        names: parameter of each column.
+        units: their units.
+        effects: of the model beyond Eq. (2).
+        problems: why the posterior must not be used as it stands.
+    """
+
+    draws: Array
+    names: Sequence[str]
+    units: Sequence[str]
+    effects: Sequence[str]
+    problems: Sequence[str]
+
+
+def polynomials(theta: Array, stiffness: float) -> tuple[Array, Array]:
+    """Return numerator and denominator of Eq. (2a), descending powers of s.
+
+    x/u = alpha_1_beta_0 / ((k + alpha_2) s^2 + (alpha_3 k + beta_1 k + beta_1 alpha_2) s
+    + beta_1 alpha_3 k + alpha_1_beta_0).
+
+    Args:
+        theta: beta_1, alpha_1_beta_0, alpha_2, alpha_3, shape (4,), SI units.
+        stiffness: of the specimen k [N/m].
+    """
+    beta_1, gain, alpha_2, alpha_3 = (float(v) for v in theta)
+    k = float(stiffness)
+    middle = alpha_3 * k + beta_1 * k + beta_1 * alpha_2
+    return np.array([gain]), np.array([k + alpha_2, middle, beta_1 * alpha_3 * k + gain])
+
+
+def write_mat(path: Path | str, of: Exported, stiffness: Sequence[float]) -> Path:
+    """Write draws and the mean model under some stiffnesses to a .mat file; return its path.
+
+    Variables: `draws` (m x p), `names`, `units`, `effects`, `problems` (cells), `mean`, `stddev`
+    (1 x p), `covariance` (p x p), `model`: a struct for each stiffness with `stiffness`, `num`,
+    `den` of the mean of the draws, `delay` [s], and `num_draws`, `den_draws`, a row for each draw.
+    `tf(model(1).num, model(1).den, 'InputDelay', model(1).delay)` is the actuator in MATLAB.
+
+    Args:
+        path: where to.
+        of: the posterior.
+        stiffness: of specimens [N/m].
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    names = list(of.names)
+    columns = [names.index(name) for name in NAMES]
+    base = of.draws[:, columns]
+    mean = of.draws.mean(axis=0)
+    late = float(mean[names.index('delay')]) if 'delay' in names else 0.0
+    fields = ('stiffness', 'num', 'den', 'delay', 'num_draws', 'den_draws')
+    model = np.zeros((1, len(stiffness)), dtype=[(field, object) for field in fields])
+    for i, k in enumerate(stiffness):
+        num, den = polynomials(mean[columns], k)
+        drawn = [polynomials(theta, k) for theta in base]
+        rows = np.array([n for n, _ in drawn]), np.array([d for _, d in drawn])
+        model[0, i] = (float(k), num, den, late, *rows)
+    content = {
+        'draws': of.draws,
+        'names': _cells(names),
+        'units': _cells(of.units),
+        'effects': _cells(of.effects),
+        'problems': _cells(of.problems),
+        'mean': mean,
+        'stddev': of.draws.std(axis=0),
+        'covariance': np.atleast_2d(np.cov(of.draws, rowvar=False)),
+        'model': model,
+    }
+    path = Path(path)
+    try:
+        scipy.io.savemat(str(path), content, appendmat=False, do_compression=True)
+    except OSError as error:
+        raise InputError(f'{path}: cannot be written ({error.strerror or error})') from error
+    return path
+
+
+def _cells(texts: Sequence[str]) -> np.ndarray:
+    """Return texts as MATLAB's cell array, empty ones too."""
+    out = np.empty(len(texts), dtype=object)
+    out[:] = list(texts)
+    return out

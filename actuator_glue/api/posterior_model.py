@@ -1,0 +1,172 @@
+"""What the draws of a posterior predict: displacements, frequency responses, models for others."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from actuator_glue.api import frequency_response as response
+from actuator_glue.api.ensemble import GivenCommand, commanded, evenly, simulated
+from actuator_glue.api.frequency_response import FrequencyResponse
+from actuator_glue.api.given import OneRecord, one_record_given
+from actuator_glue.api.matlab import Exported, write_mat
+from actuator_glue.api.prediction import Prediction, prediction
+from actuator_glue.errors import InputError
+from actuator_glue.inference.predictive import ResidualModel
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Array, Hold, Record, check_stiffness, source_name
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_SIDE_BY_SIDE = 3  # responses in a figure
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Drawn:
+    """Draws under one model, and what it left of the records it was fitted to.
+
+    Attributes:
+        draws: shape (m, p), SI units.
+        names: parameter of each column.
+        units: their units.
+        structure: the model.
+        residual: what it left; None where that is not known.
+        records: the records, where they are still known.
+        stiffness: specimen stiffnesses of the records [N/m].
+        problems: why the posterior must not be used as it stands.
+    """
+
+    draws: Array
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    structure: Structure
+    residual: ResidualModel | None
+    records: tuple[Record, ...]
+    stiffness: tuple[float, ...]
+    problems: tuple[str, ...]
+
+
+class PosteriorModel(ABC):
+    """A result whose draws are models of the actuator."""
+
+    __slots__ = ()
+
+    @abstractmethod
+    def drawn(self) -> Drawn:
+        """Return the draws that are simulated, and under which model.
+
+        Raises:
+            InputError: a model that is not the same in all records.
+        """
+
+    def predict(
+        self,
+        command: GivenCommand,
+        stiffness: float | None = None,
+        *,
+        rate: float | None = None,
+        hold: Hold | None = None,
+    ) -> Prediction:
+        """Return where the actuator will be under a command, with 95 % bands.
+
+        The actuator starts at rest at zero, and a new measurement is taken to scatter about the
+        model as those did that it was fitted to.
+
+        Args:
+            command: a shape (`Command`), a record or a file of one, or samples [m], shape (n,).
+            stiffness: specimen stiffness [N/m], 0 for a free actuator; None for what a record
+                says.
+            rate: of samples [Hz]; shapes and records have their own.
+            hold: how samples run from one to the next, 'zoh' or 'linear'; None for what a record
+                says, else 'zoh'.
+
+        Raises:
+            InputError: no stiffness, samples without a rate, or draws that diverge.
+
+        Example:
+            >>> posterior.predict(Command('earthquake'), 250e3).plot()  # doctest: +SKIP
+        """
+        of = self.drawn()
+        record, measured = commanded(command, stiffness, rate, hold)
+        moved = simulated(evenly(of.draws), of.names, of.structure, record)
+        return prediction(record, moved, of.residual, measured=measured, problems=of.problems)
+
+    def frequency_response(
+        self, stiffness: float, frequencies: ArrayLike | None = None
+    ) -> FrequencyResponse:
+        """Return gain, phase and delay of displacement over command with 95 % bands.
+
+        Eq. (2a) with the linear effects of the model; `left_out` names the others.
+
+        Args:
+            stiffness: of the specimen [N/m], 0 for a free actuator.
+            frequencies: shape (f,) [Hz]; None for 0.1 to 30 Hz.
+
+        Raises:
+            InputError: a stiffness or frequencies that cannot be.
+        """
+        of = self.drawn()
+        k = check_stiffness(stiffness)
+        return response.frequency_response(
+            evenly(of.draws, 1000), of.names, of.structure, k, frequencies
+        )
+
+    def plot_bode(
+        self, record: OneRecord | None = None, *, stiffness: float | None = None
+    ) -> Figure:
+        """Return a Bode plot: gain, phase and delay with 95 % bands.
+
+        Args:
+            record: a test, whose own response is drawn on top; None for those that were fitted,
+                where they are still known.
+            stiffness: of the specimen [N/m], in place of a record: nothing measured is drawn.
+
+        Raises:
+            InputError: a record of which nothing can be told, or no stiffness.
+        """
+        of = self.drawn()
+        draws = evenly(of.draws, 1000)
+        shown: list[tuple[str, FrequencyResponse]] = []
+        if stiffness is None:
+            given = of.records if record is None else (one_record_given(record),)
+            for test in given[:_SIDE_BY_SIDE]:
+                found = response.recorded_response(draws, of.names, of.structure, test)
+                shown.append((response.title(found, source_name(test.source)), found))
+        if not shown:
+            known = of.stiffness if stiffness is None else (check_stiffness(stiffness),)
+            for k in known[:_SIDE_BY_SIDE]:
+                found = response.frequency_response(draws, of.names, of.structure, k)
+                shown.append((response.title(found), found))
+        if not shown:
+            raise InputError('give a record, or a specimen stiffness [N/m] as stiffness=0.0')
+        return response.bode_figure(shown)
+
+    def save_mat(self, path: Path | str, stiffness: Sequence[float] | float | None = None) -> Path:
+        """Write draws and model to a .mat file for MATLAB; return its path.
+
+        `draws` (m x p), `names`, `units`, `mean`, `covariance`, and `model`: for each stiffness
+        Eq. (2a) with the mean of the draws, as `tf(model(1).num, model(1).den)` takes it, and with
+        each draw (`num_draws`, `den_draws`). Effects beyond Eq. (2) but a delay are in the draws
+        alone.
+
+        Args:
+            path: where to.
+            stiffness: of specimens [N/m]; None for those of the records.
+
+        Raises:
+            InputError: the file cannot be written, or a stiffness that is none.
+        """
+        of = self.drawn()
+        several = of.stiffness if stiffness is None else np.ravel(np.asarray(stiffness))
+        return write_mat(
+            path,
+            Exported(of.draws, of.names, of.units, of.structure.effects, of.problems),
+            [check_stiffness(k) for k in several],
+        )
