@@ -39,6 +39,23 @@ class ScoredBand:
 
 
 @dataclass(frozen=True, slots=True)
+class WindowExplanation:
+    """A structure that is carried: its weight, and each parameter if it is true.
+
+    Attributes:
+        name: its effects, or "Eq. (2)".
+        weight: fixed before the window.
+        mean: posterior mean of each parameter, SI units; empty where no time was left for it.
+        stddev: their posterior standard deviations.
+    """
+
+    name: str
+    weight: float
+    mean: dict[str, float]
+    stddev: dict[str, float]
+
+
+@dataclass(frozen=True, slots=True)
 class WindowEstimate:
     """What was estimated in one window.
 
@@ -53,6 +70,7 @@ class WindowEstimate:
         error: of the best draw.
         bands: forecasts that ended in this window.
         tracking: how the actuator followed the command, where that was asked for.
+        explanations: structures that are carried, the likeliest first, which names `parameters`.
     """
 
     window: int
@@ -65,6 +83,7 @@ class WindowEstimate:
     error: WindowError
     bands: tuple[ScoredBand, ...]
     tracking: RecordTracking | None = None
+    explanations: tuple[WindowExplanation, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,8 +9,10 @@ import numpy as np
 from actuator_glue.api.replay_data import ReplayData, WindowEstimate
 from actuator_glue.api.tracking import shown
 from actuator_glue.model.structure import Structure
+from actuator_glue.online.stream import structure_effects
 from actuator_glue.records import source_name
-from actuator_glue.report import html
+from actuator_glue.report import html, weights
+from actuator_glue.report.quantity import plain, said_in
 from actuator_glue.report.timeseries import ParameterCourse, parameters_against_time
 
 if TYPE_CHECKING:
@@ -19,6 +21,7 @@ if TYPE_CHECKING:
 
 ROWS = 20  # windows shown to people; JSON has all
 TITLE = 'Posterior mean (SI units) and standard deviation (% of it) of each window'
+IF_TRUE = 'The parameters if each explanation of the last window is true: mean +- s. d.'
 TRACKING = 'How the actuator followed each window: median (95 % limits)'
 
 
@@ -67,6 +70,40 @@ def tracking_table(found: ReplayData) -> tuple[tuple[str, ...], list[tuple[str, 
     return ('window', 'end [s]', *(f'{text} [{unit}]' for text, unit, _ in units)), out
 
 
+def explanations_table(
+    found: ReplayData,
+) -> tuple[tuple[str, ...], list[tuple[str, ...]]] | None:
+    """Return header and rows of the explanations over time; None where there was ever one only."""
+    course = [(w.end_s, {e.name: e.weight for e in w.explanations}) for w in found.windows]
+    told = weights.spells(course)
+    several = len({name for spell in told for name in spell.last}) > 1
+    return (weights.HEADER, weights.rows(told)) if several else None
+
+
+def if_true_table(found: ReplayData) -> tuple[tuple[str, ...], list[tuple[str, ...]]] | None:
+    """Return what the parameters are if each explanation of the last window is true.
+
+    None where that has one only: what it says is in the table of the windows.
+    """
+    last = found.windows[-1].explanations if found.windows else ()
+    if len(last) < 2:
+        return None
+    known = {p.name: p for one in last for p in Structure(structure_effects(one.name)).parameters}
+    out = []
+    for name in dict.fromkeys(name for one in last for name in one.mean):
+        sizes = [(one.mean.get(name), one.stddev.get(name)) for one in last]
+        factor, unit = said_in(known[name].unit, [mean for mean, _ in sizes if mean is not None])
+        told = [
+            '-'
+            if mean is None or sd is None
+            else f'{plain(factor * mean, 4)} +- {plain(factor * sd, 2)}'
+            for mean, sd in sizes
+        ]
+        out.append((name, *told, unit or '-'))
+    shares = [f'{one.name} ({100 * one.weight:.0f} %)' for one in last]
+    return ('parameter', *shares, 'unit'), out
+
+
 def _some(windows: list[WindowEstimate]) -> list[WindowEstimate]:
     """Return some windows, evenly chosen where there are many."""
     if len(windows) <= ROWS:
@@ -97,8 +134,15 @@ def brief(found: ReplayData) -> list[html.Block]:
         html.Text(found.summary()),
         html.Table(header(found), rows(found), TITLE),
         *([html.Table(*followed, TRACKING)] if (followed := tracking_table(found)) else []),
+        *_explained(found),
         *(html.Note(line) for line in told),
     ]
+
+
+def _explained(found: ReplayData) -> list[html.Block]:
+    """Return the tables of the explanations, where there was ever more than one."""
+    tables = ((weights.TITLE, explanations_table(found)), (IF_TRUE, if_true_table(found)))
+    return [html.Table(*table, title) for title, table in tables if table is not None]
 
 
 def page(found: ReplayData) -> html.Page:

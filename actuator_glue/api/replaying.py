@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, fields
 from os import PathLike, fspath
 from typing import Any, Literal, TypedDict, Unpack
 
+from actuator_glue.api.bar import shown
 from actuator_glue.api.callbacks import harmless
 from actuator_glue.api.given import Records, records_given
 from actuator_glue.api.options import chosen, takes
@@ -16,12 +17,15 @@ from actuator_glue.api.replay_data import (
     ScoredBand,
     WindowError,
     WindowEstimate,
+    WindowExplanation,
     WindowParameter,
 )
 from actuator_glue.api.replay_result import Replay
 from actuator_glue.api.tracking import window_tracking
 from actuator_glue.errors import InputError
 from actuator_glue.given import take_numbers
+from actuator_glue.inference.choice import ModelChoice
+from actuator_glue.inference.moments import Moments
 from actuator_glue.io.bag_reader import decoded, is_bag, summarise
 from actuator_glue.io.bag_records import check_order
 from actuator_glue.io.bag_samples import topics_of_actuator
@@ -30,7 +34,7 @@ from actuator_glue.online.playback import Item, items, stream
 from actuator_glue.online.playback import replay as run
 from actuator_glue.online.replay_comparison import Published, ReplayComparison, compare, published
 from actuator_glue.online.settings import AUTOMATIC, EstimatorSettings
-from actuator_glue.online.stream import Rejected
+from actuator_glue.online.stream import Rejected, structure_name
 from actuator_glue.sample_block import Block, check_block
 from actuator_glue.workers.reports import Reports
 
@@ -129,7 +133,7 @@ def replay(
     *,
     namespace: str | None = None,
     tracking: bool = False,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
     **changes: Unpack[ReplayChanges],
 ) -> Replay:
     """Run the online estimator over recorded samples: the code that runs live, without a clock.
@@ -139,7 +143,8 @@ def replay(
             published and no setting is given, both are compared bit by bit.
         namespace: whose samples, where a bag has several actuators.
         tracking: whether each window tells how the actuator followed its command.
-        progress: called with the share of the messages read.
+        progress: called with the share of the messages read; True for a bar, False for none; None
+            for a bar in a notebook.
         changes: settings of the estimator by name; None for those of the live run.
 
     Raises:
@@ -150,7 +155,9 @@ def replay(
     under_way.tracking = tracking
     started = time.perf_counter()
     used = _settings(under_way.live, asked)
-    comparison = _estimate(under_way, used, harmless(progress) or (lambda share: None))
+    with shown('replay', 1.0, False if callable(progress) else progress) as bar:
+        told = harmless(progress) if callable(progress) else None
+        comparison = _estimate(under_way, used, told or bar)
     if not under_way.windows:
         raise InputError(f'{under_way.source}: not one window could be estimated')
     return Replay(
@@ -285,4 +292,18 @@ def _window(r: WindowResult, tracking: bool) -> WindowEstimate:
             for p in r.scored
         ),
         tracking=window_tracking(r) if tracking else None,
+        explanations=tuple(map(_explanation, r.structures, r.weights, r.parts)),
     )
+
+
+def _explanation(
+    effects: tuple[str, ...], weight: float, part: tuple[ModelChoice, Moments] | None
+) -> WindowExplanation:
+    name = structure_name(effects)
+    if part is None:
+        return WindowExplanation(name, float(weight), {}, {})
+    model, found = part
+    mean, stddev = (
+        dict(zip(model.names, map(float, of), strict=True)) for of in (found.mean, found.stddev)
+    )
+    return WindowExplanation(name, float(weight), mean, stddev)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -76,6 +77,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _bag(path: str, args: argparse.Namespace) -> dict[str, Any]:
     from actuator_glue.io.bag_reader import summarise
+    from actuator_glue.report import weights
 
     summary = summarise(path)
     filled = [p for p in summary.parts if p.count]
@@ -92,6 +94,14 @@ def _bag(path: str, args: argparse.Namespace) -> dict[str, Any]:
     topics = list(summary.topics.values())
     rows = [(t.name, t.type, str(t.count)) for t in topics]
     table('', ('topic', 'type', 'messages'), rows, args)
+    carried = weights.of_bag(path)
+    for topic, course in carried.items():
+        table(
+            f'{weights.TITLE} ({topic})',
+            weights.HEADER,
+            weights.rows(weights.spells(course)),
+            args,
+        )
     return {
         'finished': summary.finished,
         'messages': total,
@@ -101,6 +111,10 @@ def _bag(path: str, args: argparse.Namespace) -> dict[str, Any]:
             {'name': t.name, 'type': t.type, 'messages': t.count, 'type_hash': t.rihs01}
             for t in topics
         ],
+        'explanations': {
+            topic: [asdict(spell) for spell in weights.spells(course)]
+            for topic, course in carried.items()
+        },
         'damage': list(summary.damage),
     }
 

@@ -74,11 +74,25 @@ def run(args: argparse.Namespace) -> int:
             **settings,
         )
     write_json(found.to_json(), args.json)
-    from actuator_glue.api.replay_report import TITLE, TRACKING, header, rows, tracking_table
+    from actuator_glue.api.replay_report import (
+        IF_TRUE,
+        TITLE,
+        TRACKING,
+        explanations_table,
+        header,
+        if_true_table,
+        rows,
+        tracking_table,
+    )
+    from actuator_glue.report import weights
 
     table(TITLE, header(found), rows(found), args)
     if (followed := tracking_table(found)) is not None:
         table(TRACKING, *followed, args)
+    if (explained := explanations_table(found)) is not None:
+        table(weights.TITLE, *explained, args)
+    if (if_true := if_true_table(found)) is not None:
+        table(IF_TRUE, *if_true, args)
     for line in (*found.notes, *list(dict.fromkeys(found.events))[:20]):
         note(line)
     _verdict(found, args)

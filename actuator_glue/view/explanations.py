@@ -8,10 +8,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from actuator_glue.online.stream import structure_effects, structure_name
+from actuator_glue.online.stream import structure_effects
+from actuator_glue.report import experiments
 from actuator_glue.report.quantity import said_in
-
-_EXPERIMENTS = 3  # that are told, best first
+from actuator_glue.report.weights import named
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,9 +58,8 @@ def explanations(posterior: Any) -> list[Explanation]:
 
     Older messages know of one, and none of what each by itself says of the parameters.
     """
-    names = list(getattr(posterior, 'structures', ())) or [structure_name(posterior.effects)]
-    weights = list(getattr(posterior, 'weights', ())) or [1.0]
-    sizes = list(getattr(posterior, 'structure_sizes', ())) or [0] * len(names)
+    weights = named(posterior)
+    sizes = list(getattr(posterior, 'structure_sizes', ())) or [0] * len(weights)
     columns = [
         said(*one)
         for one in zip(
@@ -72,9 +71,9 @@ def explanations(posterior: Any) -> list[Explanation]:
         )
     ]
     found, start = [], 0
-    for name, weight, size in zip(names, weights, sizes, strict=False):
+    for (name, weight), size in zip(weights.items(), sizes, strict=False):
         own = tuple(columns[start : start + int(size)])
-        found.append(Explanation(str(name), float(weight), own))
+        found.append(Explanation(name, weight, own))
         start += int(size)
     return sorted(found, key=lambda one: -one.weight)
 
@@ -87,9 +86,7 @@ def diagnosed(message: Any) -> dict[str, Any]:
         'summary': message.summary,
         'reason': getattr(message, 'reason', ''),
         'effects': [_effect(one, whole) for one in message.effects],
-        'experiments': [
-            text for one in _list(whole, 'experiments')[:_EXPERIMENTS] if (text := _test(one))
-        ],
+        'experiments': experiments.told(whole),
         'advice': list(message.advice),
     }
 
@@ -146,19 +143,6 @@ def _sizes(told: Mapping[str, Any]) -> list[dict[str, Any]]:
             mean = number(factor * size['mean'])
             out.append({'name': name, 'unit': unit, 'mean': mean, 'sd': None, 'limits': limits})
     return out
-
-
-def _test(experiment: Mapping[str, Any]) -> str:
-    """Return a test in words, with what it is expected to tell."""
-    try:
-        size, stiffness = 1e3 * experiment['amplitude'], 1e-3 * experiment['stiffness']
-        where = 'without specimen' if not stiffness else f'with a specimen of {stiffness:.4g} kN/m'
-        return (
-            f'{experiment["command"]} of {size:.2g} mm {where}, {experiment["seconds"]:.0f} s '
-            f'({experiment["expected_nats"]:.2g} nats expected between what is tied)'
-        )
-    except (KeyError, TypeError, ValueError):  # of another version
-        return ''
 
 
 def _json(message: Any) -> Mapping[str, Any]:

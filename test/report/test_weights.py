@@ -1,0 +1,44 @@
+"""Explanations and their weights over time, as a table."""
+
+from pathlib import Path
+
+import pytest
+
+from actuator_glue.report import weights
+from actuator_glue.report.weights import Spell, spells
+
+SESSION = Path(__file__).resolve().parents[2] / 'bags' / 'session'
+
+
+def test_a_spell_ends_where_others_are_carried_or_another_one_leads() -> None:
+    course = [
+        (5.0, {'Eq. (2)': 1.0}),
+        (6.0, {'Eq. (2)': 1.0}),
+        (7.0, {'Eq. (2)': 0.62, 'backlash': 0.38}),
+        (8.0, {'Eq. (2)': 0.51, 'backlash': 0.49}),
+        (9.0, {'backlash': 0.7, 'Eq. (2)': 0.3}),
+        (30.0, {'Eq. (2)': 0.012, 'backlash': 0.988}),
+    ]
+    found = spells(course)
+    assert [(s.start_s, s.stop_s, s.told()) for s in found] == [
+        (5.0, 6.0, 'Eq. (2) 100 %'),
+        (7.0, 8.0, 'Eq. (2) 62 -> 51 %, backlash 38 -> 49 %'),
+        (9.0, 30.0, 'backlash 70 -> 99 %, Eq. (2) 30 -> 1 %'),
+    ]
+    assert weights.rows(found)[2][:2] == ('9.0', '30.0')
+    assert spells([]) == []
+
+
+def test_only_the_last_are_shown() -> None:
+    course = [(float(i), {f'effect-{i % 2}': 1.0}) for i in range(100)]
+    assert len(weights.rows(spells(course))) == weights.ROWS
+    assert weights.rows(spells(course))[-1] == ('99.0', '99.0', 'effect-1 100 %')
+
+
+def test_what_a_bag_carried() -> None:
+    """The reference session: Eq. (2) first, play in its place at 26 s; of an older version."""
+    (course,) = weights.of_bag(SESSION).values()
+    first, second = spells(course)
+    assert first == Spell(first.start_s, first.stop_s, {'Eq. (2)': 1.0}, {'Eq. (2)': 1.0})
+    assert (first.start_s, second.told()) == (pytest.approx(5.0), 'backlash 100 %')
+    assert first.stop_s < second.start_s < 30.0 and second.stop_s == pytest.approx(41.0)
