@@ -44,6 +44,7 @@ LIBRARIES = {
     'llvmlite': Names('llvmlite', None),
     'lz4': Names('lz4', None),
     'markupsafe': Names('markupsafe', None),
+    'matio': Names('mat-io', None),
     'matplotlib': Names('matplotlib', 'python3-matplotlib'),
     'mcap': Names('mcap', None),
     'nptdms': Names('nptdms', None),
@@ -67,7 +68,7 @@ LIBRARIES = {
     'zstandard': Names('zstandard', None),
 }
 # Libraries of the extra `lab`, each asked for where a file needs it.
-OPTIONAL = {'aiohttp', 'h5py', 'nptdms', 'openpyxl', 'pandas', 'pyarrow', 'pylsl'}
+OPTIONAL = {'aiohttp', 'h5py', 'matio', 'nptdms', 'openpyxl', 'pandas', 'pyarrow', 'pylsl'}
 # Libraries of the extra `campaign`.
 CAMPAIGN = {'distributed', 'pandas', 'pyarrow', 'ruptures'}
 # Options of pytest that pyproject.toml and Makefile use; nothing imports these plug-ins.

@@ -16,6 +16,8 @@ if TYPE_CHECKING:
     from actuator_glue.io.look import ColumnLook, FileLook
     from actuator_glue.io.propose import Guess, ProposedMap
 
+_SHOWN = 8  # blocks of samples of a file that are told
+
 EXAMPLES = (
     'map raw.txt --rate 1000 --out map.yaml',
     'map recorded_bag',
@@ -83,6 +85,13 @@ def map_text(found: FileLook, proposal: ProposedMap) -> str:
     """Return a proposal as YAML, with a comment that says why beside each channel."""
     lines = [f'# Proposed for {found.path.name}; check what is marked CHECK.']
     lines += [f'{name}: {json.dumps(value)}' for name, value in found.layout.items()]
+    if len(found.blocks) > 1:
+        begun = ', '.join(f'{b.rows} below line {b.lines}' for b in found.blocks[:_SHOWN])
+        more = len(found.blocks) - _SHOWN
+        begun += f' and {more} more' if more > 0 else ''
+        lines.append(
+            f'#   CHECK block: the longest of {len(found.blocks)} is taken; rows: {begun}'
+        )
     if proposal.rate is not None:
         lines.append(f'rate: {proposal.rate:.9g}  # Hz')
     if proposal.counter is not None:

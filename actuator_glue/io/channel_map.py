@@ -55,6 +55,7 @@ class ChannelMap:
         rate: sample rate [Hz].
         sample_number: column that counts the samples, so that gaps are found.
         header_lines: lines before the first sample; the last of them names the columns.
+        rows: samples that are read of a text; None for all, to its end.
         delimiter: text between columns; found by itself where left out.
         decimal: decimal sign, '.' or ','; found by itself where left out.
         rest_samples: samples at rest at the start, for `remove_rest_offset`.
@@ -73,6 +74,7 @@ class ChannelMap:
     rate: float | None = None
     sample_number: Column | None = None
     header_lines: int | None = None
+    rows: int | None = None
     delimiter: str | None = None
     decimal: Literal['.', ','] | None = None
     rest_samples: int = 0
@@ -125,7 +127,7 @@ def parse_channel_map(content: object, source: str) -> ChannelMap:
             values[role] = _channel(values[role], role, f'{where}: {role}')
     number(values, 'rate', where, lower=0.1, upper=1e6)
     number(values, 'stiffness', where)
-    for name in ('header_lines', 'rest_samples'):
+    for name in ('header_lines', 'rows', 'rest_samples'):
         whole(values, name, where)
     for name, allowed in _CHOICES.items():
         if values.get(name) is not None and values[name] not in allowed:

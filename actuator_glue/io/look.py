@@ -14,7 +14,7 @@ from actuator_glue.io.bag_topics import TopicSeries, topic_series
 from actuator_glue.io.channel_map import Channel, ChannelMap
 from actuator_glue.io.formats import Column, format_of, formats
 from actuator_glue.io.signature import refuse_pipe
-from actuator_glue.io.text_layout import text_layout
+from actuator_glue.io.text_layout import Block, text_layout
 from actuator_glue.io.units import written_unit
 from actuator_glue.records import Array
 
@@ -89,6 +89,7 @@ class FileLook:
         layout: entries of a channel map that say how text is laid out.
         period: time between samples [s] where the file states one.
         what: kind of file, for people.
+        blocks: of samples in a text, of which the longest is looked at.
     """
 
     path: Path
@@ -96,6 +97,7 @@ class FileLook:
     layout: dict[str, object]
     period: float | None
     what: str
+    blocks: tuple[Block, ...] = ()
 
 
 def look(path: Path | str) -> FileLook:
@@ -138,8 +140,9 @@ def _file(path: Path) -> FileLook:
     chosen = format_of(path)
     layout: dict[str, Any] = {}
     channels, places = None, None
+    blocks: list[Block] = []
     if chosen is formats()['.csv']:
-        layout, places = text_layout(path)
+        layout, places, blocks = text_layout(path)
         unknown = ChannelMap(Channel(1, 'm'), Channel(2, 'm'), rate=1.0)
         channels = replace(unknown, **layout)
     table = chosen.read(path, channels)
@@ -159,4 +162,4 @@ def _file(path: Path) -> FileLook:
         for c, i, v in zip(named, places, table.values(places), strict=True)
         if len(v) > 1
     ]
-    return FileLook(path, looks, layout, table.period, chosen.name)
+    return FileLook(path, looks, layout, table.period, chosen.name, tuple(blocks))

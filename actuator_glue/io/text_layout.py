@@ -27,11 +27,26 @@ class _Rows(NamedTuple):
     first: int
     delimiter: str | None
     numbers: list[int]
-    width: int
+    filled: int  # columns that are not empty
 
 
-def text_layout(path: Path) -> tuple[dict[str, Any], list[int]]:
-    """Return entries of a channel map for a text, and the positions of its columns of numbers.
+class Block(NamedTuple):
+    """Rows of samples without anything between them: lines before the first, and how many."""
+
+    lines: int
+    rows: int
+
+
+class Layout(NamedTuple):
+    """How a text is laid out: entries of a channel map, columns of numbers, blocks of samples."""
+
+    entries: dict[str, Any]
+    numbers: list[int]
+    blocks: list[Block]
+
+
+def text_layout(path: Path) -> Layout:
+    """Return how a text is laid out; of several blocks of samples the entries name the longest.
 
     Raises:
         InputError: no text, or no rows of at least two numbers near its beginning.
@@ -42,17 +57,56 @@ def text_layout(path: Path) -> tuple[dict[str, Any], list[int]]:
     if not found:
         raise InputError(f'{path}: no rows of at least two numbers in the first {_LOOK} lines')
     # A wrong delimiter leaves entries that are no numbers.
-    best = max(found, key=lambda rows: 2 * len(rows.numbers) - rows.width)
-    entries: dict[str, Any] = {'header_lines': best.first}
-    above = [
-        fields_of(line, best.delimiter) for line in lines[max(best.first - 2, 0) : best.first]
-    ]
-    if len(above) == 2 and len(above[0]) >= 2 and units_line(above[1]):
-        entries['header_lines'] = best.first - 1  # a line of units is found by itself
+    best = max(found, key=lambda rows: 2 * len(rows.numbers) - rows.filled)
+    blocks, follows = _blocks(path, best)
+    chosen = max(blocks, key=lambda block: block.rows)
+    entries: dict[str, Any] = {'header_lines': chosen.lines}
+    if follows:
+        entries['rows'] = chosen.rows
     read = read_head(path, entries['header_lines'])
     if best.delimiter is not None and best.delimiter != read.delimiter:
         entries['delimiter'] = best.delimiter
-    return entries, best.numbers
+    return Layout(entries, best.numbers, blocks)
+
+
+def _blocks(path: Path, like: _Rows) -> tuple[list[Block], bool]:
+    """Return the blocks of rows as the first ones are, and whether anything follows one.
+
+    A line of units above a block counts as one of its rows: it is found by itself.
+    """
+    found: list[Block] = []
+    above: list[list[str]] = []
+    first, rows, empty, follows = 0, 0, 0, False
+    with open_text(path, errors='replace') as file:
+        for at, line in enumerate(file):
+            if at < like.first - 2:
+                continue
+            entries = fields_of(line.rstrip('\r\n'), like.delimiter)
+            if not any(entries):
+                empty += bool(entries)  # delimiters alone are a row, where other rows follow
+                continue
+            if at >= like.first and _is_row(entries, like.numbers):
+                if not rows:
+                    units = len(above) == 2 and len(above[0]) >= 2 and bool(units_line(above[1]))
+                    first = at - units
+                rows += 1 + (empty if rows else 0)
+                empty = 0
+                continue
+            if rows:
+                found.append(Block(first, rows))
+                rows, follows, above = 0, True, []
+            empty = 0
+            above = [*above[-1:], entries]
+    if rows:
+        found.append(Block(first, rows))
+    return found, follows
+
+
+def _is_row(entries: list[str], numbers: list[int]) -> bool:
+    """Whether half of what is a number elsewhere is one: the rest may be `NA`, or left out."""
+    filled = [entries[i] for i in numbers if i < len(entries)]
+    found = sum(is_number(entry) or is_stamp(entry) for entry in filled)
+    return found >= max(1, len(filled) / 2) and len(filled) == len(numbers)
 
 
 def _first_rows(lines: list[str], delimiter: str | None) -> _Rows | None:
@@ -72,5 +126,6 @@ def _first_rows(lines: list[str], delimiter: str | None) -> _Rows | None:
             or all(map(is_stamp, column))
         ]
         if len(always) >= 2:
-            return _Rows(first, delimiter, sometimes, len(columns))
+            filled = sum(any(column) for column in columns)
+            return _Rows(first, delimiter, sometimes, filled)
     return None

@@ -7,7 +7,9 @@ import re
 from actuator_glue.errors import InputError
 from actuator_glue.si import FORCE, LENGTH
 
-_TIME = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'sec': 1.0, 'µs': 1e-6, 'μs': 1e-6}
+_TIME = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'µs': 1e-6, 'μs': 1e-6}
+_TIME |= dict.fromkeys(('sec', 'Sec', 'SEC', 'second', 'seconds', 'Seconds'), 1.0)
+_TIME |= dict.fromkeys(('msec', 'mSec', 'milliseconds'), 1e-3)
 
 # What a column can be, and factors to SI by unit.
 ROLES: dict[str, dict[str, float]] = {

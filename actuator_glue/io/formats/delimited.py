@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from itertools import islice
 from pathlib import Path
@@ -62,6 +62,7 @@ class TextHead:
         least: entries that a row has at least; the last ones may be remarks, and left out.
         stamps: positions of columns that hold dates or times of day.
         named: entries of the line of names, whether it fits or not.
+        rows: samples that are read; None for all.
     """
 
     names: list[str]
@@ -74,6 +75,7 @@ class TextHead:
     least: int
     named: int
     stamps: frozenset[int] = frozenset()
+    rows: int | None = None
 
 
 def read_head(
@@ -302,10 +304,20 @@ def read_columns(path: Path, head: TextHead, positions: list[int]) -> list[Array
     for part in parts:  # one after the other: of a long file not everything is there twice
         columns.append(np.concatenate(part))
         part.clear()
+    if head.rows is not None and len(columns[0]) < head.rows:
+        raise InputError(
+            f'{path}: {len(columns[0])} samples after the {head.lines} header lines, and the '
+            f'channel map says `rows: {head.rows}`'
+        )
     return columns
 
 
 def _rows(file: TextIO, head: TextHead) -> Iterator[tuple[int, str]]:
+    """Yield line numbers from 1 and the rows that are read."""
+    return islice(_all_rows(file, head), head.rows)
+
+
+def _all_rows(file: TextIO, head: TextHead) -> Iterator[tuple[int, str]]:
     """Yield line numbers from 1 and rows: no empty lines, at the end no rows of empty entries."""
     empty = _NOTHING + ('\t' if head.delimiter is None else '')
     parted = empty + (head.delimiter or '') + '"'
@@ -373,7 +385,8 @@ def _check_widths(
         raise InputError(
             f'{path}: cannot read the samples: line {number} has {width} entries, other rows '
             f'have {head.width}: a column would be shifted, or the file is cut off there; mend or '
-            f'remove that line ({line.strip()[:60]!r})'
+            f'remove that line ({line.strip()[:60]!r}); where another block of samples begins '
+            'there, `actuator-glue map` proposes which to read'
         )
 
 
@@ -445,7 +458,10 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
             )
         by_name = True
     else:
-        head = read_head(path, channels.header_lines, channels.delimiter, channels.decimal)
+        head = replace(
+            read_head(path, channels.header_lines, channels.delimiter, channels.decimal),
+            rows=channels.rows,
+        )
         wanted = [channel.column for channel in channels.roles().values()]
         by_name = any(isinstance(column, str) for column in (*wanted, channels.sample_number))
     if by_name and head.named and not head.names:

@@ -34,10 +34,6 @@ _NAMES = ('name', 'label')
 _NAME = 'an HDF5 file'
 _UNITS = ('unit', 'units', 'Unit', 'Units')
 _NOTES = ('stiffness_N_per_m', 'hold', 'actuator')
-OBJECTS = (
-    'tables, timeseries and other objects of MATLAB open nowhere else; save vectors or structs '
-    'of vectors'
-)
 
 
 def is_hdf5(path: Path) -> bool:
@@ -55,7 +51,8 @@ def read_tree(path: Path, *, matlab: bool = False) -> FileTable:
 
     Args:
         path: the file.
-        matlab: names with dots, matrices turned as MATLAB has them.
+        matlab: names with dots, matrices turned as MATLAB has them; there may be objects alone,
+            and no column.
 
     Raises:
         InputError: h5py is missing, the file is damaged or holds no numbers.
@@ -71,10 +68,27 @@ def read_tree(path: Path, *, matlab: bool = False) -> FileTable:
     with reading(path, _NAME), h5py.File(path, 'r') as file:
         tree.notes |= {n: _plain(file.attrs[n]) for n in _NOTES if n in file.attrs}
         file.visititems(tree.visit)
-    if not tree.columns:
-        hint = f'; {OBJECTS}' if matlab else ''
-        raise InputError(f'{path}: no numeric vector or matrix in this file{hint}')
+    if not tree.columns and not matlab:
+        raise InputError(f'{path}: no numeric vector or matrix in this file')
     return FileTable(named_by_structs(tree.columns, tree.texts), tree.notes, values)
+
+
+def has_objects(path: Path) -> bool:
+    """Return whether a file of MATLAB holds objects, after a look at how much it unpacks to.
+
+    Raises:
+        InputError: more numbers than are read, or than such a file can hold.
+    """
+    h5py = library('h5py', path)
+    with reading(path, _NAME), h5py.File(path, 'r') as file:
+        if '#subsystem#' not in file:
+            return False
+        sizes: list[int] = []
+        file.visititems(lambda _, found: sizes.append(getattr(found, 'nbytes', 0)))
+    check_size(sum(sizes), path)
+    if sum(sizes) > _PACKED * path.stat().st_size:
+        raise InputError(f'{path}: damaged: more numbers than a file of this size can hold')
+    return True
 
 
 class _Tree:

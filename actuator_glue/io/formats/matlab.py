@@ -1,9 +1,11 @@
-"""Variables out of MATLAB .mat files."""
+"""Variables out of MATLAB .mat files, and what objects hold of them."""
 
 from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
+from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +21,17 @@ from actuator_glue.io.formats import (
     matrix_columns,
     reading,
 )
-from actuator_glue.io.formats.hdf5 import OBJECTS, is_hdf5, named_by_structs, read_tree
+from actuator_glue.io.formats.hdf5 import has_objects, is_hdf5, named_by_structs, read_tree
 from actuator_glue.io.matlab_elements import check_elements
+from actuator_glue.io.matlab_objects import check_clocks, read_objects
 from actuator_glue.io.signature import refuse_foreign
+from actuator_glue.io.units import bare
 from actuator_glue.records import Array
+
+_OBJECTS = (
+    'of the objects of MATLAB timeseries, tables, timetables and Datasets of Simulink are read, '
+    'else save vectors'
+)
 
 
 def _content(path: Path) -> dict[str, Any]:
@@ -55,12 +64,11 @@ def _collect(name: str, value: Any, arrays: dict[str, Any], texts: dict[str, str
             arrays[name] = array
 
 
-def _read(path: Path, channels: ChannelMap | None) -> FileTable:
-    if is_hdf5(path):
-        return read_tree(path, matlab=True)
+def _plain(content: dict[str, Any]) -> FileTable:
+    """Return the vectors and matrices of a file up to version 7."""
     arrays: dict[str, Any] = {}
     texts: dict[str, str] = {}
-    for name, value in _content(path).items():
+    for name, value in content.items():
         if not name.startswith('__'):
             _collect(name, value, arrays, texts)
     columns: list[Column] = []
@@ -69,8 +77,6 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
         found = matrix_columns(name, array.shape)
         columns += found
         places += [(name, i) for i in range(len(found))]
-    if not columns:
-        raise InputError(f'{path}: no numeric vector or matrix in this file; {OBJECTS}')
     notes = {name.rpartition('.')[2]: text for name, text in texts.items()}
     for name, array in arrays.items():
         if name.rpartition('.')[2] == 'stiffness_N_per_m' and array.size == 1:
@@ -81,6 +87,39 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
         return [matrix_column(arrays[n], i).astype(np.float64, copy=False) for n, i in chosen]
 
     return FileTable(named_by_structs(columns, texts), notes, values)
+
+
+def _read(path: Path, channels: ChannelMap | None) -> FileTable:
+    if is_hdf5(path):
+        table, objects = read_tree(path, matlab=True), has_objects(path)
+    else:
+        content = _content(path)
+        table, objects = _plain(content), '__function_workspace__' in content
+    # Where vectors lie beside the objects the library for these may be missing.
+    if objects and (not table.columns or find_spec('matio') is not None):
+        table = _with_objects(path, table)
+    if not table.columns:
+        raise InputError(f'{path}: no numeric vector or matrix in this file; {_OBJECTS}')
+    return table
+
+
+def _with_objects(path: Path, table: FileTable) -> FileTable:
+    found = read_objects(path)
+    count = len(table.columns)
+    # What lies beside the objects says what it is; a second time, say, is one of an object.
+    taken = {bare(column.label) for column in table.columns}
+    labelled = [
+        replace(e.column, label=e.column.name) if bare(e.column.label) in taken else e.column
+        for e in found
+    ]
+
+    def values(wanted: list[int]) -> list[Array]:
+        own = [found[at - count] for at in wanted if at >= count]
+        check_clocks(path, own)
+        plain = iter(table.values([at for at in wanted if at < count]))
+        return [next(plain) if at < count else found[at - count].values for at in wanted]
+
+    return FileTable([*table.columns, *labelled], table.notes, values)
 
 
 def _write(path: Path, columns: Mapping[str, Array], notes: Mapping[str, str | float]) -> None:
