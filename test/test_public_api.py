@@ -136,6 +136,8 @@ def test_a_diagnosis_is_kept_and_shown(
     assert predicted.inside == pytest.approx(0.95, abs=0.02)
     assert predicted.problems == (() if found.complete else (found.summary(),))
     assert len(again.plot_bode(record).axes) == 3
+    if not again.effects:
+        assert again.transfer_function(250e3).dcgain() == pytest.approx(1.0, abs=0.02)
     assert again.save_mat(tmp_path / 'diagnosis.mat').stat().st_size > 1000
     with pytest.raises(ag.InputError, match='holds'):
         ag.Calibration.load(tmp_path / 'diagnosis.npz')

@@ -9,6 +9,7 @@ from typing import Unpack
 import numpy as np
 
 from actuator_glue.api import judgement
+from actuator_glue.api.bar import shown
 from actuator_glue.api.calibration_error import fit_error, force_errors, left_over
 from actuator_glue.api.calibration_options import CalibrationChanges, CalibrationOptions
 from actuator_glue.api.calibration_parts import CalibratedRecord, Marginal, RecordForce
@@ -43,7 +44,7 @@ def calibrate(
     options: CalibrationOptions | None = None,
     *,
     stiffness: Stiffness = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
     **changes: Unpack[CalibrationChanges],
 ) -> Calibration:
     """Draw from the joint posterior of Eq. (2) and effects given records (DREAM(ZS), GLUE).
@@ -54,7 +55,8 @@ def calibrate(
         options: those below as one object; None for their defaults.
         stiffness: specimen stiffness [N/m], one for all or one for each; None for what records
             and files say.
-        progress: called with the evaluations made so far.
+        progress: called with the evaluations made so far; True for a bar, False for none; None for
+            a bar in a notebook.
         changes: options by name.
 
     Returns:
@@ -81,7 +83,10 @@ def calibrate(
         settle = SETTLE if initial == 'measured' else 0.0
     given_before = given_prior(options.prior, options.drift, options.prior_age)
     started = time.perf_counter()
-    with compilation() as compiled:
+    with (
+        shown('calibrate', options.evaluations, False if callable(progress) else progress) as bar,
+        compilation() as compiled,
+    ):
         problem = Problem(
             records=cleaned,
             model=model,
@@ -90,7 +95,9 @@ def calibrate(
             settle=settle,
             prior=None if given_before is None else given_before.carried,
         )
-        problem, target, chains, remark = sampled(problem, options, near, harmless(progress))
+        problem, target, chains, remark = sampled(
+            problem, options, near, harmless(progress if callable(progress) else bar)
+        )
     seconds = time.perf_counter() - started - sum(compiled)
     if not chains.annealed:
         raise InputError(

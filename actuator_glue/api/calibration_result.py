@@ -10,16 +10,16 @@ import numpy as np
 
 from actuator_glue.api import store
 from actuator_glue.api.calibration_data import CalibrationData
+from actuator_glue.api.drawn import Drawn
 from actuator_glue.api.frame import frame
 from actuator_glue.api.given import OneRecord, one_record_given
-from actuator_glue.api.posterior_model import Drawn, PosteriorModel
+from actuator_glue.api.posterior_model import PosteriorModel
 from actuator_glue.api.result import Result
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.structure import Structure
 
 if TYPE_CHECKING:
     import arviz
-    import control
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
@@ -49,6 +49,7 @@ class Calibration(Result, PosteriorModel, CalibrationData):
             self.posterior,
             self.names,
             tuple(p.unit for p in self.parameters.values()),
+            self.best,
             Structure(self.effects),
             self.residual,
             self.records,
@@ -149,28 +150,6 @@ class Calibration(Result, PosteriorModel, CalibrationData):
             names=np.array(self.names),
             units=np.array([p.unit for p in self.parameters.values()]),
         )
-
-    def state_space(self, stiffness: float, draw: str | int = 'mean') -> control.StateSpace:
-        """Return x/u as a `control.StateSpace`; see `transfer_function`."""
-        from actuator_glue.api.transfer import state_space
-
-        return state_space(self, stiffness, draw)
-
-    def transfer_function(
-        self, stiffness: float, draw: str | int = 'mean'
-    ) -> control.TransferFunction:
-        """Return the closed-loop actuator x/u, Eq. (2a), as a `control.TransferFunction`.
-
-        Args:
-            stiffness: specimen stiffness k [N/m].
-            draw: 'mean' of the parameters, 'best' draw, or the number of one in `posterior`.
-
-        Raises:
-            InputError: no such draw, or effects that are no rational transfer function.
-        """
-        import control
-
-        return control.ss2tf(self.state_space(stiffness, draw))
 
     def plot(self) -> Figure:
         """Return a figure of every parameter's distribution and every pair of them."""

@@ -11,12 +11,14 @@ from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypedDict, Unpack
 
+from actuator_glue.api.bar import shown
 from actuator_glue.api.callbacks import harmless
+from actuator_glue.api.drawn import Drawn
 from actuator_glue.api.ensemble import residual_of
 from actuator_glue.api.frame import frame
 from actuator_glue.api.given import Records, Stiffness, records_given, seed_given
 from actuator_glue.api.options import chosen, takes
-from actuator_glue.api.posterior_model import Drawn, PosteriorModel
+from actuator_glue.api.posterior_model import PosteriorModel
 from actuator_glue.api.prior import check_prior, given_prior
 from actuator_glue.api.provenance import provenance
 from actuator_glue.api.result import Result
@@ -24,6 +26,7 @@ from actuator_glue.api.tracking import RecordTracking, ready, records_tracking, 
 from actuator_glue.diagnosis import diagnose as core
 from actuator_glue.diagnosis.estimate import Estimate, Json
 from actuator_glue.diagnosis.result import SCHEMA, DiagnosisData
+from actuator_glue.diagnosis.stages import ShareDone
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.effects import save_effects
 from actuator_glue.errors import InputError
@@ -131,6 +134,7 @@ class Diagnosis(Result, PosteriorModel, DiagnosisData):
             self.joint,
             self.names,
             tuple(known[n].unit if n in known else '' for n in self.names),
+            self.best,
             self.model,
             residual_of(left, len(self.names)),
             (),
@@ -263,7 +267,7 @@ def diagnose(
     options: DiagnosisOptions | None = None,
     *,
     stiffness: Stiffness = None,
-    progress: Progress | None = None,
+    progress: Progress | bool | None = None,
     **changes: Unpack[DiagnosisChanges],
 ) -> Diagnosis:
     """Ask whether Eq. (2) explains records and, if not, which effects it lacks.
@@ -276,7 +280,8 @@ def diagnose(
         options: those below as one object; None for their defaults.
         stiffness: specimen stiffness [N/m] of the records, one for all or one for each; None for
             what they and their files say.
-        progress: called with (stage, share of it done in [0, 1]).
+        progress: called with (stage, share of it done in [0, 1]); True for a bar, False for none;
+            None for a bar in a notebook.
         changes: options by name.
 
     Returns:
@@ -289,13 +294,19 @@ def diagnose(
     options = chosen(options or DiagnosisOptions(), changes, 'diagnose')
     given = records_given(records, stiffness)
     held = [] if holdout is None else records_given(holdout, name='holdout')
-    with ThreadPoolExecutor(options.jobs) as pool:
+    overall = ShareDone()
+    with (
+        shown('diagnose', 1.0, False if callable(progress) else progress) as bar,
+        ThreadPoolExecutor(options.jobs) as pool,
+    ):
         found = core.diagnose(
             given,
             held,
             seed=options.seed,
             each=pool.map,
-            progress=harmless(progress),
+            progress=harmless(progress)
+            if callable(progress)
+            else lambda stage, share: bar(overall(stage, share)),
             settings=Thresholds(false_alarms=options.false_alarms, use_force=options.use_force),
             clock=time.perf_counter,
             prior=given_prior(options.prior, options.drift, options.prior_age),

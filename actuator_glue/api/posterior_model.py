@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,45 +11,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from actuator_glue.api import frequency_response as response
+from actuator_glue.api.drawn import Drawn
 from actuator_glue.api.ensemble import GivenCommand, commanded, evenly, simulated
 from actuator_glue.api.frequency_response import FrequencyResponse
 from actuator_glue.api.given import OneRecord, one_record_given
 from actuator_glue.api.matlab import Exported, write_mat
 from actuator_glue.api.prediction import Prediction, prediction
 from actuator_glue.errors import InputError
-from actuator_glue.inference.predictive import ResidualModel
-from actuator_glue.model.structure import Structure
-from actuator_glue.records import Array, Hold, Record, check_stiffness, source_name
+from actuator_glue.records import Hold, check_stiffness, source_name
 
 if TYPE_CHECKING:
+    import control
     from matplotlib.figure import Figure
 
 _SIDE_BY_SIDE = 3  # responses in a figure
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Drawn:
-    """Draws under one model, and what it left of the records it was fitted to.
-
-    Attributes:
-        draws: shape (m, p), SI units.
-        names: parameter of each column.
-        units: their units.
-        structure: the model.
-        residual: what it left; None where that is not known.
-        records: the records, where they are still known.
-        stiffness: specimen stiffnesses of the records [N/m].
-        problems: why the posterior must not be used as it stands.
-    """
-
-    draws: Array
-    names: tuple[str, ...]
-    units: tuple[str, ...]
-    structure: Structure
-    residual: ResidualModel | None
-    records: tuple[Record, ...]
-    stiffness: tuple[float, ...]
-    problems: tuple[str, ...]
 
 
 class PosteriorModel(ABC):
@@ -147,6 +121,28 @@ class PosteriorModel(ABC):
         if not shown:
             raise InputError('give a record, or a specimen stiffness [N/m] as stiffness=0.0')
         return response.bode_figure(shown)
+
+    def state_space(self, stiffness: float, draw: str | int = 'mean') -> control.StateSpace:
+        """Return x/u as a `control.StateSpace`; see `transfer_function`."""
+        from actuator_glue.api.transfer import state_space
+
+        return state_space(self.drawn(), stiffness, draw)
+
+    def transfer_function(
+        self, stiffness: float, draw: str | int = 'mean'
+    ) -> control.TransferFunction:
+        """Return the closed-loop actuator x/u, Eq. (2a), as a `control.TransferFunction`.
+
+        Args:
+            stiffness: specimen stiffness k [N/m].
+            draw: 'mean' of the parameters, 'best' draw, or the number of one.
+
+        Raises:
+            InputError: no such draw, or effects that are no rational transfer function.
+        """
+        import control
+
+        return control.ss2tf(self.state_space(stiffness, draw))
 
     def save_mat(self, path: Path | str, stiffness: Sequence[float] | float | None = None) -> Path:
         """Write draws and model to a .mat file for MATLAB; return its path.

@@ -6,31 +6,31 @@ from typing import Any
 
 import numpy as np
 
-from actuator_glue.api.calibration_data import CalibrationData
+from actuator_glue.api.drawn import Drawn
 from actuator_glue.errors import InputError
 from actuator_glue.given import whole
-from actuator_glue.hybrid.actuator import actuator, nonlinear
+from actuator_glue.hybrid.actuator import actuator
 from actuator_glue.records import Array, check_stiffness
 
 
-def chosen_draw(found: CalibrationData, draw: str | int) -> Array:
+def chosen_draw(of: Drawn, draw: str | int) -> Array:
     """Return the parameters of the mean, the best, or a numbered draw, (p,).
 
     Raises:
         InputError: no such draw.
     """
-    draws = found.posterior
+    draws = of.draws
     if draw == 'mean':
         return np.asarray(draws.mean(axis=0))
     if draw == 'best':
-        return found.best
+        return of.best
     draw = whole(draw, 'draw') if not isinstance(draw, str) else draw
     if isinstance(draw, int) and -len(draws) <= draw < len(draws):
         return np.asarray(draws[draw])
     raise InputError(f"draw {draw!r}: use 'mean', 'best', or a number below {len(draws)}")
 
 
-def state_space(found: CalibrationData, stiffness: float, draw: str | int) -> Any:
+def state_space(of: Drawn, stiffness: float, draw: str | int) -> Any:
     """Return x/u under a specimen stiffness [N/m] as `control.StateSpace`.
 
     Raises:
@@ -38,12 +38,13 @@ def state_space(found: CalibrationData, stiffness: float, draw: str | int) -> An
     """
     import control
 
-    curved = nonlinear(found.effects)
+    curved = [e.name for e in of.structure.entries if not e.linear]
     if curved:
         raise InputError(f'the model has {", ".join(curved)}, which no transfer function has')
-    row = chosen_draw(found, draw)[None]
-    model = actuator(row, found.names, found.effects, np.array([check_stiffness(stiffness)]))
-    if 'delay' in found.effects:
+    row = chosen_draw(of, draw)[None]
+    k = np.array([check_stiffness(stiffness)])
+    model = actuator(row, of.names, of.structure.entries, k)
+    if 'delay' in of.structure.effects:
         raise InputError(
             f'the model has a delay of {1e3 * float(model.delay[0]):.3g} ms, which is no rational '
             'function; calibrate without it, or build the delay on top with control.pade'
