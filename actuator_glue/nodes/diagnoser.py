@@ -18,6 +18,7 @@ from rclpy.action import ActionServer, CancelResponse, GoalResponse
 from actuator_glue import sample_block
 from actuator_glue.errors import InputError
 from actuator_glue.nodes import diagnoser_worker, own_effects, spin, topics
+from actuator_glue.nodes.explained import Explained
 from actuator_glue.nodes.health import ERROR
 from actuator_glue.nodes.latched import Newest
 from actuator_glue.nodes.messages import publish
@@ -73,6 +74,7 @@ class DiagnoserNode(WorkingNode):
         self.collector = Collector(values['keep'])
         self.loop = live.init(diagnoser_worker.settings(values))
         self.memory = live.Memory()
+        self._explained = Explained()
         self._last = float('-inf')
         self.every(0.2, self._check)
         self.listen_when_ready()
@@ -108,7 +110,7 @@ class DiagnoserNode(WorkingNode):
                 {
                     'coverage of the noise band': self.loop.coverage,
                     'diagnosing': self._request is not None,
-                    'explanations': conversion.weighed(self.loop.weights) or 'not known yet',
+                    **self._explained.values(),
                 }
             )
 
@@ -149,6 +151,7 @@ class DiagnoserNode(WorkingNode):
             self._take(live.Judged(message.widest_coverage, int(message.window)))
 
     def _posterior(self, message: Any) -> None:
+        self._explained.posterior(message)
         contradicted = bool(message.prior_contradicted)
         self._take(live.Estimated(contradicted, conversion.weights(message)))
 
@@ -237,6 +240,7 @@ class DiagnoserNode(WorkingNode):
             return
         head = conversion.Head(now_ns(self.get_clock()), outcome.actuator)
         publish(self._diagnosis, head, diagnoser_worker.fields(outcome))
+        self._explained.diagnosis(outcome.diagnosis.to_json())
         self.get_logger().info(outcome.message)
         self._request, self._told = None, outcome
         self._take(outcome.concluded)

@@ -51,6 +51,9 @@ def posterior(window: int, mean: float = 123.4, **weights: float) -> Any:
     count = len(names)
     return Message(
         window=window,
+        index=1000 * window,
+        samples=1000,
+        period=1e-3,
         parameter_names=['beta_1'],
         units=['1/s'],
         mean=[mean],
