@@ -237,6 +237,11 @@ def weights(message: Any) -> Weights:
     )
 
 
+def weighed(found: Weights) -> str:
+    """Return structures and their weights for people."""
+    return ', '.join(f'{structure_name(sorted(name))} {weight:.0%}' for name, weight in found)
+
+
 def known(message: Any, settings: EstimatorSettings) -> Known:
     """Return the posterior of a PosteriorDraws, and when its samples were taken.
 
