@@ -56,7 +56,7 @@ def run(args: argparse.Namespace) -> int:
     # What we recorded says itself what its channels are; no other topic of it is one.
     ours = plain and found.what == 'bag'
     text = map_text(found, proposal) if proposal.complete and not ours else ''
-    refused = _fault(args.file, text) if text else '' if ours else _missing(proposal)
+    refused = _fault(args.file, text) if text else '' if ours else _missing(found, proposal)
     if text:
         for line in text.splitlines():
             say(line, args)
@@ -123,7 +123,7 @@ def _fault(path: str, text: str | None) -> str:
     return ''
 
 
-def _missing(proposal: ProposedMap) -> str:
+def _missing(found: FileLook, proposal: ProposedMap) -> str:
     if proposal.integrated is not None:
         one, other = (_called(column) for column in proposal.integrated)
         return (
@@ -143,6 +143,13 @@ def _missing(proposal: ProposedMap) -> str:
             f'{told}, and no length is made of it silently: where a lever turns a stroke into it, '
             'write the channel map by hand with `unit: mm` and `scale`, the mm per unit of angle '
             '(docs/howto_your_data.md)'
+        )
+    lengths = sorted({len(c.values) for c in found.columns if c.times is None}, reverse=True)
+    if len(lengths) > 1:
+        return (
+            f'no {" and no ".join(names)} could be told from these columns, which have '
+            f'{" and ".join(map(str, lengths[:_SHOWN]))} samples: channels of one test need one '
+            'rate and length'
         )
     if 'command' in names:
         others = ' and '.join(repr(name) for name in proposal.other_commands)

@@ -115,7 +115,7 @@ def bag_files(path: Path | str, note: Note = refuse) -> list[Path]:
     if foreign:
         raise InputError(
             f'{path}: {foreign[0]} is not in MCAP format; convert the bag with `ros2 bag convert` '
-            'to storage_id mcap'
+            'to storage_id mcap, or with `rosbags-convert --src OLD --dst NEW --dst-storage mcap`'
         )
     for file in files:
         if not file.exists():

@@ -12,6 +12,7 @@ _LOOK = 65_536  # bytes
 _TABLE = 'save the table as .csv'
 _UNPACK = 'unpack it first'
 _BAG = 'give the folder of a bag in MCAP format'
+_CONVERT = '`rosbags-convert --src OLD --dst NEW --dst-storage mcap` makes one'
 
 # First bytes, what they begin, what to do.
 _SIGNATURES: tuple[tuple[bytes, str, str], ...] = (
@@ -21,9 +22,9 @@ _SIGNATURES: tuple[tuple[bytes, str, str], ...] = (
     (b'ARROW1', 'an Arrow file', _TABLE),
     (b'\x93NUMPY', 'a NumPy array', _TABLE),
     (b'\x89HDF\r\n\x1a\n', 'an HDF5 file', _TABLE),
-    (b'SQLite format 3\0', 'an SQLite file', f'{_BAG}; `ros2 bag convert` makes one of a .db3'),
+    (b'SQLite format 3\0', 'an SQLite file', f'{_BAG}; {_CONVERT} of the folder of a .db3'),
     (b'\x89MCAP0\r\n', 'an MCAP file', 'give it a name ending in .mcap, or the folder of the bag'),
-    (b'#ROSBAG V', 'a ROS 1 bag', f'{_BAG}; `rosbags-convert` makes one'),
+    (b'#ROSBAG V', 'a ROS 1 bag', f'{_BAG}; {_CONVERT} of it'),
     (b'\x1f\x8b', 'a gzip archive', _UNPACK),
     (b'BZh', 'a bzip2 archive', _UNPACK),
     (b'\xfd7zXZ\0', 'an xz archive', _UNPACK),

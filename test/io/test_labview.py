@@ -120,13 +120,46 @@ def test_channels_without_a_common_clock_are_refused(
         read(labview(tmp_path / 'a.lvm', channels=changed))
 
 
-def test_several_measurements_in_a_file_are_refused(tmp_path: Path) -> None:
-    """Each has a heading; rows of one that follows are no rows of the first."""
-    one = labview(tmp_path / 'a.lvm', file={'Multi_Headings': 'Yes'}).read_text()
-    check(tmp_path / 'a.lvm')
-    (tmp_path / 'a.lvm').write_text(one + one.partition('***End_of_Header***\t\n')[2])
-    with pytest.raises(InputError, match='several measurements'):
-        read(tmp_path / 'a.lvm')
+def segments(path: Path, x: str, starts: list[float], *, again: bool = False, **changed) -> Path:
+    """Write a file of segments that begin so long after the first [s]; `again` for whole heads."""
+    parts = []
+    for start in starts:
+        clock = f'10:00:{start + 0.123:013.10f}'
+        channels = {'Time': (clock, clock), **changed.get(f'{start:g}', {})}
+        parts.append(labview(path, x=x, file={'Multi_Headings': 'Yes'}, channels=channels))
+        parts[-1] = path.read_text('cp1252')
+    heads = [part if again else part.partition('***End_of_Header***\t\n')[2] for part in parts]
+    path.write_text('\n'.join([parts[0], *heads[1:]]))
+    return path
+
+
+@pytest.mark.parametrize('again', [False, True])
+@pytest.mark.parametrize('x', ['No', 'One', 'Multi'])
+def test_segments_that_follow_each_other_are_one_record(
+    tmp_path: Path, x: str, again: bool
+) -> None:
+    """Each with a heading, or appended with all headings: their dates say when they begin."""
+    record = read(segments(tmp_path / 'a.lvm', x, [0.0, 4.0, 8.0], again=again))
+    np.testing.assert_allclose(record.command, np.tile(COMMAND * 1e-3, 3), atol=1e-9)
+    assert record.period == 2e-3
+    assert record.start_ns == pytest.approx(START, abs=600)
+
+
+def test_segments_that_do_not_are_refused(tmp_path: Path) -> None:
+    """A gap between two, one that begins before the last has ended, no date, other channels."""
+    path = tmp_path / 'a.lvm'
+    with pytest.raises(InputError, match='without samples after sample 1999'):
+        read(segments(path, 'No', [0.0, 4.5]))
+    with pytest.raises(InputError, match='time goes back at sample 2000'):
+        read(segments(path, 'No', [0.0, 3.0]))
+    nothing = {'Date': ('', ''), 'Time': ('', '')}
+    whole = labview(path, file={'Date': '', 'Time': ''}, channels=nothing).read_text()
+    path.write_text(whole + whole)
+    with pytest.raises(InputError, match='no date says when'):
+        read(path)
+    other = {'4': {'Y_Unit_Label': ('mm', 'kN')}}
+    with pytest.raises(InputError, match='several measurements of different channels'):
+        read(segments(path, 'No', [0.0, 4.0], **other))
 
 
 def test_text_that_is_only_called_so_is_text(tmp_path: Path) -> None:

@@ -33,7 +33,7 @@ def text(delimiter: str = ',', quote: str = '', decimal: str = '.') -> str:
         (b'PAR1' + BYTES, 'Parquet'),
         (b'TDSm' + BYTES, 'TDMS'),
         (b'\x89HDF\r\n\x1a\n' + BYTES, 'HDF5'),
-        (b'SQLite format 3\0' + BYTES, 'ros2 bag convert'),
+        (b'SQLite format 3\0' + BYTES, 'rosbags-convert'),
         (b'\x89MCAP0\r\n' + BYTES, 'MCAP'),
         (b'\x1f\x8b' + BYTES, 'gzip'),
         (BYTES, 'binary|MATLAB'),

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import re
 from datetime import UTC, datetime
-from itertools import islice
 from pathlib import Path
 from typing import NamedTuple
 
@@ -21,125 +20,226 @@ from actuator_glue.io.channel_map import ChannelMap
 from actuator_glue.io.formats import Column, FileTable, Format, delimited
 from actuator_glue.io.formats.delimited import TextHead, entry_at, fields_of, read_columns
 from actuator_glue.io.signature import open_text
+from actuator_glue.io.units import ROLES
+from actuator_glue.records import Array
 
 _NAME = 'a LabVIEW measurement file (.lvm)'
 _END = '***End_of_Header***'
 _SPECIAL = ('***Start_Special***', '***End_Special***')
 _SEPARATORS = {'tab': '\t', 'comma': ',', 'semicolon': ';', 'space': ' '}
 _LONGEST = 1000  # lines of both headings
+# What begins a heading below the rows of another: of an appended file, of a segment.
+_BEGINS = ('LabVIEW Measurement', 'Channels', _SPECIAL[0])
 _TIMES, _COMMENT = 'X_Value', 'Comment'
 # Seconds from LabVIEW's time zero, 1904, to that of Unix: absolute times count from the former.
 _EPOCH = 2_082_844_800
 
 
-class _Heading(NamedTuple):
-    """What the headings say, of the file and of each channel, the names, the lines above rows."""
+class _Segment(NamedTuple):
+    """Rows below a heading: what it says of each channel, the names, the lines above, how many."""
 
-    file: dict[str, str]
     channels: dict[str, list[str]]
     names: list[str]
     lines: int
+    rows: int
+
+
+class _Heading(NamedTuple):
+    """What the heading of the file says, what parts its entries, and the segments below it."""
+
+    file: dict[str, str]
     delimiter: str
+    segments: list[_Segment]
 
 
 def _read(path: Path, channels: ChannelMap | None) -> FileTable:
     if channels is not None and channels.header_lines is not None:
         return delimited.FORMAT.read(path, channels)  # the map describes it as any other text
     said = _heading(path)
-    # The last column is for comments, and left out where there are none.
-    least = len(said.names) - (said.names[-1] == _COMMENT)
-    head = TextHead(
-        names=said.names,
-        units=[''] * len(said.names),
-        lines=said.lines,
-        delimiter=said.delimiter,
-        notes={},
-        decimal=',' if said.file.get('Decimal_Separator') == ',' else '.',
-        width=len(said.names),
-        least=least,
-        named=len(said.names),
-    )
-    times = [at for at in range(least) if said.names[at] == _TIMES]
-    shown = [at for at in range(least) if said.names[at] != _TIMES]
+    names = said.segments[0].names
+    heads = [_head(said, segment) for segment in said.segments]
+    least = heads[0].least
+    times = [at for at in range(least) if names[at] == _TIMES]
+    shown = [at for at in range(least) if names[at] != _TIMES]
     if not shown:
         raise InputError(f'{path}: no channel in {_NAME}')
-    units = _of_channels(said, 'Y_Unit_Label', len(shown))
-    columns = [
-        Column(said.names[at], said.names[at], u) for at, u in zip(shown, units, strict=True)
-    ]
-    dimension = _common(path, said, 'X_Dimension', shown)
-    if dimension.lower() not in ('', 'time'):
-        raise InputError(f'{path}: the samples are over {dimension}, not over time')
-    start_ns, period = _stamp_ns(path, said, shown), None
-    if said.file.get('X_Columns', 'One').lower() == 'no':
-        period = _number(path, said, 'Delta_X', shown)
-        offset = _number(path, said, 'X0', shown)
-        start_ns = (-_EPOCH * 10**9 if offset > _EPOCH else start_ns) + round(offset * 1e9)
-    else:
-        columns.insert(
-            0, Column(_TIMES, 'time', _common(path, said, 'X_Unit_Label', shown) or 's')
+    units = [_of_channels(segment, 'Y_Unit_Label', len(shown)) for segment in said.segments]
+    if any(s.names != names or u != units[0] for s, u in zip(said.segments, units, strict=True)):
+        raise InputError(
+            f'{path}: several measurements of different channels in one file; save each as a '
+            'file of its own'
         )
-        shown.insert(0, times[0])
-        first, *others = read_columns(path, head, times)
-        if not all(np.array_equal(first, other) for other in others):
+    columns = [Column(names[at], names[at], u) for at, u in zip(shown, units[0], strict=True)]
+    for segment in said.segments:
+        dimension = _common(path, segment, 'X_Dimension', shown)
+        if dimension.lower() not in ('', 'time'):
+            raise InputError(f'{path}: the samples are over {dimension}, not over time')
+
+    def values(at: list[int]) -> list[Array]:
+        parts = [read_columns(path, head, at) for head in heads]
+        return (
+            parts[0] if len(parts) == 1 else [np.concatenate(c) for c in zip(*parts, strict=True)]
+        )
+
+    def entry(row: int, at: int) -> str:
+        part = 0
+        while part < len(heads) - 1 and row >= said.segments[part].rows:
+            row -= said.segments[part].rows
+            part += 1
+        return entry_at(path, heads[part], row, at)
+
+    counted = said.file.get('X_Columns', 'One').lower() == 'no'
+    unit = 's' if counted else _common(path, said.segments[0], 'X_Unit_Label', shown) or 's'
+    clocks = [_clock(path, said, i, heads[i], times, shown) for i in range(len(heads))]
+    start_ns = clocks[0].start_ns
+    if counted and len(clocks) == 1:
+        period = _number(path, said.segments[0], 'Delta_X', shown)
+        first = round(float(clocks[0].times[0]) * 1e9)
+        return FileTable(
+            columns,
+            {},
+            lambda at: values([shown[i] for i in at]),
+            period,
+            start_ns + first,
+            lambda row, at: entry(row, shown[at]),
+        )
+    clock = _joined(path, clocks, ROLES['time'].get(unit, 1.0))
+
+    def with_times(at: list[int]) -> list[Array]:
+        read = iter(values([shown[i - 1] for i in at if i] or [shown[0]]))
+        return [next(read) if i else clock for i in at]
+
+    return FileTable(
+        [Column(_TIMES, 'time', unit), *columns],
+        {},
+        with_times,
+        None,
+        start_ns,
+        lambda row, at: entry(row, shown[at - 1] if at else (times or shown)[0]),
+    )
+
+
+class _Clock(NamedTuple):
+    """Times of a segment, in the unit of the file, and the time from which they count [ns]."""
+
+    times: Array
+    start_ns: int
+    stamped: bool
+
+
+def _clock(
+    path: Path, said: _Heading, number: int, head: TextHead, times: list[int], shown: list[int]
+) -> _Clock:
+    segment = said.segments[number]
+    if said.file.get('X_Columns', 'One').lower() == 'no':
+        period = _number(path, segment, 'Delta_X', shown)
+        first = _number(path, segment, 'X0', shown)
+        own = first + period * np.arange(segment.rows, dtype=np.float64)
+    else:
+        own, *others = read_columns(path, head, times)
+        if not all(np.array_equal(own, other) for other in others):
             raise InputError(
                 f'{path}: the channels have times of their own, and they differ; bring them to '
                 'common times, and save them with one X column'
             )
-        if first[0] > _EPOCH:
-            start_ns = -_EPOCH * 10**9
-    return FileTable(
-        columns,
-        {},
-        lambda at: read_columns(path, head, [shown[i] for i in at]),
-        period,
-        start_ns,
-        lambda row, at: entry_at(path, head, row, shown[at]),
+    if own[0] > _EPOCH:
+        return _Clock(own, -_EPOCH * 10**9, False)
+    start_ns = _stamp_ns(path, said, segment, shown)
+    return _Clock(own, start_ns, start_ns > 0)
+
+
+def _joined(path: Path, clocks: list[_Clock], scale: float) -> Array:
+    """Return the times of all segments; those that begin again are later by their dates.
+
+    Args:
+        path: for messages.
+        clocks: of the segments.
+        scale: seconds in the unit of their times.
+
+    Raises:
+        InputError: times that begin again, and no date that says when.
+    """
+    parts = [clocks[0].times]
+    for clock in clocks[1:]:
+        times = clock.times
+        if times[0] <= parts[-1][-1]:
+            if not clock.stamped or not clocks[0].stamped:
+                raise InputError(
+                    f'{path}: several measurements in one file, each with times from its own '
+                    'start, and no date says when that was; save each as a file of its own'
+                )
+            times = times + (clock.start_ns - clocks[0].start_ns) * 1e-9 / scale
+        parts.append(times)
+    return np.concatenate(parts) if len(parts) > 1 else parts[0]
+
+
+def _head(said: _Heading, segment: _Segment) -> TextHead:
+    names = segment.names
+    return TextHead(
+        names=names,
+        units=[''] * len(names),
+        lines=segment.lines,
+        delimiter=said.delimiter,
+        notes={},
+        decimal=',' if said.file.get('Decimal_Separator') == ',' else '.',
+        width=len(names),
+        # The last column is for comments, and left out where there are none.
+        least=len(names) - (names[-1] == _COMMENT),
+        named=len(names),
+        rows=segment.rows if len(said.segments) > 1 else None,
     )
 
 
 def _heading(path: Path) -> _Heading:
-    """Return what is above the rows.
+    """Return what is above the rows, and where the rows of each segment are.
+
+    LabVIEW writes a heading for each segment where it is told so, and that of the file again
+    where it appends to one.
 
     Raises:
-        InputError: no names below two headings, or several measurements.
+        InputError: no names below two headings.
     """
     file: dict[str, str] = {}
+    segments: list[_Segment] = []
     channels: dict[str, list[str]] = {}
-    ends, lines, delimiter, special = 0, 0, '\t', False
+    names: list[str] = []
+    inside, delimiter, special, waiting, first, rows = 'file', '\t', False, 0, 0, 0
     with open_text(path, errors='replace') as text:
-        for line in islice(text, _LONGEST):
-            lines += 1
+        for at, line in enumerate(text, start=1):
+            if inside == 'rows' and not line.startswith(_BEGINS):
+                rows += bool(line.strip())
+                continue
+            if inside == 'rows':
+                segments.append(_Segment(channels, names, first, rows))
+                channels, rows, waiting = {}, 0, 0
+                inside = 'file' if line.startswith(_BEGINS[0]) else 'segment'
+            waiting += 1
+            if waiting > _LONGEST:
+                break
             key, *entries = [entry.strip() for entry in line.split(delimiter)]
-            if key == 'Separator' or re.match(r'Separator[,; ]', key):
+            if inside == 'file' and (key == 'Separator' or re.match(r'Separator[,; ]', key)):
                 name = re.split(r'[\t,; ]', line)[1].strip()
                 delimiter = _SEPARATORS.get(name.lower(), delimiter)
             special = (special or key == _SPECIAL[0]) and key != _SPECIAL[1]
             if key == _END:
-                ends += 1
-            elif ends == 2 and any((key, *entries)):
-                break
-            elif ends < 2 and not special and key:
-                if ends == 0:
-                    file[key] = entries[0] if entries else ''
-                else:
-                    channels[key] = entries
-        else:
-            raise InputError(f'{path}: no names of channels below the headings of {_NAME}')
-        if file.get('Multi_Headings', 'No').lower() == 'yes' and any(
-            line.startswith(_END) for line in text
-        ):
-            raise InputError(
-                f'{path}: several measurements, each with a heading, in one file; save each as a '
-                'file of its own, or with one heading only'
-            )
-    names = fields_of(line, delimiter)
-    while names and not names[-1]:
-        names.pop()
-    return _Heading(file, channels, names, lines, delimiter)
+                inside = 'segment' if inside == 'file' else 'names'
+            elif inside == 'names' and any((key, *entries)):
+                names, first, inside = fields_of(line, delimiter), at, 'rows'
+                while names and not names[-1]:
+                    names.pop()
+            elif inside == 'file' and not special and key:
+                file.setdefault(key, entries[0] if entries else '')
+            elif inside == 'segment' and not special and key:
+                channels[key] = entries
+    if inside == 'rows':
+        segments.append(_Segment(channels, names, first, rows))
+    segments = [s for i, s in enumerate(segments) if s.rows or not i]
+    if not segments or not segments[0].names:
+        raise InputError(f'{path}: no names of channels below the headings of {_NAME}')
+    return _Heading(file, delimiter, segments)
 
 
-def _of_channels(said: _Heading, name: str, count: int) -> list[str]:
+def _of_channels(said: _Segment, name: str, count: int) -> list[str]:
     """Return what a heading says of each channel."""
     entries = said.channels.get(name, [])
     filled = [entry for entry in entries if entry]
@@ -147,7 +247,7 @@ def _of_channels(said: _Heading, name: str, count: int) -> list[str]:
     return filled if len(filled) == count else [*entries, *[''] * count][:count]
 
 
-def _common(path: Path, said: _Heading, name: str, shown: list[int]) -> str:
+def _common(path: Path, said: _Segment, name: str, shown: list[int]) -> str:
     """Return what a heading says of all channels alike.
 
     Raises:
@@ -162,7 +262,7 @@ def _common(path: Path, said: _Heading, name: str, shown: list[int]) -> str:
     return found.pop() if found else ''
 
 
-def _number(path: Path, said: _Heading, name: str, shown: list[int]) -> float:
+def _number(path: Path, said: _Segment, name: str, shown: list[int]) -> float:
     text = _common(path, said, name, shown)
     try:
         value = float(text.replace(',', '.'))
@@ -173,10 +273,10 @@ def _number(path: Path, said: _Heading, name: str, shown: list[int]) -> float:
     return value
 
 
-def _stamp_ns(path: Path, said: _Heading, shown: list[int]) -> int:
+def _stamp_ns(path: Path, said: _Heading, segment: _Segment, shown: list[int]) -> int:
     """Return the date and time of the measurement [ns], taken as UTC: no zone is written."""
-    date = _common(path, said, 'Date', shown) or said.file.get('Date', '')
-    clock = _common(path, said, 'Time', shown) or said.file.get('Time', '')
+    date = _common(path, segment, 'Date', shown) or said.file.get('Date', '')
+    clock = _common(path, segment, 'Time', shown) or said.file.get('Time', '')
     numbers = re.fullmatch(
         r'(\d{4})/(\d+)/(\d+) (\d+):(\d+):(\d+)(?:[.,](\d*))?', f'{date} {clock}'
     )
