@@ -74,7 +74,9 @@ class Frames:
             history = intake.history
             period = history.period or 1.0
             newest = history.known_to
-            stop = newest if wanted.stop is None else min(round(wanted.stop / period), newest)
+            # Never after what is asked for: the page holds that for the future.
+            asked = newest if wanted.stop is None else math.floor(wanted.stop / period + 1e-6)
+            stop = min(asked, newest)
             span = max(round(wanted.span / period), 1)
             # What was said long after the last sample still has samples beside it.
             start = min(stop - span, history.measured_to - max(span // 2, 1))

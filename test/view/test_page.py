@@ -6,12 +6,13 @@ import os
 import threading
 import time
 from pathlib import Path
+from typing import Any
 
 import aiohttp
 import numpy as np
 import pytest
 from browser import PROGRAM, Browser
-from stream import feed, intake
+from stream import feed, health, intake
 
 from actuator_glue.errors import InputError
 from actuator_glue.view.intake import Intake, read_bag
@@ -38,6 +39,17 @@ LEGENDS = (
     'measured less the median',
     'tracking error [mm]',
     'force [kN]',
+)
+TOLD = (
+    'backlash \u2013 carried since 21.0 s, above one half since 59.0 s',
+    '95 %',
+    'if true: \u03b2\u2081 123.4 \u00b1 2.5 1/s, backlash 40 \u00b1 1 um',
+    'or coulomb-friction\n37 %',
+    'if true: coulomb force 812 N',
+    'Next experiment: a slow triangle wave (0.1 Hz) of 0.5 mm without specimen',
+    'all explanations, by their weights',
+    '102.0 s diagnosis: missing: backlash',
+    '/estimator: R-hat high',
 )
 # How long a page is watched, e.g. PAGE_MINUTES=60; and in how many spells.
 MINUTES = int(os.environ.get('PAGE_MINUTES', '3'))
@@ -173,6 +185,169 @@ def test_no_width_makes_the_chart_grow(width: int, tmp_path: Path) -> None:
 
     with Live() as url:
         asyncio.run(look())
+
+
+def weight_at(time: float, weight: float) -> str:
+    """Return the expression for where a weight [%] stands at a time of the whole test [s]."""
+    return (
+        '(() => { const b = weights.box.getBoundingClientRect(), at = weights.chart.valToPos; '
+        f"return JSON.stringify([b.x + LEFT + at({time}, 'x'), b.y + 6 + at({weight}, 'y')]"
+        '.map(Math.round)); })()'
+    )
+
+
+@browser
+def test_explanations_and_their_weights(tmp_path: Path) -> None:
+    """One stacked band over the whole test; which, since when, how sure, sizes if true, next."""
+
+    async def look() -> None:
+        async with Browser() as page:
+            await page.call(
+                'Emulation.setDeviceMetricsOverride',
+                width=1440,
+                height=900,
+                deviceScaleFactor=1,
+                mobile=False,
+            )
+            await page.open(url)
+            await page.until('document.body.dataset.frames > 1 && weights.chart')
+            picture = await page.picture()
+            picture.save(tmp_path / 'page.png')
+            seen = np.asarray(picture).astype(int)
+            for time_s, weight, color in (
+                (10.0, 30.0, PLAIN),
+                (40.0, 35.0, FIRST),
+                (100.0, 60.0, SECOND),
+            ):
+                x, y = json.loads(await page.value(weight_at(time_s, weight)))
+                part = seen[y - 3 : y + 4, x - 3 : x + 4].reshape(-1, 3)
+                assert (np.abs(part - color).max(axis=1) < 6).any(), (time_s, weight)
+            text = (await page.value('document.body.innerText')).replace('\xa0', ' ')
+            for words in TOLD:
+                assert words in text, words
+            # What was known at 30 s: a click on the time of what happened goes there.
+            await page.value("document.querySelector('#log li:last-child time').click()")
+            await page.until('document.body.dataset.stop < 11')
+            await page.until("$('explanations').innerText.includes('Eq. (2)')")
+            assert 'backlash' not in await page.value("$('explanations').innerText")
+            assert await page.value('weights.names.join()') == 'Eq. (2)'
+            assert not page.faults
+
+    server = PageServer(intake(120.0), 0)
+    url = server.url
+    try:
+        asyncio.run(look())
+    finally:
+        server.close()
+
+
+@browser
+def test_keys_wheel_and_drag() -> None:
+    """They move and zoom; what stands under the pointer stays; the whole test leads anywhere."""
+
+    async def look() -> None:
+        async with Browser() as page:
+
+            async def press(key: str) -> None:
+                for kind in ('keyDown', 'keyUp'):
+                    await page.call('Input.dispatchKeyEvent', type=kind, key=key)
+
+            async def mouse(kind: str, x: float, y: float, **more: Any) -> None:
+                await page.call('Input.dispatchMouseEvent', type=kind, x=x, y=y, **more)
+
+            async def at(stop: float) -> None:
+                await page.until(f'Math.abs(document.body.dataset.stop - {stop}) < 0.06', 10.0)
+
+            await page.open(url)
+            await page.until('document.body.dataset.frames > 1')
+            await press('ArrowLeft')
+            await at(119.0)
+            await press('+')
+            assert await page.value('wanted.span') == 5
+            await press('-')
+            await press('Home')
+            await at(10.0)
+            left, top, wide, high = json.loads(await page.value(box_of('motion')))
+            inside, y = wide - 74, top + high / 2
+            # Six tenths of the picture to the left: time goes on by as much.
+            await mouse('mousePressed', left + 58 + inside, y, button='left', clickCount=1)
+            for part in (0.8, 0.6, 0.4):
+                x = left + 58 + part * inside
+                await mouse('mouseMoved', x, y, button='left', buttons=1)
+            await mouse('mouseReleased', x, y, button='left', clickCount=1)
+            await at(16.0)
+            # At half of the picture stands 11 s, and there it stays.
+            await mouse(
+                'mouseWheel', left + 58 + inside / 2, y, deltaX=0, deltaY=-100, modifiers=2
+            )
+            await at(13.5)
+            assert await page.value('wanted.span') == 5
+            x, y = json.loads(await page.value(weight_at(60.0, 50.0)))
+            await mouse('mousePressed', x, y, button='left', clickCount=1)
+            await mouse('mouseReleased', x, y, button='left', clickCount=1)
+            await page.until('Math.abs(document.body.dataset.stop - 60) < 1')
+            await press('End')
+            await at(120.0)
+            assert await page.value('wanted.stop') is None
+            assert not page.faults
+
+    server = PageServer(intake(120.0), 0)
+    url = server.url
+    try:
+        asyncio.run(look())
+    finally:
+        server.close()
+
+
+@browser
+def test_ten_minutes_add_nothing_to_the_page() -> None:
+    """Fed in seconds: elements, listeners, height and heap are what they were before."""
+    counted = (
+        "JSON.stringify([document.getElementsByTagName('*').length, "
+        'document.documentElement.scrollHeight])'
+    )
+
+    async def look() -> None:
+        async with Browser() as page:
+            await page.call('Network.disable')
+            await page.call('Performance.enable')
+            await page.call(
+                'Emulation.setDeviceMetricsOverride',
+                width=390,
+                height=844,
+                deviceScaleFactor=1,
+                mobile=True,
+            )
+            await page.open(url)
+            kept = []
+            for seconds in range(120, 721, 40):
+                feed(made, 1000 * (seconds - 40), 40_000, size=200)
+                for i in range(8):  # the log is full from the second time on
+                    fault = health(f'/node{i}', b'\1', f'{i}', one=seconds, two=seconds)
+                    made.take('DiagnosticArray', fault)
+                await page.until(f'document.body.dataset.stop > {seconds - 0.5}')
+                await page.call('HeapProfiler.collectGarbage')
+                used = (await page.call('Runtime.getHeapUsage'))['usedSize'] / 1e6
+                found = await page.call('Performance.getMetrics')
+                metrics = {m['name']: m['value'] for m in found['metrics']}
+                listeners = metrics['JSEventListeners']
+                kept.append([*json.loads(await page.value(counted)), listeners, used])
+            after = np.array(kept)[7:]
+            print(np.array(kept))
+            # Lines of the log and of what is carried differ by a few from time to time.
+            assert np.ptp(after[:, 0]) < 20
+            assert np.ptp(after[:, 1]) < 120
+            assert np.ptp(after[:, 2]) < 60
+            assert after[-3:, 3].mean() - after[:3, 3].mean() < 0.5
+            assert not page.faults
+
+    made = intake(80.0)
+    server = PageServer(made, 0)
+    url = server.url
+    try:
+        asyncio.run(look())
+    finally:
+        server.close()
 
 
 @browser

@@ -129,7 +129,7 @@ function gestures(box, move, zoom) {
     const before = held.get(event.pointerId);
     if (!before) return;
     held.set(event.pointerId, {x: event.clientX, y: event.clientY});
-    if (held.size === 1) move((before.x - event.clientX) / box.clientWidth);
+    if (held.size === 1) move((before.x - event.clientX) / (box.clientWidth - LEFT - RIGHT));
     else if (held.size === 2 && apart > 0) {
       const ratio = spread() / apart;
       if (ratio > 1.4 || ratio < 0.7) { zoom(ratio > 1 ? -1 : 1, null); apart = spread(); }
