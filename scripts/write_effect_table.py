@@ -1,4 +1,4 @@
-"""Renew the table of docs/effects_catalogue.md from the effect catalogue (`make docs`)."""
+"""Renew the tables of the effect catalogue in docs/ from its entries (`make docs`)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,8 @@ from pathlib import Path
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.parameters import Parameter
 
-PAGE = Path(__file__).resolve().parent.parent / 'docs' / 'effects_catalogue.md'
+DOCS = Path(__file__).resolve().parent.parent / 'docs'
+PAGE, REMEDIES = DOCS / 'effects_catalogue.md', DOCS / 'remedies.md'
 BEGIN, END = '<!-- catalogue: begin (make docs) -->', '<!-- catalogue: end -->'
 
 
@@ -42,8 +43,15 @@ def markdown() -> str:
     return '\n'.join(rows)
 
 
-def renewed(page: str) -> str:
-    """Return a page with the table between its marks replaced by the catalogue's.
+def remedies() -> str:
+    """Return what each effect is to a mechanic and what to do about it, one row per effect."""
+    rows = ['| effect | what it is | what to do |', '|---|---|---|']
+    rows += [f'| `{e.name}` | {e.meaning} | {e.remedy} |' for e in CATALOGUE.values()]
+    return '\n'.join(rows)
+
+
+def renewed(page: str, table: str) -> str:
+    """Return a page with the table between its marks replaced by another.
 
     Raises:
         ValueError: the page lacks a mark.
@@ -52,8 +60,9 @@ def renewed(page: str) -> str:
     _, end, tail = rest.partition(END)
     if not found or not end:
         raise ValueError(f'the page lacks {BEGIN!r} or {END!r}')
-    return f'{head}{BEGIN}\n{markdown()}\n{END}{tail}'
+    return f'{head}{BEGIN}\n{table}\n{END}{tail}'
 
 
 if __name__ == '__main__':
-    PAGE.write_text(renewed(PAGE.read_text(encoding='utf-8')), encoding='utf-8')
+    for page, table in ((PAGE, markdown()), (REMEDIES, remedies())):
+        page.write_text(renewed(page.read_text(encoding='utf-8'), table), encoding='utf-8')

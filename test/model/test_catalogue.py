@@ -68,6 +68,8 @@ def test_entries_are_complete() -> None:
     seen = set(NAMES)
     for effect in CATALOGUE.values():
         assert effect.equation and effect.signature and effect.source and effect.group
+        for told in (effect.meaning, effect.remedy):
+            assert len(told.split()) > 3 and told[-1] != '.'
         lower = np.array([p.lower for p in effect.parameters])
         upper = np.array([p.upper for p in effect.parameters])
         neutral = np.array([p.neutral for p in effect.parameters], dtype=float)
@@ -83,14 +85,16 @@ def test_entries_are_complete() -> None:
 
 
 def test_page_is_in_step() -> None:
-    """docs/effects_catalogue.md holds the catalogue's table; `make docs` renews it."""
+    """docs/ holds the catalogue's tables; `make docs` renews them."""
     script = runpy.run_path(str(PAGE.parent.parent / 'scripts' / 'write_effect_table.py'))
     markdown, renewed = script['markdown'], script['renewed']
     page = PAGE.read_text(encoding='utf-8')
-    assert renewed(page) == page
+    assert renewed(page, markdown()) == page
+    other = script['REMEDIES'].read_text(encoding='utf-8')
+    assert renewed(other, script['remedies']()) == other
     assert markdown().count('\n') == len(CATALOGUE) + 3
     for effect in CATALOGUE.values():
         source = effect.source.split(';')[0].split(' (')[0]
         assert source.split(' et al.')[0].split(' &')[0].split(' 19')[0] in page.split('## Ref')[1]
     with pytest.raises(ValueError, match='lacks'):
-        renewed('no marks')
+        renewed('no marks', '')

@@ -80,6 +80,8 @@ class Effect:
         group: effects of one group leave nearly the same trace in command and displacement.
         signature: what it leaves in the residual.
         source: literature.
+        meaning: what it is to a mechanic, in a sentence without a full stop.
+        remedy: what to check or to do about it, likewise.
         starts: sizes from which a fit may start, given the scale of the test; each row holds
             one value per parameter.
         exact: states it needs beside x and q in the exact simulation (linear_effects.py), where
@@ -109,6 +111,8 @@ class Effect:
     signature: str
     source: str
     starts: Starts
+    meaning: str = ''
+    remedy: str = ''
     exact: tuple[int, ...] | None = None
     stage: Stage | None = None
     onset: Callable[[Record | None], Onset | None] | None = None

@@ -37,6 +37,8 @@ EFFECT = Effect(
     group='lost-motion',
     signature='rectangular loop against displacement, flat after reversals; size falls as 1/A',
     source='Tao & Kokotovic 1996 (play operator)',
+    meaning='play in the joints between the piston and where its displacement is measured',
+    remedy='check pins, clevises and the mounting of the transducer; take the play out',
     starts=lambda s: ((0.005 * s.stroke,), (0.02 * s.stroke,), (0.06 * s.stroke,)),
     stage=Stage(_fill, sensed=_sensed),
 )

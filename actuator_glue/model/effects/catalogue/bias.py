@@ -25,4 +25,6 @@ EFFECT = replace(
     ),
     starts=lambda s: ((0.02 * s.stroke,), (-0.02 * s.stroke,)),
     output=_bias,
+    meaning='the zero of the transducer is off',
+    remedy='zero the transducer before the test',
 )

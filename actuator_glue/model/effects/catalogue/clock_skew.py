@@ -26,6 +26,8 @@ EFFECT = Effect(
     group='skew',
     signature='lag grows with time',
     source='Mills 1991 (frequency error of clocks)',
+    meaning='controller and recorder count time by clocks of different rate',
+    remedy='record both channels with one clock, or correct the rate of the slower one',
     starts=lambda s: ((5e-5,), (-5e-5,), (3e-4,), (-3e-4,)),
     onset=lambda record: _behind,
     stage=Stage(adds={'skew': njit(lambda p: p.clock_skew)}, shared=(r.ON_LAG,)),

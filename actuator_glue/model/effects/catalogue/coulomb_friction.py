@@ -17,6 +17,8 @@ EFFECT = Effect(
     group='friction',
     signature='odd harmonics with the sign of the velocity; relative size falls as 1/A',
     source='Armstrong-Helouvry et al. 1994; return mapping: Simo & Hughes 1998',
+    meaning='seals, guides or swivels rub, whatever the speed',
+    remedy='check seals, guide bushings, alignment and side load',
     starts=lambda s: tuple((share * s.oil * s.stroke,) for share in (0.005, 0.02, 0.08)),
     stage=Stage(adds={'dry': njit(lambda p: p.coulomb_force)}),
 )

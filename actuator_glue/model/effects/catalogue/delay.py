@@ -16,6 +16,8 @@ EFFECT = Effect(
     group='lag',
     signature='linear; phase error proportional to frequency',
     source='Horiuchi et al. 1999',
+    meaning='the command reaches the controller late',
+    remedy='check network, filters and task order of the controller; compensate the rest',
     starts=lambda s: ((0.001,), (0.004,), (0.01,)),
     exact=(),
     stage=Stage(adds={'delay': njit(lambda p: p.delay)}, shared=(r.ON_LAG,)),

@@ -28,4 +28,6 @@ EFFECT = replace(
         (-0.02 * s.stroke / s.duration,),
     ),
     output=_drift,
+    meaning='the zero of the transducer wanders',
+    remedy='let amplifier and transducer warm up; check cable and earth',
 )

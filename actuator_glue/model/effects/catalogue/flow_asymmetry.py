@@ -38,6 +38,8 @@ EFFECT = Effect(
     group='asymmetry',
     signature='even harmonics and a mean that follows the velocity',
     source='Jelali & Kroll 2003 (single-rod cylinder)',
+    meaning='the actuator is stronger one way than the other',
+    remedy='a single-rod cylinder is so; for others check the valve for a worn edge and the null',
     starts=lambda s: ((0.03,), (-0.03,), (0.15,), (-0.15,)),
     stage=Stage(_fill, gain=_gain, own=ON),
 )

@@ -47,6 +47,8 @@ EFFECT = Effect(
     group='saturation',
     signature='odd harmonics above an onset in velocity',
     source='Merritt 1967; Jelali & Kroll 2003',
+    meaning='the valve gives no more flow than it is rated for',
+    remedy='command less speed, or take a larger valve or two',
     starts=lambda s: ((0.95 * s.velocity,), (0.75 * s.velocity,), (0.5 * s.velocity,)),
     stage=Stage(_fill, limit=_limit),
 )

@@ -96,6 +96,8 @@ EFFECT = Effect(
     group='inertia',
     signature='linear; pole and zero close together at the mode of the frame',
     source='Dyke et al. 1995 (structures the actuator reacts against)',
+    meaning='the reaction frame gives way and swings',
+    remedy='measure displacement relative to the specimen; stiffen the frame and its anchors',
     starts=lambda s: tuple(
         (min(0.05 / max(s.stiffness, 0.1 * s.oil), 2e-6), hz, 0.05, seen)
         for hz in _SEEN_AT

@@ -17,6 +17,8 @@ EFFECT = Effect(
     group='gain',
     signature='linear; relative residual constant down to zero frequency',
     source='Jelali & Kroll 2003',
+    meaning='the command channel has another scale than it is said to have',
+    remedy='check the scale of command and transducer in controller and recorder',
     starts=lambda s: ((1.01,), (0.99,), (1.05,), (0.95,)),
     exact=(),
     stage=Stage(adds={'gain': njit(lambda p: p.gain)}),

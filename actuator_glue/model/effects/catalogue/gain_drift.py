@@ -37,6 +37,8 @@ EFFECT = Effect(
     group='flow-time',
     signature='parameters trend with time, not with amplitude',
     source='Jelali & Kroll 2003 (viscosity and bulk modulus against temperature)',
+    meaning='flow gain changes as the oil warms',
+    remedy='warm the oil up before the test and keep its temperature',
     starts=lambda s: ((0.05 / s.duration,), (-0.05 / s.duration,), (0.2 / s.duration,)),
     record_time=True,
     stage=Stage(_fill, gain=_gain, own=ON),

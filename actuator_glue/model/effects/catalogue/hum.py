@@ -66,4 +66,6 @@ EFFECT = replace(
         or ((0.001 * s.stroke, 0.001 * s.stroke, 0.2 / s.period),)
     ),
     output=_hum,
+    meaning='a line of the mains, a pump or a motor is in the record',
+    remedy='check earth, shields and cables; a notch filter on the recorded channel',
 )

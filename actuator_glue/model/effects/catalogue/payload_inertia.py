@@ -23,6 +23,8 @@ EFFECT = Effect(
     group='inertia',
     signature='linear; resonance of the mass on the oil column',
     source='Dyke et al. 1995; Merritt 1967',
+    meaning='a mass moves along with the piston',
+    remedy='weigh what moves; declare it with --effect, and keep resonance out of the test',
     starts=lambda s: tuple(
         (s.oil / (2.0 * math.pi * hz) ** 2, 2.0 * ratio * 2.0 * math.pi * hz)
         for hz in (80.0, 40.0, 20.0)

@@ -39,6 +39,8 @@ EFFECT = Effect(
     group='pressure-flow',
     signature='odd harmonics that grow with the load; none without a specimen',
     source='Merritt 1967 (orifice equation, load pressure p_L = f/A)',
+    meaning='flow falls as the load takes up supply pressure',
+    remedy='raise supply pressure or take a larger actuator: load is near its limit',
     starts=lambda s: tuple(
         (share / max(s.stiffness * s.stroke, 0.2 * s.oil * s.stroke),) for share in (0.1, 0.4)
     ),

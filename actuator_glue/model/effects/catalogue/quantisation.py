@@ -21,6 +21,8 @@ EFFECT = Effect(
     group='quantisation',
     signature='values on a grid',
     source='Bennett 1948',
+    meaning='the converter records in coarse steps',
+    remedy='take a finer range or more bits, or a better transducer',
     starts=lambda s: ((1e-6,), (1e-5,), (5e-5,)),
     variance=_quantisation,
 )

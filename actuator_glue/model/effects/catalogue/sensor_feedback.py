@@ -29,6 +29,8 @@ EFFECT = Effect(
     group='feedback',
     signature='none alone; sensor effects move the piston, too',
     source='Jelali & Kroll 2003 (transducers)',
+    meaning='the controller closes its loop on the recorded transducer',
+    remedy='nothing is wrong: it says which transducer the loop is closed on',
     starts=lambda s: ((1.0,),),
     searched=False,  # alone it is nothing
     stage=Stage(_fill, shared=(r.ON_BEYOND, r.ON_FEEDBACK)),

@@ -45,6 +45,8 @@ EFFECT = Effect(
     group='lag',
     signature='linear; as a delay with a slight roll-off',
     source='Jelali & Kroll 2003 (transducers)',
+    meaning='transducer, amplifier or filter lag behind the piston',
+    remedy='raise the cut-off of the filter, the same one on both channels',
     starts=lambda s: ((0.0005,), (0.002,), (0.008,)),
     exact=linear_step.SENSOR,
     stage=Stage(_fill, sensed=_sensed),

@@ -53,6 +53,8 @@ EFFECT = Effect(
     group='gap',
     signature='odd; stiffness missing around zero displacement',
     source='Kerschen et al. 2006 (clearance)',
+    meaning='the specimen is not touched around its middle',
+    remedy='close bolts, pins and shims between actuator, load cell and specimen',
     starts=lambda s: ((0.02 * s.stroke,), (0.1 * s.stroke,), (0.3 * s.stroke,)),
     stage=Stage(_fill, own=ON),
 )

@@ -40,6 +40,8 @@ EFFECT = Effect(
     group='hardening',
     signature='odd harmonics; relative size grows as A^2',
     source='Kerschen et al. 2006 (Duffing)',
+    meaning='the specimen is stiffer or softer at large displacement',
+    remedy='nothing at the actuator: it is the specimen; use a linear one to calibrate',
     starts=lambda s: tuple((share / s.stroke**2,) for share in (0.1, -0.1, 0.5)),
     stage=Stage(_fill, shared=(r.ON_CURVED,)),
 )

@@ -81,6 +81,8 @@ EFFECT = Effect(
     group='hysteresis',
     signature='loop with memory, area grows with amplitude; none without a specimen',
     source='Wen 1976 (beta = gamma)',
+    meaning='the specimen yields',
+    remedy='nothing at the actuator: it is the specimen; calibrate with one that stays elastic',
     starts=lambda s: tuple(
         (ratio, share * s.stroke, sharp)
         for ratio in (0.2, 0.7)

@@ -114,6 +114,8 @@ EFFECT = Effect(
     group='friction',
     signature='as Coulomb friction, with stick-slip at reversals',
     source='Armstrong-Helouvry et al. 1994 (Stribeck curve, frictional memory)',
+    meaning='seals or guides stick before they slide',
+    remedy='check seals, lubrication and side load; a dither helps',
     starts=lambda s: tuple(
         (share * s.oil * s.stroke, ratio, speed)
         for share in (0.005, 0.02, 0.08)

@@ -81,6 +81,8 @@ EFFECT = Effect(
     group='flow-time',
     signature='gain follows the envelope of the flow',
     source='Merritt 1967 (constant-pressure supplies with accumulator)',
+    meaning='supply pressure falls while much oil is used',
+    remedy='check accumulators and pump, and what else draws from the supply',
     starts=lambda s: tuple(
         (share / s.velocity, time) for share in (0.05, 0.25) for time in (0.2, 1.0, 5.0)
     ),

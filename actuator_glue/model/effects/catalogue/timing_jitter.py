@@ -21,6 +21,8 @@ EFFECT = Effect(
     group='jitter',
     signature='variance proportional to velocity squared, no mean',
     source='Souders et al. 1990',
+    meaning='samples are not taken at even times',
+    remedy='record with a hardware clock; check the load of the recording computer',
     starts=lambda s: ((1e-4,), (5e-4,)),
     variance=_jitter,
 )

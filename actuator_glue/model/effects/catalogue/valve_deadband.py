@@ -36,6 +36,8 @@ EFFECT = Effect(
     group='lost-motion',
     signature='odd harmonics; flat where the velocity is small; relative size falls as 1/A',
     source='Merritt 1967; Tao & Kokotovic 1996',
+    meaning='the spool overlaps its ports: small errors move nothing',
+    remedy='have the servo-valve checked for overlap; a dither or compensation in the controller',
     starts=lambda s: ((0.005 * s.stroke,), (0.02 * s.stroke,), (0.06 * s.stroke,)),
     stage=Stage(_fill, error=_error),
 )

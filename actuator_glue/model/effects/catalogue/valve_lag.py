@@ -16,6 +16,8 @@ EFFECT = Effect(
     group='lag',
     signature='linear; residual grows with the square of frequency',
     source='Merritt 1967; Jelali & Kroll 2003',
+    meaning='the servo-valve is slower than Eq. (2) lets it be',
+    remedy='nothing, if it is rated so; else check pilot pressure and filters of the valve',
     starts=lambda s: ((0.0005,), (0.002,), (0.006,)),
     exact=linear_step.VALVE,
     stage=Stage(adds={'valve_lag': njit(lambda p: p.valve_lag)}),

@@ -17,6 +17,8 @@ EFFECT = Effect(
     group='offset',
     signature='constant offset; with k > 0 and leakage slightly smaller than without',
     source='Merritt 1967',
+    meaning='the valve is not closed at zero',
+    remedy='adjust the null of the servo-valve',
     starts=lambda s: ((0.02 * s.stroke,), (-0.02 * s.stroke,)),
     stage=Stage(adds={'error': njit(lambda p: p.null_offset)}),
 )

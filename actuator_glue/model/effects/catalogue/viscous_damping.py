@@ -16,6 +16,8 @@ EFFECT = Effect(
     group='gain',
     signature='linear; absorbed by the base parameters unless two stiffnesses are known',
     source='Dyke et al. 1995',
+    meaning='the specimen, or a damper beside it, resists with speed',
+    remedy='nothing at the actuator: declare it with --effect, or calibrate without it',
     starts=lambda s: tuple(
         (share * s.oil * s.stroke / s.velocity,) for share in (0.01, 0.05, 0.3)
     ),
