@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 _MOST = 500  # entries that are kept
+_LONGEST = 500  # characters of a text
 _KINDS = 1000  # alarms of a node whose counts are remembered
 _COUNT, _LAST = ' (count)', ' (last)'
 REMEMBERED = (
@@ -55,7 +56,7 @@ class Logbook:
 
     def news(self, place: int, of: str, text: str) -> None:
         """Take something that is no alarm."""
-        self._add(Entry(place, 0, of, text, place))
+        self._add(Entry(place, 0, of, text[:_LONGEST], place))
 
     def alarm(
         self, place: int, remembered: int, of: str, kind: str, level: int, text: str
@@ -75,7 +76,7 @@ class Logbook:
             last.last = place
             self.version += 1
             return
-        made = Entry(place, level, of, text, place)
+        made = Entry(place, level, of, text[:_LONGEST], place)
         self._lasting[of, kind] = made
         self._add(made)
 

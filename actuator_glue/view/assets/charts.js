@@ -25,6 +25,7 @@ const stroke = (color, width, dash) =>
 class Panel {
   // title; keys: [{label, color, line, dash, series}]; series, bands, hooks: of uPlot;
   // x(): range; y(u, least, most): range, where it is not automatic; axis: times are told below;
+  // steps: of the numbers at the left, where not all will do;
   // sync: name of those whose cursors go together; readout(u, index): text under the pointer.
   constructor(parent, options) {
     this.chart = null;
@@ -80,7 +81,7 @@ class Panel {
       axes: [
         {size: axis ? 26 : 4, grid: {width: 0.5}, ticks: {show: false}, font: '12px system-ui',
           values: (_, at) => axis ? at.map((v) => `${digits(v, 6)} s`) : at.map(() => '')},
-        {size: LEFT, grid: {width: 0.5}, ticks: {show: false}, font: '12px system-ui', space: 18,
+        {size: LEFT, grid: {width: 0.5}, ticks: {show: false}, font: '12px system-ui', space: 18, incrs: this.options.steps,
           values: this.options.values || ((_, at) => at.map((v) => digits(v, 6)))},
       ],
       legend: {show: false}, cursor, series: [{}, ...series], bands,
@@ -155,7 +156,7 @@ class Weights extends Panel {
     }
     super(parent, {
       title: 'weight [%]', axis: true, series, bands, x, y: () => [0, 100],
-      keys: [], values: (_, at) => at.map(String),
+      keys: [], steps: [25, 50], values: (_, at) => at.map(String),
       readout: (u, i) => `${digits(u.data[0][i], 5)} s: ` + this.shares(u, i),
       hooks: {draw: [(u) => this.annotate(u, log(), shown())]},
     });

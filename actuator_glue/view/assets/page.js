@@ -172,7 +172,7 @@ function brief(s) {
   const parts = [];
   if (first) parts.push(`${first.name} ${percent(first.weight)}` + (first.leads == null ? '' : ` since ${seconds(first.leads)}`));
   if (s.coverage) parts.push(`forecasts ${digits(100 * s.coverage.mean, 3)} % inside`);
-  parts.push(lasting.length ? `${lasting.length} alarm(s)` : 'no alarm');
+  parts.push(!lasting.length ? 'no alarm' : lasting.length === 1 ? '1 alarm' : `${lasting.length} alarms`);
   text('brief', parts.join(' \u00b7 '));
   $('brief').className = lasting.length ? 'warn' : 'good';
 }
