@@ -69,7 +69,7 @@ def test_entries_are_complete() -> None:
     for effect in CATALOGUE.values():
         assert effect.equation and effect.signature and effect.source and effect.group
         for told in (effect.meaning, effect.remedy):
-            assert len(told.split()) > 3 and told[-1] != '.'
+            assert len(told.split()) >= 3 and told[-1] != '.'
         lower = np.array([p.lower for p in effect.parameters])
         upper = np.array([p.upper for p in effect.parameters])
         neutral = np.array([p.neutral for p in effect.parameters], dtype=float)
