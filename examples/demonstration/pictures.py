@@ -17,7 +17,6 @@ from actuator_glue.online.job import WindowResult
 from actuator_glue.records import Array
 from actuator_glue.report import style
 from actuator_glue.report.bag_content import Content
-from actuator_glue.report.diagnosis_figures import stretches
 
 UM = 1e6
 MM = 1e3
@@ -192,7 +191,7 @@ def _draw(diagnosis: DiagnosisData, trace: Trace) -> Figure:
 def _stretch(trace: Trace) -> slice:
     """Return a short stretch without a hole, of the longest one in the middle of the record."""
     period = float(np.median(np.diff(trace.time)))
-    pieces = stretches(trace)
+    pieces = trace.stretches()
     piece = pieces[len(pieces) // 2]
     size = piece.stop - piece.start
     length = min(size, max(2, round(SECONDS / period)))
