@@ -25,6 +25,7 @@ from actuator_glue.view.trends import TrendColumn
 _POINTS = 4000  # at most, whatever the page asks for
 _TRENDS = 600  # rows of trends
 _ENTRIES = 60  # of the log
+_PAUSE = 0.5  # s, from one sending of trends to the next while a page follows
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,14 +61,20 @@ def parse_wanted(text: str) -> Wanted:
 
 
 class Frames:
-    """Frames of one page, which keeps trends and log that it was sent until there are new ones."""
+    """Frames of one page, which keeps trends and log that it was sent until there are new ones.
+
+    Attributes:
+        owing: there are new ones, which the last frame did not bring.
+    """
 
     def __init__(self, intake: Intake) -> None:
+        self.owing = False
         self._intake = intake
         self._sent: tuple[int, ...] | None = None
+        self._due = -math.inf
 
-    def next(self, wanted: Wanted) -> bytes:
-        """Return what the page is to show."""
+    def next(self, wanted: Wanted, now: float) -> bytes:
+        """Return what the page is to show; `now` is a monotonic time [s]."""
         intake = self._intake
         numbers: list[NDArray[np.floating[Any]]] = []
         with intake.lock:
@@ -93,8 +100,10 @@ class Frames:
                 'state': _state(history, stop),
             }
             key = _key(history, stop)
-            if key != self._sent:
-                self._sent = key
+            # Twenty windows a second would have it draw the whole test anew twenty times.
+            self.owing = key != self._sent and wanted.stop is None and now < self._due
+            if key != self._sent and not self.owing:
+                self._sent, self._due = key, now + _PAUSE
                 content['trends'], numbers = _trends(history, stop)
                 content['log'] = history.log.told(stop, history.period, _ENTRIES)
         # Single precision counts from the start of what is shown: whole microseconds stay.
@@ -107,7 +116,7 @@ class Frames:
 
 def frame(intake: Intake, wanted: Wanted) -> bytes:
     """Return what a page is to show first."""
-    return Frames(intake).next(wanted)
+    return Frames(intake).next(wanted, 0.0)
 
 
 def _key(history: History, place: int) -> tuple[int, ...]:

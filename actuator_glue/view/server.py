@@ -166,10 +166,10 @@ class _Page:
             now = (self.wanted, self._intake.history.version)
             # A page that stands still in the past has what it asked for.
             still = shown is not None and now[0] == shown[0] and now[0].stop is not None
-            if now != shown and not still:
+            if self._frames.owing or (now != shown and not still):
                 shown = now
                 begin = loop.time()
-                content = self._frames.next(self.wanted)
+                content = self._frames.next(self.wanted, begin)
                 # A quarter of an hour of samples takes longer: never more than a fifth of a core.
                 due = max(due, loop.time() + _SHARE * (loop.time() - begin))
                 try:

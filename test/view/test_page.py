@@ -300,6 +300,7 @@ def test_keys_wheel_and_drag() -> None:
 
 
 @browser
+@pytest.mark.slow
 def test_ten_minutes_add_nothing_to_the_page() -> None:
     """Fed in seconds: elements, listeners, height and heap are what they were before."""
     counted = (
