@@ -11,7 +11,7 @@ ROS := . install/setup.bash &&
 .DEFAULT_GOAL := help
 SAFETY_STAMP := .venv/safety
 
-.PHONY: help setup demo test coverage test-slow lint bench soak fuzz audit reproduce study-rths docs news clean
+.PHONY: help setup demo test coverage test-slow lint bench soak fuzz audit reproduce study-rths tables scores docs news clean
 
 help: ## show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 20
@@ -70,6 +70,14 @@ tables: $(VENV_STAMP) ## tables of structures of blind machines, and what anothe
 			--generator $$generator --out out/tables/$$generator; \
 		$(BIN)/python benchmarks/blind/tables.py out/tables/$$generator --generator $$generator; \
 	done
+
+# Seeds that nothing was set with; answers of another commit are refused by the page.
+scores: $(VENV_STAMP) ## diagnose machines of four generators and write docs/scores_generated.md (SCORE_ARGS='--first 70100 --cases 50')
+	@for generator in cases variant mixed far; do \
+		$(BIN)/python benchmarks/blind/campaign.py --first 70000 --cases 15 --jobs 2 $(SCORE_ARGS) \
+			--generator $$generator --out out/scores/$$generator; \
+	done
+	@$(BIN)/python benchmarks/blind/page.py out/scores --out docs/scores_generated.md
 
 $(SAFETY_STAMP): $(VENV_STAMP)
 	@$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt --editable '.[safety]'

@@ -10,6 +10,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import subprocess
 import sys
 import time
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -23,6 +24,13 @@ os.environ.setdefault('OPENBLAS_NUM_THREADS', '1')
 HERE = Path(__file__).resolve().parent
 sys.path.insert(0, str(HERE))
 sys.path.insert(0, str(HERE.parents[1]))
+
+
+def commit() -> str:
+    """Return the commit of this checkout; with `-dirty` where files differ from it."""
+    command = ['git', '-C', str(HERE), 'describe', '--always', '--dirty', '--exclude', '*']
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    return done.stdout.strip() or 'unknown'
 
 
 def one(seed: int, cache: Path, generator: str, options: dict[str, Any]) -> dict[str, Any]:
@@ -40,7 +48,7 @@ def one(seed: int, cache: Path, generator: str, options: dict[str, Any]) -> dict
     names = ('first', 'second', 'held')
     rows = zip(case.commands, case.measured, case.stiffness, names, strict=True)
     records = [Record(u, y, 1.0 / case.rate, stiffness=k, source=s) for u, y, k, s in rows]
-    start = time.perf_counter()
+    start, busy = time.perf_counter(), time.process_time()
     found = diagnose(records[:2], records[2], seed=seed, clock=time.perf_counter)
     result = {
         'seed': seed,
@@ -52,6 +60,9 @@ def one(seed: int, cache: Path, generator: str, options: dict[str, Any]) -> dict
         'parameters': dict(zip(NAMES, map(float, case.theta), strict=True)) | case.parameters,
         'colour': case.colour,
         'seconds': time.perf_counter() - start,
+        'processor_seconds': time.process_time() - busy,
+        'commit': commit(),
+        'generator': generator,
         'true_structure_error': truth.refitted(case, records),
         'clean_floor': truth.floor(case),
         'diagnosis': found.to_json(),

@@ -1,0 +1,111 @@
+"""Write what campaigns of one commit found as a page: `page.py FOLDER... --out docs/scores.md`.
+
+Answers of several commits are refused: a score pooled over versions is nobody's.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from reliability import answers, bins, coverage, named
+from reliability import table as reliability_table
+from score import scores, share
+
+Json = dict[str, Any]
+_SAYS = {
+    'false_alarms': 'healthy machines given a name, or told as incomplete',
+    'clear_exact': 'single effects of twice the noise and more: the first name is right',
+    'clear_in_set': 'the same: the right name, or tied with the first',
+    'clear_wrong_confident': 'the same: a wrong name without an alternative',
+    'pair_both_clear': 'machines with several effects, each of the noise and more: all named',
+    'unknown_told_or_described': 'effects outside the catalogue: told as incomplete, or described '
+    'to within 1.2 of the noise',
+}
+
+
+def _told(of: Json) -> str:
+    if not of['n']:
+        return '-'
+    low, high = of['ci']
+    return f'{round(of["share"] * of["n"])} of {of["n"]} ({100 * low:.0f} to {100 * high:.0f} %)'
+
+
+def page(results: list[Json]) -> str:
+    """Return the page.
+
+    Args:
+        results: answers of all campaigns.
+
+    Raises:
+        SystemExit: they are of several commits.
+    """
+    commits = sorted({r.get('commit', 'unknown') for r in results})
+    if len(commits) != 1:
+        raise SystemExit(f'answers of several commits cannot be pooled: {", ".join(commits)}')
+    groups = {
+        name: [r for r in results if r['generator'] == name] for name in _generators(results)
+    }
+    columns = {'all': results, **groups}
+    lines = [
+        '# Diagnosis: scores',
+        '',
+        f'Written by `make scores` from {len(results)} machines diagnosed by commit {commits[0]}; '
+        'brackets are 95 % Clopper-Pearson intervals. What the generators are, and what was '
+        'measured before, is in [what was measured](scores.md).',
+        '',
+        f'| what | {" | ".join(columns)} |',
+        f'|---|{"---|" * len(columns)}',
+        '| seeds | ' + ' | '.join(_seeds(rows) for rows in columns.values()) + ' |',
+    ]
+    counted = {name: scores(rows) for name, rows in columns.items()}
+    for key, text in _SAYS.items():
+        lines.append(f'| {text} | ' + ' | '.join(_told(c[key]) for c in counted.values()) + ' |')
+    for text, which in (('sizes of right names', 0), ("Eq. (2)'s parameters", 1)):
+        cells = [
+            _told(share([held for _, held in coverage(rows)[which]])) for rows in columns.values()
+        ]
+        lines.append(f'| 95 % intervals of {text} that hold the truth | {" | ".join(cells)} |')
+    ratio = [c['after_over_true_structure'] for c in counted.values()]
+    cells = ['-' if r['median'] is None else f'{r["median"]:.2f}, {r["p90"]:.2f}' for r in ratio]
+    lines.append(
+        f'| held-out error over that of the true structure: median, 90 % | {" | ".join(cells)} |'
+    )
+    lines.append(
+        '| processor time [s]: median, 95 %, most | '
+        + ' | '.join(_seconds(rows) for rows in columns.values())
+        + ' |'
+    )
+    lines += ['', '## Probabilities', '', reliability_table(bins(named(results))), '']
+    return '\n'.join(lines)
+
+
+def _generators(results: list[Json]) -> list[str]:
+    return sorted({r['generator'] for r in results})
+
+
+def _seeds(rows: list[Json]) -> str:
+    seeds = [r['seed'] for r in rows]
+    return f'{min(seeds)} to {max(seeds)}, {len(seeds)}'
+
+
+def _seconds(rows: list[Json]) -> str:
+    times = np.array([r['processor_seconds'] for r in rows])
+    return f'{np.median(times):.0f}, {np.quantile(times, 0.95):.0f}, {times.max():.0f}'
+
+
+def main() -> int:
+    """Read the answers and write the page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument('folders', nargs='+', type=Path, help='OUT of campaigns')
+    parser.add_argument('--out', type=Path, default=Path('docs/scores_generated.md'))
+    args = parser.parse_args()
+    args.out.write_text(page(answers(args.folders)))
+    print(args.out)
+    return 0
+
+
+if __name__ == '__main__':
+    raise SystemExit(main())
