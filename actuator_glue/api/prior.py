@@ -7,9 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from actuator_glue.api import store
 from actuator_glue.api.calibration_given import calibration_given
 from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.api.given import seconds
+from actuator_glue.api.pooled_prior import PooledPrior
 from actuator_glue.errors import InputError
 from actuator_glue.inference.carried import Drift
 from actuator_glue.inference.prior_use import GivenPrior
@@ -34,7 +36,8 @@ def given_prior(
     """Return what an earlier calibration, or the file it was saved to, lets one know now.
 
     Args:
-        earlier: None for nothing; what is known now already stays as it is.
+        earlier: None for nothing; what is known now already stays as it is. A file may also hold
+            what `history` made of many tests, a `PooledPrior`.
         drift: standard deviation by which the logarithm of each parameter may have moved in an
             hour since (random walk) [h^-1/2].
         age: time since, a `timedelta` or a number of seconds.
@@ -45,6 +48,10 @@ def given_prior(
     since = check_prior(drift, age)
     if earlier is None or isinstance(earlier, GivenPrior):
         return earlier
+    if isinstance(earlier, (str, Path)) and store.schema_of(earlier) == PooledPrior.schema:
+        many = store.load(earlier, PooledPrior.schema, PooledPrior)
+        known = many.carried().drifted(Drift(drift), since)
+        return GivenPrior(known, f'{earlier} ({many.source})', drift, since)
     source = 'a calibration' if isinstance(earlier, Calibration) else str(earlier)
     found = calibration_given(earlier)
     left = found.structure

@@ -72,6 +72,19 @@ def load(path: Path | str, schema: str, cls: type[T]) -> T:
         raise InputError(f'{path}: holds no {schema} ({error})') from error
 
 
+def schema_of(path: Path | str) -> str:
+    """Return what a file that `save` wrote holds.
+
+    Raises:
+        InputError: the file cannot be read, or holds nothing of ours.
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            return str(json.loads(str(file[_CONTENT]))['schema'])
+    except (OSError, ValueError, KeyError, TypeError, EOFError, zipfile.BadZipFile) as error:
+        raise InputError(f'{path}: holds no result of actuator_glue ({error})') from error
+
+
 def _pack(value: Any, arrays: dict[str, Any]) -> Any:
     if isinstance(value, np.ndarray):
         key = f'array_{len(arrays)}'

@@ -1,0 +1,48 @@
+"""What all earlier tests of an actuator say of its next one, as a file that `--prior` takes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from actuator_glue.api import store
+from actuator_glue.inference.carried import Carried
+from actuator_glue.records import Array
+
+# Normal components of the prior that it makes, at most.
+_COMPONENTS = 4
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PooledPrior:
+    """Draws of what the next test will find; scatter of days and drift until then are in them.
+
+    Attributes:
+        names: the parameters, (p,).
+        draws: shape (m, p), SI units.
+        source: what it was made from.
+    """
+
+    schema: ClassVar[str] = 'actuator_glue.prior/1'
+
+    names: tuple[str, ...]
+    draws: Array
+    source: str
+
+    def save(self, path: Path | str) -> Path:
+        """Write it to one .npz file and return its path.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        return store.save(path, self.schema, self)
+
+    def carried(self) -> Carried:
+        """Return the draws as a prior."""
+        from actuator_glue.inference.mixture_density import components
+
+        found = Carried.thinned(self.names, self.draws)
+        return replace(found, components=components(np.log(found.draws), _COMPONENTS))

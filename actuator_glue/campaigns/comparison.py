@@ -1,0 +1,151 @@
+"""Two tests or stretches of days of one actuator side by side: is it another machine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.stats import norm
+
+from actuator_glue.campaigns.actuator_history import ActuatorHistory, history
+from actuator_glue.campaigns.rows import read_results
+from actuator_glue.campaigns.series import actuators_of
+from actuator_glue.errors import InputError
+from actuator_glue.records import Array
+
+# p-value of all parameters together below which two sides are of different machines.
+DIFFERENT = 0.01
+HEADER = ('parameter', 'B over A', '2.5 %', '97.5 %', 'scatter of days', 'p')
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterDifference:
+    """One parameter of B over that of A.
+
+    Attributes:
+        name: the parameter.
+        ratio, lower, upper: B over A with its 95 % limits, each side's posterior in them.
+        usual: standard deviation of the ratio's logarithm that scatter of days alone makes.
+        p_value: of such a difference between days of one machine.
+    """
+
+    name: str
+    ratio: float
+    lower: float
+    upper: float
+    usual: float
+    p_value: float
+
+    def row(self) -> tuple[str, ...]:
+        """Return it under HEADER."""
+        numbers = (f'{v:.4f}' for v in (self.ratio, self.lower, self.upper))
+        return (self.name, *numbers, f'{100.0 * self.usual:.2g} %', f'{self.p_value:.2g}')
+
+
+@dataclass(frozen=True, slots=True)
+class DaysCompared:
+    """Two sides of one actuator.
+
+    Attributes:
+        actuator: its name.
+        a, b: the days of each side.
+        differences: of each parameter.
+        different: whether the sides differ by more than days of one machine do.
+    """
+
+    actuator: str
+    a: tuple[str, ...]
+    b: tuple[str, ...]
+    differences: tuple[ParameterDifference, ...]
+    different: bool
+
+    def summary(self) -> str:
+        """Return the answer in one line."""
+        if not self.different:
+            return f'{self.actuator}: no difference beyond the scatter of days'
+        worst = min(self.differences, key=lambda d: d.p_value)
+        return (
+            f'{self.actuator}: another machine: {worst.name} {100.0 * (worst.ratio - 1.0):+.1f} % '
+            f'(p {worst.p_value:.2g} for days of one machine)'
+        )
+
+
+def compare(folder: Path | str, a: str, b: str, *, actuator: str | None = None) -> DaysCompared:
+    """Compare two days, tests or stretches of days of one actuator.
+
+    Args:
+        folder: of a campaign.
+        a: a day (2026-03-01), a stretch (2026-03-01:2026-03-31), or the name of a test.
+        b: the other side.
+        actuator: whose; None where the campaign has one, or the test's name says it.
+
+    Raises:
+        InputError: no such test, no day of test there, or sides of two actuators.
+    """
+    if actuator is None:
+        actuator = _named(folder, (a, b))
+    found = history(folder, actuator)
+    sides = [_side(found, text) for text in (a, b)]
+    means, covariances = zip(*(_mean(found, side) for side in sides), strict=True)
+    step = means[1] - means[0]
+    spread = np.sqrt(np.diag(covariances[0] + covariances[1]))
+    usual = found.pooled.offset * np.sqrt(sum(1.0 / len(side) for side in sides))
+    whole = np.hypot(spread, usual)
+    p_values = 2.0 * norm.sf(np.abs(step) / whole)
+    differences = tuple(
+        ParameterDifference(
+            name=name,
+            ratio=float(np.exp(step[i])),
+            lower=float(np.exp(step[i] - 1.96 * spread[i])),
+            upper=float(np.exp(step[i] + 1.96 * spread[i])),
+            usual=float(usual[i]),
+            p_value=float(p_values[i]),
+        )
+        for i, name in enumerate(found.series.names)
+    )
+    days = [tuple(found.series.days[i] for i in side) for side in sides]
+    # Bonferroni over the parameters.
+    different = bool(p_values.min() * len(p_values) < DIFFERENT)
+    return DaysCompared(actuator, days[0], days[1], differences, different)
+
+
+def _named(folder: Path | str, sides: Sequence[str]) -> str:
+    table = read_results(folder)
+    of = {str(g): str(x) for g, x in zip(table['group'], table['actuator'], strict=True)}
+    said = {of[side] for side in sides if side in of}
+    every = said or set(actuators_of(table))
+    if len(every) != 1:
+        raise InputError(
+            f'whose days? The campaign has {", ".join(sorted(every)) or "no actuator with days"}; '
+            'name one with --actuator'
+        )
+    return every.pop()
+
+
+def _side(found: ActuatorHistory, text: str) -> list[int]:
+    """Return the numbers of the days of one side."""
+    series = found.series
+    if text in found.series.left_out:
+        raise InputError(f'{text}: {series.left_out[text]}; nothing can be compared with it')
+    first, _, last = text.partition(':')
+    side = [
+        i
+        for i, (day, groups) in enumerate(zip(series.days, series.groups, strict=True))
+        if text in groups or first <= day <= (last or first)
+    ]
+    if not side:
+        raise InputError(
+            f'{text}: {found.actuator} has no such test and no day of test there; its days go '
+            f'from {series.days[0]} to {series.days[-1]}'
+        )
+    return side
+
+
+def _mean(found: ActuatorHistory, side: list[int]) -> tuple[Array, Array]:
+    """Return the mean of some days' estimates, and its covariance by their posteriors."""
+    series: Any = found.series
+    count = len(side)
+    return series.mean[side].mean(axis=0), series.covariance[side].sum(axis=0) / count**2
