@@ -2,17 +2,21 @@
 
 import math
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from actuator_glue.api.live import proposed
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.model.parameters import NAMES
+from actuator_glue.model.structure import Structure
 from actuator_glue.online import live_diagnosis as live
 from actuator_glue.online.knowledge import Known
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.structures import Proposal
+from actuator_glue.records import Record
 
 SETTINGS = live.LiveSettings(apply=True, coverage_windows=3, minimum=20.0, pause=10.0)
 PLAY = frozenset({'backlash'})
@@ -178,3 +182,83 @@ def test_memory_of_posteriors_is_bounded():
     for second in range(5, 5000):
         memory.learn(known(float(second)), max(0, second - 180) * 1_000_000_000)
     assert len(memory._known) < 200
+
+
+def test_an_alarm_during_a_look_causes_no_second_one():
+    """It is of samples that the look has seen, or of a model that its answer replaces."""
+    state, _ = run(broken(20.0), live.Received(35.0), *[live.Judged(0.95)] * 3)
+    state, actions = run(state, *[live.Judged(0.5)] * 3, live.Estimated(True, ()))
+    assert looks(actions) == []
+    state, actions = run(state, live.Concluded(proposal('backlash')), live.Received(36.0))
+    assert carries(actions) == [('backlash',)] and looks(actions) == []
+    # A model that is no better is told by its own bands.
+    state, actions = run(state, *[live.Judged(0.5)] * 3)
+    assert len(looks(actions)) == 1
+
+
+def test_while_an_alarm_stands_it_looks_again_at_twice_the_data():
+    state, _ = run(broken(20.0), live.Concluded(why_not='nothing is supported'))
+    asked = []
+    for seconds in range(21, 100):
+        state, actions = run(state, live.Received(float(seconds)), live.Judged(0.5))
+        if looks(actions):
+            asked.append(seconds)
+            state, _ = run(state, live.Concluded(why_not='nothing is supported'))
+    assert asked == [40, 80]
+
+
+def test_an_addition_that_a_look_does_not_support_is_carried_beside_eq_2():
+    sure = live.Estimated(False, ((frozenset({'coulomb-friction'}), 1.0),))
+    undecided = live.Concluded(None, 'nothing is supported that could be added', True)
+    supported = replace(undecided, supported=frozenset({'coulomb-friction', 'delay'}))
+    against = replace(undecided, supported=frozenset())
+    state, _ = run(broken(), live.Concluded(proposal('coulomb-friction')), sure, live.Asked())
+    assert carries(run(state, undecided)[1]) == carries(run(state, supported)[1]) == []
+    _, (told, carry) = run(state, against)
+    assert told.kind == 'in doubt' and 'coulomb-friction' in told.message
+    both = [(one.model.effects, one.weight) for one in carry.proposal.structures]
+    assert both == [(('coulomb-friction',), 0.5), ((), 0.5)]
+
+
+def test_coverage_that_is_somewhat_low_for_long_is_a_break_too():
+    """An error of the noise's own size: 84 % of the samples, never below the limit."""
+    state, actions = run(live.init(SETTINGS), live.Received(30.0), *[live.Judged(0.84)] * 11)
+    assert actions == [] and state.trusted
+    state, actions = run(state, live.Judged(0.84))
+    assert len(looks(actions)) == 1 and '84%' in looks(actions)[0] and not state.trusted
+    healthy = np.random.default_rng(1).normal(0.95, 0.02, 500)
+    _, actions = run(live.init(SETTINGS), live.Received(30.0), *map(live.Judged, healthy))
+    assert actions == []
+
+
+def found_play(alpha_2, spread):
+    """What a proposal is made of: play, sure, and normal draws of alpha_2 that know no box."""
+    rng = np.random.default_rng(5)
+    joint = np.array([134.0, 1.1e9, 0.0, 0.5, 6e-5]) * np.exp(
+        0.01 * rng.standard_normal((4000, 5))
+    )
+    joint[:, 2] = rng.normal(alpha_2, spread, 4000)
+    effect = SimpleNamespace(name='backlash', probability=0.97, rivals=())
+    return SimpleNamespace(
+        model=Structure(('backlash',)),
+        names=(*NAMES, 'backlash'),
+        joint=joint,
+        structure=('backlash',),
+        effects=(effect,),
+        onset=None,
+        alarm=SimpleNamespace(threshold=5e-6),
+    )
+
+
+def test_what_a_record_leaves_open_is_handed_over_inside_the_box():
+    """Laplace draws of alpha_2, 4e6 +- 2e7: six of ten lie where no machine is."""
+    command = np.sin(np.linspace(0.0, 60.0, 1000))
+    record = Record(1e-3 * command, 1e-3 * command, 0.005, 250e3)
+    told = proposed(found_play(4e6, 2e7), [record]).structures[0]
+    draws = told.known.carried.draws
+    assert draws[:, 2].min() > 0.0 and draws[:, 2].max() < 1e7
+    assert draws[:, 0].mean() == pytest.approx(134.0, rel=2e-3)
+    assert 0.0 < told.model.start[2] < 1e7
+    # Where hardly any lies inside nothing is known; the structure is carried all the same.
+    told = proposed(found_play(-1e9, 1e7), [record]).structures[0]
+    assert told.known is None and told.model.effects == ('backlash',) and told.weight == 0.97

@@ -3,6 +3,7 @@
 import math
 import pickle
 from dataclasses import replace
+from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
@@ -244,3 +245,102 @@ def test_handed_sizes_are_the_prior_of_windows_that_they_have_not_seen():
             counted = job.window.record.stamp_ns(round(SETTINGS.settle * RATE))
             spread.setdefault(counted > last, []).append(result.moments.stddev[4] / SIZE)
     assert min(spread[False]) > 0.004 and max(spread[True]) < 0.0025
+
+
+def three():
+    """Two structures with effects beside Eq. (2)."""
+    return Proposal(
+        (
+            Proposed(choose_model(('backlash',), start={'backlash': SIZE}), 0.6),
+            Proposed(choose_model(('coulomb-friction',)), 0.3),
+            Proposed(choose_model(), 0.1),
+        )
+    )
+
+
+def hurried(seconds=6.0, budget=200):
+    """Results of a run whose clock counts steps: the likeliest takes more than half of them."""
+    estimator, found = Estimator(SETTINGS, three()), []
+    for item in stream(lost_motion(seconds)):
+        give(estimator, item)
+        while (job := estimator.next_job()) is not None:
+            steps = iter(range(10**9))
+            found.append(run(job, lambda share, steps=steps: next(steps) > share * budget))
+            assert not found[-1].failure
+            estimator.finish(found[-1])
+    return found
+
+
+@pytest.fixture(scope='module')
+def short_of_time():
+    return hurried()
+
+
+def test_who_has_waited_three_windows_has_half_of_the_time(short_of_time):
+    friction = [
+        r.spent[i]
+        for r in short_of_time
+        for i, names in enumerate(r.structures)
+        if names == ('coulomb-friction',)
+    ]
+    # The first window is the fourth that it waited for: it had none before.
+    assert len(friction) >= 4 and friction[:3] == [0, 0, 0] and friction[3] > 0
+
+
+def test_a_structure_without_time_forecasts_with_its_last_posterior(short_of_time):
+    pairs = [
+        (before, after)
+        for before, after in pairwise(short_of_time)
+        if len(after.rivals) == 2 and after.rivals[0].archive is None
+    ]
+    kept = [(a, b) for a, b in pairs if a.rivals[0].frozen is not None]
+    for before, after in kept:
+        old, new = before.rivals[0].frozen, after.rivals[0].frozen
+        np.testing.assert_array_equal(old.draws, new.draws)
+        assert new.start == after.frozen.start and new in after.frozen.beside
+        assert after.parts[1] is not None
+    assert kept
+
+
+def weighing(*errors):
+    """An estimator that carries play and Eq. (2), and the events of windows with such errors."""
+    estimator = Estimator(SETTINGS, choose_model())
+    window = None
+    for item in stream(lost_motion(4.0)):
+        give(estimator, item)
+        while (job := estimator.next_job()) is not None:
+            result = run(job)
+            estimator.finish(result)
+            window = result
+    play, plain = Proposed(choose_model(('backlash',)), 0.98), Proposed(choose_model(), 0.02)
+    estimator._begin(Proposal((play, plain), 5e-6))
+    told = [estimator._weigh(replace(window, errors=pair)) for pair in errors]
+    return estimator, told
+
+
+GOOD, BAD = 1e-10, 1e-10 + 30e-12  # a little more than what matters
+
+
+def test_an_addition_that_makes_forecasts_worse_is_out_within_three_windows():
+    estimator, told = weighing(*[(BAD, GOOD)] * 3)
+    assert told[0] == told[1] == []
+    assert told[2][0].worse and told[2][0].left == (('backlash',),)
+    assert 'backlash made them worse' in told[2][0].message
+    assert [(model.effects, share) for model, share in estimator.weights] == [((), 1.0)]
+
+
+def test_one_window_that_is_no_worse_begins_the_count_anew():
+    _, told = weighing(*[(BAD, GOOD), (BAD, GOOD), (GOOD, GOOD), (BAD, GOOD), (BAD, GOOD)])
+    assert told == [[]] * 5
+
+
+def test_what_forecasts_have_excluded_comes_back_where_the_addition_makes_them_worse():
+    estimator, told = weighing(*[(GOOD, 50.0 * GOOD)] * 3, *[(BAD, GOOD)] * 3)
+    assert told[0][0].left == ((),) and not told[0][0].worse
+    assert estimator.weights[0][0].effects == () and told[-1][0].worse
+
+
+def test_without_rivals_that_were_there_before_nothing_is_taken_out():
+    """Who asks for one structure has it, whatever it forecasts."""
+    estimator = Estimator(SETTINGS, Proposal((Proposed(choose_model(('backlash',))),)))
+    assert not estimator._outdone((1.0,), 1e-9)
