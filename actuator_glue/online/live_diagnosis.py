@@ -1,9 +1,10 @@
 """When a stream is diagnosed, and what follows: a state and a step, without clock, ROS or data.
 
 A diagnosis is due when coverage breaks, when the estimator's prior is contradicted, and, while
-names are tied, structure remains or one of these alarms stands, each time that twice as much has
-been received. What it says replaces what was added before: an addition that later data contradict
-is taken out, one that they do not support any more is carried beside Eq. (2) until forecasts tell.
+names are tied or structure remains, each time that twice as much has been received; while an
+alarm stands, each time that twice as much has been received since it began. What it says replaces
+what was added before: an addition that later data contradict is taken out, one that they do not
+support any more is carried beside Eq. (2) until forecasts tell.
 """
 
 from __future__ import annotations
@@ -26,6 +27,8 @@ _DOUBTED = 0.5
 # Over so many times as many bands, half of what they may lack of their level is a break, too: an
 # error of the noise's own size that never goes.
 _LASTING, _LEVEL = 4, 0.95
+# Where bands were good until now, so much of what has changed is waited for [s].
+_CHANGED = 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,6 +179,9 @@ class LiveState:
         running: a diagnosis is under way.
         looked: data there were when the last one began [s]; NaN before the first.
         left_open: the last one left names tied, or structure.
+        sound: bands of what is carried now have been good.
+        alarm: data there were when the alarm that stands began [s]; NaN where none does.
+        ready: data there have to be for a diagnosis because of it [s].
     """
 
     settings: LiveSettings
@@ -189,6 +195,9 @@ class LiveState:
     running: bool = False
     looked: float = math.nan
     left_open: bool = False
+    sound: bool = False
+    alarm: float = math.nan
+    ready: float = 0.0
 
     @property
     def coverage(self) -> float:
@@ -236,6 +245,7 @@ def step(state: LiveState, given: Input) -> tuple[LiveState, tuple[Action, ...]]
             return replace(state, running=True, looked=looked), ()
         case Concluded():
             state, told = _concluded(state, given)
+    state = _timed(state)
     reason = _due(state)
     if not reason:
         return state, told
@@ -249,10 +259,13 @@ def _judged(state: LiveState, given: Judged) -> tuple[LiveState, tuple[Action, .
     most = _LASTING * state.settings.coverage_windows
     state = replace(state, coverages=(*state.coverages, given.coverage)[-most:])
     broken = state.coverage < state.settings.coverage_limit or state.lasting
+    sound = state.sound or state.coverage >= state.settings.coverage_limit
     if math.isnan(state.coverage) or broken == state.broken:
-        return state, ()
+        return replace(state, sound=sound), ()
     if not broken:
-        return replace(state, broken=False), ()
+        return replace(state, broken=False, sound=True), ()
+    sudden = state.sound and not state.lasting
+    state = replace(state, ready=state.seconds + _CHANGED * sudden)
     covers = float(np.mean(state.coverages)) if state.lasting else state.coverage
     what = (
         f'the band of parameters and sensor noise covers {covers:.0%} of the samples: '
@@ -280,7 +293,14 @@ def _received(state: LiveState, seconds: float) -> LiveState:
 
 def _began(state: LiveState) -> LiveState:
     """Let go of bands, which are of windows before."""
-    return replace(state, coverages=(), broken=False)
+    return replace(state, coverages=(), broken=False, sound=False, alarm=math.nan)
+
+
+def _timed(state: LiveState) -> LiveState:
+    """Note since when an alarm stands."""
+    if not (state.broken or state.contradicted):
+        return replace(state, alarm=math.nan)
+    return replace(state, alarm=state.seconds) if math.isnan(state.alarm) else state
 
 
 def _concluded(state: LiveState, given: Concluded) -> tuple[LiveState, tuple[Action, ...]]:
@@ -318,15 +338,15 @@ def _due(state: LiveState) -> str:
     settings, seconds = state.settings, state.seconds
     if state.running or not settings.automatic or seconds < settings.minimum:
         return ''
-    if state.reason and not seconds < state.looked + settings.pause:
+    paused = seconds < state.looked + settings.pause
+    if state.reason and not paused and seconds >= state.ready:
         return state.reason
-    # Before the first one there is nothing to look at again.
-    if not seconds >= 2.0 * state.looked:
-        return ''
-    if state.left_open:
+    if state.left_open and seconds >= 2.0 * state.looked:
         return 'names are tied or structure remains, and there are twice as many data'
-    if state.broken or state.contradicted:
-        return 'the alarm still stands, and there are twice as many data'
+    # Before the first one there is nothing to look at again.
+    again = max(state.alarm, state.looked) + max(settings.pause, state.looked - state.alarm)
+    if seconds >= again:
+        return 'the alarm still stands, and there are more data since it began'
     return ''
 
 

@@ -196,15 +196,30 @@ def test_an_alarm_during_a_look_causes_no_second_one():
     assert len(looks(actions)) == 1
 
 
-def test_while_an_alarm_stands_it_looks_again_at_twice_the_data():
-    state, _ = run(broken(20.0), live.Concluded(why_not='nothing is supported'))
+def watched(state, upto, bands=None):
+    """When it looks, where bands are bad and no look finds anything; the state then."""
     asked = []
-    for seconds in range(21, 100):
-        state, actions = run(state, live.Received(float(seconds)), live.Judged(0.5))
+    while state.seconds < upto:
+        now = state.seconds + 1.0
+        coverage = 0.5 if bands is None else bands(now)
+        state, actions = run(state, live.Received(now), live.Judged(coverage))
         if looks(actions):
-            asked.append(seconds)
+            asked.append(now)
             state, _ = run(state, live.Concluded(why_not='nothing is supported'))
-    assert asked == [40, 80]
+    return asked, state
+
+
+def test_while_an_alarm_stands_it_looks_again_as_data_since_it_began_become_twice_as_many():
+    state, _ = run(broken(20.0), live.Concluded(why_not='nothing is supported'))
+    assert watched(state, 100.0)[0] == [30.0, 40.0, 60.0, 100.0]
+
+
+def test_what_begins_in_mid_stream_is_waited_for_and_looked_at_again_soon():
+    """Twice as many data as the whole stream before would be a minute later."""
+    asked, state = watched(live.init(SETTINGS), 70.0, lambda now: 0.95 if now < 45.0 else 0.3)
+    # Two good bands and a bad one tell it; 5 s of it are waited for.
+    assert asked == [50.0, 60.0]
+    assert state.alarm == 45.0
 
 
 def test_an_addition_that_a_look_does_not_support_is_carried_beside_eq_2():
