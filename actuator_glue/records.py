@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 from actuator_glue.errors import InputError
 from actuator_glue.even_times import uniform_period
 from actuator_glue.given import number
+from actuator_glue.motion import METRES, MOTIONS, WRITTEN, spoken
 from actuator_glue.si import FORCE, LENGTH
 
 Array: TypeAlias = NDArray[np.float64]
@@ -51,7 +52,9 @@ def numbers(values: ArrayLike) -> Array:
     return np.array(values, dtype=np.float64)
 
 
-def _column(values: ArrayLike, name: str, unit: str, limit: float, source: str) -> Array:
+def _column(
+    values: ArrayLike, name: str, unit: str, limit: float, source: str, motion: str = METRES
+) -> Array:
     where = f'{source}: ' if source else ''
     try:
         column = values if _kept(values) else numbers(values)
@@ -69,8 +72,9 @@ def _column(values: ArrayLike, name: str, unit: str, limit: float, source: str) 
             )
         at = int(np.abs(column).argmax())
         raise InputError(
-            f'{where}{name} reaches {column[at]:g} {unit} at sample {at}, beyond '
-            f'{limit:g} {unit}; check the unit of this channel'
+            f'{where}{name} reaches '
+            + spoken(f'{column[at]:g} {unit} at sample {at}, beyond {limit:g} {unit}', motion)
+            + '; check the unit of this channel'
         )
     column.flags.writeable = False
     return column
@@ -187,9 +191,12 @@ class Record:
         hold: how the command runs between its samples.
         actuator: name of the actuator.
         source: file, bag or topic the record came from, for messages.
+        motion: what command and measured are: 'm', or 'deg', 'counts', 'V', 'mA', '%', which stand
+            where metres do as `motion` tells, and have a stiffness of 0 or none.
 
     Raises:
-        InputError: fewer than two samples, unequal lengths, NaN, absurd values or period.
+        InputError: fewer than two samples, unequal lengths, NaN, absurd values or period, or a
+            stiffness in N/m of what does not move in metres.
     """
 
     command: Array
@@ -202,12 +209,20 @@ class Record:
     hold: Hold = 'zoh'
     actuator: str = 'actuator'
     source: str = ''
+    motion: str = METRES
 
     def __post_init__(self) -> None:
         where = f'{self.source}: ' if self.source else ''
         put = object.__setattr__
+        if self.motion != METRES and self.motion not in WRITTEN:
+            raise InputError(
+                f'{where}motion {self.motion!r} is unknown; use one of '
+                f'{", ".join((METRES, *WRITTEN))}'
+            )
         for name in ('command', 'measured'):
-            column = _column(getattr(self, name), name, 'm', MAX_DISPLACEMENT, self.source)
+            column = _column(
+                getattr(self, name), name, 'm', MAX_DISPLACEMENT, self.source, self.motion
+            )
             put(self, name, column)
         if self.force is not None:
             put(self, 'force', _column(self.force, 'force', 'N', MAX_FORCE, self.source))
@@ -220,6 +235,12 @@ class Record:
         check_hold(self.hold, self.source)
         if self.stiffness is not None:
             put(self, 'stiffness', check_stiffness(self.stiffness, self.source))
+            if self.stiffness and self.motion != METRES:
+                raise InputError(
+                    f'{where}the specimen stiffness is {self.stiffness:g} N/m, and the motion is '
+                    f'in {self.motion}: give 0 for a free actuator, or the mm per {self.motion} '
+                    'as `scale`, with `unit: mm`, in a channel map'
+                )
 
     @classmethod
     def from_arrays(
@@ -241,7 +262,8 @@ class Record:
             command: commanded displacement, shape (n,) [unit].
             measured: measured displacement, shape (n,) [unit].
             force: measured actuator force, shape (n,) [force_unit]; None where there is none.
-            unit: of both displacements, 'm', 'mm', 'um', 'cm' or 'in'.
+            unit: of both displacements, 'm', 'mm', 'um', 'cm' or 'in'; or of another motion,
+                'deg', 'rad', 'counts', 'V', '%'.
             force_unit: 'N', 'kN', 'MN', 'lbf' or 'kip'.
             stiffness: specimen stiffness [N/m], 0 for a free actuator; None where not known.
             hold: how the command runs between its samples, 'zoh' or 'linear'.
@@ -253,7 +275,8 @@ class Record:
             >>> Record.from_arrays([0.0, 0.01, 0.02], [0, 1, 2], [0, 0, 1], unit='mm')
             Record(actuator: 3 samples at 100 Hz (0.03 s), stiffness not known, zoh)
         """
-        length, newton = _factor(unit, LENGTH, 'unit'), _factor(force_unit, FORCE, 'force_unit')
+        motion, length = MOTIONS.get(unit) or (METRES, _factor(unit, LENGTH, 'unit'))
+        newton = _factor(force_unit, FORCE, 'force_unit')
         period, start_ns = _clock(time, '')
         channels = {'command': command, 'measured': measured}
         if force is not None:
@@ -275,6 +298,7 @@ class Record:
             force=columns.get('force'),
             start_ns=start_ns,
             hold=hold,
+            motion=motion,
         )
 
     def __len__(self) -> int:
@@ -283,6 +307,7 @@ class Record:
     def __repr__(self) -> str:
         known = 'stiffness not known' if self.stiffness is None else f'{self.stiffness:g} N/m'
         force = '' if self.force is None else ', with force'
+        force += '' if self.motion == METRES else f', in {self.motion}'
         return (
             f'Record({self.source or self.actuator}: {len(self)} samples at {self.rate:.6g} Hz '
             f'({self.duration:.4g} s), {known}, {self.hold}{force})'
@@ -332,7 +357,8 @@ class Record:
         if self.stiffness is None:
             where = f'{self.source}: ' if self.source else ''
             raise InputError(
-                f'{where}specimen stiffness is not known; give it with --stiffness N/m'
+                f'{where}specimen stiffness is not known; give it with --stiffness N/m, 0 for a '
+                'free actuator'
             )
         return self.stiffness
 
@@ -354,6 +380,13 @@ class Record:
         for name in ('command', 'measured'):
             stroke = float(np.ptp(getattr(self, name)))
             if stroke >= LONGEST_STROKE:
+                if self.motion != METRES:
+                    moves = spoken(f'{stroke:.4g} m', self.motion)
+                    most = spoken(f'{LONGEST_STROKE:g} m', self.motion)
+                    raise InputError(
+                        f'{where}{name} moves over {moves}, and {most} are the most that is '
+                        'taken; check the unit, or give a `scale` in a channel map'
+                    )
                 raise InputError(
                     f'{where}{name} moves over {stroke:.4g} m, and the longest servo-hydraulic '
                     f'actuators have {LONGEST_STROKE:g} m; check the units: a column in '

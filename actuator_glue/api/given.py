@@ -60,6 +60,12 @@ def records_given(
                 f'{name}: {type(one).__name__} is no record; give what `load` or `simulate` '
                 'return, the path of a file or bag, or a list of these'
             )
+    motions = dict.fromkeys(record.motion for record in out)
+    if len(motions) > 1:
+        raise InputError(
+            f'{name}: one moves in {" and another in ".join(motions)}; what is fitted together '
+            'moves in one unit: give a `scale` in a channel map'
+        )
     return out
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 from actuator_glue.api import store
+from actuator_glue.motion import METRES, speaking, spoken
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -28,6 +29,12 @@ class Result(ABC):
     def model_effects(self) -> tuple[str, ...]:
         """Effects of its model, whose definitions go along where they are the user's own."""
         return ()
+
+    @property
+    def motion(self) -> str:
+        """What its records measure: 'm', or 'deg', 'counts' and so on, which texts speak in."""
+        records = getattr(self, 'records', ())
+        return records[0].motion if records else METRES
 
     @abstractmethod
     def to_json(self) -> dict[str, Any]:
@@ -70,16 +77,19 @@ class Result(ABC):
         """
         from actuator_glue.report import html
 
-        return html.write(Path(path), self.page())
+        with speaking(self.motion):
+            return html.write(Path(path), self.page())
 
     def __repr__(self) -> str:
         """Return what came out in a few lines, without arrays."""
         from actuator_glue.report.plain import plain
 
-        return plain(self.brief(), '`to_json()` has them, `report(path)` shows them')
+        told = plain(self.brief(), '`to_json()` has them, `report(path)` shows them')
+        return spoken(told, self.motion)
 
     def _repr_html_(self) -> str:
         """Return what came out, for notebooks."""
         from actuator_glue.report import html
 
-        return html.fragment(self.brief())
+        with speaking(self.motion):
+            return html.fragment(self.brief())

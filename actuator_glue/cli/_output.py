@@ -9,6 +9,12 @@ from contextlib import contextmanager
 
 from actuator_glue.arguments import Output, add_force
 from actuator_glue.errors import InputError, printable
+from actuator_glue.motion import spoken
+
+
+def _told(text: str) -> str:
+    """Return a text for people: printable, and in the units of the records' motion."""
+    return spoken(printable(text))
 
 
 def add_json(parser: argparse.ArgumentParser) -> None:
@@ -43,7 +49,7 @@ def beside(out: str | None, write: Callable[[str], object]) -> int:
     except BrokenPipeError:  # the reader of our output has gone
         raise
     except (InputError, OSError) as error:
-        print(f'actuator-glue: {printable(str(error))}', file=sys.stderr)
+        print(f'actuator-glue: {_told(str(error))}', file=sys.stderr)
         return 2
     except Exception as error:
         note(
@@ -55,12 +61,12 @@ def beside(out: str | None, write: Callable[[str], object]) -> int:
 
 def note(line: str) -> None:
     """Print one remark on standard error."""
-    print(f'note: {printable(line)}', file=sys.stderr)
+    print(f'note: {_told(line)}', file=sys.stderr)
 
 
 def say(line: str, args: argparse.Namespace) -> None:
     """Print one line for people; on standard error where JSON goes to standard output."""
-    print(printable(line), file=sys.stderr if getattr(args, 'json', None) == '-' else sys.stdout)
+    print(_told(line), file=sys.stderr if getattr(args, 'json', None) == '-' else sys.stdout)
 
 
 def table(
@@ -73,16 +79,18 @@ def table(
     from rich.table import Table
 
     shown = Table(
-        title=printable(title) or None,
+        title=_told(title) or None,
         box=box.SIMPLE_HEAD,
         title_justify='left',
         pad_edge=False,
         padding=(0, 1, 0, 0),
     )
     for i, column in enumerate(columns):
-        shown.add_column(escape(column), justify='left' if i == 0 else 'right', no_wrap=True)
+        shown.add_column(
+            escape(_told(column)), justify='left' if i == 0 else 'right', no_wrap=True
+        )
     for row in rows:
-        shown.add_row(*(escape(printable(cell)) for cell in row))
+        shown.add_row(*(escape(_told(cell)) for cell in row))
     file = sys.stderr if getattr(args, 'json', None) == '-' else sys.stdout
     console = Console(file=file, highlight=False)
     # A number that is cut off is worse than a line that the terminal folds.

@@ -69,8 +69,9 @@ def load(args: argparse.Namespace) -> list[Record]:
         InputError: a record cannot be used.
     """
     from actuator_glue.io.load import load_records
+    from actuator_glue.motion import speak
 
-    return load_records(
+    found = load_records(
         args.records,
         stiffness=args.stiffness,
         channels=args.channels,
@@ -80,3 +81,5 @@ def load(args: argparse.Namespace) -> list[Record]:
         gap=note if args.split else None,
         warn=note,
     )
+    speak(found[0].motion)
+    return found

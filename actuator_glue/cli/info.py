@@ -13,6 +13,7 @@ from actuator_glue.cli._records import add_records
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
 from actuator_glue.io.units import factor
+from actuator_glue.motion import METRES, speaking
 from actuator_glue.records import Record
 
 EXAMPLES = (
@@ -68,7 +69,8 @@ def run(args: argparse.Namespace) -> int:
         for line in content['warnings']:
             note(line)
         for record in records:
-            _show(record, args)
+            with speaking(record.motion):
+                _show(record, args)
         content['records'] = [_describe(r) for r in records]
         files.append(content)
     write_json({'schema': 'actuator_glue.info/1', 'files': files}, args.json)
@@ -127,7 +129,7 @@ def _show(record: Record, args: argparse.Namespace) -> None:
         f'{record.duration:.6g} s; {record.actuator}, {stiffness}, hold {record.hold}',
         args,
     )
-    unit = args.unit
+    unit = args.unit if record.motion == METRES else 'mm'  # which is said in its own unit
     scale = 1.0 / factor('command', unit, '--unit')
     channels = [(n, getattr(record, n) * scale, unit) for n in ('command', 'measured')]
     if record.force is not None:
@@ -148,6 +150,7 @@ def _describe(record: Record) -> dict[str, Any]:
         'first_index': record.first_index,
         'stiffness_n_per_m': record.stiffness,
         'hold': record.hold,
+        'motion': record.motion,
         'command_m': [record.command.min(), record.command.max()],
         'measured_m': [record.measured.min(), record.measured.max()],
         'force_n': None if force is None else [force.min(), force.max()],

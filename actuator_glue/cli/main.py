@@ -19,6 +19,7 @@ from actuator_glue import cli
 from actuator_glue.arguments import claim_outputs
 from actuator_glue.cli._parser import Parser, examples
 from actuator_glue.errors import InputError
+from actuator_glue.motion import METRES, speak, spoken
 
 
 def commands() -> dict[str, Path]:
@@ -64,6 +65,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     debug = '--debug' in argv
     argv = [a for a in argv if a != '--debug']  # wherever it stands
     chosen = next((a for a in argv if not a.startswith('-')), None)
+    speak(METRES)  # until records say otherwise
     if not debug:
         # Deprecations inside libraries are nothing a user can act on.
         warnings.simplefilter('ignore')
@@ -99,7 +101,7 @@ def _fail(message: str, code: int, debug: bool) -> int:
     """Tell the exception that is being handled, or raise it again where it is looked for."""
     if debug:
         raise
-    print(f'actuator-glue: {message}', file=sys.stderr)
+    print(f'actuator-glue: {spoken(message)}', file=sys.stderr)
     return code
 
 

@@ -133,17 +133,7 @@ def _missing(found: FileLook, proposal: ProposedMap) -> str:
         )
     names = [role for role in ('command', 'measured') if role not in proposal.channels]
     if not names:
-        if not proposal.angles:
-            return 'no column tells the times of the samples; give their rate with --rate HZ'
-        told = ' and '.join(
-            f'{role} ({_name(guess)}) is an angle in {guess.column.unit}'
-            for role, guess in proposal.angles.items()
-        )
-        return (
-            f'{told}, and no length is made of it silently: where a lever turns a stroke into it, '
-            'write the channel map by hand with `unit: mm` and `scale`, the mm per unit of angle '
-            '(docs/howto_your_data.md)'
-        )
+        return 'no column tells the times of the samples; give their rate with --rate HZ'
     lengths = sorted({len(c.values) for c in found.columns if c.times is None}, reverse=True)
     if len(lengths) > 1:
         return (
@@ -164,10 +154,6 @@ def _missing(found: FileLook, proposal: ProposedMap) -> str:
         f'no {" and no ".join(names)} could be told from these columns; write the channel map by '
         'hand (docs/howto_your_data.md)'
     )
-
-
-def _name(guess: Guess) -> str:
-    return _called(guess.column)
 
 
 def _called(column: ColumnLook) -> str:

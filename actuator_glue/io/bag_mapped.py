@@ -82,6 +82,7 @@ def read_mapped(
                 hold=hold,
                 actuator=channels.actuator,
                 source=f'{path}{number}',
+                motion=channels.motion,
             )
         )
     if not records:

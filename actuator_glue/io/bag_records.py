@@ -29,6 +29,7 @@ from actuator_glue.io.bag_reader import (
 from actuator_glue.io.bag_samples import SAMPLE_BLOCK, BagBlock, BagSetup
 from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.io.messages import header, message
+from actuator_glue.motion import METRES
 from actuator_glue.rate_check import disagreement, rate_by_clock
 from actuator_glue.records import Record
 from actuator_glue.sample_block import Block
@@ -341,10 +342,15 @@ def write_record(
         progress: called with the number of samples written since the last call.
 
     Raises:
-        InputError: disk full, or a block of less than one sample.
+        InputError: disk full, a block of less than one sample, or a motion that is not in metres.
     """
     if block < 1:
         raise InputError(f'a block of {block} samples is impossible; use at least 1')
+    if record.motion != METRES:
+        raise InputError(
+            f'{record.source or "record"}: its motion is in {record.motion}, and messages are in '
+            'metres; write a file, or give a `scale` in a channel map'
+        )
     samples, setup = f'{namespace}/samples', f'{namespace}/test_setup'
     writer.add_topic(setup, TEST_SETUP, qos=(LATCHED,))
     writer.add_topic(samples, SAMPLE_BLOCK)

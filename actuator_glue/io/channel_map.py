@@ -9,7 +9,7 @@ from reprlib import repr as brief
 from typing import Literal
 
 from actuator_glue.errors import InputError
-from actuator_glue.io.units import ROLES, factor
+from actuator_glue.io.units import ROLES, common_motion, of_file
 from actuator_glue.io.yaml_file import located, mapping, number, parse, read_text, whole
 from actuator_glue.records import check_stiffness
 
@@ -90,6 +90,11 @@ class ChannelMap:
         return {role: channel for role, channel in found.items() if channel is not None}
 
     @property
+    def motion(self) -> str:
+        """What command and measured are in: metres, or another motion."""
+        return common_motion({r: c.unit for r, c in self.roles().items()}, self.source)
+
+    @property
     def topics(self) -> bool:
         """Whether the channels are topics of a bag."""
         columns = (channel.column for channel in self.roles().values())
@@ -146,6 +151,7 @@ def parse_channel_map(content: object, source: str) -> ChannelMap:
         )
     if made.time is None and made.rate is None and not made.topics:
         raise InputError(f'{where}: give `rate` in Hz, or a `time` channel')
+    common_motion({r: c.unit for r, c in made.roles().items()}, where)
     wants_rest = [c for c in (made.command, made.measured, made.force) if c is not None]
     if any(c.remove_rest_offset for c in wants_rest) and made.rest_samples < 1:
         raise InputError(f'{where}: remove_rest_offset needs rest_samples')
@@ -157,7 +163,7 @@ def _channel(content: object, role: str, where: str) -> Channel:
     _column(values['column'], where)
     if isinstance(values['unit'], list):
         raise InputError(f'{where}: unit is {brief(values["unit"])}; write it without brackets')
-    factor(role, str(values['unit']) if values['unit'] else None, where)
+    of_file(role, str(values['unit']) if values['unit'] else None, where)
     number(values, 'scale', where)
     number(values, 'offset', where)
     if not isinstance(values.get('remove_rest_offset', False), bool):

@@ -9,17 +9,21 @@ from pathlib import Path
 
 from actuator_glue.errors import InputError
 from actuator_glue.io.formats import formats, writable
+from actuator_glue.motion import METRES, MOTIONS, WRITTEN
 from actuator_glue.records import Array, Record
 
 
 def _columns(record: Record, unit: str) -> dict[str, Array]:
     scale = {'m': 1.0, 'mm': 1e3}[unit]
+    if record.motion != METRES:
+        unit = WRITTEN[record.motion]
+        scale = 1.0 / MOTIONS[unit][1]
     time = record.start_ns * 1e-9 + record.time
     columns = {'time_s': time}
     columns[f'command_{unit}'] = record.command * scale
     columns[f'measured_{unit}'] = record.measured * scale
     if record.force is not None:
-        columns['force_N'] = record.force
+        columns['force_Nm' if record.motion == 'deg' else 'force_N'] = record.force
     return columns
 
 

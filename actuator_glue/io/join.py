@@ -131,6 +131,11 @@ def join(
         source = f'{source} ({made.name()})'
     how = 'held' if held else 'straight between its samples'
     warn(f'{where}: {told}; the command is taken {how} at the times of the response')
+    if command.motion != response.motion:
+        raise InputError(
+            f'{where}: the command is in {command.motion} and the response in {response.motion}; '
+            'give a `scale` in a channel map'
+        )
     said = response.stiffness if response.stiffness is not None else command.stiffness
     return Record(
         command=values['command'],
@@ -142,6 +147,7 @@ def join(
         hold=hold or 'linear',
         actuator=response.actuator,
         source=source,
+        motion=response.motion,
     )
 
 

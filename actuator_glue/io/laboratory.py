@@ -16,7 +16,7 @@ from actuator_glue.io.channel_map import Channel, ChannelMap, read_channel_map
 from actuator_glue.io.formats import Column, FileTable, format_of
 from actuator_glue.io.resample import By, resample_evenly
 from actuator_glue.io.signature import refuse_pipe
-from actuator_glue.io.units import FLOAT32_COUNTS, ROLES, choose, factor, recognise
+from actuator_glue.io.units import FLOAT32_COUNTS, ROLES, choose, of_file, recognise
 from actuator_glue.rate_check import APART, disagreement, rate_by_clock
 from actuator_glue.records import Array, Hold, Record
 
@@ -36,6 +36,7 @@ class Channels:
         stiffness: specimen stiffness [N/m]; None where nothing says it.
         hold: how the command runs between its samples; None where nothing says it.
         actuator: its name.
+        motion: what command and measured are in: metres, or another motion.
     """
 
     values: dict[str, Array]
@@ -44,6 +45,7 @@ class Channels:
     stiffness: float | None
     hold: str | None
     actuator: str
+    motion: str
 
 
 def read(
@@ -106,6 +108,7 @@ def read(
         hold=chosen,
         actuator=actuator or found.actuator,
         source=source,
+        motion=found.motion,
     )
 
 
@@ -136,9 +139,15 @@ def channels_of(
     if channels is not None:
         values, period, start_ns = _mapped(path, channels, needed)
         return Channels(
-            values, period, start_ns, channels.stiffness, channels.hold, channels.actuator
+            values,
+            period,
+            start_ns,
+            channels.stiffness,
+            channels.hold,
+            channels.actuator,
+            channels.motion,
         )
-    values, notes, period, start_ns = _by_name(path, needed)
+    values, notes, period, start_ns, motion = _by_name(path, needed)
     return Channels(
         values,
         period,
@@ -146,6 +155,7 @@ def channels_of(
         _noted_stiffness(notes, path),
         notes.get('hold'),
         notes.get('actuator', 'actuator'),
+        motion,
     )
 
 
@@ -159,8 +169,8 @@ def _noted_stiffness(notes: dict[str, str], path: Path) -> float | None:
 
 def _by_name(
     path: Path, needed: tuple[str, ...]
-) -> tuple[dict[str, Array], dict[str, str], float | None, int]:
-    """Return channels in SI units by the names of their columns, notes, period and start [ns].
+) -> tuple[dict[str, Array], dict[str, str], float | None, int, str]:
+    """Return channels in SI units by their names, notes, period, start [ns] and motion.
 
     There is no period where times say it.
     """
@@ -168,7 +178,7 @@ def _by_name(
     labels, units = [c.label for c in table.columns], [c.unit for c in table.columns]
     if table.period is not None:
         needed = tuple(role for role in needed if role != 'time')
-    columns = choose(labels, units, str(path), needed)
+    columns, motion = choose(labels, units, str(path), needed)
     raw = table.values([at for at, _ in columns.values()])
     _check_numbers(raw, {role: at for role, (at, _) in columns.items()}, table, path)
     scales = [scale for _, scale in columns.values()]
@@ -178,7 +188,7 @@ def _by_name(
         }
     notes, period, start_ns = table.notes, table.period, table.start_ns
     del raw, table  # a long file's columns as they were read are not held beside these
-    return values, notes, None if 'time' in values else period, start_ns
+    return values, notes, None if 'time' in values else period, start_ns, motion
 
 
 def _mapped(
@@ -264,7 +274,7 @@ def in_si(
         column = raw[role] * channel.scale + channel.offset
         if channel.remove_rest_offset:
             column = column - _rest_offset(column, channels.rest_samples, where, role)
-        values[role] = column * factor(role, channel.unit, where)
+        values[role] = column * of_file(role, channel.unit, where)
     return values
 
 

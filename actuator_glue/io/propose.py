@@ -10,7 +10,8 @@ import numpy as np
 
 from actuator_glue.even_times import uneven
 from actuator_glue.io.look import ColumnLook, FileLook
-from actuator_glue.io.units import ANGLES, OF_NO_LENGTH, ROLES
+from actuator_glue.io.units import OF_NO_LENGTH, ROLES
+from actuator_glue.motion import MOTIONS
 from actuator_glue.records import SLOWEST_RATE, Array
 from actuator_glue.velocity_command import is_velocity
 
@@ -78,14 +79,7 @@ class ProposedMap:
         """Whether command and measured were found, both lengths, and times or a rate."""
         timed = 'time' in self.channels or self.rate is not None
         found = {'command', 'measured'} <= set(self.channels)
-        return found and timed and not self.angles and self.integrated is None
-
-    @property
-    def angles(self) -> dict[str, Guess]:
-        """Command and measured where they are angles, of which no length is made silently."""
-        return {
-            role: guess for role, guess in self.channels.items() if guess.column.unit in ANGLES
-        }
+        return found and timed and self.integrated is None
 
 
 def propose(found: FileLook, given: float | None = None) -> ProposedMap:
@@ -185,11 +179,21 @@ def _guess(column: ColumnLook, role: str, reasons: tuple[str, ...]) -> Guess:
         likeliest = next((u for u in ('s', 'ms', 'us') if pace * ROLES['time'][u] <= 1.0), 'ns')
     if not column.unit:
         said = 'the file states none, and a scale may be needed'
-    elif column.unit in ANGLES:
-        said = f'{column.unit!r} is an angle: give mm per {column.unit} as `scale`'
     else:
         said = f'the file says {column.unit!r}: give {likeliest} per {column.unit} as `scale`'
     return Guess(column, likeliest, reasons, (f'unit: {said}',))
+
+
+def _in_motion(guess: Guess, other: ColumnLook) -> Guess:
+    """Return a guess in the unit of its motion, where the other channel moves in that as well."""
+    own, motion = guess.column.unit, MOTIONS.get(other.unit, ('', 0.0))[0]
+    if motion and not own:
+        doubt = f'unit: the file states none; taken as that of {_name(other)}'
+        return replace(guess, unit=other.unit, unsure=(doubt,))
+    if motion and MOTIONS.get(own, ('', 0.0))[0] == motion:
+        reason = f'in {own}, which is kept; mm per {own} as `scale` makes a length of it'
+        return replace(guess, unit=own, reasons=(*guess.reasons, reason), unsure=())
+    return guess
 
 
 def _may_be(column: ColumnLook, role: str) -> bool:
@@ -257,6 +261,7 @@ def _pair(
     ):
         called = any(column is c for c in named[role])
         guess = _guess(column, role, (f'called {column.label.strip()!r}' if called else reason,))
+        guess = _in_motion(guess, second if column is first else first)
         doubts = []
         if not called:
             doubts.append('role: told by what the channel does, not by its name')

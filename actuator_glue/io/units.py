@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 
 from actuator_glue.errors import InputError
+from actuator_glue.motion import METRES, MOTIONS, TORQUES
 from actuator_glue.si import FORCE, LENGTH
 
 _TIME = {'s': 1.0, 'ms': 1e-3, 'us': 1e-6, 'ns': 1e-9, 'µs': 1e-6, 'μs': 1e-6}
@@ -21,7 +22,7 @@ ROLES: dict[str, dict[str, float]] = {
 # A float32 has no whole number between this one and the next but one.
 FLOAT32_COUNTS = 1 << 24
 EXAMPLE = 'time_s,command_mm,measured_mm,force_N'
-ANGLES = frozenset(('deg', '°', 'degree', 'degrees', 'rad', 'mrad', 'rev', 'turn', 'turns'))
+ANGLES = frozenset(unit for unit, (motion, _) in MOTIONS.items() if motion == 'deg')
 # Units of other quantities, so that one which is written is known to be a unit.
 _RAW = frozenset(('V', 'mV', 'volt', 'volts', 'mA', '%', 'count', 'counts', 'cnt', 'inc'))
 _OTHERS = frozenset(('bar', 'mbar', 'Pa', 'kPa', 'MPa', 'psi', 'Nm', 'kNm', 'l/min', '°C', 'degC'))
@@ -42,6 +43,7 @@ _NAME = re.compile(
     re.IGNORECASE,
 )
 _BRACKETS = re.compile(r'[\[({<]\s*([^\[\](){}<>]*?)\s*[\])}>]')
+_MOVING = ('command', 'measured')
 _BETWEEN = re.compile(r'[\s_,;:\[\](){}<>]+')
 _KNOWN = ANGLES.union(_RAW, _OTHERS, *ROLES.values())
 _LOWER = {unit.lower() for unit in _KNOWN}
@@ -81,6 +83,47 @@ def factor(role: str, unit: str | None, where: str) -> float:
             'matter), or give the factor to one as `scale` in a channel map'
         )
     return known[unit]
+
+
+def of_file(role: str, unit: str | None, where: str) -> float:
+    """Return the factor from a unit of a file to SI, or to what stands for it in a record.
+
+    Raises:
+        InputError: as `factor`; what a motion or a torque is measured in is taken.
+    """
+    if role in _MOVING and unit in MOTIONS:
+        return MOTIONS[unit][1]
+    if role == 'force' and unit in TORQUES:
+        return TORQUES[unit]
+    return factor(role, unit, where)
+
+
+def common_motion(units: dict[str, str], where: str) -> str:
+    """Return what command and measured are in: metres, or another motion that both are.
+
+    Args:
+        units: by role, as `of_file` takes them.
+        where: file, for messages.
+
+    Raises:
+        InputError: two that differ, or a torque where nothing turns.
+    """
+    found = {r: MOTIONS.get(units[r], (METRES, 1.0))[0] for r in _MOVING}
+    first = found['command']
+    if len(set(found.values())) > 1:
+        role = next(r for r, motion in found.items() if motion != METRES)
+        other = 'measured' if role == 'command' else 'command'
+        raise InputError(
+            f'{where}: {role} has unit {units[role]!r}, which is none of displacement, and '
+            f'{other} is in {units[other]}: give {units[other]} per {units[role]} as `scale` in a '
+            'channel map'
+        )
+    if units.get('force') in TORQUES and first != MOTIONS['deg'][0]:
+        raise InputError(
+            f'{where}: force is a torque ({units["force"]}), and the motion is no angle; give N '
+            f'per {units["force"]} as `scale` in a channel map'
+        )
+    return first
 
 
 def recognise(name: str) -> tuple[str, str] | None:
@@ -140,8 +183,8 @@ def _is_number(text: str) -> bool:
 
 def choose(
     names: list[str], units: list[str], where: str, needed: tuple[str, ...]
-) -> dict[str, tuple[int, float]]:
-    """Return position and factor to SI of every column that has a role.
+) -> tuple[dict[str, tuple[int, float]], str]:
+    """Return position and factor to SI of every column that has a role, and their motion.
 
     Args:
         names: column names, unit included.
@@ -153,6 +196,7 @@ def choose(
         InputError: a unit is missing or unknown, a role is there twice or a needed one not.
     """
     found: dict[str, tuple[int, float]] = {}
+    written: dict[str, str] = {}
     for position, (name, stated) in enumerate(zip(names, units, strict=True)):
         recognised = recognise(name)
         if recognised is None:
@@ -160,7 +204,9 @@ def choose(
         role, unit = recognised
         if role in found:
             raise InputError(f'{where}: two columns are called {role}; keep one')
-        found[role] = (position, factor(role, unit or stated, f'{where}: column {name.strip()!r}'))
+        written[role] = unit or stated
+        place = f'{where}: column {name.strip()!r}'
+        found[role] = (position, of_file(role, written[role], place))
     for role in needed:
         if role not in found:
             raise InputError(
@@ -168,4 +214,6 @@ def choose(
                 f'{", ".join(n.strip() for n in names)}. Name them as in {EXAMPLE}, or describe '
                 'the file with --channels MAP.yaml, which `actuator-glue map` proposes'
             )
-    return found
+    if not {'command', 'measured'} <= set(found):  # a part of a test
+        return found, MOTIONS.get(''.join(written.get(r, '') for r in _MOVING), (METRES, 1.0))[0]
+    return found, common_motion(written, where)

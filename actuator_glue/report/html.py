@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from actuator_glue import __version__
 from actuator_glue.errors import InputError
+from actuator_glue.motion import spoken
 from actuator_glue.report.style import data_uri
 
 TEMPLATES = Path(__file__).with_name('templates')
@@ -98,7 +99,7 @@ def _template(name: str) -> Template:
 
 def fragment(blocks: Sequence[Block]) -> str:
     """Return blocks as HTML without a page around them, for notebooks."""
-    return _template('fragment').render(blocks=blocks)
+    return spoken(_template('fragment').render(blocks=blocks))
 
 
 def render(page: Page) -> str:
@@ -111,7 +112,7 @@ def render(page: Page) -> str:
         for block in section.blocks:
             if isinstance(block, Table) and any(len(r) != len(block.header) for r in block.rows):
                 raise ValueError(f'table {block.caption!r}: a row is not as long as the header')
-    return _template('report').render(**page._asdict(), version=__version__)
+    return spoken(_template('report').render(**page._asdict(), version=__version__))
 
 
 def write(path: Path, page: Page) -> Path:

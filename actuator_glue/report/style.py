@@ -13,9 +13,11 @@ from typing import ParamSpec, TypeVar
 import matplotlib.style
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from numpy.typing import ArrayLike
 
 from actuator_glue.errors import printable
+from actuator_glue.motion import spoken
 
 P = ParamSpec('P')
 R = TypeVar('R')
@@ -101,6 +103,13 @@ def new_figure(height: float, width: float = WIDTH) -> Figure:
     return Drawing(figsize=(width, height), layout='constrained')
 
 
+def _speak(figure: Figure) -> None:
+    """Say sizes in the units of the motion that is spoken of."""
+    for text in figure.findobj(Text):
+        if (told := spoken(text.get_text())) != text.get_text():
+            text.set_text(told)
+
+
 @styled
 def save(figure: Figure, path: Path) -> Path:
     """Write a figure to a file, its format taken from the suffix (png, svg, pdf); return the path.
@@ -109,6 +118,7 @@ def save(figure: Figure, path: Path) -> Path:
         OSError: the file cannot be written.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
+    _speak(figure)
     figure.savefig(path)
     return path
 
@@ -117,6 +127,7 @@ def save(figure: Figure, path: Path) -> Path:
 def png(figure: Figure) -> bytes:
     """Return a figure as a PNG image."""
     buffer = io.BytesIO()
+    _speak(figure)
     figure.savefig(buffer, format='png')
     return buffer.getvalue()
 

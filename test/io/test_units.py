@@ -11,6 +11,7 @@ from actuator_glue.io.channel_map import parse_channel_map
 from actuator_glue.io.laboratory import read
 from actuator_glue.io.look import look
 from actuator_glue.io.units import recognise, written_unit
+from actuator_glue.motion import MOTIONS
 
 COUNT = 1000
 TIME = np.arange(COUNT) * 1e-3
@@ -63,25 +64,25 @@ def test_a_unit_is_seen_where_it_is_written(name: str, unit: str) -> None:
     assert written_unit(name) == unit
 
 
-@pytest.mark.parametrize('unit', ['deg', 'rad', '°', 'mrad'])
-def test_an_angle_is_never_a_length(
-    tmp_path: Path, unit: str, capsys: pytest.CaptureFixture[str]
-) -> None:
-    """Refused by name and in a map, not proposed as mm; read with the arm of its lever."""
-    names = ['time_s', f'command_{unit}', f'measured_{unit}']
-    path = table(tmp_path / 'a.csv', names)
-    with pytest.raises(InputError, match=rf'is an angle \({unit}\).*scale'):
-        read(path)
-    with pytest.raises(InputError, match='is an angle'):
-        parse_channel_map({'command': {'column': 2, 'unit': unit}, 'measured': 3}, 'map')
-    assert main(['map', str(path), '--out', str(tmp_path / 'map.yaml')]) == 1
-    assert f'is an angle in {unit}' in capsys.readouterr().err
-    assert not (tmp_path / 'map.yaml').exists()
+@pytest.mark.parametrize('unit', ['deg', 'rad', '°', 'mrad', 'counts', 'V', '%'])
+def test_a_motion_of_its_own_is_never_a_length(tmp_path: Path, unit: str) -> None:
+    """Kept by name and in a proposed map, never taken as mm; a length by the arm of a lever."""
+    path = table(tmp_path / 'a.csv', ['time_s', f'command_{unit}', f'measured_{unit}'])
+    motion, inside = MOTIONS[unit]
+    record = read(path)
+    assert record.motion == motion
+    np.testing.assert_allclose(record.command, COMMAND * inside, atol=1e-6 * inside)
+    path = table(tmp_path / 'b.csv', ['t [s]', f'Soll [{unit}]', f'Ist [{unit}]'])
+    assert main(['map', str(path), '--out', str(tmp_path / 'map.yaml')]) == 0
+    mapped = read(path, channels=tmp_path / 'map.yaml')
+    np.testing.assert_array_equal(mapped.measured, record.measured)
+    assert mapped.motion == motion
     described = {'time': {'column': 1, 'unit': 's'}}
     for role, column in (('command', 2), ('measured', 3)):
         described[role] = {'column': column, 'unit': 'mm', 'scale': 4.0}
     record = read(path, channels=parse_channel_map(described, 'map'))
     np.testing.assert_allclose(record.command, COMMAND * 4e-3, atol=1e-8)
+    assert record.motion == 'm'
 
 
 def test_a_unit_of_something_else_is_named(

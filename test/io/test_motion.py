@@ -1,0 +1,141 @@
+"""Records that move in degrees, counts or volts: kept, spoken, and never mixed with metres."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+import actuator_glue as ag
+from actuator_glue.cli.main import main
+from actuator_glue.errors import InputError
+from actuator_glue.io.bag_records import write_record
+from actuator_glue.io.bag_writer import BagWriter
+from actuator_glue.io.export import write
+from actuator_glue.motion import speaking, spoken
+from actuator_glue.records import Record
+from actuator_glue.report.style import png
+
+RATE, COUNT = 200.0, 2000
+TIME = np.arange(COUNT) / RATE
+COMMAND = 2e-3 * np.sin(0.3 * TIME**2)
+MEASURED = np.roll(COMMAND, 3)
+
+
+def record(motion: str = 'deg', **more) -> Record:
+    """Return a test of 2 degrees, 2 volts, 2000 counts."""
+    return Record(COMMAND, MEASURED, 1.0 / RATE, 0.0, motion=motion, **more)
+
+
+@pytest.mark.parametrize(
+    ('text', 'told'),
+    [
+        ('held-out error 36.2 -> 10.0 um', 'held-out error 36.2 -> 10.0 mdeg'),
+        ('rms [um]', 'rms [mdeg]'),
+        ('TI at the end mm^2', 'TI at the end deg^2'),
+        ('N/(m s^2)', 'Nm/(kdeg s^2)'),
+        ('alpha_2 N/m', 'alpha_2 Nm/kdeg'),
+        ('41 um (40.2 to 41.9)', '41 mdeg (40.2 to 41.9)'),
+        ('velocity [mm/s]', 'velocity [deg/s]'),
+        ('beyond 10 m; 3 kN', 'beyond 10 kdeg; 3 kNm'),
+        ('<td>um</td><td>m</td>', '<td>mdeg</td><td>kdeg</td>'),
+        ('m', 'kdeg'),
+        (r'residual [um/$\sqrt{\mathrm{Hz}}$]', r'residual [mdeg/$\sqrt{\mathrm{Hz}}$]'),
+        ('/data/m/mm/um.csv: command_mm of test mm.csv, --noise-mm', ''),
+        ('a hold m. of A/m/b, 2 min, 3 ms, 5 N.m', ''),
+    ],
+)
+def test_sizes_are_said_in_the_unit_of_the_motion(text: str, told: str) -> None:
+    """Wherever they stand; paths, names and other units are left alone, and metres are metres."""
+    assert spoken(text, 'deg') == (told or text)
+    assert spoken(text) == spoken(text, 'm') == text
+    with speaking('deg'):
+        assert spoken(text) == (told or text)
+
+
+def test_figures_speak_it() -> None:
+    """Labels of axes, as the figure is drawn."""
+    with mpl.rc_context():
+        figure = Figure()
+        axes = figure.add_subplot()
+        axes.set_ylabel('residual [um]')
+        png(figure)
+        assert axes.get_ylabel() == 'residual [um]'
+        with speaking('V'):
+            png(figure)
+    assert axes.get_ylabel() == 'residual [mV]'
+
+
+@pytest.mark.parametrize('suffix', ['.csv', '.mat', '.h5', '.parquet'])
+@pytest.mark.parametrize('motion', ['deg', 'counts', 'V', 'mA', '%'])
+def test_files_keep_it(tmp_path: Path, motion: str, suffix: str) -> None:
+    """Written in its unit and read back the same."""
+    write(tmp_path / f'a{suffix}', record(motion))
+    back = ag.load(tmp_path / f'a{suffix}')
+    assert back.motion == motion
+    np.testing.assert_allclose(back.command, COMMAND, rtol=1e-12, atol=1e-18)
+    assert repr(back).endswith(f'zoh, in {motion})')
+
+
+def test_commands_speak_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Ranges, limits and refusals; the next command is in metres again."""
+    write(tmp_path / 'a.csv', record('counts', force=np.ones(COUNT)))
+    assert main(['info', str(tmp_path / 'a.csv'), '--json', str(tmp_path / 'a.json')]) == 0
+    shown = capsys.readouterr().out
+    assert '2 kcounts' in shown
+    assert ' mm' not in shown
+    told = json.loads((tmp_path / 'a.json').read_text())['files'][0]['records'][0]
+    assert told['motion'] == 'counts'
+    write(tmp_path / 'b.csv', replace(record('m'), stiffness=250e3))
+    assert main(['info', str(tmp_path / 'b.csv')]) == 0
+    assert '2 mm' in capsys.readouterr().out
+    far = Record(1e3 * COMMAND, 1e3 * MEASURED, 1.0 / RATE, 0.0, motion='deg')
+    write(tmp_path / 'c.csv', far)
+    assert main(['info', str(tmp_path / 'c.csv')]) == 2
+    assert 'command moves over 4 kdeg, and 2 kdeg are the most' in capsys.readouterr().err
+
+
+def test_what_metres_alone_can_have_is_refused(tmp_path: Path) -> None:
+    """A stiffness in N/m, a bag, tests of two motions together, channels of two, a torque."""
+    with pytest.raises(InputError, match='the motion is in deg: give 0'):
+        replace(record(), stiffness=250e3)
+    with pytest.raises(InputError, match="motion 'furlong' is unknown"):
+        record('furlong')
+    with BagWriter(tmp_path / 'bag') as bag, pytest.raises(InputError, match='are in metres'):
+        write_record(bag, record())
+    with pytest.raises(InputError, match='one moves in deg and another in m;'):
+        ag.calibrate([record(), replace(record('m'), command=-COMMAND)])
+    head = 'time_s,{},{}{}\n' + '\n'.join(f'{i * 0.01},{i % 7},{i % 5},0' for i in range(99))
+    for names, said in (
+        (('command_deg', 'measured_mm', ',x'), 'command has unit .deg.*mm per deg'),
+        (('command_mm', 'measured_V', ',x'), "measured has unit 'V'.*mm per V"),
+        (('command_deg', 'measured_counts', ',x'), 'counts per deg'),
+        (('command_mm', 'measured_mm', ',force_Nm'), 'a torque'),
+    ):
+        (tmp_path / 'a.csv').write_text(head.format(*names))
+        with pytest.raises(InputError, match=said):
+            ag.load(tmp_path / 'a.csv')
+    (tmp_path / 'a.csv').write_text(head.format('command_rad', 'measured_deg', ',force_kNm'))
+    assert ag.load(tmp_path / 'a.csv').motion == 'deg'
+
+
+def test_arrays_may_be_angles() -> None:
+    """As they may be millimetres."""
+    made = Record.from_arrays(TIME, np.radians(1e3 * COMMAND), MEASURED, unit='rad')
+    assert made.motion == 'deg'
+    np.testing.assert_allclose(made.command, COMMAND, atol=1e-15)
+
+
+def test_a_calibration_speaks_it() -> None:
+    """The same numbers as in metres, with other units; kept where it is saved."""
+    test = ag.simulate(ag.Command(rate=RATE, duration=10.0), stiffness=0.0, seed=3)
+    options = {'evaluations': 12_000, 'seed': 5}
+    plain = ag.calibrate(test, **options)
+    turned = ag.calibrate(replace(test, motion='deg'), **options)
+    np.testing.assert_array_equal(plain.draws, turned.draws)
+    assert turned.motion == 'deg'
+    assert ' mm' in repr(plain)
+    assert repr(turned) == spoken(repr(plain), 'deg') != repr(plain)
