@@ -60,8 +60,13 @@ def numbers(found: ActuatorHistory, columns: Sequence[tuple[str, str, float]]) -
             )
             _bars(axes, days, middle, low, high)
         else:
-            axes.plot(days, factor * table[name].to_numpy(dtype=np.float64), '.', ms=3,
-                      color=style.MEASURED)  # fmt: skip
+            axes.plot(
+                days,
+                factor * table[name].to_numpy(dtype=np.float64),
+                '.',
+                ms=3,
+                color=style.MEASURED,
+            )
         axes.set_ylabel(label)
         _marks(axes, found)
     _dates(rows[-1])

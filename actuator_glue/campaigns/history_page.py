@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 import os
+from html import escape
 from pathlib import Path
+from typing import NamedTuple
+from urllib.parse import quote
 
 import numpy as np
-from markupsafe import Markup, escape
 
 from actuator_glue.campaigns import history_figures as figures
 from actuator_glue.campaigns.actuator_history import ActuatorHistory
@@ -145,10 +147,12 @@ def _check(found: ActuatorHistory) -> list[Block]:
     if found.changes:
         last = found.changes[-1]
         blocks += [
-            Note(f'Since {last.day}, {word(n)} is another one: look at {_LOOK_AT[n]}. If this was '
-                 'a repair, all is well.')
+            Note(
+                f'Since {last.day}, {word(n)} is another one: look at {_LOOK_AT[n]}. If this was '
+                'a repair, all is well.'
+            )
             for n in last.moved
-        ]  # fmt: skip
+        ]
     blocks += [
         Note(
             f'{e.name} is there since {e.spells[-1].begin}'
@@ -161,9 +165,11 @@ def _check(found: ActuatorHistory) -> list[Block]:
     failed = found.table[found.table['failure'] != '']
     if len(failed):
         blocks.append(
-            Note(f'{len(failed)} of {len(found.table)} tests could not be used; the last section '
-                 'lists them.')
-        )  # fmt: skip
+            Note(
+                f'{len(failed)} of {len(found.table)} tests could not be used; the last section '
+                'lists them.'
+            )
+        )
     return blocks or [Text('Nothing beyond the usual.')]
 
 
@@ -230,12 +236,17 @@ def _look(found: ActuatorHistory, folder: Path) -> list[Block]:
     return blocks
 
 
-def _link(campaign: Path, report: str, folder: Path) -> Markup | str:
-    if not report:
-        return '-'
-    return Markup('<a href="{}">report</a>').format(
-        escape(Path(os.path.relpath(campaign / report, folder)).as_posix())
-    )
+class _Link(NamedTuple):
+    """A link in a cell of a table; templates take its HTML as it is."""
+
+    target: str
+
+    def __html__(self) -> str:
+        return f'<a href="{escape(quote(self.target))}">report</a>'
+
+
+def _link(campaign: Path, report: str, folder: Path) -> _Link | str:
+    return _Link(Path(os.path.relpath(campaign / report, folder)).as_posix()) if report else '-'
 
 
 def _words(found: ActuatorHistory) -> list[Block]:

@@ -15,8 +15,14 @@ BROKEN = ('cut', 'gap', 'dead', 'garbage', 'empty')
 def _csv(path: Path, u: Array, x: Array) -> None:
     t = np.arange(len(u)) / RATE
     table = np.column_stack([t, 1e3 * u, 1e3 * x])
-    np.savetxt(path, table, delimiter=',', header='time_s,command_mm,measured_mm', comments='',
-               fmt=('%.4f', '%.7f', '%.7f'))  # fmt: skip
+    np.savetxt(
+        path,
+        table,
+        delimiter=',',
+        header='time_s,command_mm,measured_mm',
+        comments='',
+        fmt=('%.4f', '%.7f', '%.7f'),
+    )
 
 
 def _controller(path: Path, u: Array, x: Array) -> None:
@@ -37,8 +43,10 @@ def _hdf5(path: Path, u: Array, x: Array) -> None:
 
     with h5py.File(path, 'w') as file:
         for name, column in (
-            ('time_s', np.arange(len(u)) / RATE), ('command_m', u), ('measured_m', x)
-        ):  # fmt: skip
+            ('time_s', np.arange(len(u)) / RATE),
+            ('command_m', u),
+            ('measured_m', x),
+        ):
             file[name] = column
 
 
@@ -79,8 +87,14 @@ LOGGERS = {
 }
 
 
-def break_file(path: Path, kind: str, write: Callable[[Path, Array, Array], None], u: Array,
-               x: Array, rng: np.random.Generator) -> None:  # fmt: skip
+def break_file(
+    path: Path,
+    kind: str,
+    write: Callable[[Path, Array, Array], None],
+    u: Array,
+    x: Array,
+    rng: np.random.Generator,
+) -> None:
     """Write a file of which nothing can be made: cut off, with a gap, dead, garbage, empty."""
     if kind == 'gap':  # a channel without numbers
         x = x.copy()

@@ -79,9 +79,10 @@ def _told(table: Any, group: str) -> bool:
     one = row.iloc[0]
     problems = one.get('problems')
     return bool(
-        one['failure'] or (isinstance(problems, str) and problems)
+        one['failure']
+        or (isinstance(problems, str) and problems)
         or one['verdict'] not in ('none', 'missing-effect')
-    )  # fmt: skip
+    )
 
 
 def _share(inside: list[list[bool]]) -> Json:
@@ -219,17 +220,23 @@ def text(scores: Json, how: Json) -> str:
         ('broken files told', 'all', f'{scores["broken_told"]} of {scores["broken_files"]}'),
         ('groups without a broken file that failed', '0', str(scores['sound_groups_failed'])),
         ('changes found within a week', 'all', f'{c["within_a_week"]} of {c["events"]}'),
-        ('false changes per actuator-year', '<= 1',
-         f'{c["false_per_actuator_year"]:.2f} in {c["actuator_years"]:.1f} years'),
+        (
+            'false changes per actuator-year',
+            '<= 1',
+            f'{c["false_per_actuator_year"]:.2f} in {c["actuator_years"]:.1f} years',
+        ),
         ('95 % intervals of single tests', '-', percent(scores['test_intervals'])),
         ('95 % pooled intervals', '92 to 98 %', percent(scores['pooled_intervals'])),
         ('95 % intervals of the next test', '92 to 98 %', percent(scores['next_test'])),
         ('the same after calibrating with the prior', '-', percent(p['intervals'])),
-        ('narrower with the prior, free and clamped', 'stated',
-         factors(p['narrower_two_stiffnesses'])),
+        (
+            'narrower with the prior, free and clamped',
+            'stated',
+            factors(p['narrower_two_stiffnesses']),
+        ),
         ('narrower with the prior, one test', 'stated', factors(p['narrower_one_stiffness'])),
         ('days with an effect: named', '-', f'{e["named"]} of {e["there"]}'),
         ('days without: an effect named', '-', f'{e["false"]} of {e["absent"]}'),
-    ]  # fmt: skip
+    ]
     lines = [' | '.join(row) for row in (('', 'required', 'measured'), ('---',) * 3, *rows)]
     return '\n'.join(f'| {line} |' for line in lines) + '\n'

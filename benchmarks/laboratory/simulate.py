@@ -18,7 +18,7 @@ from benchmarks.laboratory.machines import (
     Machine,
     command,
     measured,
-)  # fmt: skip
+)
 
 BEGIN = datetime(2024, 1, 8, 9)
 # 2000 records of four machines, two a day of test: 250 days in two years.

@@ -55,17 +55,31 @@ def main() -> int:
     place = args.out / 'scheduler.json'
     place.unlink(missing_ok=True)
     scheduler = start(
-        'distributed.cli.dask_scheduler', '--scheduler-file', place, '--host', '127.0.0.1',
-        '--port', '0', '--no-dashboard',
-    )  # fmt: skip
+        'distributed.cli.dask_scheduler',
+        '--scheduler-file',
+        place,
+        '--host',
+        '127.0.0.1',
+        '--port',
+        '0',
+        '--no-dashboard',
+    )
     while not (place.exists() and place.read_text('utf-8').endswith('}')):
         time.sleep(0.1)
     address = json.loads(place.read_text('utf-8'))['address']
     workers = [
-        start('distributed.cli.dask_worker', address, '--nthreads', '1', '--no-dashboard',
-              '--no-nanny', '--host', '127.0.0.1')
+        start(
+            'distributed.cli.dask_worker',
+            address,
+            '--nthreads',
+            '1',
+            '--no-dashboard',
+            '--no-nanny',
+            '--host',
+            '127.0.0.1',
+        )
         for _ in range(args.workers)
-    ]  # fmt: skip
+    ]
     samples: list[dict[str, float]] = []
     began = time.perf_counter()
 
@@ -76,9 +90,12 @@ def main() -> int:
 
     try:
         ag.campaign(
-            args.out / 'records', args.out / 'out', scheduler=address, progress=look,
+            args.out / 'records',
+            args.out / 'out',
+            scheduler=address,
+            progress=look,
             analysis='benchmarks.laboratory.tiny_tasks:nothing',
-        )  # fmt: skip
+        )
     finally:
         for process in (*workers, scheduler):
             process.terminate()

@@ -1,6 +1,7 @@
 """What many tests say together: changes, levels, the next test, and what a page tells of it."""
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -96,9 +97,14 @@ def test_scatter_of_days_is_told(found: ActuatorHistory) -> None:
 
 def test_a_test_far_off_is_an_outlier(tmp_path: Path) -> None:
     """It alone; a test that is not explained is one as well, and tells no level."""
-    write_table(tmp_path, seed=5, days=40, jump=(39, (0.2, 0.0, 0.0, 0.0)), verdict=[
-        'unexplained' if i == 20 else 'none' for i in range(40)
-    ], report=['reports/odd.html' if i == 20 else None for i in range(40)])  # fmt: skip
+    write_table(
+        tmp_path,
+        seed=5,
+        days=40,
+        jump=(39, (0.2, 0.0, 0.0, 0.0)),
+        verdict=['unexplained' if i == 20 else 'none' for i in range(40)],
+        report=['reports/odd.html' if i == 20 else None for i in range(40)],
+    )
     far = history(tmp_path, 'north')
     assert [(o.group, o.report) for o in far.outliers] == [
         ('north/2025-03-02', 'reports/odd.html'),
@@ -113,9 +119,11 @@ def test_its_next_test_is_a_prior(found: ActuatorHistory, tmp_path: Path) -> Non
     """Written, read by `calibrate`, told there, and narrower intervals with it."""
     path = found.prior.save(tmp_path / 'north.npz')
     record = ag.simulate(
-        ag.Command(rate=100.0, duration=8.0), stiffness=250e3, seed=4,
+        ag.Command(rate=100.0, duration=8.0),
+        stiffness=250e3,
+        seed=4,
         theta=np.median(found.pooled.next_draws, axis=0),
-    )  # fmt: skip
+    )
     alone = ag.calibrate(record, evaluations=8000, seed=1)
     with_it = ag.calibrate(record, evaluations=8000, seed=1, prior=path)
     assert with_it.prior is not None and not with_it.prior.contradicted
@@ -158,6 +166,9 @@ def test_a_page_and_a_prior_for_each_actuator(
     text = (pages / 'north.html').read_text('utf-8')
     assert 'look at the servo-valve' in text
     assert 'backlash is there since 2025-06-21' in text
+    link = re.search(r'<a href="([^"]*)">report</a>', text)
+    assert link is not None
+    assert (pages / link[1]).resolve() == (repaired / 'reports' / 'x.html').resolve()
     assert 'Nothing points to a repair' in (pages / 'south.html').read_text('utf-8')
     told = json.loads((tmp_path / 'h.json').read_text('utf-8'))['actuators']
     assert [a['actuator'] for a in told] == ['north', 'south']

@@ -45,9 +45,16 @@ def scheduler(start: Start, tmp_path: Path) -> str:
     """Address of a scheduler in a process of its own."""
     place = tmp_path / 'scheduler.json'
     start(
-        '-m', 'distributed.cli.dask_scheduler', '--scheduler-file', place,
-        '--host', '127.0.0.1', '--port', '0', '--no-dashboard',
-    )  # fmt: skip
+        '-m',
+        'distributed.cli.dask_scheduler',
+        '--scheduler-file',
+        place,
+        '--host',
+        '127.0.0.1',
+        '--port',
+        '0',
+        '--no-dashboard',
+    )
     until(lambda: place.exists() and place.read_text('utf-8').endswith('}'))
     return str(json.loads(place.read_text('utf-8'))['address'])
 
@@ -63,9 +70,16 @@ def until(true: Callable[[], bool], seconds: float = 60.0) -> None:
 def add_worker(start: Start, scheduler: str) -> subprocess.Popen[str]:
     """Start a worker without a nanny: what ends is gone."""
     return start(
-        '-m', 'distributed.cli.dask_worker', scheduler, '--no-nanny', '--nthreads', '1',
-        '--no-dashboard', '--host', '127.0.0.1',
-    )  # fmt: skip
+        '-m',
+        'distributed.cli.dask_worker',
+        scheduler,
+        '--no-nanny',
+        '--nthreads',
+        '1',
+        '--no-dashboard',
+        '--host',
+        '127.0.0.1',
+    )
 
 
 @pytest.mark.slow
@@ -81,8 +95,11 @@ def test_a_killed_worker_and_a_killed_client_cost_no_row(
         '-c',
         'import sys, actuator_glue as ag\n'
         'ag.campaign(sys.argv[1], sys.argv[2], scheduler=sys.argv[3], analysis=sys.argv[4])',
-        records, out, scheduler, ANALYSIS,
-    )  # fmt: skip
+        records,
+        out,
+        scheduler,
+        ANALYSIS,
+    )
     made = RowFolder(out)
     until(lambda: len(list(made.all())) >= 2)
     client.send_signal(signal.SIGKILL)
@@ -106,8 +123,10 @@ def test_a_killed_worker_and_a_killed_client_cost_no_row(
     assert all(rows[key] == row for key, row in before.items())
     assert found.progress.known >= len(before)
     assert (found.progress.state, found.progress.done, found.progress.failed) == (
-        'finished', 12, 0,
-    )  # fmt: skip
+        'finished',
+        12,
+        0,
+    )
 
 
 @pytest.mark.slow
