@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from actuator_glue.diagnosis.completeness import Decision
+from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.estimate import Estimate, Json
 from actuator_glue.diagnosis.held_out import HeldOutError
 from actuator_glue.diagnosis.homogeneity import Homogeneity
@@ -32,6 +33,16 @@ def _where(row: Json) -> str:
         f'{row["source"]}: the rest sits at {band}, displacements of '
         f'{1e3 * x[0]:.2g} to {1e3 * x[1]:.2g} mm and {t[0]:g} to {t[1]:g} s '
         f'(middle 80 %), {100 * row["share_at_low_velocity"]:.0f} % of it in the slow half'
+    )
+
+
+def ended(effort: Effort) -> tuple[str, ...]:
+    """Say that a search ended before it had tried all that it promised itself something of."""
+    if not effort.over:
+        return ()
+    return (
+        f'the search ended at its effort, {effort.spent / 1e6:.0f} million sub-steps: what was '
+        'known by then is told, and more effort (`--effort 3`) may replace it or add to it',
     )
 
 

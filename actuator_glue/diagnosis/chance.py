@@ -96,7 +96,8 @@ def without(
             continue
         lost, best = found
         known = {frozenset([rich.name]): best}
-        again = Search(_counted(search.data, lost), search.names, search.each, _tried=known)
+        fewer, effort = _counted(search.data, lost), search.effort
+        again = Search(fewer, search.names, search.each, effort=effort, _tried=known)
         if fixed:
             return prepared, again
         model = search.structure(rich.name)

@@ -27,7 +27,9 @@ from actuator_glue.diagnosis import (
     wrong_setup,
 )
 from actuator_glue.diagnosis.detect import alarm_of
+from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.estimate import Estimate
+from actuator_glue.diagnosis.first_look import FirstLook
 from actuator_glue.diagnosis.force import check_forces
 from actuator_glue.diagnosis.held_out import COMPLETE
 from actuator_glue.diagnosis.hold import with_the_right_hold
@@ -52,6 +54,7 @@ from actuator_glue.hygiene.clean import rest_samples
 from actuator_glue.inference.at_bound import Pressed, pressed
 from actuator_glue.inference.least_squares.base_prior import BasePrior
 from actuator_glue.inference.least_squares.each import Each
+from actuator_glue.inference.least_squares.fit import base_fit
 from actuator_glue.inference.least_squares.free_run import Model
 from actuator_glue.inference.least_squares.space import UPPER, Space
 from actuator_glue.inference.prior_use import GivenPrior
@@ -68,6 +71,7 @@ def diagnose(
     seed: int = 0,
     each: Each = map,
     progress: Progress | None = None,
+    first_look: Callable[[FirstLook], None] | None = None,
     settings: Thresholds | None = None,
     clock: Clock | None = None,
     prior: GivenPrior | None = None,
@@ -81,6 +85,7 @@ def diagnose(
         seed: seed of every random step; the same seed gives the same diagnosis.
         each: refits candidates and evaluates draws: `map`, or that of a pool of threads.
         progress: called with (stage, share done in [0, 1]).
+        first_look: called once, seconds after the start, with what Eq. (2) leaves.
         settings: thresholds.
         clock: gives seconds, for the duration reported (NaN without one).
         prior: what an earlier calibration knew of Eq. (2)'s parameters.
@@ -97,12 +102,17 @@ def diagnose(
     if settings.use_force:
         check_forces(records)
     ready = prepare(records, held, known)
-    other = wrong_setup.find(ready.fit, settings)
+    effort = Effort(settings.effort)
+    some = wrong_setup.stretched(ready.fit)
+    given = base_fit(some)
+    if first_look is not None:
+        first_look(FirstLook.of(some, given, settings))
+    other = wrong_setup.find(ready.fit, settings, given=given)
     if other is not None and other.enough:
         # What a wrong set-up leaves is nothing that the actuator does.
         result = as_given(ready, settings, each, tell)
     else:
-        first = conclude(ready, settings, each, tell)
+        first = conclude(ready, settings, each, tell, effort)
         # What acts all the time comes before what appears.
         always = with_the_right_hold(first, settings, each, tell)
         result = since_onset(always, settings, each, tell)
@@ -210,6 +220,7 @@ def diagnose(
             *([used.contradiction()] if used and used.contradicted else []),
             *advice.at_bound(held_at, estimates),
             *([result.onset.sentence()] if result.onset else []),
+            *advice.ended(effort),
             *(term.sentence() for term in learned),
             *advice.of(decision, found, result.generic, stretches, experiments),
             *contradicted,
@@ -250,6 +261,7 @@ def diagnose(
         remaining=decision.remaining,
         seconds=clock() - start if clock else math.nan,
         at_bound=held_at,
+        effort=effort.share,
         preparation=tuple(prepared.told),
         sampling=tuple(
             {

@@ -18,6 +18,8 @@ from actuator_glue.diagnosis.trial import Trial
 
 # Rounds in which members may be swapped for better or simpler ones.
 _SWAPS = 4
+# Where something material remains what swaps mend terms may, too: fewer of both are tried.
+_OPEN, _OPEN_TRIED = 2, 3
 _SURE = 2.0  # standard errors over the blocks: what is less is not told apart
 
 
@@ -81,7 +83,7 @@ class ModelSelection(Judge):
             if self.left(current) < max(threshold, s.left_share * self.first):
                 # Most is explained: small change may only mend the form of what was found.
                 threshold = max(threshold, s.later_share * removed(base, current))
-            if self.left(current) < self.material or stage == s.most:
+            if self.left(current) < self.material or stage == s.most or self.search.effort.over:
                 break
             ranked = self.extend(self.rescored(ranked[: s.beam]), stage + 1)
             if ranked and self.left(current) >= self.material:
@@ -145,14 +147,15 @@ class ModelSelection(Judge):
         for attempt in range(_SWAPS):
             rivals: dict[str, tuple[Rival, ...]] = {}
             best, complete = current, self.left(current) < self.material
+            most = self.settings.tried if complete else _OPEN_TRIED
             for name in current.effects:
                 rest = self.search.without(current, name)
                 names = self.search.others(current)
                 if len(current.effects) > 1:
-                    names = self.search.screened(rest, names)[: self.settings.tried]
+                    names = self.search.screened(rest, names)[:most]
                 below = ranking.left_by_rivals(rest, current)
                 trials = self.search.additions(rest, names, below=below)
-                two = pairs.rivals(self.search, name, trials, self.settings.tried, below, complete)
+                two = pairs.rivals(self.search, name, trials, most, below, complete)
                 rivals[name] = self._rivals(rest, current, name, [*trials, *two])
                 for trial in (*trials, *pairs.ahead(self, current, name, rivals[name], two)):
                     pressed = ranking.pressed_form(self.search, trial, trial.added, name)
@@ -161,7 +164,8 @@ class ModelSelection(Judge):
             if best is current:
                 best = simplest.instead(self, current, rivals, complete)
             # The last members stay, so that the rivals told are theirs.
-            if best is current or attempt == _SWAPS - 1:
+            last = attempt == (_SWAPS if complete else _OPEN) - 1 or self.search.effort.over
+            if best is current or last:
                 break
             # Beside what came others may be worth nothing any more.
             current = self.pruned(best)

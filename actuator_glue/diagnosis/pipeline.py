@@ -23,6 +23,7 @@ from actuator_glue.diagnosis import (
 )
 from actuator_glue.diagnosis.candidates import mean_effects
 from actuator_glue.diagnosis.completeness import Decision, decide
+from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.measured import hum
 from actuator_glue.diagnosis.measured.hum import Line
 from actuator_glue.diagnosis.measured.measurement import Measured
@@ -78,7 +79,12 @@ class Conclusion:
 
 
 def conclude(
-    prepared: Prepared, settings: Thresholds, each: Each, tell: Progress, fixed: bool = False
+    prepared: Prepared,
+    settings: Thresholds,
+    each: Each,
+    tell: Progress,
+    effort: Effort,
+    fixed: bool = False,
 ) -> Conclusion:
     """Search for what the model lacks and decide; nothing looks at the held-out part.
 
@@ -87,7 +93,7 @@ def conclude(
     to be none, they are taken out, or restored, and all is done again.
     """
     tell('base fit', 0.0)
-    prepared, search, line = _begun(prepared, settings, each, fixed)
+    prepared, search, line = _begun(prepared, settings, each, effort, fixed)
     first = _conclude(prepared, search, line, settings, tell)
     final = first.found.final
     clean = cleaned.without_impulses(prepared, final)
@@ -96,23 +102,24 @@ def conclude(
     taken = prepared.fit.target - clean.fit.target
     if not cleaned.swayed(final.fit, first.scorer, taken):
         return first
-    return _conclude(*_begun(clean, settings, each, fixed=True), settings, tell)
+    return _conclude(*_begun(clean, settings, each, effort, fixed=True), settings, tell)
 
 
 def as_given(prepared: Prepared, settings: Thresholds, each: Each, tell: Progress) -> Conclusion:
     """Say what Eq. (2) leaves, and each effect beside it, without any search."""
     tell('base fit', 0.0)
-    prepared, search, line = _begun(prepared, settings, each, fixed=True)
+    prepared, search, line = _begun(prepared, settings, each, Effort(), fixed=True)
     return _searched(prepared, search, line, replace(settings, most=0), tell)
 
 
 def _begun(
-    prepared: Prepared, settings: Thresholds, each: Each, fixed: bool
+    prepared: Prepared, settings: Thresholds, each: Each, effort: Effort, fixed: bool
 ) -> tuple[Prepared, Search, Line | None]:
-    search = Search(prepared.fit, mean_effects(), each)
+    search = Search(prepared.fit, mean_effects(), each, effort=effort)
     line = hum.find(prepared.fit, search.base().error)
     if line is not None:
-        search = Search(hum.without(prepared.fit, line), mean_effects(), each)
+        data = hum.without(prepared.fit, line)
+        search = Search(data, mean_effects(), each, effort=effort)
     return *chance.without(prepared, search, settings, fixed), line
 
 
@@ -124,7 +131,7 @@ def _conclude(
         left = _line_left(prepared.fit, result.found.final)
         if left is None or not left.same_as(line):
             data = prepared.fit if left is None else hum.without(prepared.fit, left)
-            search = Search(data, search.names, search.each)
+            search = Search(data, search.names, search.each, effort=search.effort)
             result = _searched(prepared, search, left, settings, tell)
     fed_back = transducer.in_the_loop(result.selection, result.found)
     if fed_back is not None:
@@ -135,11 +142,14 @@ def _conclude(
     elif result.decision.verdict == 'missing-effect':
         selection = _apart(result.selection)  # forms and their signatures serve all ways
         for way in learning.ways(result.found):
+            if selection.search.effort.over:
+                break
             if other := _complete(result, selection, way(selection, result.found)):
                 return other
-    if result.decision.verdict == 'unexplained' and mean_effects(reserved=True):
+    over = result.selection.search.effort.over
+    if result.decision.verdict == 'unexplained' and mean_effects(reserved=True) and not over:
         result = _with_reserved(prepared, result, settings, tell)
-    if result.decision.verdict != 'unexplained':
+    if result.decision.verdict != 'unexplained' or over:
         return result
     prepared, selection, search = result.prepared, result.selection, result.selection.search
     tell('one record', 0.0)
@@ -209,7 +219,9 @@ def _with_reserved(
     usual, cost = first.selection.search, math.log(len(reserved))
     ways = [(_wider(usual, reserved), first.line)]
     if first.line is not None:
-        ways.insert(0, (Search(prepared.fit, (*usual.names, *reserved), usual.each), None))
+        names = *usual.names, *reserved
+        whole = Search(prepared.fit, names, usual.each, effort=usual.effort)
+        ways.insert(0, (whole, None))
 
     def better(after: Trial, scorer: Scorer) -> bool:
         known = replace(before, scores=scorer.block_scores(before.fit))
@@ -245,7 +257,8 @@ def with_learned_terms(result: Conclusion) -> Conclusion:
     """
     decision, found = result.decision, result.found
     left = decision.verdict == 'unexplained' or decision.left >= found.material
-    if not left or found.final.own is not None:
+    over = result.selection.search.effort.over
+    if over or not left or found.final.own is not None:
         return result
     described = learning.reshaped(result.selection, found)
     if described is None or described.left >= described.material:
@@ -266,7 +279,8 @@ def with_what_matters(result: Conclusion) -> Conclusion:
     says surely more.
     """
     for ask in (companions.that_matter, exchange.exchanged):
-        if result.decision.verdict != 'missing-effect':
+        over = result.selection.search.effort.over
+        if over or result.decision.verdict != 'missing-effect':
             return result
         found = ask(result.selection, result.found)
         result = _complete(result, result.selection, found) or result

@@ -32,6 +32,8 @@ _AT_BOUND = 1e-3
 _NOT_NEAR = 0.1  # of the best's weight: excess beyond the tolerance
 MUCH = 0.5  # of what matters: a description in the place of a name removes so much
 _SAME = 0.5  # of what the best removes: a rival that removes less is none
+# A tie asks for nearly all of it: a rough refit that removes less is not worth the last digits.
+_NEARLY = 0.9
 
 
 def removed(before: Trial, after: Trial) -> float:
@@ -64,8 +66,8 @@ def least_removed(form: str, names: Sequence[str], material: float) -> float:
 
 
 def left_by_rivals(rest: Trial, best: Trial) -> float:
-    """Mean squared error that a rival of what `best` has beyond `rest` leaves at most [m^2]."""
-    return rest.mean_square - _SAME**2 * (rest.mean_square - best.mean_square)
+    """Mean squared error that a rough refit of a rival leaves that is worth finishing [m^2]."""
+    return rest.mean_square - _NEARLY**2 * (rest.mean_square - best.mean_square)
 
 
 def worth(search: Search, final: Trial) -> tuple[dict[str, float], dict[str, float]]:

@@ -98,6 +98,7 @@ class DiagnosisData:
         setup: another set-up of the records that explains them far better than the one given.
         structures: all structures that the search which led to the answer refitted, least error
             left out first.
+        effort: what the search cost, of what it may; it ended early where that is 1 and more.
     """
 
     verdict: Verdict
@@ -129,6 +130,7 @@ class DiagnosisData:
     prior: PriorUse | None = None
     setup: WrongSetup | None = None
     structures: tuple[Row, ...] = ()
+    effort: float = 0.0
     sampler: Json = field(default_factory=dict)
     joint: Array = field(default_factory=lambda: np.empty((0, 0)))
 
@@ -165,6 +167,7 @@ class DiagnosisData:
             'surrogate': self.surrogate,
             'remaining': self.remaining,
             'advice': list(self.advice),
+            'effort': self.effort,
             'seconds': json_value(self.seconds),
             'provenance': self.provenance,
         }

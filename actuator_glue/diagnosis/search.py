@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from actuator_glue.diagnosis import global_search, poles
+from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.screening import screen, signatures
 from actuator_glue.diagnosis.trial import Trial
@@ -51,6 +53,7 @@ class Search:
         each: refits candidates, several at a time if it can (the kernels release the
             interpreter lock).
         described: whether the entries hold the forms of learned terms.
+        effort: what all refits cost.
     """
 
     data: Data
@@ -59,6 +62,7 @@ class Search:
     scorer: Scorer | None = None
     entries: dict[str, Effect] = field(default_factory=lambda: dict(CATALOGUE))
     described: bool = False
+    effort: Effort = field(default_factory=Effort)
     _tried: dict[frozenset[str], Fit] = field(default_factory=dict)
     _signatures: dict[str, tuple[Array, Array]] = field(default_factory=dict)
     _misfit: WeakKeyDictionary[Fit, Scorer] = field(default_factory=WeakKeyDictionary)
@@ -68,7 +72,7 @@ class Search:
     def base(self) -> Fit:
         """Fit Eq. (2)."""
         if frozenset() not in self._tried:
-            self._tried[frozenset()] = base_fit(self.data)
+            self._tried[frozenset()] = self.effort.spent_on(base_fit(self.data))
         return self._tried[frozenset()]
 
     def scale(self) -> Scale:
@@ -112,12 +116,14 @@ class Search:
         key = frozenset(model.effects)
         if key not in self._tried:
             starts, part = self.screen(current, name)[1], self._stand_in(model)
-            found = fit(part.data, model, starts, iterations=_COARSE, tolerance=_TOLERANCE)
+            found = self._fit(part.data, model, starts, iterations=_COARSE, tolerance=_TOLERANCE)
             friction = not current.effects and self.entries[name].group == 'friction'
             if friction and found.rms < _PROMISING * rms(current.fit.error[part.rows]):
-                found = global_search.refit(part.data, model, found, _COARSE, _TOLERANCE, each)
+                found = self.effort.spent_on(
+                    global_search.refit(part.data, model, found, _COARSE, _TOLERANCE, each)
+                )
             if part is not self._whole:
-                found = fit(
+                found = self._fit(
                     self.data, model, found.theta, iterations=_FINISHED, tolerance=_TOLERANCE
                 )
             self._tried[key] = found
@@ -136,8 +142,8 @@ class Search:
                 stiffness = frozenset(r.known_stiffness() for r in data.records)
                 start = poles.starts(trial.structure, added, start, stiffness)
             if data is not self.data:
-                start = np.stack([fit(data, trial.structure, start).theta, before])
-            self._tried[key] = fit(self.data, trial.structure, start)
+                start = np.stack([self._fit(data, trial.structure, start).theta, before])
+            self._tried[key] = self._fit(self.data, trial.structure, start)
             self._polished[key] = wanted
         return self.trial(trial.effects, trial.added)
 
@@ -148,14 +154,17 @@ class Search:
         friction that sticks and slips differences do not point down.
         """
         key, model = frozenset(trial.effects), trial.structure
-        found = fit(self.data, model, trial.fit.theta, iterations=_LAST)
+        found = self._fit(self.data, model, trial.fit.theta, iterations=_LAST)
         if finely:
             space = Space(model, self.data.duration, _FINER)
-            lower = fit(self.data, model, found.theta, iterations=_LAST, space=space)
+            lower = self._fit(self.data, model, found.theta, iterations=_LAST, space=space)
             if lower.rms < found.rms:
-                found = fit(self.data, model, lower.theta, iterations=_FINISHED)
+                found = self._fit(self.data, model, lower.theta, iterations=_FINISHED)
         self._tried[key] = found
         return self.trial(trial.effects, trial.added)
+
+    def _fit(self, data: Data, model: Structure, starts: Array, **how: Any) -> Fit:
+        return self.effort.spent_on(fit(data, model, starts, **how))
 
     def _stand_in(self, model: Structure) -> Part:
         """Return the data that structures are refitted to roughly."""
@@ -278,7 +287,7 @@ class Search:
             kept = np.delete(current.fit.theta, current.structure.columns(name))
             start = np.tile(kept, (2, 1))
             start[1, : len(BASE)] = self._tried[frozenset()].theta
-            again = fit(self.data, self.structure(*effects), start)
+            again = self._fit(self.data, self.structure(*effects), start)
             if key not in self._tried or again.rms < self._tried[key].rms:
                 self._tried[key] = again
             self._polished.setdefault(key, 1)

@@ -33,6 +33,7 @@ class Thresholds:
         beam: structures carried on from one size to the next.
         evaluations: of the posterior's likelihood, at most; 0 takes the Laplace approximation.
         tried: refits per structure after the first stage, best screened first.
+        effort: work of all refits after which no further search is begun (diagnosis/effort.py).
         use_force: the recorded force chooses among tied names (diagnosis/force_ranking.py).
     """
 
@@ -54,6 +55,7 @@ class Thresholds:
     beam: int = 3
     tried: int = 5
     evaluations: int = 12_000
+    effort: float = 1.5e8
     use_force: bool = False
 
     def material(self, noise: float, stroke: float) -> float:

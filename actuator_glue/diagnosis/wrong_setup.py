@@ -105,7 +105,9 @@ class WrongSetup(JsonObject):
         return f'check the set-ups: with {" and ".join(parts)} {alone}'
 
 
-def find(data: Data, settings: Thresholds, both_holds: bool = False) -> WrongSetup | None:
+def find(
+    data: Data, settings: Thresholds, both_holds: bool = False, given: Fit | None = None
+) -> WrongSetup | None:
     """Return a set-up that explains records far better than the one given; None for none.
 
     A command that was given as held and runs linearly is found with what else it leads to
@@ -115,9 +117,10 @@ def find(data: Data, settings: Thresholds, both_holds: bool = False) -> WrongSet
         data: the fitting part.
         settings: thresholds.
         both_holds: whether it is asked here either way round.
+        given: Eq. (2) fitted to `stretched(data)`, where that is known.
     """
-    some = _stretches(data)
-    given = base_fit(some)
+    some = stretched(data)
+    given = given or base_fit(some)
     stroke = scale(some.records, given.theta).stroke
     left, noise = pooled(some, splits_of(some, given.error))
     if left < settings.material(noise, stroke):
@@ -125,7 +128,7 @@ def find(data: Data, settings: Thresholds, both_holds: bool = False) -> WrongSet
     others = list(_others(data, both_holds))
     if not others:
         return None
-    parts = [_stretches(other) for other in others]
+    parts = [stretched(other) for other in others]
     fits = [base_fit(part) for part in parts]
     best = min(range(len(fits)), key=lambda i: fits[i].rms)
     fit = fits[best]
@@ -138,7 +141,8 @@ def find(data: Data, settings: Thresholds, both_holds: bool = False) -> WrongSet
     return WrongSetup.between(data, others[best], (given.rms, fit.rms), left < material)
 
 
-def _stretches(data: Data) -> Data:
+def stretched(data: Data) -> Data:
+    """Return stretches that stand for long records; short ones as they are."""
     part = stretches(data)
     return part.data if part else data
 

@@ -15,7 +15,7 @@ from actuator_glue.inference.least_squares.base_prior import BasePrior
 from actuator_glue.inference.least_squares.decimate import decimated
 from actuator_glue.inference.least_squares.each import Each
 from actuator_glue.inference.least_squares.free_run import Model, ObservedChannel, parts
-from actuator_glue.model.effects.run import sample_steps
+from actuator_glue.model.effects.run import sample_steps, turning
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Hold, Record
@@ -243,6 +243,14 @@ class Data:
     def simulated(self, model: Model) -> int:
         """How many samples a structure simulates of one parameter set."""
         return sum(len(self._runs_as(model, same[0])[0]) for same in self._repeats)
+
+    def sub_steps(self, model: Model) -> int:
+        """How many sub-steps the kernels take over all records, however many sets at a time."""
+        runs = (self._runs_as(model, same[0])[0] for same in self._repeats)
+        if not isinstance(model, Structure) or model.linear:
+            return sum(map(len, runs))
+        program = model.program
+        return sum(len(r) * sample_steps(r.period, turning(program, r.hold)) for r in runs)
 
     @property
     def _singles(self) -> list[list[int]]:

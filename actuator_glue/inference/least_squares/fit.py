@@ -44,6 +44,8 @@ class Fit:
             in single precision, which holds all that finite differences tell.
         z: the working coordinates of `theta`, (p,).
         room: how far their bounds let them move down and up, (2, p); empty for freely.
+        work: sub-steps that the kernels took on the way, each for as many simulations as they
+            take at a time.
     """
 
     theta: Array
@@ -51,6 +53,7 @@ class Fit:
     slopes: Array | NDArray[np.float32]
     z: Array
     room: Array = field(default_factory=lambda: np.empty((2, 0)))
+    work: int = 0
 
     @property
     def jacobian(self) -> Array:
@@ -154,6 +157,8 @@ def fit(
     space = space or Space(model, data.duration)
     z = space.z(np.atleast_2d(starts))
     found, ahead = _tried(data, model, space, z[:, None])
+    size, p, length = data.target.size, z.shape[1], data.sub_steps(model)
+    passes = _passes(len(z) * (1 if ahead is None else p + 1))
     output = found[:, 0]
     error = data.target - output
     sse = sum_of_squares(error)
@@ -161,11 +166,11 @@ def fit(
     z, output, error, sse = z[alive], output[alive], error[alive], sse[alive]
     cost = _objective(data, z, sse)
     if not len(z):
-        p = len(space.lower)
         first = space.z(np.atleast_2d(starts))[0]
         # Every start diverged: a metre of error, which nothing prefers.
-        size = data.target.size
-        return Fit(space.theta(first), np.ones(size), np.zeros((p, size)), first)
+        return Fit(
+            space.theta(first), np.ones(size), np.zeros((p, size)), first, work=passes * length
+        )
     damping, pace = np.full(len(z), 1e-2), cost.copy()
     active = np.ones(len(z), dtype=np.bool_)
     slopes = [None if ahead is None else ahead[i, 0] for i in np.flatnonzero(alive)]
@@ -180,6 +185,7 @@ def fit(
             new = [r for r in wanted if active[r] and slopes[r] is None]
             if new:
                 some = jacobian(data, model, space, z[new], output[new])
+                passes += _passes(len(new) * p)
                 for r, jac in zip(new, some, strict=True):
                     slopes[r] = jac
             if others.size and (best_jac := slopes[lead]) is not None:
@@ -190,8 +196,8 @@ def fit(
                 active[others[beyond < most]] = False
         rows = np.flatnonzero(active)
         # Two steps of each start with their slopes take no longer than three without.
-        lanes = rows.size * (z.shape[1] + 1)
-        factors = _DAMPINGS[: 2 if 2 * lanes <= LANES < 3 * lanes else 3]
+        each = rows.size * (p + 1)
+        factors = _DAMPINGS[: 2 if 2 * each <= LANES < 3 * each else 3]
         tries = np.stack(
             [
                 _proposals(
@@ -205,6 +211,7 @@ def fit(
             ]
         )
         tried, ahead = _tried(data, model, space, tries)
+        passes += _passes(len(rows) * tries.shape[1] * (1 if ahead is None else p + 1))
         for i, r in enumerate(rows):
             errors = data.target - tried[i]
             sums = sum_of_squares(errors)
@@ -229,10 +236,16 @@ def fit(
     final = slopes[best]
     if final is None:
         final = jacobian(data, model, space, z[best : best + 1], output[best : best + 1])[0]
+        passes += _passes(p)
     # Copies: views would keep what all starts left.
     room = np.stack([space.lower, space.upper]) - z[best]
     kept = final.astype(np.float32 if final.shape[1] > _LONG else np.float64)
-    return Fit(space.theta(z[best]), error[best].copy(), kept, z[best].copy(), room)
+    theta, error_left = space.theta(z[best]), error[best].copy()
+    return Fit(theta, error_left, kept, z[best].copy(), room, work=passes * length)
+
+
+def _passes(simulations: int) -> int:
+    return -(-simulations // LANES)
 
 
 def _tried(data: Data, model: Model, space: Space, tries: Array) -> tuple[Array, Array | None]:

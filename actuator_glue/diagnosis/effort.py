@@ -1,0 +1,43 @@
+"""How much a search may simulate before it tells what is known by then."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+from actuator_glue.inference.least_squares.fit import Fit
+
+
+@dataclass(frozen=True)
+class Effort:
+    """Work of all refits of a diagnosis, shared by every search that it makes.
+
+    Counted in sub-steps of the kernels, not in seconds: the same records give the same answer on
+    every machine. A core takes one to three millions of them in a second.
+
+    Attributes:
+        most: sub-steps after which no further search is begun.
+    """
+
+    most: float = math.inf
+    _refits: list[int] = field(default_factory=list)
+
+    def spent_on(self, found: Fit) -> Fit:
+        """Count the work of a refit, from any thread; return the refit."""
+        self._refits.append(found.work)
+        return found
+
+    @property
+    def spent(self) -> int:
+        """Sub-steps so far."""
+        return sum(self._refits)
+
+    @property
+    def share(self) -> float:
+        """What was spent of what there is; above one where the last refits took more."""
+        return self.spent / self.most
+
+    @property
+    def over(self) -> bool:
+        """Whether no further refits are begun."""
+        return self.spent >= self.most
