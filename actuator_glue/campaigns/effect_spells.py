@@ -34,6 +34,7 @@ class EffectHistory:
     Attributes:
         name: of it, as diagnoses told it.
         meaning: what it is, for people; empty for one that the catalogue does not hold.
+        remedy: what to check or to do about it, likewise.
         spells: when it was there.
         sizes: parameter, its unit, and mean, lower and upper limit of the size on one day when it
             is there.
@@ -43,6 +44,7 @@ class EffectHistory:
 
     name: str
     meaning: str
+    remedy: str
     spells: tuple[EffectSpell, ...]
     sizes: tuple[tuple[str, str, float, float, float], ...]
     probability_next: float
@@ -83,7 +85,8 @@ def _history(
     parameters = () if entry is None else entry.parameters
     return EffectHistory(
         name=name,
-        meaning='; '.join(p.meaning for p in parameters),
+        meaning='' if entry is None else entry.meaning,
+        remedy='' if entry is None else entry.remedy,
         spells=tuple(spells),
         sizes=tuple(
             size for p in parameters if (size := _size(p.name, p.unit, name, rows)) is not None

@@ -157,7 +157,7 @@ def _check(found: ActuatorHistory) -> list[Block]:
         Note(
             f'{e.name} is there since {e.spells[-1].begin}'
             + (f' ({e.meaning})' if e.meaning else '')
-            + ': check it before the next test.'
+            + f'. What to do: {e.remedy or "look for it before the next test"}.'
         )
         for e in found.effects
         if e.there
