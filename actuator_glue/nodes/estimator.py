@@ -160,6 +160,8 @@ class EstimatorNode(WorkingNode):
             elif isinstance(event, Contradicted):
                 self.contradictions += 1
                 self.complain('prior', event.message)
+            elif isinstance(event, Reweighed) and event.worse:
+                self.complain('taken out', f'{event.message} ({_date(event.stamp_ns)})')
             elif isinstance(event, Reweighed):
                 self.get_logger().info(event.message)
             elif isinstance(event, Restarted) and event.reason == 'setup':
@@ -331,9 +333,10 @@ class EstimatorNode(WorkingNode):
             return
         since, window = self.contradiction.since_ns, self.last.window
         if since is not None:
-            at = datetime.fromtimestamp(since * 1e-9, UTC).strftime('%Y-%m-%d %H:%M:%S UTC')
             self.health.values['prior contradicted for (s)'] = self.contradiction.lasted(window)
-            self.complain('contradiction', f'samples contradict what was known, since {at}')
+            self.complain(
+                'contradiction', f'samples contradict what was known, since {_date(since)}'
+            )
         else:
             self.health.values.pop('prior contradicted for (s)', None)
         if sampled_too_slowly(self.last):
@@ -344,6 +347,10 @@ class EstimatorNode(WorkingNode):
                 f'frequency is {natural:.2g} Hz): parameters and intervals say nothing; '
                 'sample ten times as fast',
             )
+
+
+def _date(stamp_ns: int) -> str:
+    return datetime.fromtimestamp(stamp_ns * 1e-9, UTC).strftime('%Y-%m-%d %H:%M:%S UTC')
 
 
 def main(args: list[str] | None = None) -> int:

@@ -411,6 +411,7 @@ class Estimator:
                 + (f'; no longer carried: {gone}' if gone else '')
                 + (f'; {structure_name(before.effects)} made them worse' if worse else ''),
                 worse,
+                window.record.stamp_ns(len(window.record) - 1),
             )
         ]
 

@@ -107,6 +107,7 @@ class Reweighed:
         left: effects of those that left.
         message: for people.
         worse: the likeliest has left because it made forecasts worse.
+        stamp_ns: acquisition time of the last sample that decided it [ns].
     """
 
     number: int
@@ -115,6 +116,7 @@ class Reweighed:
     left: tuple[tuple[str, ...], ...]
     message: str
     worse: bool = False
+    stamp_ns: int = 0
 
 
 def structure_name(effects: Sequence[str]) -> str:

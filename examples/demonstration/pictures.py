@@ -14,14 +14,17 @@ from actuator_glue.diagnosis.result import DiagnosisData, Trace
 from actuator_glue.errors import InputError
 from actuator_glue.model.parameters import BASE
 from actuator_glue.online.job import WindowResult
+from actuator_glue.online.stream import structure_effects, structure_name
 from actuator_glue.records import Array
 from actuator_glue.report import style
 from actuator_glue.report.bag_content import Content
+from actuator_glue.report.weights import named
 
 UM = 1e6
 MM = 1e3
 POINTS = 4000  # in a scatter plot; more only blacken it
 SECONDS = 0.6  # of residual drawn against time
+COLOURS = (style.BAND, style.PUBLISHED, style.WARNING, style.LIGHT_BAND, style.DETERMINISTIC)
 
 
 @style.styled
@@ -73,6 +76,55 @@ def _came_to(content: Content, hops: Sequence[Any]) -> str:
         return f'{text}, which was not changed'
     start, name = changes[-1]
     return f'{text}, {middle(start, np.inf)} with {name}'
+
+
+@style.styled
+def explanations(content: Content, path: Path, hidden: Sequence[str]) -> Path:
+    """Draw the weight of each explanation over time, one on the other.
+
+    Args:
+        content: the bag of a run.
+        path: where the picture goes.
+        hidden: effects of a simulated actuator, which are marked; empty where nobody knows.
+    """
+    first, posteriors = content.record.first_index, content.posteriors
+    time = [(int(p.index) + int(p.samples) - first) * float(p.period) for p in posteriors]
+    told = [named(p) for p in posteriors]
+    true = next((name for one in told for name in one if _is(name, hidden)), '')
+    plain = structure_name(())
+    names = list(dict.fromkeys([true] * bool(true) + [n for one in told for n in one]))
+    others = iter(COLOURS * len(names))
+    known = {true: style.TRUTH, plain: style.COMMAND}
+    figure = style.new_figure(2.8)
+    axes = figure.subplots()
+    below = np.zeros(len(time))
+    for name in names:
+        above = below + [100.0 * one.get(name, 0.0) for one in told]
+        axes.fill_between(
+            time,
+            below,
+            above,
+            step='pre',
+            lw=0.5,
+            color=known.get(name) or next(others),
+            hatch='//' if name == true else None,
+            edgecolor='white',
+            label=f'{name} (the truth)' if name == true and hidden else name,
+        )
+        below = above
+    axes.set(ylim=(0, 100), xlim=(time[0], time[-1]), xlabel='time [s]')
+    axes.set(ylabel='weight of the\nexplanation [%]')
+    axes.legend(loc='center left', bbox_to_anchor=(1.01, 0.5))
+    last = max(told[-1], key=lambda name: told[-1][name])
+    title = f'What explains the samples: at the end {last}, {told[-1][last]:.0%}'
+    if hidden:
+        title += f'; hidden: {structure_name(hidden)}'
+    figure.suptitle(style.fit(title, style.WIDTH, size=10))
+    return style.save(figure, path)
+
+
+def _is(name: str, effects: Sequence[str]) -> bool:
+    return set(structure_effects(name)) == set(effects)
 
 
 @style.styled

@@ -174,6 +174,7 @@ def finish(
     estimate_figures.parameters(content, folder / 'parameters.png', truth)
     display.advance(stage, 2)
     pictures.live(content, folder / 'live.png')
+    pictures.explanations(content, folder / 'explanations.png', source.hidden)
     display.advance(stage, 3)
     if (folder / 'calibration.npz').exists():
         pictures.carried(content, from_the_box(content), folder / 'prior.png', truth)
