@@ -159,7 +159,7 @@ def diagnose(
     open_ridge = ridge.left_open(space, after.model, scorer, after.theta)
     others = alternatives.alternatives(result)
     larger = final
-    if decision.verdict in COMPLETE:
+    if decision.verdict in COMPLETE and not effort.over:
         larger = companions.with_companions(result.selection, final)
     told = draws
     # Chains that met nowhere give no interval that anything beside, or in place, could widen.
@@ -206,7 +206,7 @@ def diagnose(
         used = prior.used(known.components, known.quality, p_value)
     contradicted = advice.contradicted(error, found.material)
     beside = companions.sentences(final, larger, prepared.held, bool(contradicted))
-    if contradicted and not beside and decision.verdict in COMPLETE:
+    if contradicted and not beside and decision.verdict in COMPLETE and not effort.over:
         beside = companions.hint(result.selection, final, prepared.held)
     tell('done', 1.0)
     return DiagnosisData(
