@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from actuator_glue.api import tracking
+from actuator_glue.api import judgement, tracking
 from actuator_glue.api.calibration_data import CalibrationData
 from actuator_glue.api.ensemble import evenly, simulated
 from actuator_glue.inference.bands import band
@@ -15,13 +16,17 @@ from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record, source_name
 from actuator_glue.report import html
+from actuator_glue.report.first_page import FirstPage, command
 from actuator_glue.report.posterior_figure import posterior_figure
+from actuator_glue.report.quantity import plain, said_in, spread, word
+from actuator_glue.report.residual_figure import Left, residual_figure
 from actuator_glue.report.timeseries import Bands, band_at_zooms, even_zooms
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LEVEL = 0.95
+_PANELS = 4  # records in the first picture
 HEADER = ('parameter', 'unit', 'mean', 'sd', 'skew', 'COV', 'R-hat', 'ESS')
 
 
@@ -95,6 +100,145 @@ def error_line(found: CalibrationData) -> str:
     return line if found.structure is None else f'{line}; {found.structure.amounts()}'
 
 
+def first_page(found: CalibrationData, hybrid: str = '', *, drawn: bool = True) -> FirstPage:
+    """Return what a person is told first.
+
+    Args:
+        found: the calibration.
+        hybrid: what it means for a hybrid test.
+        drawn: with a picture, where the records are known, and symbols for names; on a terminal
+            neither.
+    """
+    verdict = found.problems or (f'the model fits: {error_line(found)}',)
+    picture = None
+    if drawn and found.records:
+        picture = html.Picture.of(
+            residual_figure(_left(found)),
+            'What the best draw leaves of each record; grey is noise, which no model explains.',
+        )
+    return FirstPage(
+        tuple(verdict),
+        _certainty(found, word if drawn else str),
+        picture,
+        _errors(found),
+        _parameters(found, word if drawn else str),
+        _delay(found),
+        (),
+        hybrid,
+        next_command(found),
+    )
+
+
+def _certainty(found: CalibrationData, name: Callable[[str], str]) -> str:
+    """Return the widest interval over its mean, and what that is."""
+    if found.problems:
+        return 'not at all, as long as that stands: the intervals are those of a wrong model'
+    ends = np.quantile(found.posterior, (0.025, 0.975), axis=0).T
+    at_zero = {p.name for p in found.at_bound if p.physical}
+    shares = {
+        n: 50.0 * (high - low) / abs(p.mean)
+        for (n, p), (low, high) in zip(found.parameters.items(), ends, strict=True)
+        if p.mean and n not in at_zero
+    }
+    worst = max(shares, key=shares.__getitem__)
+    rest = f' ({", ".join(map(name, at_zero))} aside, of which the most is known)'
+    return (
+        f'+-{plain(shares[worst], 2)} % is the widest interval, that of {name(worst)} (half of '
+        f'its 95 % interval over its mean){rest if at_zero else ""}'
+    )
+
+
+def _errors(found: CalibrationData) -> html.Table:
+    rows = []
+    left = found.structure
+    if left is not None:
+        rows.append(['before: the command itself, no model', f'{1e6 * left.command_rms_m:.1f}'])
+    rows.append(['after: the best draw', f'{1e6 * found.error.rms_m:.1f}'])
+    if len(found.error.records) > 1:
+        for of in found.error.records:
+            name = source_name(of.source) or 'a record'
+            rows.append([f'... in {name}', f'{1e6 * of.rms_m:.1f}'])
+    if left is not None:
+        rows.append(['structure in it', f'{1e6 * left.structure_m:.1f}'])
+        rows.append(['noise', f'{1e6 * left.noise_m:.1f}'])
+    return html.Table(['', 'rms [um]'], rows, 'Measured displacement less the model.')
+
+
+def _parameters(found: CalibrationData, name: Callable[[str], str]) -> html.Table:
+    meanings = {p.name: p.meaning for p in Structure(found.effects).parameters}
+    ends = np.quantile(found.posterior, (0.025, 0.975), axis=0).T
+    rows = []
+    for (n, p), (low, high) in zip(found.parameters.items(), ends, strict=True):
+        factor, unit = said_in(p.unit, *p.bounds)
+        before = f'{plain(factor * p.bounds[0])} to {plain(factor * p.bounds[1])} {unit}'.rstrip()
+        rows.append(
+            [name(n), meanings.get(n, ''), before, spread(p.mean, float(low), float(high), p.unit)]
+        )
+    known = '' if found.prior is None else f', and what {source_name(found.prior.source)} knew'
+    header = ['parameter', 'what it is', 'before', 'after']
+    caption = f'Parameters before (bounds{known}) and after (means, 95 % intervals).'
+    return html.Table(header, rows, caption, prose=True)
+
+
+def _delay(found: CalibrationData) -> str:
+    told = []
+    for of in found.tracking:
+        known = (('delay_at_5_hz_s', ' at 5 Hz'), ('fei_delay_s', ' over the record'))
+        for key, where in known:
+            if key in of.predicted:
+                d = of.predicted[key]
+                interval = f'{1e3 * d.lower:.2f} to {1e3 * d.upper:.2f}'
+                told.append(f'{1e3 * d.median:.2f} ms ({interval}){where} in {of.source}')
+                break
+    return '; '.join(told)
+
+
+def next_command(found: CalibrationData) -> str:
+    """Return what to type next."""
+    tests = [(s.source, s.stiffness_n_per_m) for s in found.sources]
+    effects = [text for name in found.effects for text in ('--effect', name)]
+    left = found.structure
+    apart = any(not p.rhat <= judgement.APART for p in found.parameters.values())
+    pressed = [p for p in found.at_bound if not p.physical]
+    if apart:
+        more = ['--evaluations', str(2 * found.evaluations)]
+        return command('calibrate', tests, *effects, *more)
+    if left is not None and left.setup is not None:
+        setup = left.setup
+        tests = list(zip(setup.sources, setup.stiffness, strict=True))
+        hold = dict.fromkeys(setup.hold)
+        other = ['--hold', *hold] if len(hold) == 1 and 'hold' in setup.changed else []
+        return command('calibrate', tests, *effects, *other)
+    if left is not None and left.other_fits:
+        return command('calibrate', tests, *effects, '--hold', left.other_hold)
+    if pressed and left is not None and left.intervals_hold:
+        wider = []
+        for p in pressed:
+            low, high = found.parameters[p.name].bounds
+            span = high - low
+            low, high = (low - span, high) if p.side == 'lower' else (low, high + span)
+            wider += ['--bounds', f'{p.name}={low:g}:{high:g}']
+        return command('calibrate', tests, *effects, *wider)
+    if found.problems or not found.effects:
+        return command('diagnose', tests, '--report', 'report.html')
+    return command('calibrate', tests, *effects, '--save', 'posterior.npz')
+
+
+def _left(found: CalibrationData) -> list[Left]:
+    structure = Structure(found.effects)
+    best = found.best[: len(structure.names)]
+    initial: Initial = 'rest' if found.initial == 'rest' else 'measured'
+    noise = None if found.structure is None else found.structure.noise_m
+    out = []
+    for record in found.records[:_PANELS]:
+        first = round(found.settle / record.period)
+        error = record.measured - structure.simulate(best, record, initial=initial)
+        k = f'k = {record.known_stiffness() / 1e3:g} kN/m'
+        title = f'{source_name(record.source) or "record"}: {k}'
+        out.append(Left(title, record.time[first:], error[first:], noise))
+    return out
+
+
 def brief(found: CalibrationData) -> list[html.Block]:
     """Return problems, moments, error and notes."""
     blocks: list[html.Block] = [html.Note(line) for line in found.problems]
@@ -104,12 +248,24 @@ def brief(found: CalibrationData) -> list[html.Block]:
     return [*blocks, *(html.Note(line) for line in found.notes)]
 
 
-def page(found: CalibrationData) -> html.Page:
-    """Return the report of a calibration."""
+def page(found: CalibrationData, hybrid: str = '') -> html.Page:
+    """Return the report of a calibration; `hybrid` tells what it means for a hybrid test."""
+    first = first_page(found, hybrid)
     picture = html.Picture.of(
         posterior(found), 'Distribution of each parameter, and of each pair.'
     )
-    sections = [html.Section('Posterior', [*brief(found), picture])]
+    moments: list[html.Block] = [
+        html.Table(HEADER, moment_rows(found), moments_title(found)),
+        picture,
+        *(html.Note(line) for line in found.notes),
+    ]
+    sections = [
+        html.Section('The answer', first.blocks(headline=False)),
+        html.Section('Posterior', moments),
+    ]
+    if found.tracking:
+        tables = tracking.tables(found.tracking)
+        sections.append(html.Section('How the actuator follows its command', tables))
     if found.records:
         pictures = []
         for record in found.records:
@@ -120,6 +276,5 @@ def page(found: CalibrationData) -> html.Page:
             )
             pictures.append(html.Picture.of(figure, caption))
         sections.append(html.Section('Bands over the records', pictures))
-    lead = '; '.join(found.problems) or error_line(found)
     made = f'{found.evaluations} evaluations, seed {found.seed}'
-    return html.Page('Calibration', lead, sections, made)
+    return html.Page('Calibration', first.verdict[0], sections, made)

@@ -14,7 +14,6 @@ from actuator_glue.api.drawn import Drawn
 from actuator_glue.api.frame import frame
 from actuator_glue.api.given import OneRecord, one_record_given
 from actuator_glue.api.posterior_model import PosteriorModel
-from actuator_glue.api.result import Result
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.structure import Structure
 
@@ -23,11 +22,13 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
+    from actuator_glue.hybrid.partition import Partition
     from actuator_glue.report import html
+    from actuator_glue.report.first_page import FirstPage
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Calibration(Result, PosteriorModel, CalibrationData):
+class Calibration(PosteriorModel, CalibrationData):
     """A joint posterior, and what forbids or limits its use.
 
     Its numbers are those of `CalibrationData`: `parameters` by name, `draws`, `problems`, ...
@@ -173,8 +174,18 @@ class Calibration(Result, PosteriorModel, CalibrationData):
 
         return brief(self)
 
-    def page(self) -> html.Page:
-        """Return the report: the posterior, and its bands over the records."""
+    def first_page(self, partition: Partition | Path | str | None = None) -> FirstPage:
+        """Return what a person is told first; see `PosteriorModel`."""
+        from actuator_glue.api.calibration_report import first_page
+
+        return first_page(self, self.hybrid(partition), drawn=False)
+
+    def page(self, partition: Partition | Path | str | None = None) -> html.Page:
+        """Return the report: the answer, the posterior, and its bands over the records.
+
+        Args:
+            partition: as `first_page` takes it.
+        """
         from actuator_glue.api.calibration_report import page
 
-        return page(self)
+        return page(self, self.hybrid(partition))

@@ -21,7 +21,6 @@ from actuator_glue.api.options import chosen, takes
 from actuator_glue.api.posterior_model import PosteriorModel
 from actuator_glue.api.prior import check_prior, given_prior
 from actuator_glue.api.provenance import provenance
-from actuator_glue.api.result import Result
 from actuator_glue.api.tracking import RecordTracking, ready, records_tracking, tables
 from actuator_glue.diagnosis import diagnose as core
 from actuator_glue.diagnosis.estimate import Estimate, Json
@@ -40,14 +39,16 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
     from actuator_glue.api.calibration_result import Calibration
+    from actuator_glue.hybrid.partition import Partition
     from actuator_glue.inference.prior_use import GivenPrior
     from actuator_glue.report import html
+    from actuator_glue.report.first_page import FirstPage
 
 Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, slots=True, repr=False)
-class Diagnosis(Result, PosteriorModel, DiagnosisData):
+class Diagnosis(PosteriorModel, DiagnosisData):
     """Verdict, evidence and the augmented model, with its files and pictures.
 
     Attributes:
@@ -182,11 +183,21 @@ class Diagnosis(Result, PosteriorModel, DiagnosisData):
 
         return brief(self)
 
-    def page(self) -> html.Page:
-        """Return the report."""
+    def first_page(self, partition: Partition | Path | str | None = None) -> FirstPage:
+        """Return what a person is told first; see `PosteriorModel`."""
+        from actuator_glue.report.diagnosis_summary import first_page
+
+        return first_page(self, self.hybrid(partition), drawn=False)
+
+    def page(self, partition: Partition | Path | str | None = None) -> html.Page:
+        """Return the report.
+
+        Args:
+            partition: as `first_page` takes it.
+        """
         from actuator_glue.report.diagnosis_report import page
 
-        return page(self, tables(self.tracking))
+        return page(self, tables(self.tracking), self.hybrid(partition))
 
 
 def _row(effect: str, name: str, size: Estimate) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,19 +15,26 @@ from actuator_glue.api.drawn import Drawn
 from actuator_glue.api.ensemble import GivenCommand, commanded, evenly, simulated
 from actuator_glue.api.frequency_response import FrequencyResponse
 from actuator_glue.api.given import OneRecord, one_record_given
+from actuator_glue.api.hybrid_meaning import hybrid_meaning
 from actuator_glue.api.matlab import Exported, write_mat
 from actuator_glue.api.prediction import Prediction, prediction
+from actuator_glue.api.result import Result
 from actuator_glue.errors import InputError
+from actuator_glue.hybrid.partition import Partition
+from actuator_glue.motion import speaking
 from actuator_glue.records import Hold, check_stiffness, source_name
 
 if TYPE_CHECKING:
     import control
     from matplotlib.figure import Figure
 
+    from actuator_glue.report import html
+    from actuator_glue.report.first_page import FirstPage
+
 _SIDE_BY_SIDE = 3  # responses in a figure
 
 
-class PosteriorModel(ABC):
+class PosteriorModel(Result):
     """A result whose draws are models of the actuator."""
 
     __slots__ = ()
@@ -121,6 +128,49 @@ class PosteriorModel(ABC):
         if not shown:
             raise InputError('give a record, or a specimen stiffness [N/m] as stiffness=0.0')
         return response.bode_figure(shown)
+
+    def hybrid(self, partition: Partition | Path | str | None) -> str:
+        """Return what the actuator means for a hybrid test, in a sentence; empty without one.
+
+        Args:
+            partition: the test; a YAML file, or the name of one that comes with the package.
+
+        Raises:
+            InputError: a partition that cannot be used.
+        """
+        if partition is None:
+            return ''
+        return hybrid_meaning(partition, lambda k, f: self.frequency_response(k, [f]).delay)
+
+    @abstractmethod
+    def first_page(self, partition: Partition | Path | str | None = None) -> FirstPage:
+        """Return what a person is told first, without a picture.
+
+        Args:
+            partition: a hybrid test, of which it is told what the actuator means for it.
+
+        Raises:
+            InputError: a partition that cannot be used.
+        """
+
+    @abstractmethod
+    def page(self, partition: Partition | Path | str | None = None) -> html.Page:
+        """Return its report; with a partition, what the actuator means for that hybrid test."""
+
+    def report(self, path: Path | str, partition: Partition | Path | str | None = None) -> Path:
+        """Write a report, one HTML file, and return its path.
+
+        Args:
+            path: where to.
+            partition: a hybrid test, of which the first page tells what the actuator means for it.
+
+        Raises:
+            InputError: the file cannot be written, or a partition that cannot be used.
+        """
+        from actuator_glue.report import html
+
+        with speaking(self.motion):
+            return html.write(Path(path), self.page(partition))
 
     def state_space(self, stiffness: float, draw: str | int = 'mean') -> control.StateSpace:
         """Return x/u as a `control.StateSpace`; see `transfer_function`."""

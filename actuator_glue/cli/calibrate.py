@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from actuator_glue.arguments import Output, number, number_or_auto
 from actuator_glue.cli._effects_file import add_effects_file, load_effects
+from actuator_glue.cli._first_page import add_partition, show_first
 from actuator_glue.cli._output import add_json, beside, note, progress, say, table
 from actuator_glue.cli._prior import add_prior, prior_options
 from actuator_glue.cli._records import add_records, load
@@ -98,6 +99,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         'apart; gain and offset of its transducer are fitted in each record',
     )
     add_prior(parser)
+    add_partition(parser)
     parser.add_argument(
         '--save',
         '--draws',
@@ -142,7 +144,7 @@ def run(args: argparse.Namespace) -> int:
     failed = beside(args.json, lambda out: write_json(content, out))
     failed = beside(args.save, found.save) or failed
     _show(found, args)
-    failed = beside(args.report, found.report) or failed
+    failed = beside(args.report, lambda out: found.report(out, args.partition)) or failed
     return failed or (1 if found.problems else 0)
 
 
@@ -168,14 +170,12 @@ def bounds(given: Sequence[str]) -> dict[str, tuple[float, float]]:
 def _show(found: Calibration, args: argparse.Namespace) -> None:
     from actuator_glue.api.calibration_report import (
         HEADER,
-        error_line,
         moment_rows,
         moments_title,
     )
     from actuator_glue.api.tracking import HEADER as TRACKING
 
-    for line in found.problems:
-        say(line, args)
+    show_first(found, args)
     rows: list[tuple[str, ...]] = moment_rows(found)
     columns: tuple[str, ...] = HEADER
     mostly = ['prior' if p.prior_dominated else '' for p in found.parameters.values()]
@@ -183,7 +183,6 @@ def _show(found: Calibration, args: argparse.Namespace) -> None:
         rows = [(*row, text) for row, text in zip(rows, mostly, strict=True)]
         columns = (*columns, 'mostly')
     table(moments_title(found), columns, rows, args)
-    say(error_line(found), args)
     for of in found.tracking:
         table(of.title, TRACKING, of.rows(), args)
     say(f'{found.evaluations} evaluations in {found.seconds:.1f} s', args)

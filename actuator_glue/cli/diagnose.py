@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING
 
 from actuator_glue.arguments import Output
 from actuator_glue.cli._effects_file import add_effects_file, load_effects
+from actuator_glue.cli._first_page import add_partition, show_first
 from actuator_glue.cli._heap import give_back
-from actuator_glue.cli._output import add_json, beside, note, progress, say, table
+from actuator_glue.cli._output import add_json, beside, note, progress, table
 from actuator_glue.cli._prior import add_prior, prior_options
 from actuator_glue.cli._records import add_records, load
 from actuator_glue.io.json_file import write_json
@@ -63,6 +64,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action='store_true',
         help='the recorded force chooses among effects that the displacement cannot tell apart',
     )
+    add_partition(parser)
     add_prior(parser)
     parser.add_argument('--seed', type=int, default=1, metavar='S', help='seed (default 1)')
     parser.add_argument(
@@ -110,7 +112,7 @@ def run(args: argparse.Namespace) -> int:
     _show(found, args)
     if args.save_effects is not None and not found.learned:
         note(f'{args.save_effects}: not written, for no term was learned')
-    failed = beside(args.report, found.report) or failed
+    failed = beside(args.report, lambda out: found.report(out, args.partition)) or failed
     return failed or (0 if found.complete else 1)
 
 
@@ -135,38 +137,7 @@ def _load(args: argparse.Namespace) -> tuple[list[Record], list[Record]]:
 
 
 def _show(found: Diagnosis, args: argparse.Namespace) -> None:
-    from actuator_glue.report.quantity import plain, said_in
-
-    say(found.summary(), args)
-    e = found.error
-    micro = [f'{1e6 * v:.2f}' for v in (e.before, *e.before_ci, e.after, *e.after_ci)]
-    table(
-        'Free-run error on held-out data',
-        ['', 'rms um', '95 % from', 'to', 'in band %'],
-        [
-            ['before (Eq. 2, refitted)', *micro[:3], f'{100 * found.coverage[0]:.1f}'],
-            ['after', *micro[3:], f'{100 * found.coverage[1]:.1f}'],
-            ['sham effect (control)', f'{1e6 * e.sham:.2f}', '', '', ''],
-            ['noise floor', f'{1e6 * e.noise_floor:.2f}', '', '', ''],
-        ],
-        args,
-    )
-    if found.effects:
-        rows = []
-        for effect in found.effects:
-            for i, (name, p) in enumerate(effect.parameters.items()):
-                factor, unit = said_in(p.unit, p.mean, p.stddev)
-                rows.append(
-                    [
-                        effect.name if i == 0 else '',
-                        name,
-                        plain(factor * p.mean, 4),
-                        plain(factor * p.stddev, 2),
-                        unit or '-',
-                        ', '.join(effect.alternatives) if i == 0 else '',
-                    ]
-                )
-        table('Missing effects', ['effect', 'parameter', 'mean', 'sd', 'unit', 'or'], rows, args)
+    show_first(found, args)
     table(
         'Candidates, Eq. (2) + one effect, refitted',
         ['effect', 'rms um', 'score nats'],

@@ -9,7 +9,7 @@ from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.json_value import Json
 from actuator_glue.records import source_name
 from actuator_glue.report import diagnosis_figures as figures
-from actuator_glue.report.diagnosis_summary import closing, summary
+from actuator_glue.report.diagnosis_summary import advice, closing, first_page
 from actuator_glue.report.html import Block, Note, Page, Picture, Section, Table, Text
 from actuator_glue.report.learned_figure import learned_terms
 from actuator_glue.report.quantity import plain, said_in, word
@@ -219,18 +219,22 @@ def _records(found: DiagnosisData) -> Section:
 
 
 def brief(found: DiagnosisData) -> list[Block]:
-    """Return verdict, effects and advice in text and tables."""
-    blocks: list[Block] = [Text(found.summary())]
-    if found.effects:
-        blocks.append(_posterior(found))
-    advice = [line for line in found.advice if line not in found.preparation]
-    return [*blocks, *(Note(line) for line in advice)]
+    """Return the first page in text and tables, and advice."""
+    told = [line for line in found.advice if line not in found.preparation]
+    return [*first_page(found, drawn=False).blocks(), *(Note(line) for line in told)]
 
 
-def page(found: DiagnosisData, tracking: Sequence[Block] = ()) -> Page:
-    """Return the report of a diagnosis; `tracking` tells how it follows its command."""
+def page(found: DiagnosisData, tracking: Sequence[Block] = (), hybrid: str = '') -> Page:
+    """Return the report of a diagnosis.
+
+    Args:
+        found: the diagnosis.
+        tracking: tells how it follows its command.
+        hybrid: what it means for a hybrid test.
+    """
+    first = Section('The answer', first_page(found, hybrid).blocks(headline=False))
     evidence = [_error(found), _effects(found), _residual(found), _records(found)]
     if tracking:
         evidence.insert(2, Section('How the actuator follows its command', tracking))
-    sections = [summary(found), *evidence, *closing(found)]
+    sections = [first, *advice(found), *evidence, *closing(found)]
     return Page('Diagnosis', found.summary(), sections)

@@ -1,16 +1,19 @@
-"""First and last pages of a diagnosis report: what came out, what to do; words, provenance."""
+"""First and last pages of a diagnosis: what came out, what to do; words, provenance."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.model.parameters import BASE
 from actuator_glue.report.diagnosis_figures import residual_summary
+from actuator_glue.report.first_page import FirstPage, command
 from actuator_glue.report.html import Block, Note, Picture, Section, Table, Text
-from actuator_glue.report.quantity import percents, spread, word
+from actuator_glue.report.quantity import percents, said, spread, word
 
+_TOLD = 5.0  # Hz, at which the delay is told
 _MEANS = {
     'none': 'The model is enough: nothing material is missing.',
     'missing-effect': 'Something is missing, and what is named below is all of it as far as '
@@ -51,7 +54,7 @@ def _range(pair: tuple[float, float], scale: float, digits: int = 1) -> str:
     return f'{scale * pair[0]:.{digits}f} to {scale * pair[1]:.{digits}f}'
 
 
-def _certainty(found: DiagnosisData) -> list[Block]:
+def _names(found: DiagnosisData) -> list[Block]:
     """What is missing, how large it is, and how sure the name is."""
     rows = []
     for e in found.effects:
@@ -69,6 +72,27 @@ def _certainty(found: DiagnosisData) -> list[Block]:
         return []
     header = ['effect', 'size (95 % interval)', 'probability', 'or', 'none of these']
     return [Table(header, rows, 'What is missing, and how sure its name is.', prose=True)]
+
+
+def certainty(found: DiagnosisData) -> str:
+    """Return how sure the answer is: one number, and what it is a number of."""
+    inside = f'{100 * found.coverage[1]:.0f} % of what was held out lies in the 95 % band'
+    named = [e for e in found.effects if math.isfinite(e.probability)]
+    if not found.complete:
+        return f'{inside}, and the answer is not complete: intervals are too narrow'
+    if not named:
+        return inside + (' (a learned term is a description, no cause)' if found.learned else '')
+    least = min(named, key=lambda e: e.probability)
+    others = [r for r in least.rivals if r.tied and r.name != least.name]
+    known = [least.none] if math.isfinite(least.none) else []
+    own, *rest = percents([least.probability, *(r.probability for r in others), *known])
+    told = [f'{r.name} {share} %' for r, share in zip(others, rest, strict=False)]
+    told += [f'none of these {rest[-1]} %'] if known else []
+    which = f', the least sure of {len(named)} names' if len(named) > 1 else ''
+    return (
+        f'{own} % is the probability of the name {least.name}{which}, among all effects that were '
+        f'tried and none of them' + (f' ({", ".join(told)})' if told else '')
+    )
 
 
 def _error(found: DiagnosisData) -> Table:
@@ -95,14 +119,94 @@ def _estimate(p: Estimate | None) -> str:
     return text if p.identified else f'{text}, not identified'
 
 
-def _parameters(found: DiagnosisData) -> Table:
+def _parameters(found: DiagnosisData, name: Callable[[str], str]) -> Table | None:
     meanings = {p.name: p.meaning for p in BASE}
     rows = [
-        [word(n), meanings.get(n, ''), _estimate(found.base_before.get(n)), _estimate(p)]
+        [name(n), meanings.get(n, ''), _estimate(found.base_before.get(n)), _estimate(p)]
         for n, p in found.base.items()
     ]
+    for e in found.effects:
+        own = {p.name: p.meaning for p in found.entry(e.name).parameters}
+        rows += [[name(n), own.get(n, e.name), '-', _estimate(p)] for n, p in e.parameters.items()]
     header = ['parameter', 'what it is', 'before', 'after']
-    return Table(header, rows, "Eq. (2)'s parameters: means, 95 % intervals.", prose=True)
+    caption = 'Parameters before and after: means, 95 % intervals.'
+    return Table(header, rows, caption, prose=True) if rows else None
+
+
+def delay(found: DiagnosisData) -> str:
+    """Return the delay at one frequency under each stiffness; empty where it is not known."""
+    told = []
+    for r in found.responses:
+        known = [s for s in r.sines if math.isfinite(s.delay)]
+        if known:
+            s = min(known, key=lambda s: abs(s.frequency - _TOLD))
+            where = 'free' if r.stiffness == 0.0 else f'with {r.stiffness / 1e3:g} kN/m'
+            told.append(
+                f'{1e3 * s.delay:.2f} ms ({_range(s.delay_ci, 1e3, 2)}) at {s.frequency:g} Hz '
+                f'{where}'
+            )
+    return '; '.join(told)
+
+
+def remedies(found: DiagnosisData) -> tuple[str, ...]:
+    """Return what each effect is at the machine, and what to do, a line each."""
+    out = []
+    for e in found.effects:
+        entry = found.entry(e.name)
+        sizes = ', '.join(said(p.mean, p.unit) for p in e.parameters.values())
+        if entry.remedy:
+            go = '' if e.noise is not None else f'; go on with --effect {e.name}, or mend it'
+            out.append(f'{e.name}, {sizes}: {entry.meaning}. What to do: {entry.remedy}{go}.')
+    return tuple(out)
+
+
+def next_command(found: DiagnosisData) -> str:
+    """Return what to type next."""
+    fitted = [(t.source, t.stiffness) for t in found.traces if not t.held_out]
+    own = {source for source, _ in fitted}
+    held = [t.source for t in found.traces if t.held_out and t.source not in own]
+    if found.setup is not None and not found.setup.taken:
+        tests = list(zip(found.setup.sources, found.setup.stiffness, strict=True))
+        hold = dict.fromkeys(found.setup.hold)
+        options = ['--hold', *hold] if len(hold) == 1 and 'hold' in found.setup.changed else []
+        return command('diagnose', tests, *options, held=held)
+    if found.verdict == 'undecided' and held:
+        alone = [(t.source, t.stiffness) for t in found.traces if t.source in held]
+        return command('diagnose', alone)
+    if found.learned:
+        return command('diagnose', fitted, '--save-effects', 'learned.yaml', held=held)
+    if not found.complete:
+        return command('diagnose', fitted, '--report', 'report.html', held=held)
+    effects = [word for e in found.effects if e.noise is None for word in ('--effect', e.name)]
+    return command('calibrate', fitted, *effects, '--save', 'posterior.npz')
+
+
+def first_page(found: DiagnosisData, hybrid: str = '', *, drawn: bool = True) -> FirstPage:
+    """Return what a person is told first.
+
+    Args:
+        found: the diagnosis.
+        hybrid: what it means for a hybrid test.
+        drawn: with its picture, and symbols for names; on a terminal neither.
+    """
+    picture = None
+    if drawn:
+        picture = Picture.of(
+            residual_summary(found),
+            'What the model leaves of held-out data, where both models differ most, and its rms '
+            'error over all of them; grey is noise, which no model explains.',
+        )
+    return FirstPage(
+        (found.summary(), _MEANS[found.verdict]),
+        certainty(found),
+        picture,
+        _error(found),
+        _parameters(found, word if drawn else str),
+        delay(found),
+        remedies(found),
+        hybrid,
+        next_command(found),
+    )
 
 
 def _response(found: DiagnosisData) -> list[Block]:
@@ -134,19 +238,10 @@ def equation(found: DiagnosisData) -> str:
     return '; '.join(lines) + (f'; with {sizes}' if sizes else '')
 
 
-def summary(found: DiagnosisData) -> Section:
-    """Return the verdict, the residual, what is missing, errors, what next, parameters."""
-    blocks: list[Block] = [
-        Text(_MEANS[found.verdict]),
-        Picture.of(
-            residual_summary(found),
-            'What the model leaves of held-out data, where both models differ most, and its rms '
-            'error over all of them; grey is noise, which no model explains.',
-        ),
-        _error(found),
-        *_certainty(found),
-        *(Note(line) for line in found.advice if line not in found.preparation),
-    ]
+def advice(found: DiagnosisData) -> list[Section]:
+    """Return names with their rivals, advice, tests to come, and what the model does to sines."""
+    blocks = _names(found)
+    blocks += [Note(line) for line in found.advice if line not in found.preparation]
     if found.experiments:
         rows = [
             [e.text, f'{1e3 * e.amplitude:.2g}', f'{e.stiffness / 1e3:g}', f'{e.nats:.3g}']
@@ -154,10 +249,8 @@ def summary(found: DiagnosisData) -> Section:
         ]
         header = ['test', 'amplitude [mm]', 'k [kN/m]', 'nats expected']
         blocks.append(Table(header, rows, 'Tests that would tell tied names apart.', prose=True))
-    if found.base:
-        blocks.append(_parameters(found))
     blocks += _response(found)
-    return Section('The answer', blocks)
+    return [Section('More on the answer', blocks)] if blocks else []
 
 
 def closing(found: DiagnosisData) -> list[Section]:
