@@ -99,7 +99,7 @@ def test_a_calibration_is_shown(posterior: ag.Calibration, tmp_path: Path) -> No
     assert posterior.plot_bands(posterior.records[0]).axes
     assert 'beta_1' in posterior._repr_html_()
     page = posterior.report(tmp_path / 'report.html').read_text()
-    assert 'Posterior moments' in page and page.count('<img') == 2
+    assert 'Posterior moments' in page and page.count('<img') == 3
     data = posterior.inference_data
     assert data.posterior['beta_1'].attrs['unit'] == '1/s'
     assert data.posterior['beta_1'].attrs['upper'] == 400.0

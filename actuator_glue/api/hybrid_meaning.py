@@ -44,4 +44,4 @@ def hybrid_meaning(
         told = 'it is unstable without a compensator'
     else:
         told = 'whether it is stable is open'
-    return f'{name}: it bears {margin:.2f} ms of delay, {has}: {told}; `rths` tells more.'
+    return f'{name}: it bears {margin:.2f} ms of delay, {has}: {told}; rths tells more.'

@@ -1,6 +1,8 @@
 """The one-file HTML report."""
 
 import re
+import shutil
+import subprocess
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -56,3 +58,32 @@ def test_a_page_that_cannot_be_written_is_one_clear_error(tmp_path: Path) -> Non
     (tmp_path / 'file').write_text('')
     with pytest.raises(InputError, match='cannot be written'):
         write(tmp_path / 'file' / 'page.html', Page('T', 'L', []))
+
+
+CHROMIUM = next(filter(None, map(shutil.which, ('chromium', 'chromium-browser', 'chrome'))), None)
+MEASURE = """<script>addEventListener('load', () => { document.title = [
+  innerWidth, document.documentElement.scrollWidth,
+  getComputedStyle(document.querySelector('td')).display,
+  document.querySelector('img').clientWidth].join(' '); })</script></html>"""
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason='no browser')
+def test_a_phone_shows_the_page_in_its_width(tmp_path: Path) -> None:
+    """Long names break, wide tables and pictures scroll alone, rows of text are stacked."""
+    picture = Picture.of(Figure(figsize=(7.2, 2)), 'A figure')
+    wide = Table([f'column {i}' for i in range(12)], [range(12)], 'A wide table')
+    prose = Table(('parameter', 'before', 'after'), [('a', 'b ' * 40, 'x' * 80)], 'T', prose=True)
+    page = Page('T' * 60, 'a_long_name' * 9, [Section('S', [prose, picture, wide])])
+    path = tmp_path / 'page.html'
+    path.write_text(render(page).replace('</html>', MEASURE))
+    options = ['--headless=new', '--no-sandbox', '--disable-gpu', '--virtual-time-budget=2000']
+    for window, stacked in ((390, True), (1200, False)):
+        dom = subprocess.run(
+            [str(CHROMIUM), *options, f'--user-data-dir={tmp_path / str(window)}',
+             f'--window-size={window},900', '--dump-dom', path.as_uri()],
+            capture_output=True, text=True, check=True, timeout=60,
+        ).stdout  # fmt: skip
+        inner, width, display, image = re.findall(r'<title>(.*?)</title>', dom)[0].split()
+        assert int(width) <= int(inner)
+        assert display == ('grid' if stacked and int(inner) <= 640 else 'table-cell')
+        assert int(image) >= 600
