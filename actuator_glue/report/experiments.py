@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from actuator_glue.report.quantity import plain
+
 _MOST = 3  # that are told, best first
 
 
@@ -25,7 +27,7 @@ def _words(experiment: Any) -> str:
         where = 'without specimen' if not stiffness else f'with a specimen of {stiffness:.4g} kN/m'
         return (
             f'{experiment["command"]} of {size:.2g} mm {where}, {experiment["seconds"]:.0f} s '
-            f'({experiment["expected_nats"]:.2g} nats expected between what is tied)'
+            f'({plain(experiment["expected_nats"], 2)} nats expected between what is tied)'
         )
     except (KeyError, TypeError, ValueError):  # of another version
         return ''

@@ -22,6 +22,9 @@ function make(tag, properties, ...children) {
 const stroke = (color, width, dash) =>
   ({stroke: color, width, dash, points: {show: false}, spanGaps: false});
 
+// A little room above and below; axes stay where there is nothing to draw.
+const roomy = (_, least, most) => least == null ? [-1, 1] : uPlot.rangeNum(least, most, 0.08, true);
+
 class Panel {
   // title; keys: [{label, color, line, dash, series}]; series, bands, hooks: of uPlot;
   // x(): range; y(u, least, most): range, where it is not automatic; axis: times are told below;
@@ -76,12 +79,12 @@ class Panel {
     const cursor = {drag: {x: false, y: false}, y: false, points: {show: false}};
     if (sync) cursor.sync = {key: sync};
     return {
-      scales: {x: {time: false, auto: false, range: x}, y: y ? {range: y} : {}},
+      scales: {x: {time: false, auto: false, range: x}, y: {range: y || roomy}},
       padding: [6, RIGHT, axis ? 0 : 4, 0],
       axes: [
         {size: axis ? 26 : 4, grid: {width: 0.5}, ticks: {show: false}, font: '12px system-ui',
           values: (_, at) => axis ? at.map((v) => `${digits(v, 6)} s`) : at.map(() => '')},
-        {size: LEFT, grid: {width: 0.5}, ticks: {show: false}, font: '12px system-ui', space: 18, incrs: this.options.steps,
+        {size: LEFT, grid: {width: 0.5}, ticks: {show: false}, font: '12px system-ui', space: axis ? 28 : 18, incrs: this.options.steps,
           values: this.options.values || ((_, at) => at.map((v) => digits(v, 6)))},
       ],
       legend: {show: false}, cursor, series: [{}, ...series], bands,
