@@ -1,0 +1,78 @@
+"""The row of a group: what a calibration and a diagnosis of it say, under columns that stay."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import actuator_glue as ag
+from actuator_glue.campaigns.analysis import analysed, pooling
+from actuator_glue.campaigns.grouping import tasks_of
+from actuator_glue.campaigns.recipe import parse_recipe
+from actuator_glue.io.export import write
+
+
+@pytest.fixture(scope='module')
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two tests of one day, free and clamped."""
+    place = tmp_path_factory.mktemp('day')
+    for name, k in (('free', 0.0), ('clamped', 250e3)):
+        test = ag.simulate(ag.Command(rate=100.0, duration=8.0), stiffness=k, seed=(2, int(k)))
+        write(place / f'north_20260301T090000_{name}.csv', test)
+    return place
+
+
+RECIPE = {
+    'names': r'(?P<actuator>[a-z]+)_(?P<started>\d{8}T\d{6})_(?P<specimen>[a-z]+)',
+    'group': ['actuator', 'day'],
+    'calibrate': {'evaluations': 16000, 'seed': 7},
+    'diagnose': 'never',
+    'partition': 'sdof',
+    'draws': True,
+}
+
+
+def test_a_row_says_what_the_calibration_says(folder: Path, tmp_path: Path) -> None:
+    """The same numbers as `calibrate` and `rths`, to the bit, draws kept where asked for."""
+    (task,) = tasks_of([folder], parse_recipe(RECIPE, folder))
+    row = analysed(task, tmp_path, 'k')
+    records = [r for m in task.members for r in m.records()]
+    alone = ag.calibrate(records, evaluations=16000, seed=7)
+    for i, name in enumerate(alone.names):
+        assert row[f'{name}_mean'] == alone.posterior[:, i].mean()
+        assert row[f'{name}_lower'] < row[f'{name}_mean'] < row[f'{name}_upper']
+    judged = ag.rths('sdof', alone)
+    assert row['p_unstable'] == judged.p_unstable.value
+    assert judged.margin_s is not None and row['margin_s_mean'] == judged.margin_s.mean
+    assert (row['actuator'], row['day'], row['started']) == (
+        'north',
+        '2026-03-01',
+        '2026-03-01T09:00:00',
+    )
+    assert (row['verdict'], row['records']) == ('none', 2)
+    assert row['duration_s'] == pytest.approx(sum(r.duration for r in records))
+    assert 0.0 < row['delay_at_5_hz_s_lower'] < row['delay_at_5_hz_s_mean']
+    assert np.array_equal(ag.Calibration.load(tmp_path / row['draws']).draws, alone.draws)
+
+
+def test_what_is_held_out_is_not_fitted(folder: Path, tmp_path: Path) -> None:
+    """One record left is one record; none left is a reason."""
+    some = parse_recipe({**RECIPE, 'holdout': '*_free.*', 'draws': False}, folder)
+    row = analysed(tasks_of([folder], some)[0], tmp_path, 'k')
+    assert (row['records'], row['stiffness_n_per_m']) == (1, '250000')
+    with pytest.raises(ag.InputError, match='every record is held out'):
+        analysed(
+            tasks_of([folder], parse_recipe({**RECIPE, 'holdout': '*'}, folder))[0], tmp_path, 'k'
+        )
+
+
+def test_pooling_is_of_logarithms(rng_seed: int) -> None:
+    """Mean and covariance of what was drawn; nothing where draws reach zero (never by chance)."""
+    rng = np.random.default_rng(rng_seed)
+    names = ('beta_1', 'alpha_1_beta_0', 'backlash', 'alpha_2', 'alpha_3')
+    logs = rng.standard_normal((500, 5))
+    told = pooling(np.exp(logs), names)
+    assert told is not None and told['names'] == [n for n in names if n != 'backlash']
+    np.testing.assert_allclose(told['mean'], logs[:, [0, 1, 3, 4]].mean(axis=0))
+    np.testing.assert_allclose(told['covariance'], np.cov(logs[:, [0, 1, 3, 4]].T))
+    assert pooling(np.exp(logs) * [1, 1, 1, 0, 1], names) is None
