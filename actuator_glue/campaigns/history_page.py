@@ -17,7 +17,7 @@ from actuator_glue.campaigns.change_points import A_YEAR
 from actuator_glue.campaigns.effect_spells import EffectHistory
 from actuator_glue.model.parameters import BASE
 from actuator_glue.report.html import Block, Note, Page, Picture, Section, Table, Text
-from actuator_glue.report.quantity import plain, said, spread, word
+from actuator_glue.report.quantity import plain, said, said_in, spread, word
 
 # What stands behind a parameter that moved, for a mechanic.
 _LOOK_AT = {
@@ -189,7 +189,7 @@ def _next(found: ActuatorHistory) -> list[Block]:
         ['parameter', 'median', '95 % interval', 'scatter of days'],
         rows,
         f'Predicted for a test {found.pooled.ahead:g} days after the last one, unless the '
-        'actuator is changed before; `history --prior` writes it for `--prior`.',
+        'actuator is changed before. The command history writes it as a file for --prior.',
     )
     return [table]
 
@@ -203,7 +203,10 @@ def _months(found: ActuatorHistory) -> list[Block]:
         )
     ]
     there = [c for c in _NUMBERS if c[0] in found.table or f'{c[0]}_mean' in found.table]
-    sizes = [(n, f'{word(n)} [{u}]', 1.0) for e in found.effects for n, u, *_ in e.sizes]
+    sizes = []
+    for name, unit, _, low, high in (size for e in found.effects for size in e.sizes):
+        factor, people = said_in(unit, low, high)
+        sizes.append((name, f'{word(name)} [{people or "-"}]', factor))
     if there:
         blocks.append(Picture.of(figures.numbers(found, there), 'How well it followed.'))
     if sizes:
