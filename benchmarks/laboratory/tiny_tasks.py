@@ -33,6 +33,12 @@ def resident(pid: int) -> float:
     return int(Path(f'/proc/{pid}/statm').read_text('utf-8').split()[1]) * _PAGE
 
 
+def worked(pid: int) -> float:
+    """Return the processor time that a process has taken [s]."""
+    fields = Path(f'/proc/{pid}/stat').read_text('utf-8').rpartition(')')[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
+
+
 def start(*args: object) -> subprocess.Popen[bytes]:
     """Start a program of dask, its threads pinned."""
     environment = {**os.environ, **dict.fromkeys(THREADS, '1')}
@@ -86,7 +92,9 @@ def main() -> int:
     def look(now: Progress) -> None:
         memory = {'client': os.getpid(), 'scheduler': scheduler.pid, 'worker': workers[0].pid}
         sizes = {name: resident(pid) for name, pid in memory.items()}
-        samples.append({'tasks': now.done, 'seconds': time.perf_counter() - began, **sizes})
+        times = {f'{name}_cpu': worked(pid) for name, pid in memory.items()}
+        at = {'tasks': now.done, 'seconds': time.perf_counter() - began}
+        samples.append({**at, **sizes, **times})
 
     try:
         ag.campaign(
@@ -110,9 +118,14 @@ def text(samples: list[dict[str, float]], tasks: int, workers: int) -> str:
     """Return memory over the run as a table of Markdown; the last look is at the result."""
     during = [s for s in samples[:-1] if s['tasks']] or samples
     first, last = during[0], during[-1]
-    pace = (last['seconds'] - first['seconds']) / max(last['tasks'] - first['tasks'], 1)
+
+    def each(name: str) -> float:
+        return 1e3 * (last[name] - first[name]) / max(last['tasks'] - first['tasks'], 1)
+
+    shares = ', '.join(f'{n} {each(f"{n}_cpu"):.2f} ms' for n in ('client', 'scheduler', 'worker'))
     lines = [
-        f'{tasks} tasks, {workers} worker(s): {1e3 * pace:.1f} ms a task',
+        f'{tasks} tasks, {workers} worker(s): {each("seconds"):.1f} ms a task by the clock; of the '
+        f'processor: {shares}',
         '',
         '| tasks done | client [MB] | scheduler [MB] | worker [MB] |',
         '|---|---|---|---|',
