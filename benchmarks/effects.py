@@ -11,6 +11,7 @@ from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.effects.terms.entry import term
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.model.structure import Structure
+from actuator_glue.model.structure_errors import StructureErrors
 from actuator_glue.records import Record
 from benchmarks.turns import in_turns
 
@@ -87,7 +88,7 @@ def _task(structure: Structure) -> Callable[[], object]:
     """Return what simulates a batch of parameter sets over a record."""
     command = commands.noise(1000.0, SAMPLES / 1000.0, 0.2, 8.0, seed=0)
     record = Record(command, command, 1e-3, 250e3)
-    errors = structure.errors([record])
+    errors = StructureErrors(structure, [record])
     theta = np.tile(structure.neutral(THETA), (THETAS, 1))
     for j, parameter in enumerate(structure.parameters[4:], start=4):
         neutral = float(theta[0, j])

@@ -11,6 +11,7 @@ from actuator_glue.inference.predictive import ResidualModel
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.force_errors import ForceErrors
 from actuator_glue.model.structure import Structure
+from actuator_glue.model.structure_errors import StructureErrors
 from actuator_glue.records import Array, Record
 
 
@@ -20,7 +21,9 @@ def fit_error(
     """Return the error of the best draw, over all records and in each."""
     structure = Structure(model.effects)
     counts = [round(settle / r.period) for r in records]
-    residuals = structure.errors(records, counts, initial).residuals(best[: len(structure.names)])
+    residuals = StructureErrors(structure, records, counts, initial).residuals(
+        best[: len(structure.names)]
+    )
     measured = [r.measured[n:] for r, n in zip(records, counts, strict=True)]
     whole = RecordError.of('', np.concatenate(residuals), np.concatenate(measured))
     each = (
@@ -37,7 +40,7 @@ def left_over(
     structure = Structure(model.effects)
     counts = [round(settle / r.period) for r in records]
     count = len(structure.names)
-    errors = structure.errors(records, counts, initial)
+    errors = StructureErrors(structure, records, counts, initial)
     return residual_of(errors.residuals(best[:count]), count)
 
 

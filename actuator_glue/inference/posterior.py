@@ -30,6 +30,7 @@ from actuator_glue.model.exact import Initial
 from actuator_glue.model.fast import FastErrors
 from actuator_glue.model.force_errors import ForceErrors
 from actuator_glue.model.structure import Structure
+from actuator_glue.model.structure_errors import StructureErrors
 from actuator_glue.records import Array, Record
 
 Likelihood: TypeAlias = Literal['glue', 'gaussian', 'ar1']
@@ -121,7 +122,7 @@ class Problem:
         effects, initial = self.model.effects, self.initial
         if self.likelihood == 'ar1' or effects:
             origin = self.first_index * self.records[0].period
-            errors = Structure(effects).errors(self.records, counts, initial, origin)
+            errors = StructureErrors(Structure(effects), self.records, counts, initial, origin)
             if self.likelihood == 'ar1':
                 return Ar1Likelihood(errors)
         sums = errors if effects else FastErrors(self.records, counts, initial, near=self.near)

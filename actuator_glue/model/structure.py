@@ -23,7 +23,6 @@ from actuator_glue.model.effects.terms import machine
 from actuator_glue.model.effects.terms.program import Written, compiled
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.parameters import BASE, Parameter
-from actuator_glue.model.structure_errors import StructureErrors
 from actuator_glue.records import Array, Record
 
 
@@ -171,20 +170,6 @@ class Structure:
         start = linear.initial_state(record) if initial == 'measured' else (0.0, 0.0)
         onsets = self.onsets(record, initial)
         return self.parts(table, record, start, onsets, origin, rate, force)
-
-    def errors(
-        self,
-        records: Sequence[Record],
-        settle: Sequence[int] | int = 0,
-        initial: Initial = 'rest',
-        origin: float = 0.0,
-    ) -> StructureErrors:
-        """Return the error sums of this structure over records, as ExactErrors for (m, p).
-
-        Raises:
-            InputError: no record, unknown stiffness or initial, settle too long.
-        """
-        return StructureErrors(self, records, settle, initial, origin)
 
     def onsets(self, record: Record, initial: Initial) -> tuple[Onset, ...]:
         """Return what depends on where a record begins, effect by effect."""

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from actuator_glue.model.effects import run
 from actuator_glue.model.exact import ExactErrors, Initial, settle_samples
+from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
-
-if TYPE_CHECKING:
-    from actuator_glue.model.structure import Structure
 
 
 class StructureErrors:

@@ -17,10 +17,11 @@ from actuator_glue.errors import InputError
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.nodes import configuration, own_effects, spin, topics
 from actuator_glue.nodes.estimator_worker import compute, warm_up
-from actuator_glue.nodes.health import ERROR, Rate, Silence
+from actuator_glue.nodes.health import ERROR, Rate
 from actuator_glue.nodes.latched import Newest
 from actuator_glue.nodes.messages import publish
 from actuator_glue.nodes.now import now_ns
+from actuator_glue.nodes.silence import Silence
 from actuator_glue.nodes.tracking import publish_tracking
 from actuator_glue.nodes.working import WorkingNode
 from actuator_glue.online import conversion

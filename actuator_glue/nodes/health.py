@@ -4,12 +4,9 @@ from __future__ import annotations
 
 from collections import deque
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
-
-if TYPE_CHECKING:
-    from actuator_glue.nodes.base import SuiteNode
 
 OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.ERROR
 
@@ -17,8 +14,6 @@ OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.E
 REMEMBER = 10.0  # s
 # What comes again within this time has lasted [s]; reports are up to a second apart.
 LASTING = 1.5
-# Nothing for so long is told, and is an error [s]; what has never come is waited for.
-SILENT, LOST = 10.0, 30.0
 # A stream of a thousand bad blocks a second must not fill the log; /diagnostics counts them all.
 LOGGED_PER_SECOND = 5
 
@@ -39,37 +34,6 @@ class Rate:
         self._marks.append((now, self.count))
         first, seen = self._marks[0]
         return (self.count - seen) / (now - first) if now > first else 0.0
-
-
-class Silence:
-    """How long nothing has come of a stream.
-
-    Args:
-        now: monotonic time from which on something is waited for [s].
-    """
-
-    def __init__(self, now: float) -> None:
-        self._last, self._any = now, False
-
-    def heard(self, now: float) -> None:
-        """Note that something has come at a monotonic time [s]."""
-        self._last, self._any = now, True
-
-    def tell(self, node: SuiteNode, what: str, now: float) -> None:
-        """Show how long nothing has come, complain where that is long; for `do_report`.
-
-        Args:
-            node: who listens.
-            what: to what.
-            now: monotonic time [s].
-        """
-        seconds = now - self._last
-        node.health.values['nothing for (s)'] = round(seconds, 1)
-        if seconds > LOST and self._any:
-            node.complain('silence', f'nothing comes on {what} for {LOST:g} s and more', ERROR)
-        elif seconds > SILENT:
-            yet = '' if self._any else ' yet'
-            node.complain('silence', f'nothing comes on {what}{yet}')
 
 
 class Health:

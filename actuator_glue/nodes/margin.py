@@ -15,9 +15,9 @@ from actuator_glue.io.partition import read_partition
 from actuator_glue.model.parameters import NAMES
 from actuator_glue.nodes import base, spin, topics
 from actuator_glue.nodes.beside import Beside
-from actuator_glue.nodes.health import Silence
 from actuator_glue.nodes.messages import publish
 from actuator_glue.nodes.parameters import Spec
+from actuator_glue.nodes.silence import Silence
 from actuator_glue.online.conversion import Head
 from actuator_glue.sample_block import stamp_ns
 

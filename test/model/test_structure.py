@@ -16,6 +16,7 @@ from actuator_glue.model.exact import ExactErrors
 from actuator_glue.model.parameters import TABLE_2
 from actuator_glue.model.stream import Stream
 from actuator_glue.model.structure import Structure
+from actuator_glue.model.structure_errors import StructureErrors
 from actuator_glue.records import Record
 
 
@@ -88,7 +89,7 @@ def test_error_sums_are_those_of_the_simulation(names: tuple[str, ...], initial:
     settle = (0, 1100)
     structure = Structure(names)
     theta = np.stack([typical(names, records[0]), structure.neutral(TABLE_2)])
-    errors = structure.errors(records, settle, initial)
+    errors = StructureErrors(structure, records, settle, initial)
     assert errors.sizes.tolist() == [len(U), 500]
     sums = errors(theta)
     for i, (r, skip) in enumerate(zip(records, settle, strict=True)):
@@ -165,7 +166,7 @@ def test_bounds_are_survived(name: str) -> None:
     theta = np.array([[*b, *c] for b in bases for c in corners])
     with np.errstate(all='ignore'):
         y = structure.simulate(theta, r)
-        sums = structure.errors([r])(theta)
+        sums = StructureErrors(structure, [r])(theta)
     assert y.shape == (len(theta), 600)
     assert sums.shape == (len(theta), 1, 2)
     if name not in ('payload-inertia', 'specimen-hardening'):  # these may truly diverge

@@ -11,7 +11,8 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.inference.prior_conflict import Conflict
 from actuator_glue.nodes import estimator
-from actuator_glue.nodes.health import LOGGED_PER_SECOND, REMEMBER, Health, Rate, Silence
+from actuator_glue.nodes.health import LOGGED_PER_SECOND, REMEMBER, Health, Rate
+from actuator_glue.nodes.silence import Silence
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.stream import Contradicted, Window
 from actuator_glue.records import Record
