@@ -124,8 +124,8 @@ def text(samples: list[dict[str, float]], tasks: int, workers: int) -> str:
 
     shares = ', '.join(f'{n} {each(f"{n}_cpu"):.2f} ms' for n in ('client', 'scheduler', 'worker'))
     lines = [
-        f'{tasks} tasks, {workers} worker(s): {each("seconds"):.1f} ms a task by the clock; of the '
-        f'processor: {shares}',
+        f'{tasks} tasks, {workers} worker(s): {each("seconds"):.1f} ms a task by the clock; '
+        f'processor time: {shares}',
         '',
         '| tasks done | client [MB] | scheduler [MB] | worker [MB] |',
         '|---|---|---|---|',
