@@ -30,3 +30,13 @@ def test_first_things_first() -> None:
     places = [TEXT.index(w) for w in ('calibrate free.csv', 'diagnose free.csv', 'tutorial.md')]
     assert places == sorted(places) and places[-1] < picture
     assert TEXT.count('![') == 1
+
+
+def test_each_kind_of_reader_has_a_page() -> None:
+    """Below 1500 words, linked from here, with commands or code that are tested."""
+    for reader in ('test_engineers', 'ros_engineers', 'statisticians'):
+        page = ROOT / 'docs' / f'for_{reader}.md'
+        text = page.read_text(encoding='utf-8')
+        assert len(text.split()) < 1500
+        assert f'docs/{page.name}' in TEXT
+        assert '```sh\n' in text or '```python\n' in text
