@@ -158,7 +158,8 @@ class DiagnoserNode(WorkingNode):
     def _draws(self, message: Any) -> None:
         if self.loop.trusted and self.memory.settings is not None:
             known = conversion.known(message, self.memory.settings)
-            self.memory.learn(known, self.collector.first_ns)
+            if known is not None:
+                self.memory.learn(known, self.collector.first_ns)
 
     def _take(self, given: live.Input) -> None:
         """Have the loop take something, and do what follows."""

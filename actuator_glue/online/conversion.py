@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, TypeAlias
 import numpy as np
 
 from actuator_glue.errors import InputError
-from actuator_glue.inference.carried import Carried
+from actuator_glue.inference.carried import FEWEST, Carried
 from actuator_glue.inference.choice import ModelChoice, choose_model
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.online.forecast import Prediction
@@ -242,14 +242,19 @@ def weighed(found: Weights) -> str:
     return ', '.join(f'{structure_name(sorted(name))} {weight:.0%}' for name, weight in found)
 
 
-def known(message: Any, settings: EstimatorSettings) -> Known:
+def known(message: Any, settings: EstimatorSettings) -> Known | None:
     """Return the posterior of a PosteriorDraws, and when its samples were taken.
+
+    None for a window that was cut so short that its draws say nothing.
 
     Raises:
         InputError: draws that are none.
     """
-    names, last = tuple(message.parameter_names), stamp_ns(message.header)
+    names = tuple(message.parameter_names)
     draws = _array(message.values).reshape(-1, max(len(names), 1))
+    if len(draws) < FEWEST:
+        return None
+    last = stamp_ns(message.header)
     middle = last - round(0.5e9 * (settings.window - settings.settle))
     since = settings.window - 1e-9 * (last - middle)
     return Known(Carried(names, draws).later(since), middle, last)

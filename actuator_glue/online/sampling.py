@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.errors import InputError
-from actuator_glue.inference.carried import Carried, later
+from actuator_glue.inference.carried import FEWEST, Carried, later
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.inference.convergence import quick_rhat_and_ess
@@ -120,7 +120,8 @@ class WindowFit:
         shaping_factor: G of Eq. (4); NaN for a formal likelihood.
         frozen: the posterior, to be held against later samples.
         archive: points to start from, shape (m, p).
-        learned: the posterior, for the priors of later windows; None where none is wanted.
+        learned: the posterior, for the priors of later windows; None where none is wanted, or the
+            window was cut so short that it says nothing.
         conflict: how far the window contradicts its prior; None where that is the box.
         complete: the sampling was not ended early.
         failure: why there is nothing of all this; empty where there is.
@@ -185,7 +186,7 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> WindowFit:
         archive=joined(posterior[spread(len(posterior), ARCHIVE)], job.archive),
         learned=(
             Carried.thinned(job.model.names, posterior)
-            if job.settings.prior == 'sequential' and chains.annealed
+            if job.settings.prior == 'sequential' and chains.annealed and len(posterior) >= FEWEST
             else None
         ),
         conflict=None if target.prior is None else conflict(target.prior, posterior),

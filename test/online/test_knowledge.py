@@ -273,3 +273,18 @@ def test_ranks_of_the_truth_are_uniform(drift, rng_seed):
         p = kstest(smooth[:, i], 'uniform').pvalue
         print(f'{name}: p {p:.3f}', np.histogram(smooth[:, i], 10, (0, 1))[0])
         assert p > 1e-3 / 8, name
+
+
+def test_a_window_that_was_cut_short_gives_a_posterior_and_no_prior():
+    """Of an overloaded computer: 30 draws are told as they are, and nothing is learned of them."""
+    estimator = Estimator(SEQUENTIAL, choose_model(), carried=known())
+    for item in stream(record(3.0)):
+        estimator.setup(item) if isinstance(item, StreamSetup) else estimator.push(item)
+    estimator.finish(run(estimator.next_job()))
+    short = run(estimator.next_job(), lambda share: True)
+    assert not short.failure and short.moments is not None
+    assert len(short.draws) < 50 and short.learned is None
+    assert estimator.finish(short) == []
+    message = type('M', (), conversion.draws(short)[1])
+    assert conversion.known(message, SEQUENTIAL) is None
+    assert run(estimator.next_job()).learned is not None
