@@ -25,11 +25,17 @@ stream goes on while a diagnosis computes, for 8 s, whatever it takes on a core 
 
 
 def page(rows: Sequence[Row], cases: int) -> str:
-    """Return the page of so many streams of `cases`."""
-    commits = ', '.join(sorted({str(row['commit']) for row in rows}))
+    """Return the page of so many streams of `cases`, those of each commit by themselves."""
+    by_commit: dict[str, list[Row]] = {}
+    for row in rows:
+        by_commit.setdefault(str(row['commit']), []).append(row)
+    return HEAD + '\n'.join(_of_one(rows, at, cases) for at, rows in by_commit.items())
+
+
+def _of_one(rows: Sequence[Row], commit: str, cases: int) -> str:
     seeds = sorted(row['seed'] for row in rows)
-    told = f'{len(rows)} of {cases} streams (seeds {seeds[0]} to {seeds[-1]}), commit {commits}.'
-    return f'{HEAD}{told}\n\n{_required(rows)}\n{_streams(rows)}'
+    told = f'{len(rows)} of {cases} streams (seeds {seeds[0]} to {seeds[-1]}), commit {commit}.'
+    return f'## Commit {commit}\n\n{told}\n\n{_required(rows)}\n{_streams(rows)}'
 
 
 def _required(rows: Sequence[Row]) -> str:
@@ -39,6 +45,8 @@ def _required(rows: Sequence[Row]) -> str:
     clear = [row for row in hidden if row['ratio'] >= CLEAR]
     named = [row for row in hidden if np.isfinite(row['true_least'])]
     delays = [row['delay'] for row in hidden if np.isfinite(row['delay'])]
+    # Rows of commits before this was counted have none.
+    counted = [row for row in rows if 'worse' in row]
     looks = [seconds for row in rows for seconds in row['looks']]
     lines = [
         ('windows after the first addition whose 95 % intervals hold the truth', '93 to 97 %',
@@ -59,7 +67,7 @@ def _required(rows: Sequence[Row]) -> str:
         ('samples in the 95 % bands of forecasts', '93 to 97 %',
          f'{np.mean([row["coverage"] for row in rows]):.1%}'),
         ('streams in which an addition made forecasts worse for more than three windows', 'none',
-         f'{sum(row["worse"] > 3 for row in rows)} of {len(rows)}'),
+         f'{sum(row["worse"] > 3 for row in counted)} of {len(counted)}'),
         ('processor time of a diagnosis beside other work, median', '',
          f'{np.median(looks):.0f} s of {len(looks)}' if looks else 'none'),
     ]  # fmt: skip
