@@ -24,6 +24,7 @@ from actuator_glue.api.provenance import provenance
 from actuator_glue.api.tracking import RecordTracking, ready, records_tracking, tables
 from actuator_glue.diagnosis import diagnose as core
 from actuator_glue.diagnosis.estimate import Estimate, Json
+from actuator_glue.diagnosis.first_look import FirstLook
 from actuator_glue.diagnosis.result import SCHEMA, DiagnosisData
 from actuator_glue.diagnosis.stages import ShareDone
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -237,6 +238,8 @@ class DiagnosisOptions:
             hour since (random walk) [h^-1/2].
         prior_age: time since that calibration, a `timedelta` or a number of seconds.
         use_force: the recorded force chooses among names that the displacement leaves tied.
+        effort: how much is simulated before what is known by then is told, in times of the usual,
+            which is about a minute on two cores.
     """
 
     seed: int = 1
@@ -246,6 +249,7 @@ class DiagnosisOptions:
     drift: float = 0.02
     prior_age: timedelta | float = 0.0
     use_force: bool = False
+    effort: float = 1.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, 'seed', seed_given(self.seed))
@@ -253,6 +257,8 @@ class DiagnosisOptions:
         check_prior(self.drift, self.prior_age)
         if self.jobs < 1:
             raise InputError(f'jobs {self.jobs} is below 1')
+        if not self.effort > 0.0:
+            raise InputError(f'effort {self.effort:g} is not above 0')
         if not 0.0 < self.false_alarms < 1.0:
             raise InputError(
                 f'false_alarms {self.false_alarms:g} is no probability between 0 and 1'
@@ -269,6 +275,7 @@ class DiagnosisChanges(TypedDict, total=False):
     drift: float
     prior_age: timedelta | float
     use_force: bool
+    effort: float
 
 
 @takes(DiagnosisOptions)
@@ -279,6 +286,7 @@ def diagnose(
     *,
     stiffness: Stiffness = None,
     progress: Progress | bool | None = None,
+    first_look: Callable[[FirstLook], None] | None = None,
     **changes: Unpack[DiagnosisChanges],
 ) -> Diagnosis:
     """Ask whether Eq. (2) explains records and, if not, which effects it lacks.
@@ -293,6 +301,7 @@ def diagnose(
             what they and their files say.
         progress: called with (stage, share of it done in [0, 1]); True for a bar, False for none;
             None for a bar in a notebook.
+        first_look: called once, seconds after the start, with what Eq. (2) leaves.
         changes: options by name.
 
     Returns:
@@ -303,6 +312,7 @@ def diagnose(
             or an option that cannot be used.
     """
     options = chosen(options or DiagnosisOptions(), changes, 'diagnose')
+    started = time.perf_counter()
     given = records_given(records, stiffness)
     held = [] if holdout is None else records_given(holdout, name='holdout')
     overall = ShareDone()
@@ -318,11 +328,16 @@ def diagnose(
             progress=harmless(progress)
             if callable(progress)
             else lambda stage, share: bar(overall(stage, share)),
-            settings=Thresholds(false_alarms=options.false_alarms, use_force=options.use_force),
-            clock=time.perf_counter,
+            first_look=harmless(first_look),
+            settings=Thresholds(
+                false_alarms=options.false_alarms,
+                use_force=options.use_force,
+                effort=options.effort * Thresholds().effort,
+            ),
             prior=given_prior(options.prior, options.drift, options.prior_age),
         )
     values = {f.name: getattr(found, f.name) for f in fields(found)}
+    values['seconds'] = time.perf_counter() - started
     values['provenance'] = provenance([*given, *held], options.seed)
     return Diagnosis(**values, tracking=_tracking(found, given))
 

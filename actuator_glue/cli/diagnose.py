@@ -68,6 +68,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_prior(parser)
     parser.add_argument('--seed', type=int, default=1, metavar='S', help='seed (default 1)')
     parser.add_argument(
+        '--effort',
+        type=float,
+        default=1.0,
+        metavar='X',
+        help='how much is simulated before what is known by then is told, in times of the usual, '
+        'about a minute on two cores (default 1)',
+    )
+    parser.add_argument(
         '--jobs', type=int, default=2, metavar='N', help='threads for the refits (default 2)'
     )
     add_json(parser)
@@ -101,6 +109,8 @@ def run(args: argparse.Namespace) -> int:
             progress=tell,
             false_alarms=args.false_alarms,
             use_force=args.use_force,
+            effort=args.effort,
+            first_look=lambda look: note(look.sentence()),
             **prior_options(args),
         )
     command = shlex.join(['actuator-glue', *sys.argv[1:]])

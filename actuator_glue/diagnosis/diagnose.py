@@ -61,8 +61,6 @@ from actuator_glue.inference.prior_use import GivenPrior
 from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array, Record
 
-Clock = Callable[[], float]
-
 
 def diagnose(
     records: Sequence[Record],
@@ -73,7 +71,6 @@ def diagnose(
     progress: Progress | None = None,
     first_look: Callable[[FirstLook], None] | None = None,
     settings: Thresholds | None = None,
-    clock: Clock | None = None,
     prior: GivenPrior | None = None,
 ) -> DiagnosisData:
     """Diagnose records whose specimen stiffness is known.
@@ -87,13 +84,11 @@ def diagnose(
         progress: called with (stage, share done in [0, 1]).
         first_look: called once, seconds after the start, with what Eq. (2) leaves.
         settings: thresholds.
-        clock: gives seconds, for the duration reported (NaN without one).
         prior: what an earlier calibration knew of Eq. (2)'s parameters.
 
     Raises:
         InputError: stiffness not known, records too short, or nothing moves.
     """
-    start = clock() if clock else math.nan
     settings = settings or Thresholds()
     tell = progress or (lambda stage, share: None)
     held = [holdout] if isinstance(holdout, Record) else list(holdout or ())
@@ -259,7 +254,6 @@ def diagnose(
         ),
         surrogate=result.generic.to_json(),
         remaining=decision.remaining,
-        seconds=clock() - start if clock else math.nan,
         at_bound=held_at,
         effort=effort.share,
         preparation=tuple(prepared.told),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import asdict, dataclass, field
 from itertools import pairwise
 
@@ -83,7 +84,7 @@ class DiagnosisData:
         traces: curves for the report.
         surrogate: a generic regression of equal flexibility and what it leaves out of sample.
         remaining: where in loop, frequency, amplitude and time the unexplained rest sits.
-        seconds: wall time.
+        seconds: wall time; NaN where nobody took it.
         at_bound: parameters that their bounds hold.
         sampling: per record its source, its rate as recorded and as fitted [Hz].
         preparation: the lines of `advice` that say what was done to the records.
@@ -117,7 +118,7 @@ class DiagnosisData:
     traces: tuple[Trace, ...]
     surrogate: Json
     remaining: Json
-    seconds: float
+    seconds: float = math.nan
     at_bound: tuple[Pressed, ...] = ()
     sampling: tuple[Json, ...] = ()
     preparation: tuple[str, ...] = ()
