@@ -66,6 +66,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         help='begin no further stream after that; they come in an order drawn by the seed, so '
         'that those that were run are a fair sample of all',
     )
+    parser.add_argument('--hidden', metavar='NAME', help='only streams that hide it, or nothing')
     parser.add_argument(
         '--page', type=Path, metavar='FILE.md', help='write the page of rows in --out; run nothing'
     )
@@ -77,6 +78,9 @@ def main(argv: Sequence[str] | None = None) -> int:
         rows = [json.loads(line) for line in file.read_text().splitlines()]
         args.page.write_text(page(rows, len(cases)))
         return 0
+    if args.hidden is not None:
+        wanted = () if args.hidden == 'nothing' else tuple(args.hidden.split('+'))
+        cases = [case for case in cases if case.effects == wanted]
     cases = [cases[i] for i in np.random.default_rng(args.seed).permutation(len(cases))]
     folder.mkdir(parents=True, exist_ok=True)
     rows, at = [], commit()
