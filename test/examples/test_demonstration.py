@@ -11,6 +11,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,7 +28,7 @@ from actuator_glue.online.replay_comparison import ReplayComparison
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.records import Array, Record
 from examples.demonstration import __main__ as command
-from examples.demonstration import domain
+from examples.demonstration import domain, pictures
 from examples.demonstration.outcome import SessionOutcome
 from examples.demonstration.processes import Nodes, executable
 from examples.demonstration.session import prepare
@@ -335,3 +336,25 @@ def test_only_the_default_demonstration_promises_what_it_finds(tmp_path: Path) -
     assert usual.promises and set(usual.hidden) == {'backlash', 'gain-drift'}
     assert not simulator(30.0, 1000.0, None, 'backlash', tmp_path / 't', 1).promises
     assert not simulator(60.0, 1000.0, None, 'delay', tmp_path / 't', 1).promises
+
+
+def test_weights_of_explanations_are_drawn_over_time_with_the_truth_marked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    content = windows(
+        [[]] * 5 + [['backlash']] * 4 + [['gain-drift', 'backlash']] * 6, [True] * 15
+    )
+    content.posteriors[9].structures = ['gain-drift + backlash', 'Eq. (2)']
+    content.posteriors[9].weights = [0.7, 0.3]
+    kept: list[Any] = []
+    monkeypatch.setattr(pictures.style, 'save', lambda figure, path: kept.append(figure))
+    pictures.explanations(content, tmp_path / 'p.png', ('backlash', 'gain-drift'))  # type: ignore[arg-type]
+    (axes,) = kept[0].axes
+    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    assert labels == ['gain-drift + backlash (the truth)', 'Eq. (2)', 'backlash']
+    bands = dict(zip(labels, axes.collections, strict=True))
+    corners = bands[labels[0]].get_paths()[0].vertices
+    # 70 % in the window that ends at 14 s, all from then on, nothing before.
+    assert {float(y) for x, y in corners if x > 14.5} <= {0.0, 70.0, 100.0}
+    assert max(y for x, y in corners if x < 13.0) == 0.0
+    assert 'at the end gain-drift + backlash, 100%' in kept[0].get_suptitle()
