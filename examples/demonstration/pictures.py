@@ -107,18 +107,14 @@ def explanations(content: Content, path: Path, hidden: Sequence[str]) -> Path:
             step='pre',
             lw=0.5,
             color=known.get(name) or next(others),
-            hatch='//' if name == true else None,
-            edgecolor='white',
             label=f'{name} (the truth)' if name == true and hidden else name,
         )
         below = above
     axes.set(ylim=(0, 100), xlim=(time[0], time[-1]), xlabel='time [s]')
     axes.set(ylabel='weight of the\nexplanation [%]')
-    axes.legend(loc='center left', bbox_to_anchor=(1.01, 0.5))
+    figure.legend(*axes.get_legend_handles_labels(), loc='outside lower center', ncols=2)
     last = max(told[-1], key=lambda name: told[-1][name])
-    title = f'What explains the samples: at the end {last}, {told[-1][last]:.0%}'
-    if hidden:
-        title += f'; hidden: {structure_name(hidden)}'
+    title = f'Explanations over time; at the end {last}, {told[-1][last]:.0%}'
     figure.suptitle(style.fit(title, style.WIDTH, size=10))
     return style.save(figure, path)
 

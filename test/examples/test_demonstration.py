@@ -350,7 +350,7 @@ def test_weights_of_explanations_are_drawn_over_time_with_the_truth_marked(
     monkeypatch.setattr(pictures.style, 'save', lambda figure, path: kept.append(figure))
     pictures.explanations(content, tmp_path / 'p.png', ('backlash', 'gain-drift'))  # type: ignore[arg-type]
     (axes,) = kept[0].axes
-    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    labels = [text.get_text() for text in kept[0].legends[0].get_texts()]
     assert labels == ['gain-drift + backlash (the truth)', 'Eq. (2)', 'backlash']
     bands = dict(zip(labels, axes.collections, strict=True))
     corners = bands[labels[0]].get_paths()[0].vertices
