@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from actuator_glue import effects as effects
     from actuator_glue.api.calibration import calibrate as calibrate
     from actuator_glue.api.calibration_result import Calibration as Calibration
+    from actuator_glue.api.combinations import combinations as combinations
     from actuator_glue.api.compensation import compare_compensators as compare_compensators
     from actuator_glue.api.diagnosis import Diagnosis as Diagnosis
     from actuator_glue.api.diagnosis import diagnose as diagnose
@@ -57,6 +58,7 @@ _PUBLIC = {
     'StabilityResult': ('api.stability', 'StabilityResult'),
     'calibrate': ('api.calibration', 'calibrate'),
     'campaign': ('campaigns.campaign', 'campaign'),
+    'combinations': ('api.combinations', 'combinations'),
     'compare_compensators': ('api.compensation', 'compare_compensators'),
     'diagnose': ('api.diagnosis', 'diagnose'),
     'effects': ('effects', ''),

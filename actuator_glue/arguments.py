@@ -47,6 +47,11 @@ def number_or_auto(text: str) -> float | Literal['auto']:
     return 'auto' if text == 'auto' else number(text)
 
 
+def stiffness(text: str) -> float | Literal['unknown']:
+    """Return a stiffness, or 'unknown'."""
+    return 'unknown' if text == 'unknown' else number(text)
+
+
 class Output(str):
     """A file or bag that a command writes; `-` is standard output."""
 

@@ -358,7 +358,7 @@ class Record:
             where = f'{self.source}: ' if self.source else ''
             raise InputError(
                 f'{where}specimen stiffness is not known; give it with --stiffness N/m, 0 for a '
-                'free actuator'
+                'free actuator; `calibrate --stiffness unknown` tells what holds without it'
             )
         return self.stiffness
 

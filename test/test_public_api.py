@@ -25,6 +25,7 @@ NAMES = {
     'StabilityResult',
     'calibrate',
     'campaign',
+    'combinations',
     'compare_compensators',
     'diagnose',
     'effects',

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from actuator_glue.arguments import number
+from actuator_glue.arguments import number, stiffness
 from actuator_glue.cli._output import note
 from actuator_glue.io.formats import formats
 from actuator_glue.records import Record
@@ -26,10 +26,10 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         '--stiffness',
         action='append',
-        type=number,
+        type=stiffness,
         metavar='N/m...',
         help='specimen stiffness: one for all records or one per record (250 kN/m is 250e3, 0 is '
-        'a free actuator); wins over what a file says',
+        'a free actuator or a shaking table, `unknown` leaves it open); wins over what files say',
     )
     parser.add_argument(
         '--channels', metavar='MAP.yaml', help='channel map: columns of files, or topics of a bag'

@@ -20,7 +20,9 @@ from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
 
 if TYPE_CHECKING:
+    from actuator_glue.api.calibration_options import CalibrationOptions
     from actuator_glue.api.calibration_result import Calibration
+    from actuator_glue.records import Record
 
 EXAMPLES = (
     'calibrate free.csv clamped.csv --stiffness 0 250e3 --save monday.npz',
@@ -138,6 +140,8 @@ def run(args: argparse.Namespace) -> int:
         **prior_options(args),
     )
     records = load(args)
+    if args.stiffness and 'unknown' in args.stiffness:
+        return _combinations(records, options, args)
     with progress('calibrating', args.evaluations) as done:
         found = calibrate(records, options, progress=done)
     content = found.to_json()
@@ -145,6 +149,37 @@ def run(args: argparse.Namespace) -> int:
     failed = beside(args.save, found.save) or failed
     _show(found, args)
     failed = beside(args.report, lambda out: found.report(out, args.partition)) or failed
+    return failed or (1 if found.problems else 0)
+
+
+def _combinations(
+    records: list[Record], options: CalibrationOptions, args: argparse.Namespace
+) -> int:
+    """Print what holds without a stiffness, and return the exit code."""
+    from actuator_glue.api.combinations import HEADER, TITLE, combinations
+    from actuator_glue.api.tracking import HEADER as TRACKING
+
+    if args.partition is not None:
+        raise InputError('a hybrid test cannot be judged without the specimen stiffness; give it')
+    if any(record.stiffness is not None for record in records):
+        raise InputError(
+            'one stiffness is given and another is unknown; calibrate the tests of the one and of '
+            'the other on their own'
+        )
+    with progress('calibrating', args.evaluations) as done:
+        found = combinations(records, options, progress=done)
+    content = found.to_json()
+    failed = beside(args.json, lambda out: write_json(content, out))
+    failed = beside(args.save, found.save) or failed
+    for line in found.problems:
+        say(line, args)
+    table(TITLE, HEADER, found.rows(), args)
+    say(found.error_line(), args)
+    for of in found.tracking:
+        table(of.title, TRACKING, of.rows(), args)
+    for line in found.notes:
+        note(line)
+    failed = beside(args.report, found.report) or failed
     return failed or (1 if found.problems else 0)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 
 from actuator_glue.cli._output import note
 from actuator_glue.cli._records import add_records, load
@@ -48,13 +49,17 @@ def _joined(args: argparse.Namespace) -> Record:
         )
     if args.stiffness is not None and len(args.stiffness) != 1:
         raise InputError('--join makes one record: give one --stiffness')
-    return join(
+    known, left_open = None, args.stiffness == ['unknown']
+    if args.stiffness is not None and not left_open:
+        (known,) = args.stiffness
+    found = join(
         *args.records,
         by=args.join,
         channels=args.channels,
-        stiffness=None if args.stiffness is None else args.stiffness[0],
+        stiffness=known,
         hold=args.hold,
         resample=args.resample,
         resample_by=args.resample_by,
         warn=note,
     )
+    return replace(found, stiffness=None) if left_open else found

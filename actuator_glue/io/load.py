@@ -6,6 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from os import PathLike
 from pathlib import Path
+from typing import Literal, TypeAlias
 
 import numpy as np
 
@@ -18,11 +19,13 @@ from actuator_glue.io.channel_map import ChannelMap, read_channel_map
 from actuator_glue.io.resample import By
 from actuator_glue.records import Hold, Record, check_stiffness
 
+Stiffness: TypeAlias = float | Literal['unknown']
+
 
 def load(
     path: Path | str,
     *,
-    stiffness: float | None = None,
+    stiffness: Stiffness | None = None,
     channels: ChannelMap | Path | str | None = None,
     hold: Hold | None = None,
     resample: float | None = None,
@@ -57,7 +60,7 @@ def load(
 def load_records(
     paths: Sequence[Path | str] | Path | str,
     *,
-    stiffness: Sequence[float] | float | None = None,
+    stiffness: Sequence[Stiffness] | Stiffness | None = None,
     channels: ChannelMap | Path | str | None = None,
     hold: Hold | None = None,
     resample: float | None = None,
@@ -71,7 +74,8 @@ def load_records(
     Args:
         paths: bag folders, .mcap, laboratory files; one bag may hold several records.
         stiffness: specimen stiffness [N/m]: one for all, or one per path, or one per record;
-            None for what the files say. What is given wins over what the files say.
+            None for what the files say, which 'unknown' leaves aside. What is given wins over what
+            the files say.
         channels: channel map for the laboratory files, or for bags where it names topics.
         hold: how the command runs between its samples; None for what the files say.
         resample: samples per second [Hz] to which the jittered clock of a file is made even; an
@@ -123,7 +127,10 @@ def load_records(
     if stiffness is None:
         return records
     # One number of any type, or several in whatever holds them.
-    given = [check_stiffness(k) for k in np.ravel(np.asarray(stiffness, dtype=object))]
+    given = [
+        None if k == 'unknown' else check_stiffness(k)
+        for k in np.ravel(np.asarray(stiffness, dtype=object))
+    ]
     if len(given) == 1:
         given = given * len(records)
     elif len(given) == len(paths):

@@ -1,0 +1,96 @@
+"""What holds where the specimen's stiffness is not known, against the truth that was simulated."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import actuator_glue as ag
+from actuator_glue.api.combinations import NAMES, Combinations
+from actuator_glue.cli.main import main
+from actuator_glue.errors import InputError
+from actuator_glue.io.export import write
+
+# Table 2 of the paper with a leakage that shows.
+THETA = np.array([116.0, 9.0e8, 2.4e5, 8.0])
+SHORT = {'evaluations': 16_000, 'seed': 2}
+
+
+def simulated(stiffness: float, seed: int = 7) -> ag.Record:
+    """Return a test with a leak."""
+    command = ag.Command(rate=250.0, duration=20.0)
+    return ag.simulate(command, stiffness=stiffness, theta=THETA, seed=seed)
+
+
+def truth(k: float) -> np.ndarray:
+    """Return the combinations of the simulated actuator."""
+    beta_1, loop, oil, leak = THETA
+    share = leak * k / (oil + k)
+    return np.array([loop / (oil + k), beta_1 + share, beta_1 * share])
+
+
+@pytest.mark.parametrize('stiffness', [0.0, 120e3, 700e3])
+def test_the_combinations_are_those_of_the_actuator(stiffness: float) -> None:
+    """Whatever the stiffness is; what the record says of it is left aside."""
+    record = replace(simulated(stiffness), force=None)
+    found = ag.combinations(record, **SHORT)
+    assert list(found.combinations) == list(NAMES)
+    mean = np.array([p.mean for p in found.combinations.values()])
+    spread = np.array([p.stddev for p in found.combinations.values()])
+    off = np.abs(mean - truth(stiffness)) / spread
+    if stiffness == 0.0:
+        off = off[:2]  # nothing is below 0, where the third one lies
+        assert found.combinations['beta_1 alpha_3 k / (alpha_2 + k)'].best < 0.02 * truth(0.0)[0]
+    assert (off < 4.0).all()
+    assert (spread[:2] < 0.02 * mean[:2]).all()
+    assert found.problems == ()
+    assert 'it predicts no other stiffness' in found.notes[0]
+    assert found.sources[0].stiffness_n_per_m is None
+
+
+def test_what_it_is_told_and_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """By the command line as by the library; the force says what the stiffness may be."""
+    write(tmp_path / 'a.csv', replace(simulated(250e3), source='a.csv'))
+    options = ['--stiffness', 'unknown', '--evaluations', '16000', '--seed', '2']
+    places = ['--json', str(tmp_path / 'a.json'), '--save', str(tmp_path / 'a.npz')]
+    places += ['--report', str(tmp_path / 'a.html')]
+    assert main(['calibrate', str(tmp_path / 'a.csv'), *options, *places]) == 0
+    said = capsys.readouterr()
+    assert 'beta_1 + alpha_3 k / (alpha_2 + k)' in said.out
+    assert 'force over displacement is 2.5' in said.err
+    told = json.loads((tmp_path / 'a.json').read_text())
+    assert told['records'][0]['stiffness_n_per_m'] is None
+    kept = Combinations.load(tmp_path / 'a.npz')
+    for name, p in kept.combinations.items():
+        assert p.mean == told['combinations'][name]['mean']
+    page = (tmp_path / 'a.html').read_text()
+    assert 'no hybrid test' in page
+    # Others ask for the stiffness, and say what there is without.
+    assert main(['diagnose', str(tmp_path / 'a.csv'), '--stiffness', 'unknown']) == 2
+    assert '`calibrate --stiffness unknown` tells what holds' in capsys.readouterr().err
+
+
+def test_what_needs_a_stiffness_is_refused(tmp_path: Path) -> None:
+    """A mass, the force as evidence, records of which one has a stiffness."""
+    record = simulated(250e3)
+    with pytest.raises(InputError, match='mass cannot be told'):
+        ag.combinations(record, effects='payload-inertia')
+    with pytest.raises(InputError, match='need the specimen stiffness'):
+        ag.combinations(record, use_force=True)
+    for name in ('a.csv', 'b.csv'):
+        write(tmp_path / name, record)
+    words = ['calibrate', str(tmp_path / 'a.csv'), str(tmp_path / 'b.csv'), '--stiffness']
+    assert main([*words, '0', 'unknown']) == 2
+
+
+@pytest.mark.slow
+def test_a_shaking_table_is_a_free_actuator_with_a_payload() -> None:
+    """A rigid payload has no stiffness: --stiffness 0 and the mass that moves along."""
+    command = ag.Command(rate=250.0, duration=20.0)
+    table = ag.simulate(command, stiffness=0.0, effects=['payload-inertia'], seed=9)
+    plain = ag.calibrate(table, **SHORT)
+    found = ag.calibrate(table, effects='payload-inertia', evaluations=80_000, seed=2)
+    assert found.error.rms_m < 0.2 * plain.error.rms_m
+    assert found.error.rms_m == pytest.approx(1e-5, rel=0.1)
