@@ -7,9 +7,13 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.live.cases import EFFECTS
+
 Row = dict[str, Any]
 # Of two sizes, the one that no tie excuses.
 CLEAR = 4.0
+# Streams of `--few`.
+FEW = len(EFFECTS) + 2
 
 HEAD = """# The live loop: what was measured
 
@@ -35,6 +39,10 @@ def page(rows: Sequence[Row], cases: int) -> str:
 def _of_one(rows: Sequence[Row], commit: str, cases: int) -> str:
     seeds = sorted(row['seed'] for row in rows)
     told = f'{len(rows)} of {cases} streams (seeds {seeds[0]} to {seeds[-1]}), commit {commit}.'
+    if not any(row['effects'] for row in rows):
+        told += ' Only machines that hide no effect (`--hidden nothing`).'
+    elif len(rows) == FEW:
+        told += ' Each effect once (`--few`).'
     return f'## Commit {commit}\n\n{told}\n\n{_required(rows)}\n{_streams(rows)}'
 
 
@@ -49,28 +57,58 @@ def _required(rows: Sequence[Row]) -> str:
     counted = [row for row in rows if 'worse' in row]
     looks = [seconds for row in rows for seconds in row['looks']]
     lines = [
-        ('windows after the first addition whose 95 % intervals hold the truth', '93 to 97 %',
-         _inside(hidden)),
+        (
+            'windows after the first addition whose 95 % intervals hold the truth',
+            '93 to 97 %',
+            _inside(hidden),
+        ),
         ('the same, healthy machines, all windows', '93 to 97 %', _inside(healthy)),
-        ('largest weight at the end is the truth, larger size', '90 %',
-         _share([row['right'] for row in clear])),
-        ('largest weight at the end is the truth, both sizes', '',
-         _share([row['right'] for row in hidden])),
-        ('the truth once proposed and then never below 5 %', 'all',
-         _share([row['true_least'] >= 0.05 for row in named])),
-        ('healthy machines without an addition', 'all of 50',
-         _share([not np.isfinite(row['added']) for row in healthy])),
-        ('machines whose gain grows by 3 %, without an addition', '',
-         _share([not np.isfinite(row['added']) for row in drifting])),
-        ('first addition after the coverage broke, median', '15 s',
-         f'{np.median(delays):.0f} s of {len(delays)}' if delays else 'none'),
-        ('samples in the 95 % bands of forecasts', '93 to 97 %',
-         f'{np.mean([row["coverage"] for row in rows]):.1%}'),
-        ('streams in which an addition made forecasts worse for more than three windows', 'none',
-         f'{sum(row["worse"] > 3 for row in counted)} of {len(counted)}'),
-        ('processor time of a diagnosis beside other work, median', '',
-         f'{np.median(looks):.0f} s of {len(looks)}' if looks else 'none'),
-    ]  # fmt: skip
+        (
+            'largest weight at the end is the truth, larger size',
+            '90 %',
+            _share([row['right'] for row in clear]),
+        ),
+        (
+            'largest weight at the end is the truth, both sizes',
+            '',
+            _share([row['right'] for row in hidden]),
+        ),
+        (
+            'the truth once proposed and then never below 5 %',
+            'all',
+            _share([row['true_least'] >= 0.05 for row in named]),
+        ),
+        (
+            'healthy machines without an addition',
+            'all of 50',
+            _share([not np.isfinite(row['added']) for row in healthy]),
+        ),
+        (
+            'machines whose gain grows by 3 %, without an addition',
+            '',
+            _share([not np.isfinite(row['added']) for row in drifting]),
+        ),
+        (
+            'first addition after the coverage broke, median',
+            '15 s',
+            f'{np.median(delays):.0f} s of {len(delays)}' if delays else 'none',
+        ),
+        (
+            'samples in the 95 % bands of forecasts',
+            '93 to 97 %',
+            f'{np.mean([row["coverage"] for row in rows]):.1%}',
+        ),
+        (
+            'streams in which an addition made forecasts worse for more than three windows',
+            'none',
+            f'{sum(row["worse"] > 3 for row in counted)} of {len(counted)}',
+        ),
+        (
+            'processor time of a diagnosis beside other work, median',
+            '',
+            f'{np.median(looks):.0f} s of {len(looks)}' if looks else 'none',
+        ),
+    ]
     table = ['| what | required | measured |', '|---|---|---|']
     return '\n'.join([*table, *(f'| {" | ".join(line)} |' for line in lines), ''])
 
