@@ -348,7 +348,11 @@ def test_weights_of_explanations_are_drawn_over_time_with_the_truth_marked(
     content.posteriors[9].weights = [0.7, 0.3]
     kept: list[Any] = []
     monkeypatch.setattr(pictures.style, 'save', lambda figure, path: kept.append(figure))
-    pictures.explanations(content, tmp_path / 'p.png', ('backlash', 'gain-drift'))  # type: ignore[arg-type]  # stands for a bag's
+    pictures.explanations(
+        content,  # type: ignore[arg-type]  # stands for a bag's
+        tmp_path / 'p.png',
+        ('backlash', 'gain-drift'),
+    )
     (axes,) = kept[0].axes
     labels = [text.get_text() for text in kept[0].legends[0].get_texts()]
     assert labels == ['gain-drift + backlash (the truth)', 'Eq. (2)', 'backlash']
