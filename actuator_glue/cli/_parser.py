@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Sequence
 from typing import Any, NoReturn
 
-from actuator_glue.arguments import is_number, number
+from actuator_glue.arguments import is_number, number, stiffness
 from actuator_glue.errors import InputError
 
 EPILOG = (
@@ -51,7 +51,7 @@ class Parser(argparse.ArgumentParser):
         many = {
             name
             for action in self._actions
-            if isinstance(action, argparse._AppendAction) and action.type is number
+            if isinstance(action, argparse._AppendAction) and action.type in (number, stiffness)
             for name in action.option_strings
         }
         spread: list[str] = []
