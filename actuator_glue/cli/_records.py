@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import argparse
+from typing import TYPE_CHECKING
 
 from actuator_glue.arguments import number, stiffness
 from actuator_glue.cli._output import note
 from actuator_glue.io.formats import formats
 from actuator_glue.records import Record
+
+if TYPE_CHECKING:
+    from actuator_glue.io.resample import Resample
 
 
 def add_records(parser: argparse.ArgumentParser) -> None:
@@ -62,6 +66,11 @@ def add_reading(parser: argparse.ArgumentParser) -> None:
     )
 
 
+def resampling(args: argparse.Namespace) -> Resample | None:
+    """Return what --resample and --resample-by say."""
+    return None if args.resample is None else (args.resample, args.resample_by)
+
+
 def load(args: argparse.Namespace) -> list[Record]:
     """Return the records that the options name; where bags are split is told.
 
@@ -76,8 +85,7 @@ def load(args: argparse.Namespace) -> list[Record]:
         stiffness=args.stiffness,
         channels=args.channels,
         hold=args.hold,
-        resample=args.resample,
-        resample_by=args.resample_by,
+        resample=resampling(args),
         gap=note if args.split else None,
         warn=note,
     )

@@ -6,7 +6,7 @@ import argparse
 from dataclasses import replace
 
 from actuator_glue.cli._output import note
-from actuator_glue.cli._records import add_records, load
+from actuator_glue.cli._records import add_records, load, resampling
 from actuator_glue.cli._save import add_out, save
 from actuator_glue.errors import InputError
 from actuator_glue.records import Record
@@ -58,8 +58,7 @@ def _joined(args: argparse.Namespace) -> Record:
         channels=args.channels,
         stiffness=known,
         hold=args.hold,
-        resample=args.resample,
-        resample_by=args.resample_by,
+        resample=resampling(args),
         warn=note,
     )
     return replace(found, stiffness=None) if left_open else found

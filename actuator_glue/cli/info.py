@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from actuator_glue.cli._output import add_json, note, say, table
-from actuator_glue.cli._records import add_records
+from actuator_glue.cli._records import add_records, resampling
 from actuator_glue.errors import InputError
 from actuator_glue.io.json_file import write_json
 from actuator_glue.io.units import factor
@@ -55,8 +55,7 @@ def run(args: argparse.Namespace) -> int:
                 stiffness=args.stiffness,
                 channels=args.channels,
                 hold=args.hold,
-                resample=args.resample,
-                resample_by=args.resample_by,
+                resample=resampling(args),
                 note=lambda _: None,
                 gap=note if args.split else content['damage'].append,
                 warn=content['warnings'].append,

@@ -16,8 +16,7 @@ from actuator_glue.even_times import uniform_period
 from actuator_glue.io.bag_reader import warn_caller
 from actuator_glue.io.channel_map import ChannelMap, read_channel_map
 from actuator_glue.io.laboratory import Channels, channels_of
-from actuator_glue.io.resample import By as ResampleBy
-from actuator_glue.io.resample import resample_evenly
+from actuator_glue.io.resample import Resample, rate_and_way, resample_evenly
 from actuator_glue.records import Array, Hold, Record
 
 By: TypeAlias = Literal['time', 'correlation']
@@ -60,8 +59,7 @@ def join(
     channels: ChannelMap | Path | str | None = None,
     stiffness: float | None = None,
     hold: Hold | None = None,
-    resample: float | None = None,
-    resample_by: ResampleBy = 'band-limited',
+    resample: Resample | None = None,
     warn: Callable[[str], None] = warn_caller,
 ) -> Record:
     """Return the record of a test whose command is in one file and whose response in another.
@@ -81,8 +79,8 @@ def join(
             columns say what they are.
         stiffness: specimen stiffness [N/m]; None for what the map or the response says.
         hold: how the command runs between its samples; None for straight between them.
-        resample: samples per second [Hz] to which a jittered clock of the response is made even.
-        resample_by: how: 'band-limited', or by straight 'lines'.
+        resample: samples per second [Hz] to which a jittered clock of the response is made even;
+            `(27.0, 'lines')` for straight lines between samples.
         warn: called with a line that tells how the files were joined and how sure that is.
 
     Raises:
@@ -125,7 +123,7 @@ def join(
     except InputError:
         if resample is None:
             raise
-        made = resample_evenly(values, resample, str(response_file), resample_by)
+        made = resample_evenly(values, *rate_and_way(resample), where=str(response_file))
         values, period = made.values, made.period
         warn(f'{response_file}: {made.told()}')
         source = f'{source} ({made.name()})'

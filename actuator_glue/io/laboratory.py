@@ -14,7 +14,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.even_times import uniform_period
 from actuator_glue.io.channel_map import Channel, ChannelMap, read_channel_map
 from actuator_glue.io.formats import Column, FileTable, format_of
-from actuator_glue.io.resample import By, resample_evenly
+from actuator_glue.io.resample import Resample, rate_and_way, resample_evenly
 from actuator_glue.io.signature import refuse_pipe
 from actuator_glue.io.units import FLOAT32_COUNTS, ROLES, choose, of_file, recognise
 from actuator_glue.rate_check import APART, disagreement, rate_by_clock
@@ -55,8 +55,7 @@ def read(
     stiffness: float | None = None,
     hold: Hold | None = None,
     actuator: str | None = None,
-    resample: float | None = None,
-    resample_by: By = 'band-limited',
+    resample: Resample | None = None,
     warn: Callable[[str], None] = warnings.warn,
 ) -> Record:
     """Return the record of a laboratory file.
@@ -70,8 +69,8 @@ def read(
         actuator: name of the actuator; None for what map or file say.
         resample: samples per second [Hz] to which a jittered clock is made even; None where an
             uneven clock is refused. The record's source tells it, and its command runs straight
-            between samples where nothing else is given.
-        resample_by: 'band-limited', or by straight 'lines' between samples.
+            between samples where nothing else is given. Band-limited; `(27.0, 'lines')` draws
+            straight lines between samples.
         warn: called with a line that tells what resampling cost.
 
     Raises:
@@ -88,7 +87,7 @@ def read(
         except InputError:
             if resample is None:
                 raise
-            made = resample_evenly(values, resample, source, resample_by)
+            made = resample_evenly(values, *rate_and_way(resample), where=source)
             values, period = made.values, made.period
             warn(f'{path}: {made.told()}')
             source, said_hold = f'{path} ({made.name()})', said_hold or 'linear'

@@ -16,7 +16,7 @@ from actuator_glue.io.bag_mapped import read_mapped
 from actuator_glue.io.bag_reader import Note, is_bag, refuse, warn_caller
 from actuator_glue.io.bag_records import read_records
 from actuator_glue.io.channel_map import ChannelMap, read_channel_map
-from actuator_glue.io.resample import By
+from actuator_glue.io.resample import Resample
 from actuator_glue.records import Hold, Record, check_stiffness
 
 Stiffness: TypeAlias = float | Literal['unknown']
@@ -28,8 +28,7 @@ def load(
     stiffness: Stiffness | None = None,
     channels: ChannelMap | Path | str | None = None,
     hold: Hold | None = None,
-    resample: float | None = None,
-    resample_by: By = 'band-limited',
+    resample: Resample | None = None,
 ) -> Record:
     """Return the one record of a bag or laboratory file.
 
@@ -38,8 +37,8 @@ def load(
         stiffness: specimen stiffness [N/m]; None for what the file says.
         channels: channel map for a laboratory file, or one of topics for a bag.
         hold: how the command runs between its samples; None for what the file says.
-        resample: samples per second [Hz] to which a jittered clock of a file is made even.
-        resample_by: how: 'band-limited', or by straight 'lines' between samples.
+        resample: samples per second [Hz] to which a jittered clock of a file is made even,
+            band-limited; `(27.0, 'lines')` for straight lines between samples.
 
     Raises:
         InputError: the file cannot be used, or holds several records.
@@ -50,7 +49,6 @@ def load(
         channels=channels,
         hold=hold,
         resample=resample,
-        resample_by=resample_by,
     )
     if len(found) > 1:
         raise InputError(f'{path} holds {len(found)} records; `load_records` returns them all')
@@ -63,8 +61,7 @@ def load_records(
     stiffness: Sequence[Stiffness] | Stiffness | None = None,
     channels: ChannelMap | Path | str | None = None,
     hold: Hold | None = None,
-    resample: float | None = None,
-    resample_by: By = 'band-limited',
+    resample: Resample | None = None,
     note: Note = refuse,
     gap: Note | None = None,
     warn: Note = warn_caller,
@@ -79,8 +76,8 @@ def load_records(
         channels: channel map for the laboratory files, or for bags where it names topics.
         hold: how the command runs between its samples; None for what the files say.
         resample: samples per second [Hz] to which the jittered clock of a file is made even; an
-            even one is left as it is. The record's source tells it.
-        resample_by: how: 'band-limited', or by straight 'lines' between samples.
+            even one is left as it is. The record's source tells it. Band-limited;
+            `(27.0, 'lines')` for straight lines between samples.
         note: called with one line per damage of a bag; the default raises it.
         gap: called with one line where a bag lacks samples or its clock jumps, and is split
             there; the default raises.
@@ -115,7 +112,6 @@ def load_records(
             channels=channels,
             hold=hold,
             resample=resample,
-            resample_by=resample_by,
             warn=warn,
         )
         groups.append([record])

@@ -14,7 +14,7 @@ from actuator_glue.io.bag_topics import TopicSeries, topic_series
 from actuator_glue.io.channel_map import Channel, ChannelMap
 from actuator_glue.io.formats import Column, format_of, formats
 from actuator_glue.io.signature import refuse_pipe
-from actuator_glue.io.text_layout import Block, text_layout
+from actuator_glue.io.text_layout import SampleRows, text_layout
 from actuator_glue.io.units import written_unit
 from actuator_glue.records import Array
 
@@ -97,7 +97,7 @@ class FileLook:
     layout: dict[str, object]
     period: float | None
     what: str
-    blocks: tuple[Block, ...] = ()
+    blocks: tuple[SampleRows, ...] = ()
 
 
 def look(path: Path | str) -> FileLook:
@@ -140,7 +140,7 @@ def _file(path: Path) -> FileLook:
     chosen = format_of(path)
     layout: dict[str, Any] = {}
     channels, places = None, None
-    blocks: list[Block] = []
+    blocks: list[SampleRows] = []
     if chosen is formats()['.csv']:
         layout, places, blocks = text_layout(path)
         unknown = ChannelMap(Channel(1, 'm'), Channel(2, 'm'), rate=1.0)

@@ -15,6 +15,8 @@ from actuator_glue.even_times import near_whole_rate, rounding, span
 from actuator_glue.records import Array
 
 By: TypeAlias = Literal['band-limited', 'lines']
+# Samples per second that are wanted [Hz], and how where it is not band-limited.
+Resample: TypeAlias = float | tuple[float, By]
 # Times of the samples, a channel, samples per second that are wanted: the channel at even times.
 _Interpolate: TypeAlias = Callable[[Array, Array, float], Array]
 
@@ -98,8 +100,13 @@ class Resampled:
         return f'resampled to {1.0 / self.period:.6g} Hz'
 
 
+def rate_and_way(resample: Resample) -> tuple[float, By]:
+    """Return the samples per second that are wanted [Hz], and how."""
+    return resample if isinstance(resample, tuple) else (resample, 'band-limited')
+
+
 def resample_evenly(
-    values: dict[str, Array], rate: float, where: str, by: By = 'band-limited'
+    values: dict[str, Array], rate: float, by: By = 'band-limited', *, where: str
 ) -> Resampled:
     """Return channels at even times.
 
@@ -110,8 +117,8 @@ def resample_evenly(
     Args:
         values: channels by role, each of shape (n,), with `time` [s].
         rate: samples per second that are wanted.
-        where: file, for messages.
         by: how.
+        where: file, for messages.
 
     Raises:
         InputError: times that are no numbers, go back, or stand still where the samples are not

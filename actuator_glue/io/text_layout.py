@@ -30,22 +30,22 @@ class _Rows(NamedTuple):
     filled: int  # columns that are not empty
 
 
-class Block(NamedTuple):
+class SampleRows(NamedTuple):
     """Rows of samples without anything between them: lines before the first, and how many."""
 
     lines: int
     rows: int
 
 
-class Layout(NamedTuple):
+class TextLayout(NamedTuple):
     """How a text is laid out: entries of a channel map, columns of numbers, blocks of samples."""
 
     entries: dict[str, Any]
     numbers: list[int]
-    blocks: list[Block]
+    blocks: list[SampleRows]
 
 
-def text_layout(path: Path) -> Layout:
+def text_layout(path: Path) -> TextLayout:
     """Return how a text is laid out; of several blocks of samples the entries name the longest.
 
     Raises:
@@ -66,15 +66,15 @@ def text_layout(path: Path) -> Layout:
     read = read_head(path, entries['header_lines'])
     if best.delimiter is not None and best.delimiter != read.delimiter:
         entries['delimiter'] = best.delimiter
-    return Layout(entries, best.numbers, blocks)
+    return TextLayout(entries, best.numbers, blocks)
 
 
-def _blocks(path: Path, like: _Rows) -> tuple[list[Block], bool]:
+def _blocks(path: Path, like: _Rows) -> tuple[list[SampleRows], bool]:
     """Return the blocks of rows as the first ones are, and whether anything follows one.
 
     A line of units above a block counts as one of its rows: it is found by itself.
     """
-    found: list[Block] = []
+    found: list[SampleRows] = []
     above: list[list[str]] = []
     first, rows, empty, follows = 0, 0, 0, False
     with open_text(path, errors='replace') as file:
@@ -93,12 +93,12 @@ def _blocks(path: Path, like: _Rows) -> tuple[list[Block], bool]:
                 empty = 0
                 continue
             if rows:
-                found.append(Block(first, rows))
+                found.append(SampleRows(first, rows))
                 rows, follows, above = 0, True, []
             empty = 0
             above = [*above[-1:], entries]
     if rows:
-        found.append(Block(first, rows))
+        found.append(SampleRows(first, rows))
     return found, follows
 
 

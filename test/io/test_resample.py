@@ -41,23 +41,24 @@ def test_values_are_those_at_even_times(tmp_path: Path, by: str) -> None:
     """Within the error of the method, on the time of the first sample; the source tells it."""
     lines: list[str] = []
     path = table(tmp_path / 'a.csv', TIME + 100.0)
-    (record,) = load_records(path, resample=27, resample_by=by, warn=lines.append)
+    (record,) = load_records(path, resample=(27, by), warn=lines.append)
     assert record.source == f'{tmp_path}/a.csv (resampled to 27 Hz)'
     assert (record.rate, record.hold, record.start_ns) == (27.0, 'linear', 100 * 10**9)
     assert len(record) == int(TIME[-1] * 27) + 1
     off = np.sqrt(np.mean((record.measured - command(100.0 + record.time - 0.12)) ** 2))
-    made = resample_evenly(channels(TIME, TIME + 100.0), 27, 'x', by)
+    made = resample_evenly(channels(TIME, TIME + 100.0), 27, by, where='x')
     if by == 'lines':
         assert off == pytest.approx(made.error['measured'], rel=0.35)
     else:
         assert (
-            off < 0.02 * resample_evenly(channels(TIME, TIME), 27, 'x', 'lines').error['command']
+            off
+            < 0.02 * resample_evenly(channels(TIME, TIME), 27, 'lines', where='x').error['command']
         )
     assert '20 to 55 ms apart' in lines[0]
     with pytest.raises(InputError, match='jittered'):
         ag.load(tmp_path / 'a.csv')
     with pytest.warns(UserWarning, match='variance of noise'):
-        assert ag.load(path, resample=27, resample_by=by, hold='zoh').hold == 'zoh'
+        assert ag.load(path, resample=(27, by), hold='zoh').hold == 'zoh'
 
 
 @pytest.mark.parametrize(
@@ -66,11 +67,13 @@ def test_values_are_those_at_even_times(tmp_path: Path, by: str) -> None:
 def test_the_lost_band_and_the_noise_are_what_is_told(by: str, rate: float) -> None:
     """A sine at the edge of the band keeps 95 % of itself; white noise the share that is told."""
     noise = RNG.standard_normal(COUNT)
-    made = resample_evenly({**channels(TIME, TIME), 'force': noise}, rate, 'x', by)
+    made = resample_evenly({**channels(TIME, TIME), 'force': noise}, rate, by, where='x')
     assert np.var(made.values['force']) == pytest.approx(made.noise, rel=0.1)
     wave = 2.0 * np.pi * made.band
     even = np.arange(len(made.values['measured'])) / rate
-    kept = resample_evenly({**channels(TIME, TIME), 'force': np.sin(wave * TIME)}, rate, 'x', by)
+    kept = resample_evenly(
+        {**channels(TIME, TIME), 'force': np.sin(wave * TIME)}, rate, by, where='x'
+    )
     basis = np.column_stack([np.sin(wave * even), np.cos(wave * even)])
     amplitude = np.linalg.lstsq(basis, kept.values['force'], rcond=None)[0]
     assert np.hypot(*amplitude) == pytest.approx(0.95, abs=0.01)
@@ -79,14 +82,14 @@ def test_the_lost_band_and_the_noise_are_what_is_told(by: str, rate: float) -> N
         spacing = np.sqrt(np.sum(np.diff(TIME) ** 3) / TIME[-1])
         assert made.band == pytest.approx(np.sqrt(0.15) / np.pi / spacing, rel=0.05)
     else:
-        other = resample_evenly(channels(TIME, TIME), 27, 'x', 'lines')
+        other = resample_evenly(channels(TIME, TIME), 27, 'lines', where='x')
         assert made.band > min(1.3 * other.band, 0.4 * rate)
 
 
 def test_what_fewer_samples_cannot_hold_is_not_folded() -> None:
     """A sine above half the wanted rate leaves next to nothing."""
     fast = channels(TIME, TIME) | {'force': np.sin(2.0 * np.pi * 7.0 * TIME)}
-    made = resample_evenly(fast, 9, 'x')
+    made = resample_evenly(fast, 9, where='x')
     assert np.std(made.values['force'][20:-20]) < 0.02
 
 
@@ -100,24 +103,24 @@ def test_stamps_beside_even_samples_give_way_to_an_even_clock(late: str) -> None
         'whole seconds': np.floor(true),
         'milliseconds': np.round(true, 3),
     }[late]
-    made = resample_evenly(channels(stamps, true), rate, 'x')
+    made = resample_evenly(channels(stamps, true), rate, where='x')
     np.testing.assert_allclose(made.values['command'], command(true), atol=1e-9)
     assert made.late == pytest.approx(np.std(stamps - true), rel=0.1)
     assert 'an even clock was taken in place of them' in made.told()
     # What was taken at uneven times is no log of even samples.
-    assert resample_evenly(channels(TIME, TIME, 1e-5), 27, 'x').late == 0.0
+    assert resample_evenly(channels(TIME, TIME, 1e-5), 27, where='x').late == 0.0
 
 
 def test_what_the_stamps_are_worth_is_told_in_micrometres() -> None:
     """Samples at uneven times, stamped 2 ms beside: noise where the piston moves."""
     stamps = TIME + np.random.default_rng(7).normal(0.0, 2e-3, COUNT)
     stamps -= stamps[0]
-    made = resample_evenly(channels(stamps, TIME, 2e-6), 27, 'x')
+    made = resample_evenly(channels(stamps, TIME, 2e-6), 27, where='x')
     speed = np.sqrt(np.mean(np.gradient(command(TIME), TIME) ** 2))
     assert made.jitter == pytest.approx(2e-3, rel=0.15)
     assert made.moved == pytest.approx(2e-3 * speed, rel=0.15)
     assert f'which is {1e6 * made.moved:.2g} um of noise' in made.told()
-    assert resample_evenly(channels(TIME, TIME, 5e-6), 27, 'x').jitter == 0.0
+    assert resample_evenly(channels(TIME, TIME, 5e-6), 27, where='x').jitter == 0.0
 
 
 @pytest.mark.parametrize(

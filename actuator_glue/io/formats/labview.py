@@ -35,7 +35,7 @@ _TIMES, _COMMENT = 'X_Value', 'Comment'
 _EPOCH = 2_082_844_800
 
 
-class _Segment(NamedTuple):
+class _HeadedRows(NamedTuple):
     """Rows below a heading: what it says of each channel, the names, the lines above, how many."""
 
     channels: dict[str, list[str]]
@@ -49,7 +49,7 @@ class _Heading(NamedTuple):
 
     file: dict[str, str]
     delimiter: str
-    segments: list[_Segment]
+    segments: list[_HeadedRows]
 
 
 def _read(path: Path, channels: ChannelMap | None) -> FileTable:
@@ -119,7 +119,7 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
     )
 
 
-class _Clock(NamedTuple):
+class _SegmentTimes(NamedTuple):
     """Times of a segment, in the unit of the file, and the time from which they count [ns]."""
 
     times: Array
@@ -129,7 +129,7 @@ class _Clock(NamedTuple):
 
 def _clock(
     path: Path, said: _Heading, number: int, head: TextHead, times: list[int], shown: list[int]
-) -> _Clock:
+) -> _SegmentTimes:
     segment = said.segments[number]
     if said.file.get('X_Columns', 'One').lower() == 'no':
         period = _number(path, segment, 'Delta_X', shown)
@@ -143,12 +143,12 @@ def _clock(
                 'common times, and save them with one X column'
             )
     if own[0] > _EPOCH:
-        return _Clock(own, -_EPOCH * 10**9, False)
+        return _SegmentTimes(own, -_EPOCH * 10**9, False)
     start_ns = _stamp_ns(path, said, segment, shown)
-    return _Clock(own, start_ns, start_ns > 0)
+    return _SegmentTimes(own, start_ns, start_ns > 0)
 
 
-def _joined(path: Path, clocks: list[_Clock], scale: float) -> Array:
+def _joined(path: Path, clocks: list[_SegmentTimes], scale: float) -> Array:
     """Return the times of all segments; those that begin again are later by their dates.
 
     Args:
@@ -173,7 +173,7 @@ def _joined(path: Path, clocks: list[_Clock], scale: float) -> Array:
     return np.concatenate(parts) if len(parts) > 1 else parts[0]
 
 
-def _head(said: _Heading, segment: _Segment) -> TextHead:
+def _head(said: _Heading, segment: _HeadedRows) -> TextHead:
     names = segment.names
     return TextHead(
         names=names,
@@ -200,7 +200,7 @@ def _heading(path: Path) -> _Heading:
         InputError: no names below two headings.
     """
     file: dict[str, str] = {}
-    segments: list[_Segment] = []
+    segments: list[_HeadedRows] = []
     channels: dict[str, list[str]] = {}
     names: list[str] = []
     inside, delimiter, special, waiting, first, rows = 'file', '\t', False, 0, 0, 0
@@ -210,7 +210,7 @@ def _heading(path: Path) -> _Heading:
                 rows += bool(line.strip())
                 continue
             if inside == 'rows':
-                segments.append(_Segment(channels, names, first, rows))
+                segments.append(_HeadedRows(channels, names, first, rows))
                 channels, rows, waiting = {}, 0, 0
                 inside = 'file' if line.startswith(_BEGINS[0]) else 'segment'
             waiting += 1
@@ -232,14 +232,14 @@ def _heading(path: Path) -> _Heading:
             elif inside == 'segment' and not special and key:
                 channels[key] = entries
     if inside == 'rows':
-        segments.append(_Segment(channels, names, first, rows))
+        segments.append(_HeadedRows(channels, names, first, rows))
     segments = [s for i, s in enumerate(segments) if s.rows or not i]
     if not segments or not segments[0].names:
         raise InputError(f'{path}: no names of channels below the headings of {_NAME}')
     return _Heading(file, delimiter, segments)
 
 
-def _of_channels(said: _Segment, name: str, count: int) -> list[str]:
+def _of_channels(said: _HeadedRows, name: str, count: int) -> list[str]:
     """Return what a heading says of each channel."""
     entries = said.channels.get(name, [])
     filled = [entry for entry in entries if entry]
@@ -247,7 +247,7 @@ def _of_channels(said: _Segment, name: str, count: int) -> list[str]:
     return filled if len(filled) == count else [*entries, *[''] * count][:count]
 
 
-def _common(path: Path, said: _Segment, name: str, shown: list[int]) -> str:
+def _common(path: Path, said: _HeadedRows, name: str, shown: list[int]) -> str:
     """Return what a heading says of all channels alike.
 
     Raises:
@@ -262,7 +262,7 @@ def _common(path: Path, said: _Segment, name: str, shown: list[int]) -> str:
     return found.pop() if found else ''
 
 
-def _number(path: Path, said: _Segment, name: str, shown: list[int]) -> float:
+def _number(path: Path, said: _HeadedRows, name: str, shown: list[int]) -> float:
     text = _common(path, said, name, shown)
     try:
         value = float(text.replace(',', '.'))
@@ -273,7 +273,7 @@ def _number(path: Path, said: _Segment, name: str, shown: list[int]) -> float:
     return value
 
 
-def _stamp_ns(path: Path, said: _Heading, segment: _Segment, shown: list[int]) -> int:
+def _stamp_ns(path: Path, said: _Heading, segment: _HeadedRows, shown: list[int]) -> int:
     """Return the date and time of the measurement [ns], taken as UTC: no zone is written."""
     date = _common(path, segment, 'Date', shown) or said.file.get('Date', '')
     clock = _common(path, segment, 'Time', shown) or said.file.get('Time', '')
