@@ -80,11 +80,11 @@ def check_clocks(path: Path, columns: list[ObjectColumn]) -> None:
     Raises:
         InputError: two columns with times that differ.
     """
-    timed = [c for c in columns if c.times is not None]
-    for one in timed[1:]:
-        if not np.array_equal(one.times, timed[0].times):  # type: ignore[arg-type]
+    timed = [(c.column.name, c.times) for c in columns if c.times is not None]
+    for name, times in timed[1:]:
+        if not np.array_equal(times, timed[0][1]):
             raise InputError(
-                f'{path}: {timed[0].column.name} and {one.column.name} have times of their own, '
+                f'{path}: {timed[0][0]} and {name} have times of their own, '
                 'and they differ; bring them to common times (`synchronize` or `resample` in '
                 'MATLAB), and save them again'
             )

@@ -42,7 +42,8 @@ def at(time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return command and measured displacement at other times [mm], without new noise."""
     record = test()
     channels = (record.command, record.measured)
-    return tuple(1e3 * np.interp(time, record.time, c) for c in channels)  # type: ignore[return-value]
+    command, measured = (1e3 * np.interp(time, record.time, c) for c in channels)
+    return command, measured
 
 
 def columns() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -91,11 +92,14 @@ def control_desk(folder: Path) -> None:
 def simulink(folder: Path) -> None:
     """Write what Simulink logs: a Dataset of two signals with a timeseries each."""
     _, command, measured = columns()
-    number = lambda value: np.array([[float(value)]])  # noqa: E731
     signals = np.empty((2, 1), dtype=object)
     for i, (name, values) in enumerate((('command', command), ('measured', measured))):
-        info = {'Units': 'seconds', 'Start_': number(0.0), 'Increment_': number(1.0 / RATE)}
-        info['Length'] = number(len(values))
+        info = {
+            'Units': 'seconds',
+            'Start_': np.zeros((1, 1)),
+            'Increment_': np.full((1, 1), 1.0 / RATE),
+        }
+        info['Length'] = np.full((1, 1), float(len(values)))
         series = {
             'Name': name,
             'Data_': values.reshape(-1, 1),
