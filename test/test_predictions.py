@@ -177,9 +177,13 @@ def test_a_mat_file_holds_draws_and_model(posterior: ag.Calibration, tmp_path: P
 def test_arviz_has_every_group(posterior: ag.Calibration, data: Any, tmp_path: Path) -> None:
     """Draws, likelihood in seconds, predictions beside what was observed."""
     assert set(data.groups()) >= {
-        'posterior', 'sample_stats', 'log_likelihood', 'posterior_predictive', 'observed_data',
+        'posterior',
+        'sample_stats',
+        'log_likelihood',
+        'posterior_predictive',
+        'observed_data',
         'constant_data',
-    }  # fmt: skip
+    }
     for i, record in enumerate(posterior.records, 1):
         name = f'measured_{i}'
         seen, drawn = data.observed_data[name], data.posterior_predictive[name]

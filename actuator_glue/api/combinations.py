@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any, ClassVar, Unpack
 
 import numpy as np
 
 from actuator_glue.api import judgement, tracking
 from actuator_glue.api.calibration import calibrate
-from actuator_glue.api.calibration_options import CalibrationOptions
+from actuator_glue.api.calibration_options import CalibrationChanges, CalibrationOptions
 from actuator_glue.api.calibration_parts import CalibratedRecord, FitError, Marginal
 from actuator_glue.api.given import Records, records_given
-from actuator_glue.api.options import chosen
+from actuator_glue.api.options import chosen, takes
 from actuator_glue.api.result import Result
 from actuator_glue.api.tracking import RecordTracking
 from actuator_glue.errors import InputError
@@ -159,12 +159,13 @@ HEADER = ('combination', 'unit', 'mean', 'sd', 'R-hat')
 TITLE = 'b, a and c of x/u = b / (s^2 + a s + b + c), Eq. (2), and effects'
 
 
+@takes(CalibrationOptions)
 def combinations(
     records: Records,
     options: CalibrationOptions | None = None,
     *,
     progress: Callable[[float], None] | None = None,
-    **changes: Any,
+    **changes: Unpack[CalibrationChanges],
 ) -> Combinations:
     """Return what records tell under one specimen whose stiffness is not known.
 
@@ -173,7 +174,7 @@ def combinations(
             say of a stiffness is left aside.
         options: how to calibrate; see CalibrationOptions.
         progress: called with the evaluations made so far.
-        changes: options by name that replace those of `options`.
+        changes: options by name.
 
     Raises:
         InputError: as `calibrate`; an earlier calibration or the force as evidence, which need the

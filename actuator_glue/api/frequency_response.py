@@ -34,7 +34,7 @@ class Limits(NamedTuple):
     upper: Array
 
 
-class Measured(NamedTuple):
+class MeasuredResponse(NamedTuple):
     """What a record shows at the frequencies that it excited, shape (g,) each."""
 
     frequency: Array
@@ -63,7 +63,7 @@ class FrequencyResponse:
     delay: Limits
     stiffness: float
     left_out: tuple[str, ...] = ()
-    measured: Measured | None = None
+    measured: MeasuredResponse | None = None
 
     def __repr__(self) -> str:
         low, high = self.frequency[[0, -1]]
@@ -159,7 +159,7 @@ def _limits(
     hertz: Array,
     structure: Structure,
     stiffness: float,
-    measured: Measured | None = None,
+    measured: MeasuredResponse | None = None,
 ) -> FrequencyResponse:
     phase = np.unwrap(np.angle(response), axis=1)
     # No actuator leads its command by half a turn at the lowest frequency.
@@ -180,7 +180,7 @@ def _over_draws(values: Array) -> Limits:
     return Limits(median, lower, upper)
 
 
-def measured_response(record: Record) -> Measured:
+def measured_response(record: Record) -> MeasuredResponse:
     """Return gain and phase [degrees] of a record at the frequencies that its command excited.
 
     Raises:
@@ -215,7 +215,7 @@ def measured_response(record: Record) -> Measured:
         )
     turns = np.unwrap(np.angle(response[used]))
     turns -= 2.0 * np.pi * np.rint(turns[0] / (2.0 * np.pi))
-    return Measured(middle[used], np.abs(response[used]), np.degrees(turns))
+    return MeasuredResponse(middle[used], np.abs(response[used]), np.degrees(turns))
 
 
 def bode_figure(responses: Sequence[tuple[str, FrequencyResponse]]) -> Figure:

@@ -37,12 +37,12 @@ class FirstLook(JsonObject):
 
     @property
     def missing(self) -> bool:
-        """Whether something is missing; what is passes for noise at times, and is found later."""
+        """Whether more than noise shows; what passes for noise is found later."""
         return self.structure_m >= self.matters_m
 
     def sentence(self) -> str:
         """Say it in one line."""
         sizes = f'{1e6 * self.error_m:.1f} um over {1e6 * self.noise_m:.1f} um of noise'
         if self.missing:
-            return f'Eq. (2) leaves {sizes}: something is missing'
+            return f'Eq. (2) leaves {sizes}: more than noise, looking for what it is'
         return f'Eq. (2) leaves {sizes}: nothing that matters shows yet'

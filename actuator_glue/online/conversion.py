@@ -16,7 +16,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.inference.carried import FEWEST, Carried
 from actuator_glue.inference.choice import ModelChoice, choose_model
 from actuator_glue.model.effects import CATALOGUE
-from actuator_glue.online.forecast import Prediction
+from actuator_glue.online.forecast import WindowPrediction
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.knowledge import Known
 from actuator_glue.online.sampling import ARCHIVE, spread
@@ -260,7 +260,7 @@ def known(message: Any, settings: EstimatorSettings) -> Known | None:
     return Known(Carried(names, draws).later(since), middle, last)
 
 
-def prediction(result: Prediction, actuator: str) -> tuple[Head, Fields]:
+def prediction(result: WindowPrediction, actuator: str) -> tuple[Head, Fields]:
     """Return header and fields of a PredictionBand."""
     band, scored = result.band, result.coverage is not None
     fields: Fields = {

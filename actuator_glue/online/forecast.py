@@ -74,7 +74,7 @@ class FrozenPosterior:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Prediction:
+class WindowPrediction:
     """One band over consecutive samples.
 
     Attributes:
@@ -107,7 +107,7 @@ def predictions(
     levels: tuple[float, ...],
     seed: int,
     measured: Array | None = None,
-) -> list[Prediction]:
+) -> list[WindowPrediction]:
     """Return the bands of a frozen posterior over its forecast, scored where it was measured.
 
     The bands do not depend on whether they are scored: what is scored is what was published.
@@ -146,7 +146,7 @@ def predictions(
             error = float(np.sqrt(np.mean((measured - limits.median) ** 2)))
         width = np.asarray((limits.upper - limits.lower).mean(axis=1))
         found.append(
-            Prediction(
+            WindowPrediction(
                 number=frozen.number,
                 index=frozen.start,
                 stamp_ns=stamp_ns,

@@ -17,7 +17,7 @@ from actuator_glue.inference.convergence import rhat_and_ess
 from actuator_glue.inference.moments import Moments, moments
 from actuator_glue.inference.prior_conflict import Conflict
 from actuator_glue.online import fitting, sampling
-from actuator_glue.online.forecast import FrozenPosterior, Prediction, predictions
+from actuator_glue.online.forecast import FrozenPosterior, WindowPrediction, predictions
 from actuator_glue.online.response import ResponseBand, response_band
 from actuator_glue.online.sampling import Job, WindowFit
 from actuator_glue.online.settings import EstimatorSettings
@@ -93,8 +93,8 @@ class WindowResult:
     stopped_early: bool = False
     converged: bool = False
     response: ResponseBand | None = None
-    scored: tuple[Prediction, ...] = ()
-    forecast: tuple[Prediction, ...] = ()
+    scored: tuple[WindowPrediction, ...] = ()
+    forecast: tuple[WindowPrediction, ...] = ()
     frozen: FrozenPosterior | None = None
     archive: Array | None = None
     learned: Carried | None = None
@@ -313,7 +313,7 @@ def _mixed(job: Job, each: Sequence[tuple[Job, Array | None]]) -> Array:
     return pooled(job.model.names, parts, rng)
 
 
-def _score(job: Job, old: FrozenPosterior) -> list[Prediction]:
+def _score(job: Job, old: FrozenPosterior) -> list[WindowPrediction]:
     """Hold an earlier posterior against the samples of its forecast, as this window holds them."""
     record = job.window.recent
     end, start, stop = (i - record.first_index for i in (old.end, old.start, old.stop))
@@ -326,7 +326,7 @@ def _score(job: Job, old: FrozenPosterior) -> list[Prediction]:
     )
 
 
-def _forecast(job: Job, frozen: FrozenPosterior) -> list[Prediction]:
+def _forecast(job: Job, frozen: FrozenPosterior) -> list[WindowPrediction]:
     """Bands over the samples to come, where their commands are known."""
     if job.ahead is None:
         return []

@@ -49,9 +49,15 @@ def bode(responses: Sequence[Bode]) -> Figure:
             seen = (gain, phase, -1e3 * phase / (360.0 * hertz))
             for axes, values in zip(column, seen, strict=True):
                 axes.semilogx(
-                    hertz, values, '.-', color=style.MEASURED, lw=0.6, ms=2.5, zorder=TOP,
+                    hertz,
+                    values,
+                    '.-',
+                    color=style.MEASURED,
+                    lw=0.6,
+                    ms=2.5,
+                    zorder=TOP,
                     label='measured',
-                )  # fmt: skip
+                )
         column[0].set_title(style.fit(of.title, style.WIDTH / count - 0.5))
         column[-1].set_xlabel('frequency [Hz]')
         low, high = of.frequency[[0, -1]]

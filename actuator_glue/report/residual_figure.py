@@ -34,9 +34,12 @@ def residual_figure(records: Sequence[Left]) -> Figure:
             axes.axhspan(-wide, wide, color=NOISE, lw=0, label='noise (2 standard deviations)')
         some = slice(None, None, max(1, len(of.time) // _POINTS))
         axes.plot(
-            of.time[some], 1e6 * of.residual[some], color=style.TOTAL, lw=0.6,
+            of.time[some],
+            1e6 * of.residual[some],
+            color=style.TOTAL,
+            lw=0.6,
             label='measured less model',
-        )  # fmt: skip
+        )
         axes.set_title(style.fit(of.title, style.WIDTH - 0.7))
         axes.set_ylabel('residual [um]')
     panels[-1].set_xlabel('time [s]')

@@ -109,10 +109,16 @@ class Intake:
         self._tell('setup', content)
 
     def _take_posterior(self, posterior: Any) -> None:
-        columns = list(zip(
-            posterior.parameter_names, posterior.units, posterior.mean, posterior.stddev,
-            posterior.prior_dominated, strict=False,
-        ))  # fmt: skip
+        columns = list(
+            zip(
+                posterior.parameter_names,
+                posterior.units,
+                posterior.mean,
+                posterior.stddev,
+                posterior.prior_dominated,
+                strict=False,
+            )
+        )
         carried = explanations(posterior)
         content = {
             'window': int(posterior.window),

@@ -29,8 +29,12 @@ ORDER = (
 
 def text_of(page: Path) -> str:
     """Return what a report says, without pictures and the look."""
-    text = re.sub(r'data:image/png;base64,[^"]*|<style.*?</style>', '', page.read_text('utf-8'),
-                  flags=re.DOTALL)  # fmt: skip
+    text = re.sub(
+        r'data:image/png;base64,[^"]*|<style.*?</style>',
+        '',
+        page.read_text('utf-8'),
+        flags=re.DOTALL,
+    )
     return html.unescape(re.sub(r'<[^>]+>', ' ', text))
 
 
@@ -99,12 +103,14 @@ def test_the_next_command_reads_as_this_one_did(
         ([('a b.csv', 1.5)], "'a b.csv' --stiffness 1.5"),
         ([('a.csv', None), ('b.csv', 1.0)], 'a.csv b.csv'),
         ([('', 1.0)], 'RECORD --stiffness 1'),
-        ([('bag:/samples (record 1 of 2)', 5.0), ('bag:/samples (record 2 of 2)', 5.0)],
-         'bag --stiffness 5'),
+        (
+            [('bag:/samples (record 1 of 2)', 5.0), ('bag:/samples (record 2 of 2)', 5.0)],
+            'bag --stiffness 5',
+        ),
         ([('x.csv (resampled to 500 Hz)', 0.0)], 'x.csv --stiffness 0'),
         ([('C:/lab/x.csv', 0.0)], 'C:/lab/x.csv --stiffness 0'),
     ],
-)  # fmt: skip
+)
 def test_records_are_written_as_a_shell_takes_them(
     tests: list[tuple[str, float | None]], typed: str
 ) -> None:

@@ -28,7 +28,7 @@ simulate bag --stiffness 250e3 --duration 6 --rate 200 --seed 1
 replay bag --json again.json
 rths sdof --posterior rig.npz --json rths.json
 send rig_2.csv --to udp://127.0.0.1:5999 --speed 100
-diagnose rig_1.csv rig_2.csv --report rig.html --json rig.json
+diagnose rig_1.csv rig_2.csv --report lacks.html --json rig.json
 """
 # `view` and `doctor` wait or look at this computer.
 WAITING = {'view', 'doctor'}

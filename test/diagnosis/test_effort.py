@@ -43,7 +43,7 @@ def test_a_search_ends_at_its_effort_and_says_so() -> None:
     assert look.missing
     assert look.noise_m < 0.7 * look.error_m
     assert look.error_m**2 == pytest.approx(look.noise_m**2 + look.structure_m**2, rel=1e-6)
-    assert 'something is missing' in look.sentence()
+    assert 'more than noise' in look.sentence()
 
 
 def test_nothing_is_missing_of_noise() -> None:

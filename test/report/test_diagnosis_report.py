@@ -238,20 +238,28 @@ def test_the_answer_comes_first_and_what_was_done_to_the_records_last() -> None:
     found = diagnosis(6e-5)
     finding = replace(found.effects[0], rivals=(), probability=0.9749)
     found = replace(
-        found, effects=(finding,), base=base, base_before=base,
-        advice=('check the pins', *sampling), preparation=sampling,
+        found,
+        effects=(finding,),
+        base=base,
+        base_before=base,
+        advice=('check the pins', *sampling),
+        preparation=sampling,
         alarm=replace(found.alarm, tests={'ljung_box_p': 0.5, 'trend': 2e-6}),
-    )  # fmt: skip
+    )
     page = render(page_of(found))
     lead, first = page.index('class="lead"'), page.index('<img')
     assert lead < page.index('Something is missing') < first < page.index('<table')
     text = re.sub(r'data:image/png;base64,[^"]*|<style.*?</style>', '', page, flags=re.DOTALL)
     text = re.sub(r'<[^>]+>', ' ', text)
     order = [
-        'How sure: 97 % is the probability of the name backlash', 'removable error removed',
-        '240 kN/m (230 to', '60 um (54 to 66)', 'What to do: check pins', 'Next: actuator-glue',
+        'How sure: 97 % is the probability of the name backlash',
+        'removable error removed',
+        '240 kN/m (230 to',
+        '60 um (54 to 66)',
+        'What to do: check pins',
+        'Next: actuator-glue',
         'check the pins',
-    ]  # fmt: skip
+    ]
     places = [text.index(words) for words in order]
     assert places == sorted(places)
     records = text.index('What was read, and from where')

@@ -79,10 +79,19 @@ def test_a_phone_shows_the_page_in_its_width(tmp_path: Path) -> None:
     options = ['--headless=new', '--no-sandbox', '--disable-gpu', '--virtual-time-budget=2000']
     for window, stacked in ((390, True), (1200, False)):
         dom = subprocess.run(
-            [str(CHROMIUM), *options, f'--user-data-dir={tmp_path / str(window)}',
-             f'--window-size={window},900', '--dump-dom', path.as_uri()],
-            capture_output=True, text=True, check=True, timeout=60,
-        ).stdout  # fmt: skip
+            [
+                str(CHROMIUM),
+                *options,
+                f'--user-data-dir={tmp_path / str(window)}',
+                f'--window-size={window},900',
+                '--dump-dom',
+                path.as_uri(),
+            ],
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=60,
+        ).stdout
         inner, width, display, image = re.findall(r'<title>(.*?)</title>', dom)[0].split()
         assert int(width) <= int(inner)
         assert display == ('grid' if stacked and int(inner) <= 640 else 'table-cell')

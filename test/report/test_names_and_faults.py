@@ -10,7 +10,7 @@ import pytest
 from test_diagnosis_report import diagnosis
 
 from actuator_glue.api.diagnosis import Diagnosis
-from actuator_glue.api.result import Result
+from actuator_glue.api.posterior_model import PosteriorModel
 from actuator_glue.cli import _output
 from actuator_glue.cli.main import main
 from actuator_glue.errors import InputError
@@ -86,7 +86,7 @@ def test_a_report_that_fails_ends_nothing(
     def fail(*_: object) -> None:
         raise error
 
-    monkeypatch.setattr(Result, 'report', fail)
+    monkeypatch.setattr(PosteriorModel, 'report', fail)
     assert main(['diagnose', str(file), *outputs(tmp_path, 'd')]) == code
     assert json.loads((tmp_path / 'd.json').read_text('utf-8'))['verdict'] == 'missing-effect'
     told = capsys.readouterr()

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 from ros_nodes import executable
+from test_live import free_port
 
 from actuator_glue.nodes import parameter_file
 
@@ -68,7 +69,11 @@ def test_each_node_starts_on_a_read_only_disk(node, begin, probe, tmp_path):
         'recorder': {'bag': tmp_path / 'out' / 'bag'},
         'margin': {'partition': 'sdof'},
         'viewer': {'port': 0},
-        'lab_bridge': {'source': 'udp://127.0.0.1:0', 'rate': 500.0, 'specimen_stiffness': 0.0},
+        'lab_bridge': {
+            'source': f'udp://127.0.0.1:{free_port()}',
+            'rate': 500.0,
+            'specimen_stiffness': 0.0,
+        },
         'replay': {'bag': BAGS / 'free', 'wait_for': 9},
     }
     process = begin(node, *parameters(**given.get(node, {})))
