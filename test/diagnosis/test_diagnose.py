@@ -105,6 +105,7 @@ def test_noise_of_the_measurement_is_no_missing_effect() -> None:
     assert found.complete
 
 
+@pytest.mark.slow
 def test_an_effect_pressed_against_its_bound_is_told_first() -> None:
     """A valve further off its null than the catalogue allows: the size is that of the bound."""
     furthest = CATALOGUE['valve-null'].parameters[0].upper
@@ -168,6 +169,7 @@ def few_forms(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(learning, 'forms', sensors)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures('few_forms')
 def test_a_name_that_a_regression_beats_is_doubted() -> None:
     """A command gain that depends on its rate: no effect of the catalogue, small enough to pass.
@@ -215,7 +217,8 @@ def rate_gain() -> list[Record]:
     return records
 
 
-@pytest.mark.parametrize('size', [1.03, pytest.param(1.05, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize('size', [1.03, 1.05])
 def test_a_gain_of_one_test_is_named_with_its_record(size: float) -> None:
     """The spring test alone has a command gain: no common size explains it, its own does."""
     free, spring, _ = make(['gain'], [1.0], 23)

@@ -204,6 +204,7 @@ def test_what_passed_for_an_impulse_beside_another_model_is_restored(rng_seed: i
     assert again is clean and same[0] is found
 
 
+@pytest.mark.slow
 def test_what_an_effect_makes_is_not_left_out_of_its_size(rng_seed: int) -> None:
     """Damping under steps, sampled 100 times a second: beside Eq. (2) some passes for impulses.
 

@@ -41,7 +41,7 @@ def test_no_effect_is_the_linear_kernel() -> None:
     theta = np.random.default_rng(1).uniform(0.7, 1.3, (5, 4)) * TABLE_2
     x = linear.simulate(theta, r.command, stiffness=250e3, period=r.period)
     assert np.array_equal(Structure(()).simulate(theta, r), x)
-    assert np.array_equal(Structure(()).errors([r])(theta), ExactErrors([r])(theta))
+    assert np.array_equal(StructureErrors(Structure(()), [r])(theta), ExactErrors([r])(theta))
 
 
 @pytest.mark.parametrize('names', [('coulomb-friction',), ('delay',), MANY, EVERY])
@@ -190,7 +190,7 @@ def test_absurd_parameters_stay_quiet(hold: str) -> None:
         assert np.array_equal(y[0], structure.simulate(good, r))
         acts = len(good) if CATALOGUE[name].variance is None else 4
         assert np.isnan(y[1 : 1 + acts, 2:]).all(), name
-        assert structure.errors([r])(np.array(rows)).shape == (len(rows), 1, 2)
+        assert StructureErrors(structure, [r])(np.array(rows)).shape == (len(rows), 1, 2)
 
 
 def test_bad_input_is_named() -> None:

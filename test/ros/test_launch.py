@@ -223,6 +223,7 @@ def recorded_values(bag):
     return np.concatenate([m.measured for _, m in decoded(bag, ('SampleBlock',))])
 
 
+@pytest.mark.slow
 def test_two_actuators_side_by_side(start, probe, tmp_path):
     side_by_side(start, probe, tmp_path, ['north', 'east'])
 

@@ -256,7 +256,7 @@ def test_keys_wheel_and_drag() -> None:
                 await page.call('Input.dispatchMouseEvent', type=kind, x=x, y=y, **more)
 
             async def at(stop: float) -> None:
-                await page.until(f'Math.abs(document.body.dataset.stop - {stop}) < 0.06', 10.0)
+                await page.until(f'Math.abs(document.body.dataset.stop - {stop}) < 0.06', 40.0)
 
             await page.open(url)
             await page.until('document.body.dataset.frames > 1')

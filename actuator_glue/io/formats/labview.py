@@ -197,7 +197,7 @@ def _heading(path: Path) -> _Heading:
     where it appends to one.
 
     Raises:
-        InputError: no names below two headings.
+        InputError: no names below two headings, or no rows below them.
     """
     file: dict[str, str] = {}
     segments: list[_HeadedRows] = []
@@ -236,6 +236,8 @@ def _heading(path: Path) -> _Heading:
     segments = [s for i, s in enumerate(segments) if s.rows or not i]
     if not segments or not segments[0].names:
         raise InputError(f'{path}: no names of channels below the headings of {_NAME}')
+    if not segments[0].rows:
+        raise InputError(f'{path}: no samples below the names of the channels')
     return _Heading(file, delimiter, segments)
 
 
