@@ -35,7 +35,7 @@ def test_differences_ahead_change_no_bit(
     data = Data.whole([Record(command, model.simulate(theta, bare) + noise, 1.0 / rate, 250e3)])
     start = theta * np.where(np.arange(len(theta)) < 4, 1.3, 0.5)
     ahead = fit(data, model, start, iterations=8)
-    monkeypatch.setattr(module, 'LANES', 0)
+    monkeypatch.setattr(module, 'LANES', 1)
     after = fit(data, model, start, iterations=8)
     assert ahead.rms < 1e-5
     for name in ('theta', 'error', 'jacobian', 'z'):
