@@ -14,7 +14,8 @@ from actuator_glue.campaigns.change_points import ChangePoint, change_points
 from actuator_glue.campaigns.effect_spells import EffectHistory, effect_histories
 from actuator_glue.campaigns.pooling import Pooled, pooled
 from actuator_glue.campaigns.rows import read_results
-from actuator_glue.campaigns.series import HOLDS, Series, actuators_of, series_of, tests_of
+from actuator_glue.campaigns.series import Series, series_of, tests_of
+from actuator_glue.diagnosis.held_out import COMPLETE
 from actuator_glue.json_value import json_value
 
 if TYPE_CHECKING:
@@ -145,7 +146,12 @@ class ActuatorHistory:
 
 
 def history(
-    folder: Path | str, actuator: str, *, ahead: float | None = None, seed: int = 1
+    folder: Path | str,
+    actuator: str,
+    *,
+    ahead: float | None = None,
+    seed: int = 1,
+    results: DataFrame | None = None,
 ) -> ActuatorHistory:
     """Return the history of an actuator from the table of a campaign; nothing is tested again.
 
@@ -154,11 +160,12 @@ def history(
         actuator: its name.
         ahead: days from the last test to the next one; None for as many as between tests so far.
         seed: of the draws.
+        results: the campaign's table where it has been read.
 
     Raises:
         InputError: no campaign there, or no test of this actuator with a day and numbers.
     """
-    table = tests_of(read_results(folder), actuator)
+    table = tests_of(read_results(folder) if results is None else results, actuator)
     series = series_of(table, actuator)
     changes = change_points(series)
     together = pooled(series, changes, ahead, seed)
@@ -170,18 +177,9 @@ def history(
         series=series,
         changes=changes,
         pooled=together,
-        effects=effect_histories([r for r in rows if r['verdict'] in HOLDS]),
+        effects=effect_histories([r for r in rows if r['verdict'] in COMPLETE]),
         outliers=_outliers(rows, series, together),
     )
-
-
-def histories(folder: Path | str, **options: Any) -> tuple[ActuatorHistory, ...]:
-    """Return the history of every actuator of a campaign; options as `history`.
-
-    Raises:
-        InputError: as `history`.
-    """
-    return tuple(history(folder, name, **options) for name in actuators_of(read_results(folder)))
 
 
 def _outliers(rows: list[dict[str, Any]], series: Series, together: Pooled) -> tuple[Outlier, ...]:
@@ -192,7 +190,7 @@ def _outliers(rows: list[dict[str, Any]], series: Series, together: Pooled) -> t
     for row in rows:
         group = str(row['group'])
         reason = ''
-        if not row.get('failure') and row['verdict'] not in HOLDS:
+        if not row.get('failure') and row['verdict'] not in COMPLETE:
             reason = f'verdict {row["verdict"]}: more is left than the model tells'
         elif group in where and far[where[group]]:
             reason = far[where[group]]

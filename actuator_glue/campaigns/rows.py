@@ -14,13 +14,14 @@ from actuator_glue.campaigns.grouping import Member, Task
 from actuator_glue.errors import InputError
 from actuator_glue.io.bag_reader import bag_files, is_bag
 from actuator_glue.json_value import json_value
+from actuator_glue.optional_library import library
 
 if TYPE_CHECKING:
     from pandas import DataFrame
 
 RESULTS = 'results.parquet'
 _FOLDER = 'rows'
-# RowFolder that become one table at a time.
+# Rows that become one table at a time.
 _CHUNK = 5000
 Row = dict[str, Any]
 
@@ -183,11 +184,4 @@ def needed(module: str, what: str) -> Any:
     Raises:
         InputError: it is not installed; the message says what to install.
     """
-    import importlib
-
-    try:
-        return importlib.import_module(module)
-    except ImportError as error:
-        raise InputError(
-            f"{what} needs {module}; install it with `pip install 'actuator_glue[campaign]'`"
-        ) from error
+    return library(module, f'{what} needs {module}', 'campaign')

@@ -9,15 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from actuator_glue.diagnosis.held_out import COMPLETE
 from actuator_glue.errors import InputError
 from actuator_glue.model.parameters import NAMES
 from actuator_glue.records import Array
 
 if TYPE_CHECKING:
     from pandas import DataFrame
-
-# Verdicts under which the intervals of a row hold.
-HOLDS = ('none', 'missing-effect')
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -123,7 +121,7 @@ def _numbers(row: dict[str, Any]) -> tuple[Array, Array] | str:
     """Return mean and covariance of the logarithms, or why there are none that hold."""
     if row.get('failure'):
         return str(row['failure'])
-    if row['verdict'] not in HOLDS:
+    if row['verdict'] not in COMPLETE:
         return f'verdict {row["verdict"]}: its intervals do not hold'
     text = row.get('pooling')
     value = json.loads(text) if isinstance(text, str) else None

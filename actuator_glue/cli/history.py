@@ -64,7 +64,7 @@ def run(args: argparse.Namespace) -> int:
     found: list[ActuatorHistory] = []
     for name in names:
         try:
-            found.append(history(args.folder, name, ahead=ahead, seed=args.seed))
+            found.append(history(args.folder, name, ahead=ahead, seed=args.seed, results=results))
         except InputError as error:
             if args.actuator:
                 raise

@@ -105,7 +105,7 @@ def diagnose(
     other = wrong_setup.find(ready.fit, settings, given=given)
     if other is not None and other.enough:
         # What a wrong set-up leaves is nothing that the actuator does.
-        result = as_given(ready, settings, each, tell)
+        result = as_given(ready, settings, each, tell, effort)
     else:
         first = conclude(ready, settings, each, tell, effort)
         # What acts all the time comes before what appears.

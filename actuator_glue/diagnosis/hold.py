@@ -57,9 +57,8 @@ def _linearly(
     of a large effect that Eq. (2) leaves, either hold may leave more.
     """
     prepared = first.prepared
-    effort = first.selection.search.effort
     held_commands = any(r.hold == 'zoh' for r in prepared.fit.recorded)
-    if first.decision.verdict == 'none' or not held_commands or effort.over:
+    if first.decision.verdict == 'none' or not held_commands or first.effort.over:
         return None
     fitted, held = (data.with_setup(hold='linear') for data in (prepared.fit, prepared.held))
     other = replace(prepared, fit=fitted, held=held)
@@ -70,7 +69,7 @@ def _linearly(
     tell('other hold', 0.0)
     if first.decision.verdict == 'missing-effect' and _explains_less(first, other, base):
         return None
-    second = conclude(other, settings, each, tell, effort, fixed=True)
+    second = conclude(other, settings, each, tell, first.effort, fixed=True)
     if _gained(first, second) < settings.nats:
         return None
     errors, enough = (before**0.5, base.rms), second.decision.verdict == 'none'

@@ -37,16 +37,14 @@ def since_onset(first: Conclusion, settings: Thresholds, each: Each, tell: Progr
         if all(removed < least for _, removed in changed):
             return first
 
-    effort = first.selection.search.effort
-
     def search(moment: Moment) -> Conclusion:
         tell('onset', 0.0)
         since = first.prepared.since(moment)
-        return conclude(since, settings, each, tell, effort, fixed=True)
+        return conclude(since, settings, each, tell, first.effort, fixed=True)
 
     best, least = first, math.inf
     for moment, quiet in _asked(first):
-        if effort.over:
+        if first.effort.over:
             break
         told = _since(first, moment, quiet, settings, search)
         if told is None:

@@ -70,6 +70,11 @@ class Conclusion:
     selection: ModelSelection
     appeared: Appeared | None = None
 
+    @property
+    def effort(self) -> Effort:
+        """What the search cost so far."""
+        return self.selection.search.effort
+
     @cached_property
     def onset(self) -> Onset | None:
         """When the effects appeared that are found now; None for from the beginning."""
@@ -105,10 +110,12 @@ def conclude(
     return _conclude(*_begun(clean, settings, each, effort, fixed=True), settings, tell)
 
 
-def as_given(prepared: Prepared, settings: Thresholds, each: Each, tell: Progress) -> Conclusion:
+def as_given(
+    prepared: Prepared, settings: Thresholds, each: Each, tell: Progress, effort: Effort
+) -> Conclusion:
     """Say what Eq. (2) leaves, and each effect beside it, without any search."""
     tell('base fit', 0.0)
-    prepared, search, line = _begun(prepared, settings, each, Effort(), fixed=True)
+    prepared, search, line = _begun(prepared, settings, each, effort, fixed=True)
     return _searched(prepared, search, line, replace(settings, most=0), tell)
 
 
@@ -142,14 +149,13 @@ def _conclude(
     elif result.decision.verdict == 'missing-effect':
         selection = _apart(result.selection)  # forms and their signatures serve all ways
         for way in learning.ways(result.found):
-            if selection.search.effort.over:
+            if result.effort.over:
                 break
             if other := _complete(result, selection, way(selection, result.found)):
                 return other
-    over = result.selection.search.effort.over
-    if result.decision.verdict == 'unexplained' and mean_effects(reserved=True) and not over:
+    if _goes_on(result) and mean_effects(reserved=True):
         result = _with_reserved(prepared, result, settings, tell)
-    if result.decision.verdict != 'unexplained' or over:
+    if not _goes_on(result):
         return result
     prepared, selection, search = result.prepared, result.selection, result.selection.search
     tell('one record', 0.0)
@@ -157,6 +163,11 @@ def _conclude(
     found, held = result.found, prepared.held.records
     own = per_record_settings.setting(search, found, limit, held, settings)
     return result if own is None else _conclusion(prepared, selection, own, result.line)
+
+
+def _goes_on(result: Conclusion) -> bool:
+    """Whether something is left to be explained, and effort to do it."""
+    return result.decision.verdict == 'unexplained' and not result.effort.over
 
 
 def _described(result: Conclusion, fed_back: Selection) -> Conclusion | None:
@@ -257,8 +268,7 @@ def with_learned_terms(result: Conclusion) -> Conclusion:
     """
     decision, found = result.decision, result.found
     left = decision.verdict == 'unexplained' or decision.left >= found.material
-    over = result.selection.search.effort.over
-    if over or not left or found.final.own is not None:
+    if result.effort.over or not left or found.final.own is not None:
         return result
     described = learning.reshaped(result.selection, found)
     if described is None or described.left >= described.material:
@@ -279,8 +289,7 @@ def with_what_matters(result: Conclusion) -> Conclusion:
     says surely more.
     """
     for ask in (companions.that_matter, exchange.exchanged):
-        over = result.selection.search.effort.over
-        if over or result.decision.verdict != 'missing-effect':
+        if result.effort.over or result.decision.verdict != 'missing-effect':
             return result
         found = ask(result.selection, result.found)
         result = _complete(result, result.selection, found) or result

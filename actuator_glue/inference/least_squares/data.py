@@ -242,15 +242,19 @@ class Data:
 
     def simulated(self, model: Model) -> int:
         """How many samples a structure simulates of one parameter set."""
-        return sum(len(self._runs_as(model, same[0])[0]) for same in self._repeats)
+        return sum(map(len, self._as_simulated(model)))
 
     def sub_steps(self, model: Model) -> int:
         """How many sub-steps the kernels take over all records, however many sets at a time."""
-        runs = (self._runs_as(model, same[0])[0] for same in self._repeats)
         if not isinstance(model, Structure) or model.linear:
-            return sum(map(len, runs))
-        program = model.program
-        return sum(len(r) * sample_steps(r.period, turning(program, r.hold)) for r in runs)
+            return self.simulated(model)
+        return sum(
+            len(run) * sample_steps(run.period, turning(model.program, run.hold))
+            for run in self._as_simulated(model)
+        )
+
+    def _as_simulated(self, model: Model) -> Iterator[Record]:
+        return (self._runs_as(model, same[0])[0] for same in self._repeats)
 
     @property
     def _singles(self) -> list[list[int]]:

@@ -14,6 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from actuator_glue import optional_library
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
 from actuator_glue.io.signature import beginning
@@ -116,13 +117,8 @@ def library(name: str, path: Path) -> Any:
     Raises:
         InputError: it is not installed; the message says what to install.
     """
-    try:
-        return importlib.import_module(name)
-    except ImportError as error:
-        raise InputError(
-            f'{path}: {name.partition(".")[0]} is needed to read this file; install it with '
-            "`pip install 'actuator_glue[lab]'`"
-        ) from error
+    needed = f'{path}: {name.partition(".")[0]} is needed to read this file'
+    return optional_library.library(name, needed, 'lab')
 
 
 @contextmanager
