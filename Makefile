@@ -2,6 +2,9 @@
 SHELL := bash
 .SHELLFLAGS := -e -o pipefail -c
 
+# Many a process starts here; one that compiles all that it imports takes seconds longer each time.
+unexport PYTHONDONTWRITEBYTECODE
+
 BIN := .venv/bin
 VENV_STAMP := .venv/stamp
 ROS_STAMP := install/stamp

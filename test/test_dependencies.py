@@ -7,6 +7,7 @@ import sys
 import tomllib
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterable
+from functools import cache
 from importlib.metadata import metadata
 from pathlib import Path
 from typing import NamedTuple
@@ -76,7 +77,8 @@ CAMPAIGN = {'distributed', 'pandas', 'pyarrow', 'ruptures'}
 PLUGINS = {'pytest_timeout', 'xdist'}
 
 
-def imported(*folders: str) -> set[str]:
+@cache
+def imported(*folders: str) -> frozenset[str]:
     """Return the libraries and ROS packages that the sources below some folders import."""
     found = set()
     for path in (p for folder in folders for p in (ROOT / folder).rglob('*.py')):
@@ -86,11 +88,17 @@ def imported(*folders: str) -> set[str]:
             elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
                 found.add(node.module.partition('.')[0])
     # Type checkers alone know the last one.
-    return found - OURS - set(sys.stdlib_module_names) - {'_typeshed'}
+    return frozenset(found - OURS - set(sys.stdlib_module_names) - {'_typeshed'})
 
 
-RUN = imported('actuator_glue', 'launch') - OPTIONAL - CAMPAIGN
-TEST = (imported('test') | PLUGINS) - RUN
+def needed() -> frozenset[str]:
+    """Return what the package cannot do without."""
+    return imported('actuator_glue', 'launch') - OPTIONAL - CAMPAIGN
+
+
+def needed_to_test() -> frozenset[str]:
+    """Return what the tests need besides."""
+    return (imported('test') | PLUGINS) - needed()
 
 
 def pip_names(requirements: Iterable[str]) -> set[str]:
@@ -104,7 +112,7 @@ def manifest(*tags: str) -> set[str]:
     return {str(e.text) for tag in tags for e in root.iter(tag)}
 
 
-def rosdep_keys(modules: set[str]) -> set[str]:
+def rosdep_keys(modules: Iterable[str]) -> set[str]:
     """Return the keys under which rosdep knows imported modules; a ROS package is its own key."""
     keys = {LIBRARIES[m].rosdep if m in LIBRARIES else m for m in modules}
     return {key for key in keys if key}
@@ -112,18 +120,18 @@ def rosdep_keys(modules: set[str]) -> set[str]:
 
 def test_pip_installs_what_the_package_imports() -> None:
     """[project] dependencies: every library, and none that nothing imports."""
-    expected = {LIBRARIES[m].pip for m in RUN if m in LIBRARIES}
+    expected = {LIBRARIES[m].pip for m in needed() if m in LIBRARIES}
     assert pip_names(PROJECT['dependencies']) == expected
 
 
 def test_studies_and_examples_need_nothing_more() -> None:
     """They run where the package does."""
-    assert imported('studies', 'examples') <= RUN
+    assert imported('studies', 'examples') <= needed()
 
 
 def test_pip_installs_what_the_tests_import() -> None:
     """The extra `test`: what is not needed at run time already."""
-    expected = {LIBRARIES[m].pip for m in TEST - OPTIONAL - CAMPAIGN if m in LIBRARIES}
+    expected = {LIBRARIES[m].pip for m in needed_to_test() - OPTIONAL - CAMPAIGN if m in LIBRARIES}
     expected.add('actuator_glue')  # with its extras `campaign` and `lab`
     assert pip_names(PROJECT['optional-dependencies']['test']) == expected
 
@@ -142,12 +150,12 @@ def test_an_extra_is_what_single_files_need(extra: str, modules: set[str]) -> No
 
 def test_rosdep_installs_what_the_package_imports() -> None:
     """package.xml: every ROS package and every library that has a key."""
-    assert manifest('depend', 'exec_depend') == rosdep_keys(RUN)
+    assert manifest('depend', 'exec_depend') == rosdep_keys(needed())
 
 
 def test_rosdep_installs_what_the_tests_import() -> None:
     """package.xml: test dependencies likewise."""
-    assert manifest('test_depend') == rosdep_keys(TEST)
+    assert manifest('test_depend') == rosdep_keys(needed_to_test())
 
 
 def test_every_requirement_is_pinned_once() -> None:

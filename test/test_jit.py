@@ -24,6 +24,7 @@ print(hashlib.sha256(band.lower.tobytes() + band.upper.tobytes()).hexdigest())
 """
 
 
+@pytest.mark.slow
 def test_fresh_and_cached_code_agree_to_the_bit(tmp_path: Path) -> None:
     """Without forced inlining one limit in 80 000 differed in its last bit."""
     environment = {**os.environ, 'NUMBA_CACHE_DIR': str(tmp_path)}

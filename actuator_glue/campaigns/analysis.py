@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +10,7 @@ import numpy as np
 
 from actuator_glue.campaigns.grouping import Task
 from actuator_glue.errors import InputError
+from actuator_glue.io.calendar_time import calendar_time
 from actuator_glue.model.parameters import NAMES
 from actuator_glue.records import Array, Record, source_name
 
@@ -78,9 +78,9 @@ def _described(task: Task, records: Sequence[Record]) -> Row:
     """Return what the records say of themselves where neither names nor a table did."""
     first = min(records, key=lambda r: r.start_ns)
     started = task.started
-    if started is None and first.start_ns > 0:
-        moment = datetime.fromtimestamp(first.start_ns * 1e-9, UTC).replace(tzinfo=None)
-        started = moment.isoformat(timespec='seconds')
+    moment = calendar_time(first.start_ns)
+    if started is None and moment is not None:
+        started = moment.replace(tzinfo=None).isoformat(timespec='seconds')
     if started is None and task.day is not None:
         started = f'{task.day}T00:00:00'
     return {

@@ -14,6 +14,7 @@ from typing import Any
 from actuator_glue.campaigns.recipe import SAID, FileRule, Recipe, channels_of
 from actuator_glue.errors import InputError
 from actuator_glue.io.bag_reader import is_bag
+from actuator_glue.io.calendar_time import calendar_time
 from actuator_glue.io.formats import formats
 from actuator_glue.io.load import load_records
 from actuator_glue.records import Record, check_hold, check_stiffness
@@ -267,8 +268,8 @@ def _by_itself(member: Member, keys: Sequence[str]) -> dict[str, str]:
     except InputError:
         return {}
     said = {'actuator': first.actuator}
-    if first.start_ns > 0:
-        said['day'] = datetime.fromtimestamp(first.start_ns * 1e-9, UTC).date().isoformat()
+    if moment := calendar_time(first.start_ns):
+        said['day'] = moment.date().isoformat()
     if first.stiffness is not None:
         said['specimen'] = f'{first.stiffness:g} N/m'
     return {key: said[key] for key in keys if key in said}

@@ -28,6 +28,8 @@ COMMON = (
 )
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 ERROR = TransitionCallbackReturn.ERROR
+# How long a node that ends waits for who listens [s]: one that hangs never takes what is sent.
+LAST_WORDS = 1.0
 
 
 class SuiteNode(LifecycleNode):
@@ -284,9 +286,20 @@ class SuiteNode(LifecycleNode):
         self._undone.append(undo)
 
     def _clean(self) -> None:
+        self.until_heard()
         self._made.clear()
         while self._undone:
             self._undone.pop()()
+
+    def until_heard(self) -> None:
+        """Wait until who listens has what was said last, `LAST_WORDS` at most.
+
+        What a publisher that goes has not handed over is lost, however reliable it was.
+        """
+        end = time.monotonic() + LAST_WORDS
+        for made in (*self._made, self._diagnostics):
+            left = max(end - time.monotonic(), 0.0)
+            made.wait_for_all_acked(Duration(seconds=left))
 
     # Diagnostics.
 

@@ -7,7 +7,6 @@ import sys
 import time
 from collections import deque
 from collections.abc import Mapping
-from datetime import UTC, datetime
 from typing import Any
 
 from actuator_glue_msgs.srv import SetModel
@@ -15,6 +14,7 @@ from actuator_glue_msgs.srv import SetModel
 from actuator_glue import sample_block
 from actuator_glue.errors import InputError
 from actuator_glue.inference.choice import choose_model
+from actuator_glue.io.calendar_time import calendar_time
 from actuator_glue.nodes import configuration, own_effects, spin, topics
 from actuator_glue.nodes.estimator_worker import compute, warm_up
 from actuator_glue.nodes.health import ERROR, Rate
@@ -351,7 +351,10 @@ class EstimatorNode(WorkingNode):
 
 
 def _date(stamp_ns: int) -> str:
-    return datetime.fromtimestamp(stamp_ns * 1e-9, UTC).strftime('%Y-%m-%d %H:%M:%S UTC')
+    moment = calendar_time(stamp_ns)
+    if moment is None:
+        return f'{stamp_ns * 1e-9:.3f} s of the stream'
+    return moment.strftime('%Y-%m-%d %H:%M:%S UTC')
 
 
 def main(args: list[str] | None = None) -> int:

@@ -118,6 +118,7 @@ def _leave(executor: Executor, node: SuiteNode) -> int:
 def _end(node: SuiteNode) -> None:
     if node.state in ('unconfigured', 'inactive', 'active'):
         node.trigger_shutdown()
+        node.until_heard()
     else:
         # Shut down by a service: the answer must leave before the node that gives it is gone.
         time.sleep(0.3)

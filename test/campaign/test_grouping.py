@@ -1,5 +1,6 @@
 """From files to tasks: names, tables, what files say themselves, and how each is read."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -86,6 +87,15 @@ def test_set_ups_of_files_tell_what_nothing_else_does(tmp_path: Path) -> None:
         ('c.csv', 1),
         ('simulated/250000 N/m', 2),
     ]
+
+
+def test_a_clock_that_is_no_calendar_tells_no_day(tmp_path: Path) -> None:
+    """Seconds since a test began are not the first of January 1970."""
+    test = ag.simulate(ag.Command(rate=100.0, duration=2.0), stiffness=250e3)
+    write(tmp_path / 'a.csv', replace(test, start_ns=10**9))
+    write(tmp_path / 'b.csv', replace(test, start_ns=1_700_000_000 * 10**9))
+    found = {t.group: t.day for t in tasks_of([tmp_path], recipe_of(tmp_path, group=['day']))}
+    assert found == {'a.csv': None, '2023-11-14': '2023-11-14'}
 
 
 def test_a_name_without_a_date_costs_its_file(records: Path) -> None:

@@ -68,6 +68,7 @@ def test_play_is_diagnosed_with_json_and_report(
     assert 'missing: backlash' in page
 
 
+@pytest.mark.slow
 def test_a_reader_that_has_gone_takes_nothing_from_the_json(tmp_path: Path) -> None:
     """`calibrate ... --json FILE | true`: the file is written before anything is printed."""
     record, out = write(tmp_path / 'a.csv', 0.0, 0.0, 1), tmp_path / 'c.json'

@@ -117,6 +117,7 @@ def _names(tell: object) -> list[str]:
     return [effect.name for effect in CATALOGUE.registered()]
 
 
+@pytest.mark.slow
 def test_a_worker_process_knows_them(own: str) -> None:
     """Also those registered after it began."""
     answers: queue.Queue[Answer] = queue.Queue()

@@ -29,11 +29,17 @@ replay bag --json again.json
 rths sdof --posterior rig.npz --json rths.json
 send rig_2.csv --to udp://127.0.0.1:5999 --speed 100
 diagnose rig_1.csv rig_2.csv --report lacks.html --json rig.json
+simulate rig_2026-01-05.csv --stiffness 250e3 --duration 6 --rate 200 --seed 2
+simulate rig_2026-01-06.csv --stiffness 250e3 --duration 6 --rate 200 --seed 3
+campaign rig_2026-01-05.csv rig_2026-01-06.csv --recipe recipe.yaml --out year --workers 1
+history year --report year.html
+compare year 2026-01-05 2026-01-06
 """
 # `view` and `doctor` wait or look at this computer.
 WAITING = {'view', 'doctor'}
-RUN = """
-import shlex, sys
+RUN = r"""
+import pathlib, shlex, sys
+pathlib.Path('recipe.yaml').write_text(r"names: '(?P<actuator>rig)_(?P<day>[-\d]+)\.'")
 from actuator_glue.cli.main import main
 for line in sys.argv[1].strip().splitlines():
     code = main(shlex.split(line))

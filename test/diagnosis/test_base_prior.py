@@ -68,6 +68,7 @@ def test_a_fit_ends_at_the_most_probable_parameters() -> None:
     assert cost(plain.theta[None]) > cost(found.theta[None]) + 0.1
 
 
+@pytest.mark.slow
 def test_what_one_stiffness_leaves_open_is_known_from_the_calibration() -> None:
     """Base parameters about as wide as the prior at most, and right; the effect is still named."""
     record = make(['backlash'], [6e-5], 31)[1]

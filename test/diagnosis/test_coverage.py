@@ -20,6 +20,7 @@ RATE = 128.0
 MACHINES = TABLE_2, np.array([235.0, 5.0e10, 4.23e6, 3.3])
 
 
+@pytest.mark.slow
 def test_what_is_immaterial_is_in_the_intervals() -> None:
     """20 N of friction and 3 um of play, too small to be added, move Eq. (2)'s parameters.
 

@@ -120,6 +120,7 @@ def ranks(seed: tuple[int, int], case: Case) -> Array:
     return np.asarray((chosen < truth).sum(axis=0))
 
 
+@pytest.mark.slow
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize('name', SLOW_BUT_ONE)
 def test_ranks_of_the_truth_are_uniform(

@@ -23,6 +23,7 @@ def record(seed: int) -> Record:
     return Record(command, y + noise, 1.0 / RATE, stiffness=250e3)
 
 
+@pytest.mark.slow
 def test_a_search_ends_at_its_effort_and_says_so() -> None:
     """Twice the same, and less than a search that may go on; seeds are fixed."""
     looks: list[FirstLook] = []

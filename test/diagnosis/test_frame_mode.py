@@ -41,6 +41,7 @@ def test_a_mode_has_its_name(effect: str, sizes: list[float], rng_seed: int) -> 
     assert [r.name for r in found.rivals[effect] if r.tied and len(r.effects) == 1] == [effect]
 
 
+@pytest.mark.slow
 def test_a_mode_is_tried_where_all_other_effects_leave_something(rng_seed: int) -> None:
     """And stays; what rings on in the residual of Eq. (2) is not taken for hum. 60 runs of 60."""
     assert 'frame-mode' not in mean_effects()

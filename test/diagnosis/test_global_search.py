@@ -68,6 +68,7 @@ def test_what_is_found_is_never_worse_than_what_was_there() -> None:
     assert global_search.refit(data, COULOMB, before, 8, 1e-4).rms <= before.rms
 
 
+@pytest.mark.slow
 def test_the_diagnosis_names_it_with_its_size() -> None:
     """With slopes alone it was Coulomb friction of 139 N and a lag of the valve beside it."""
     *records, held = held_up(5, (0.0, 250e3, 250e3))
@@ -97,6 +98,7 @@ def test_friction_under_one_stiffness_goes_along_its_ridge(rng_seed: int) -> Non
     assert there.rms < fit(data, COULOMB, start).rms
 
 
+@pytest.mark.slow
 def test_a_hold_that_explains_less_is_not_searched_with() -> None:
     """Of friction that holds the piston Eq. (2) leaves 150 um, 1 um less with the other hold."""
     theta, rng = np.array([128.0, 1.01e9, 2.42e5, 0.3, 300.0]), np.random.default_rng(1)

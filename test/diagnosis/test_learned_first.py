@@ -13,6 +13,7 @@ THETA = np.array([230.0, 3.5e9, 4e5, 0.6])
 RATE_GAIN, LAG = 2.7, 6e-3
 
 
+@pytest.mark.slow
 def test_a_name_is_found_beside_a_description() -> None:
     """A lag beside a command that grows with its rate: names make up for both, and for neither."""
     u = sweep(2e-3, 8.0, 32.0)

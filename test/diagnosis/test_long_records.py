@@ -14,6 +14,7 @@ from actuator_glue.inference import importance
 CUT = posterior._FEWEST  # evaluations
 
 
+@pytest.mark.slow
 def test_chains_that_reach_no_posterior_leave_the_normal_approximation(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -28,6 +29,7 @@ def test_chains_that_reach_no_posterior_leave_the_normal_approximation(
     assert size.lower < 2e-4 < size.upper and size.identified
 
 
+@pytest.mark.slow
 def test_chains_of_a_long_record_are_cut(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where they have met nowhere nothing beside, or in place, is drawn: no interval shows it."""
     monkeypatch.setattr(posterior, '_SIMULATED', 1)

@@ -10,6 +10,7 @@ PLAY, LAG = 60e-6, 8e-3
 NAMES = ('backlash', 'sensor-lag', 'gain', 'viscous-damping', 'bias')
 
 
+@pytest.mark.slow
 def test_lost_motion_of_the_command_is_one_cause() -> None:
     """It moves the piston as play and a lag of the transducer do, nearly."""
     u = sweep(2e-3, 9.0, 24.0)

@@ -48,6 +48,7 @@ def diagnosed(
     return diagnose([record], settings=Thresholds(evaluations=0))
 
 
+@pytest.mark.slow
 def test_an_effect_that_appears_at_half_time_is_dated() -> None:
     """It is named from the data since then; all it leaves there is noise."""
     found = diagnosed('coulomb-friction', 2500.0, 14.0)
@@ -123,7 +124,7 @@ def test_what_appears_beside_what_eq_2_cannot_take_over(rng_seed: int) -> None:
     assert found.error.after < 3.6e-6
 
 
-@pytest.mark.parametrize('at', [0.0, 100.0])
+@pytest.mark.parametrize('at', [pytest.param(0.0, marks=pytest.mark.slow), 100.0])
 def test_what_acts_all_the_time_or_never_has_no_onset(at: float) -> None:
     """A sweep that shows an effect only when it is fast does not make it appear."""
     assert diagnosed('coulomb-friction', 2500.0, at).onset is None

@@ -15,7 +15,7 @@ from actuator_glue.model.structure import Structure
 @pytest.mark.parametrize(
     ('effect', 'size', 'which'),
     [
-        ('valve-deadband', 2e-4, (1,)),
+        pytest.param('valve-deadband', 2e-4, (1,), marks=pytest.mark.slow),
         pytest.param('backlash', 6e-5, (0, 1), marks=pytest.mark.slow),
         pytest.param('backlash', 6e-5, (1,), marks=pytest.mark.slow),
         pytest.param('valve-deadband', 2e-4, (0, 1), marks=pytest.mark.slow),
@@ -50,6 +50,7 @@ def test_chains_keep_the_spread_of_the_posterior(
     assert estimate.mean == pytest.approx(size, abs=5 * estimate.stddev)
 
 
+@pytest.mark.slow
 def test_effects_that_take_turns_end_in_a_diagnosis() -> None:
     """Delay without a specimen: members were swapped until the last round, whose rivals lacked."""
     found = diagnose(make(['delay'], [0.004], 31)[:1], settings=QUICK, seed=2)

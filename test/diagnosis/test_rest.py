@@ -28,6 +28,7 @@ def machine(still: float, moving: float, rest: float = 3.0) -> Record:
     return replace(bare, measured=x + noise)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ('still', 'moving', 'said'),
     [

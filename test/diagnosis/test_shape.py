@@ -25,6 +25,7 @@ def held_out(found: Selection, kind: int) -> float:
     return float(np.sqrt(np.mean(left**2)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ('kind', 'form', 'where', 'share', 'names'),
     [
@@ -83,6 +84,7 @@ def test_a_wrong_name_that_seems_enough_gives_way() -> None:
     assert told.final.fit.theta[4] == pytest.approx(25e-6, rel=0.1)
 
 
+@pytest.mark.slow
 def test_a_right_name_stays() -> None:
     """No form of all is better by what a description must be."""
     effects = {'valve-deadband': 60e-6}

@@ -19,6 +19,7 @@ def selected(delay: float, droop: float) -> tuple[ModelSelection, Selection]:
     return two_sweeps.selected(NAMES, effects, stroke=2.2e-3, hertz=8.0, seconds=30.0)
 
 
+@pytest.mark.slow
 def test_two_that_hide_each_other_are_found() -> None:
     """Of 25 machines 0.76 to 0.85 of the noise was left; alone half of what matters goes."""
     selection, found = selected(DELAY, DROOP)

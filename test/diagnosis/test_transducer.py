@@ -57,7 +57,7 @@ def selected(half: float, inside: bool, rng: np.random.Generator) -> Selection:
     return in_the_loop(selection, found) or found
 
 
-@pytest.mark.parametrize('inside', [True, False])
+@pytest.mark.parametrize('inside', [pytest.param(True, marks=pytest.mark.slow), False])
 def test_play_inside_of_the_loop_is_told_from_play_beside_it(inside: bool, rng_seed: int) -> None:
     """Its size, and that the loop is closed on it; beside the loop it is play alone."""
     rng = np.random.default_rng(rng_seed)

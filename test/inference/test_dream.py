@@ -70,6 +70,7 @@ def test_mass_in_the_corner_of_the_prior(rng_seed: int, moves: tuple[Move, ...])
     _check_moments(target, _replicates(target, rng_seed, 12, 30_000, SamplerSettings(moves=moves)))
 
 
+@pytest.mark.slow
 def test_gaussian_with_the_moves_of_vrugt_alone_from_the_prior(rng_seed: int) -> None:
     target = targets.equicorrelated(4)
     plain = SamplerSettings(start='prior', moves=PUBLISHED, chains=5, adaptation=400)
@@ -89,6 +90,7 @@ def test_two_modes_ten_sigma_apart(rng_seed: int) -> None:
     _check_moments(target, both)
 
 
+@pytest.mark.slow
 def test_ten_dimensional_banana_with_default_settings(rng_seed: int) -> None:
     """Variances of the two bent coordinates, as long a run as `calibrate` makes by default.
 

@@ -97,6 +97,7 @@ def held(seed: tuple[int, ...], phi: float, evaluations: int) -> np.ndarray:
     return np.asarray((low <= truth) & (truth <= high))
 
 
+@pytest.mark.slow
 def test_intervals_hold_the_truth_under_coloured_noise(rng_seed: int) -> None:
     """24 intervals of six machines: fewer than 18 hold it by chance once in 1000 runs."""
     hits = sum(held((rng_seed, i), 0.9, 16_000).sum() for i in range(6))

@@ -61,6 +61,7 @@ def test_what_no_array_holds_is_refused(tmp_path: Path, says: str, pack: type) -
         load_records(path)
 
 
+@pytest.mark.slow
 def test_too_many_variables_are_refused_soon(tmp_path: Path) -> None:
     """Kilobytes that inflate to a million and more empty cells."""
     cell = struct.pack('<II', 14, 0)

@@ -173,6 +173,7 @@ def test_what_was_not_added_is_not_drawn() -> None:
         assert any('after' in t.get_text() for t in two.legends[0].get_texts())
 
 
+@pytest.mark.slow
 def test_paths_stand_in_one_table() -> None:
     """The headline names files; where they lay is told once for each."""
     found = diagnosis(6e-5)

@@ -20,7 +20,13 @@ from actuator_glue.records import Record
 NAMES = (os.fsdecode(b'test \xe9.csv'), '$\\frac$ a_b.csv', 'line\nfeed.csv')
 
 
-@pytest.fixture(params=NAMES, ids=['bytes', 'formula', 'line'])
+@pytest.fixture(
+    params=[
+        pytest.param(NAMES[0], id='bytes', marks=pytest.mark.slow),
+        pytest.param(NAMES[1], id='formula'),
+        pytest.param(NAMES[2], id='line', marks=pytest.mark.slow),
+    ]
+)
 def file(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
     """A record under a name that is no text, no formula and no line."""
     time = np.arange(2000) / 200.0

@@ -126,6 +126,7 @@ def worker_of(process):
     return int(worker)
 
 
+@pytest.mark.slow
 def test_a_worker_that_is_killed_after_a_warning_is_replaced(start, probe):
     """An error after a warning is logged, and what follows it is done."""
     estimator = start('estimator', **QUICK)
@@ -150,6 +151,7 @@ def test_a_worker_that_is_killed_after_a_warning_is_replaced(start, probe):
     assert estimator.end() == 0 and 'Traceback' not in estimator.text
 
 
+@pytest.mark.slow
 def test_a_goal_ends_with_the_worker_that_diagnosed(start, probe):
     diagnoser = start('diagnoser')
     probe.until(lambda: probe.value('diagnoser', 'worker') == 'ready', 200, 'diagnoser compiled')
@@ -169,6 +171,7 @@ def test_a_goal_ends_with_the_worker_that_diagnosed(start, probe):
     assert diagnoser.end() == 0
 
 
+@pytest.mark.slow
 def test_a_simulated_clock_that_jumps_back_is_said_and_survived(start, probe):
     nodes = {
         'estimator': start('estimator', use_sim_time=True, **QUICK),

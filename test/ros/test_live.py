@@ -95,7 +95,14 @@ def whole(probe, record, bag):
         assert probe.number('lab_bridge', name) == 0, name
 
 
-@pytest.mark.parametrize('scheme', ['udp', 'tcp', 'lsl'])
+@pytest.mark.parametrize(
+    'scheme',
+    [
+        'udp',
+        pytest.param('tcp', marks=pytest.mark.slow),
+        pytest.param('lsl', marks=pytest.mark.slow),
+    ],
+)
 def test_a_record_that_is_sent_is_recorded_to_the_bit(scheme, start, probe, tmp_path):
     if scheme == 'lsl':
         pytest.importorskip('pylsl', reason='no pylsl: pip install "actuator_glue[lab]"')
@@ -191,6 +198,7 @@ def unpacked(data):
     return dict(zip(FIELDS, struct.unpack(f'<{len(FIELDS)}d', data), strict=True))
 
 
+@pytest.mark.slow
 def test_results_go_back_to_the_controller(start, probe, tmp_path):
     """A datagram of doubles per window, and how long the band takes from its last sample."""
     port, given = free_port(), tmp_path / 'given'

@@ -24,6 +24,7 @@ from actuator_glue.nodes.topics import SAMPLES
 from actuator_glue.records import Record
 
 
+@pytest.mark.slow
 def test_a_stream_does_not_leave_before_it_is_taken(start, probe, tmp_path):
     """A recorder that is held up until after the end of the stream still gets all of it."""
     samples, size = 150_000, 250
@@ -48,7 +49,14 @@ def test_a_stream_does_not_leave_before_it_is_taken(start, probe, tmp_path):
     assert np.array_equal(recorded(bag), np.arange(samples))
 
 
-@pytest.mark.parametrize('node', ['actuator_sim', 'lab_bridge', 'replay'])
+@pytest.mark.parametrize(
+    'node',
+    [
+        'lab_bridge',
+        pytest.param('actuator_sim', marks=pytest.mark.slow),
+        pytest.param('replay', marks=pytest.mark.slow),
+    ],
+)
 def test_no_sample_is_sent_before_subscribers_have_the_set_up(node, start, probe, tmp_path):
     """Who has not, may not have heard of the publisher, and would miss what it sends."""
     samples, bag = 600, tmp_path / 'bag'
@@ -111,6 +119,7 @@ def test_a_recorder_writes_what_has_reached_it_when_it_is_stopped(probe, tmp_pat
     assert published == sorted(published)
 
 
+@pytest.mark.slow
 def test_windows_that_are_complete_at_once_are_all_estimated(start, probe):
     """What held up the samples, or the computer, is no reason to leave windows out."""
     settings = {**QUICK, 'hop': 2.0, 'time_budget': 2.0}

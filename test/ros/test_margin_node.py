@@ -56,6 +56,7 @@ def test_margins_follow_posteriors(start, probe, tmp_path, damping, unstable):
     assert node.end() == 0
 
 
+@pytest.mark.slow
 def test_the_estimator_feeds_it(start, probe):
     """From samples to StabilityMargin: one for each window, of the same number."""
     estimator = start('estimator', **QUICK)

@@ -250,6 +250,7 @@ def test_a_folder_that_cannot_be_written_is_said(start):
     assert recorder.wait(30) == 2 and 'cannot' in recorder.text
 
 
+@pytest.mark.slow
 def test_an_estimator_that_is_killed_begins_anew_and_says_so(start, probe):
     simulator = start('actuator_sim', rate=RATE, repeat=True, duration=20.0, wait_for=1)
     first = start('estimator', **QUICK)

@@ -5,6 +5,7 @@ import statistics
 import time
 
 import numpy as np
+import pytest
 from actuator_glue_msgs.msg import SampleBlock
 from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy
 from ros_nodes import QUICK, RATE, recorded
@@ -44,6 +45,7 @@ def test_the_recorder_adapts_to_what_is_offered(start, probe, tmp_path):
     assert [m.data for _, m in decoded(bag, ('std_msgs/msg/String',))] == ['written before']
 
 
+@pytest.mark.slow
 def test_a_partner_that_will_never_be_heard_is_a_warning(start, probe):
     estimator = start('estimator', **QUICK)
     probe.until(lambda: probe.value('estimator', 'worker') == 'ready', 200, 'estimator compiled')

@@ -36,6 +36,7 @@ def test_samples_are_listened_to_once_the_worker_is_ready(make, probe):
     node.destroy_node()
 
 
+@pytest.mark.slow
 def test_a_stream_says_for_whom_it_waits(start, probe):
     simulator = start('actuator_sim', wait_for=2)
     waits = 'waiting for 2 subscribers of samples, 0 are there'

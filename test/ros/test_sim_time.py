@@ -23,7 +23,9 @@ def stamps(blocks):
     return np.array([m.header.stamp.sec + 1e-9 * m.header.stamp.nanosec for m in blocks])
 
 
-@pytest.mark.parametrize('node', ['actuator_sim', 'lab_bridge'])
+@pytest.mark.parametrize(
+    'node', ['actuator_sim', pytest.param('lab_bridge', marks=pytest.mark.slow)]
+)
 def test_a_stream_runs_pauses_and_jumps_with_the_clock(node, start, probe, clock, tmp_path):
     blocks = []
     probe.create_subscription(SampleBlock, 'samples', blocks.append, QoSProfile(depth=1000))

@@ -63,6 +63,7 @@ def one_kilohertz(start, probe, tmp_path, seconds):
     return live
 
 
+@pytest.mark.slow
 def test_one_kilohertz_for_ten_seconds(start, probe, tmp_path):
     live = one_kilohertz(start, probe, tmp_path, 10.0)
     # Whether each window is in time is judged on a computer that has nothing else to do.
@@ -153,6 +154,7 @@ def test_a_file_is_streamed_and_replayed_faster_than_real_time(start, probe, tmp
     assert setup.specimen_stiffness == 1e5 and setup.rate == pytest.approx(RATE)
 
 
+@pytest.mark.slow
 def test_a_recorder_that_stalls_keeps_the_set_up_before_its_samples(start, probe, tmp_path):
     """What waits on two topics at once is recorded in the order a replay needs."""
     bag = tmp_path / 'bag'

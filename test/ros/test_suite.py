@@ -43,6 +43,7 @@ def together(tmp_path):
         process.wait()
 
 
+@pytest.mark.slow
 def test_one_process_holds_a_whole_test(together, probe, tmp_path):
     bag = tmp_path / 'bag'
     process = together(
@@ -103,6 +104,7 @@ sys.exit(suite.main(['recorder', 'viewer', 'actuator_sim', *sys.argv[1:]]))
 """
 
 
+@pytest.mark.slow
 def test_a_bug_in_one_of_them_leaves_the_records_whole(probe, tmp_path):
     bag = tmp_path / 'bag'
     file = tmp_path / 'parameters.yaml'

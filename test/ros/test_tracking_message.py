@@ -1,11 +1,13 @@
 """How the actuator follows its command, after every window of the estimator."""
 
 import numpy as np
+import pytest
 from actuator_glue_msgs.msg import TrackingIndicators
 from ros_nodes import QUICK
 from windows import windows_of_a_test
 
 
+@pytest.mark.slow
 def test_one_for_each_window(start, probe):
     """The numbers of its window; their limits in order, and about the measured ones."""
     estimator = start('estimator', **QUICK, tracking_frequencies=[2.0, 5.0])

@@ -62,7 +62,9 @@ def test_a_bridge_that_is_told_half_the_rate_says_so(layout, start, probe, tmp_p
     assert bridge.end() == 0 and estimator.end() == 0
 
 
-@pytest.mark.parametrize(('factor', 'good'), [(0.5, False), (1.0, True)])
+@pytest.mark.parametrize(
+    ('factor', 'good'), [(0.5, False), pytest.param(1.0, True, marks=pytest.mark.slow)]
+)
 def test_a_foreign_publisher_whose_stamps_disagree(factor, good, start, probe):
     worst, posteriors = levels(probe), []
     probe.create_subscription(PosteriorMoments, 'posterior', posteriors.append, 10)

@@ -118,6 +118,7 @@ def test_gain_with_the_specimen_removes_the_papers_residual() -> None:
     assert rms[centres < 1].min() > 2.5 * rms[centres > 9].max()
 
 
+@pytest.mark.slow
 def test_total_band_covers_what_it_says_and_the_glue_band_is_reported(rng_seed: int) -> None:
     """The 95 % total band covers 93-97 % of held-out samples over 12 simulated tests.
 

@@ -20,6 +20,7 @@ from studies.chen.report import prose
 from studies.chen.study import Results
 from studies.chen.tables import TABLES
 
+pytestmark = pytest.mark.slow
 SECONDS = 60.0  # processor time of the quick study
 
 

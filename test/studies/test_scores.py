@@ -4,7 +4,6 @@ import itertools
 
 import numpy as np
 import pytest
-import scoringrules
 from scipy.stats import norm
 
 from actuator_glue.errors import InputError
@@ -14,6 +13,8 @@ from studies.chen.scores import coverage, crps_ensemble, interval_score, mean_wi
 
 
 def test_crps_of_ensemble_agrees_with_scoringrules(rng_seed: int) -> None:
+    import scoringrules  # compiles for ten seconds
+
     rng = np.random.default_rng(rng_seed)
     observed, draws = rng.normal(size=200), rng.standard_t(3, size=(37, 200))
     expected = scoringrules.crps_ensemble(observed, draws.T, estimator='nrg')
@@ -41,6 +42,8 @@ def test_crps_is_the_integral_of_its_definition() -> None:
 
 
 def test_interval_score_agrees_with_scoringrules(rng_seed: int) -> None:
+    import scoringrules  # compiles for ten seconds
+
     rng = np.random.default_rng(rng_seed)
     observed = rng.normal(size=50)
     lower = rng.normal(size=50) - 1

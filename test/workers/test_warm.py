@@ -97,6 +97,7 @@ def test_warming_up_is_cut_short_by_no_deadline(monkeypatch: pytest.MonkeyPatch)
     assert len(ends) > 5 and set(ends) == {math.inf}
 
 
+@pytest.mark.slow
 def test_tracking_numbers_take_no_time_from_a_window(monkeypatch: pytest.MonkeyPatch) -> None:
     """Without time left for them there are none; a slow moment is forgotten after some windows."""
     found: list[Tracked | None] = []

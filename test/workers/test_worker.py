@@ -66,6 +66,7 @@ def test_work_failure_and_progress_are_answered_in_order(worker, answers):
     assert [a.payload for a in answers] == [4, 8, 'ValueError: no', 5, 10]
 
 
+@pytest.mark.slow
 def test_a_restart_gives_up_the_work_and_is_no_death(worker, answers):
     """At whatever moment of its start or work it comes."""
     before = open_files()
