@@ -65,6 +65,11 @@ def speak(motion: str) -> None:
     _SPEAKING.set(motion)
 
 
+def spoken_of() -> str:
+    """Return the motion that `spoken` takes where none is given."""
+    return _SPEAKING.get()
+
+
 def spoken(text: str, motion: str | None = None) -> str:
     """Return a text in which sizes of a motion have its own units.
 

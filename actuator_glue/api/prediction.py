@@ -10,6 +10,7 @@ import numpy as np
 from actuator_glue.api.frame import frame
 from actuator_glue.inference.bands import band
 from actuator_glue.inference.predictive import ResidualModel, total_band
+from actuator_glue.motion import METRES, spoken
 from actuator_glue.records import Array, Record
 
 if TYPE_CHECKING:
@@ -35,6 +36,7 @@ class Prediction:
         residual_known: whether the model's error is in the band; where it is not, as with files of
             earlier versions, both bands are those of the parameters.
         problems: why the posterior must not be used as it stands.
+        motion: what is measured: 'm', or 'deg', 'counts' and so on, see `Record`.
     """
 
     time: Array
@@ -48,6 +50,7 @@ class Prediction:
     measured: Array | None = None
     residual_known: bool = True
     problems: tuple[str, ...] = ()
+    motion: str = METRES
 
     @property
     def inside(self) -> float | None:
@@ -65,7 +68,7 @@ class Prediction:
             'by the parameters'
         )
         told += '' if self.inside is None else f'; {100.0 * self.inside:.1f} % measured inside'
-        return '\n'.join([*self.problems, f'{told})'])
+        return spoken('\n'.join([*self.problems, f'{told})']), self.motion)
 
     def to_dataframe(self) -> DataFrame:
         """Return a table with a row for each sample by its time, in SI units.
@@ -90,6 +93,7 @@ class Prediction:
                 self.median,
                 (self.lower, self.upper),
                 (self.parameter_lower, self.parameter_upper),
+                self.motion,
             )
         )
 
@@ -127,4 +131,5 @@ def prediction(
         measured=record.measured if measured else None,
         residual_known=residual is not None,
         problems=problems,
+        motion=record.motion,
     )

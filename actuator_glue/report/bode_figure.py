@@ -64,7 +64,7 @@ def bode(responses: Sequence[Bode]) -> Figure:
         if high > low:
             column[-1].set_xlim(low, high)
     for axes, text in zip(
-        grid[:, 0], ('gain [mm/mm]', 'phase [degrees]', 'delay [ms]'), strict=True
+        grid[:, 0], ('gain [-]', 'phase [degrees]', 'delay [ms]'), strict=True
     ):
         axes.set_ylabel(text)
     named = {

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from matplotlib.figure import Figure
 
+from actuator_glue.motion import METRES
 from actuator_glue.records import Array
 from actuator_glue.report import style
 from actuator_glue.report.timeseries import PARAMETER_LOOK, TOP, TOTAL_LOOK
@@ -15,7 +16,10 @@ _POINTS = 4000  # per line: more cannot be seen
 
 
 class Predicted(NamedTuple):
-    """Curves of a prediction, shape (n,) each: time [s], displacements and limits [m]."""
+    """Curves of a prediction, shape (n,) each: time [s], displacements and limits [m].
+
+    `motion` is what they measure, as in a `Record`.
+    """
 
     time: Array
     command: Array
@@ -23,12 +27,13 @@ class Predicted(NamedTuple):
     median: Array
     total: tuple[Array, Array]
     parameter: tuple[Array, Array]
+    motion: str = METRES
 
 
 @style.styled
 def prediction_figure(of: Predicted) -> Figure:
     """Draw the whole test, and below it bands and measurement less the median."""
-    figure = style.new_figure(4.2)
+    figure = style.new_figure(4.2, motion=of.motion)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(1.4, 1.0))
     some = slice(None, None, max(1, len(of.time) // _POINTS))
     t, median = of.time[some], of.median[some]

@@ -18,7 +18,7 @@ def record_figure(record: Record) -> Figure:
     The tracking error is command less measured: what the actuator lags behind, not a model error.
     """
     rows = 3 if record.force is None else 4
-    figure = style.new_figure(1.6 + 1.7 * rows)
+    figure = style.new_figure(1.6 + 1.7 * rows, motion=record.motion)
     grid = figure.add_gridspec(rows, 3, height_ratios=(1.0, 1.4, *([0.8] * (rows - 2))))
     time = record.time
     whole = figure.add_subplot(grid[0, :])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import math
+import re
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
@@ -17,7 +18,7 @@ from matplotlib.text import Text
 from numpy.typing import ArrayLike
 
 from actuator_glue.errors import printable
-from actuator_glue.motion import spoken
+from actuator_glue.motion import spoken, spoken_of
 
 P = ParamSpec('P')
 R = TypeVar('R')
@@ -43,13 +44,15 @@ SYMBOL = {
     'alpha_2': r'$\alpha_2$',
     'alpha_3': r'$\alpha_3$',
 }
-UNIT = {'N/(m s^2)': r'N/(m s$^2$)', '1': '-'}
+UNIT = {'1': '-'}
 
 
 def label(name: str, unit: str, exponent: int = 0) -> str:
     """Return an axis label: symbol and unit, values in units of 10^exponent."""
     power = rf'$10^{{{exponent}}}$ ' if exponent else ''
-    return f'{SYMBOL.get(name, name.replace("_", " "))} [{power}{UNIT.get(unit, unit)}]'
+    unit = spoken(unit)
+    shown = UNIT.get(unit) or re.sub(r'\^(\d)', r'$^\1$', unit)
+    return f'{SYMBOL.get(name, name.replace("_", " "))} [{power}{shown}]'
 
 
 def engineering(*values: ArrayLike) -> int:
@@ -86,27 +89,45 @@ def styled(draw: Callable[P, R]) -> Callable[P, R]:
     @wraps(draw)
     def within(*args: P.args, **kwargs: P.kwargs) -> R:
         with matplotlib.style.context(str(STYLE_FILE)):
-            return draw(*args, **kwargs)
+            drawn = draw(*args, **kwargs)
+            if isinstance(drawn, Figure):
+                _speak(drawn)
+            return drawn
 
     return within
 
 
 class Drawing(Figure):
-    """A figure that a notebook shows without any spell: it needs no pyplot and no backend."""
+    """A figure that a notebook shows without any spell: it needs no pyplot and no backend.
+
+    Attributes:
+        motion: whose units its texts have, however and whenever it is shown.
+    """
+
+    motion: str
 
     def _repr_png_(self) -> bytes:
         return png(self)
 
 
-def new_figure(height: float, width: float = WIDTH) -> Figure:
-    """Return an empty figure [in]; call it from a `styled` function."""
-    return Drawing(figsize=(width, height), layout='constrained')
+def new_figure(height: float, width: float = WIDTH, *, motion: str | None = None) -> Figure:
+    """Return an empty figure [in]; call it from a `styled` function.
+
+    Args:
+        height: of it [in].
+        width: of it [in].
+        motion: what its records measure; None for what is spoken of.
+    """
+    figure = Drawing(figsize=(width, height), layout='constrained')
+    figure.motion = spoken_of() if motion is None else motion
+    return figure
 
 
 def _speak(figure: Figure) -> None:
-    """Say sizes in the units of the motion that is spoken of."""
+    """Say sizes in the units of the motion that is drawn, or else is spoken of."""
+    motion = figure.motion if isinstance(figure, Drawing) else None
     for text in figure.findobj(Text):
-        if (told := spoken(text.get_text())) != text.get_text():
+        if (told := spoken(text.get_text(), motion)) != text.get_text():
             text.set_text(told)
 
 

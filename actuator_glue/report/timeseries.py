@@ -146,7 +146,7 @@ def band_at_zooms(
         InputError: a band or response of another length, or without this level.
     """
     bands.check(len(record))
-    figure = style.new_figure(4.6)
+    figure = style.new_figure(4.6, motion=record.motion)
     rows = figure.subplots(2, len(zooms), sharex='col', squeeze=False, height_ratios=(1.4, 1.0))
     time = record.time
     middle = (bands.parameter if bands.total is None else bands.total).median

@@ -75,6 +75,7 @@ def test_friction_that_may_fall_with_velocity_has_an_alternative() -> None:
     assert {'parameter': name, 'limit': limit} in [r['limit'] for r in told]
 
 
+@pytest.mark.slow
 def test_held_out_records_that_contradict_are_undecided() -> None:
     """A transducer set differently for that test alone: headline, verdict and notes say so."""
     a, b, held = make([], [], 13)
@@ -238,7 +239,7 @@ def test_a_gain_of_one_test_is_named_with_its_record(size: float) -> None:
 @pytest.mark.parametrize(
     ('effect', 'size'),
     [
-        ('specimen-gap', 6e-4),
+        pytest.param('specimen-gap', 6e-4, marks=pytest.mark.slow),
         pytest.param('specimen-hardening', 2.5e5, marks=pytest.mark.slow),
         pytest.param('viscous-damping', 2e4, marks=pytest.mark.slow),
     ],

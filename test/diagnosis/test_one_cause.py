@@ -23,6 +23,7 @@ def test_lost_motion_of_the_command_is_one_cause() -> None:
     assert one.final.fit.theta[4] == pytest.approx(PLAY, rel=0.1)
 
 
+@pytest.mark.slow
 def test_two_causes_stay_two_names() -> None:
     """Play and a lag of the transducer: no term explains both."""
     effects = {'backlash': PLAY, 'sensor-lag': LAG}

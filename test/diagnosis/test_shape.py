@@ -72,6 +72,7 @@ VALVE = ('valve-deadband', 'coulomb-friction', 'valve-null', 'gain', 'bias')
 MACHINE = np.array([230.0, 3.5e9, 4e5, 0.6])
 
 
+@pytest.mark.slow
 def test_a_wrong_name_that_seems_enough_gives_way() -> None:
     """Lost motion of the command leaves next to nothing as a dead band of the valve."""
     u = sweep(2e-3, 8.0, 32.0)

@@ -26,11 +26,12 @@ def _uniform_step(z, uniforms, rows, size, tuning, knobs, scratch, candidate):
     return 0.0, NO_CLASS
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     'share',
     [
         pytest.param(0.5, id='fixed'),
-        pytest.param(None, id='by what it achieves', marks=pytest.mark.slow),
+        pytest.param(None, id='by what it achieves'),
     ],
 )
 def test_a_fourth_move_is_registered_from_outside(share: float | None, rng_seed: int) -> None:

@@ -62,7 +62,8 @@ def by_fine_steps(record: Record, force: float, way: float, steps: int) -> Array
     return out
 
 
-@pytest.mark.parametrize('stiffness', [pytest.param(0.0, marks=pytest.mark.slow), 250e3])
+@pytest.mark.slow
+@pytest.mark.parametrize('stiffness', [0.0, 250e3])
 def test_against_fine_steps(stiffness: float) -> None:
     """Friction of 5 and 50 um that holds back 40 um."""
     record = sweeping(stiffness)

@@ -162,6 +162,7 @@ def all_killed_at_once(start, probe, tmp_path, victims, nodes, rule, **more):
     assert np.array_equal(index, np.arange(len(index)))
 
 
+@pytest.mark.slow
 def test_a_viewer_that_is_killed_comes_back_and_ends_nothing(start, probe, tmp_path):
     nodes, rule, _ = launched('demo', view='true')
     nodes = [n for n in nodes if n.executable in ('recorder', 'viewer', 'actuator_sim')]

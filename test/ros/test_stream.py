@@ -208,6 +208,7 @@ def test_an_undeclared_effect_is_told_to_nobody_but_the_sealed_file(start, probe
     assert '/parameter_events' in summarise(bag).topics
 
 
+@pytest.mark.slow
 def test_the_measured_record_streams_through_the_suite(start, probe, tmp_path):
     """A real servo-hydraulic machine, four times faster than it was measured."""
     folder = Path(os.environ.get('ACTUATOR_GLUE_MTS', ROOT.parent / 'shared/data/mts'))

@@ -21,7 +21,8 @@ def levels(probe):
     return worst
 
 
-@pytest.mark.parametrize('layout', ['', pytest.param('counter.yaml', marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize('layout', ['', 'counter.yaml'])
 def test_a_bridge_that_is_told_half_the_rate_says_so(layout, start, probe, tmp_path):
     """The real chain: send, lab_bridge, estimator. `rate:=500` gave half of beta_1, all OK."""
     at = f'udp://127.0.0.1:{free_port()}'

@@ -12,6 +12,7 @@ from actuator_glue.report.frequency import instantaneous_frequency
 from studies.chen.scores import coverage, crps_ensemble, interval_score, mean_width, score
 
 
+@pytest.mark.slow
 def test_crps_of_ensemble_agrees_with_scoringrules(rng_seed: int) -> None:
     import scoringrules  # compiles for ten seconds
 
@@ -41,6 +42,7 @@ def test_crps_is_the_integral_of_its_definition() -> None:
     assert crps_ensemble(np.array([observed]), draws)[0] == pytest.approx(expected)
 
 
+@pytest.mark.slow
 def test_interval_score_agrees_with_scoringrules(rng_seed: int) -> None:
     import scoringrules  # compiles for ten seconds
 

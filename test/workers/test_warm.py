@@ -82,6 +82,7 @@ def test_a_live_stream_has_nothing_left_to_compile(which: str) -> None:
     assert done.stdout.strip() == '[]', done.stdout + done.stderr
 
 
+@pytest.mark.slow
 def test_warming_up_is_cut_short_by_no_deadline(monkeypatch: pytest.MonkeyPatch) -> None:
     """After a minute of compiling it was called ready, with half still to be compiled."""
     ends: list[float] = []
