@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from actuator_glue.api.compensation import compare_compensators as compare_compensators
     from actuator_glue.api.diagnosis import Diagnosis as Diagnosis
     from actuator_glue.api.diagnosis import diagnose as diagnose
+    from actuator_glue.api.record_plot import plot as plot
     from actuator_glue.api.replay_result import Replay as Replay
     from actuator_glue.api.replaying import replay as replay
     from actuator_glue.api.rths import rths as rths
@@ -65,6 +66,7 @@ _PUBLIC = {
     'join': ('io.join', 'join'),
     'load': ('io.load', 'load'),
     'load_records': ('io.load', 'load_records'),
+    'plot': ('api.record_plot', 'plot'),
     'replay': ('api.replaying', 'replay'),
     'rths': ('api.rths', 'rths'),
     'simulate': ('api.simulation', 'simulate'),

@@ -32,6 +32,7 @@ NAMES = {
     'join',
     'load',
     'load_records',
+    'plot',
     'replay',
     'rths',
     'simulate',

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_glue.model.force_errors import transducer
+from actuator_glue.motion import METRES
 from actuator_glue.records import Array, Record, source_name
 
 # Logarithm of a transducer's gain beyond which its scale is doubted.
@@ -113,15 +114,23 @@ class FitError:
 
 @dataclass(frozen=True, slots=True)
 class CalibratedRecord:
-    """A record that was calibrated with."""
+    """A record that was calibrated with; `motion` is what it measures, as in `Record`."""
 
     source: str
     samples: int
     rate_hz: float
     stiffness_n_per_m: float | None
     hold: str
+    motion: str = METRES
 
     @classmethod
     def of(cls, record: Record) -> CalibratedRecord:
         """Describe a record."""
-        return cls(record.source, len(record), record.rate, record.stiffness, record.hold)
+        return cls(
+            record.source,
+            len(record),
+            record.rate,
+            record.stiffness,
+            record.hold,
+            record.motion,
+        )

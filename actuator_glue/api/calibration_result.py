@@ -16,6 +16,7 @@ from actuator_glue.api.given import OneRecord, one_record_given
 from actuator_glue.api.posterior_model import PosteriorModel
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.structure import Structure
+from actuator_glue.motion import speaking, spoken
 
 if TYPE_CHECKING:
     import arviz
@@ -74,10 +75,11 @@ class Calibration(PosteriorModel, CalibrationData):
         return groups(self)
 
     def to_dataframe(self) -> DataFrame:
-        """Return a table of the parameters, a row for each by its name, in SI units.
+        """Return a table of the parameters, a row for each by its name.
 
         Columns: `unit`, `mean`, `stddev`, `lower` and `upper` (95 % interval), `best`,
-        `skewness`, `cov`, `rhat`, `ess`, `prior_lower`, `prior_upper`, `prior_dominated`.
+        `skewness`, `cov`, `rhat`, `ess`, `prior_lower`, `prior_upper`, `prior_dominated`. SI
+        units, or what `unit` says where the records move in degrees, counts or volts.
 
         Raises:
             InputError: pandas is not installed.
@@ -86,7 +88,7 @@ class Calibration(PosteriorModel, CalibrationData):
         rows = [
             {
                 'parameter': name,
-                'unit': p.unit,
+                'unit': spoken(p.unit, self.motion),
                 'mean': p.mean,
                 'stddev': p.stddev,
                 'lower': lower,
@@ -156,7 +158,8 @@ class Calibration(PosteriorModel, CalibrationData):
         """Return a figure of every parameter's distribution and every pair of them."""
         from actuator_glue.api.calibration_report import posterior
 
-        return posterior(self)
+        with speaking(self.motion):
+            return posterior(self)
 
     def plot_bands(self, record: OneRecord) -> Figure:
         """Return a figure of the parameter band and the total predictive band over a record.

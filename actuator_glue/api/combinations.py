@@ -20,7 +20,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.hygiene.checks import pull
 from actuator_glue.inference.moments import moments
 from actuator_glue.model.structure import Structure
-from actuator_glue.motion import METRES
+from actuator_glue.motion import METRES, speaking
 from actuator_glue.records import Array, Record, source_name
 
 if TYPE_CHECKING:
@@ -110,7 +110,8 @@ class Combinations(Result):
         from actuator_glue.report.posterior_figure import posterior_figure
 
         units = [p.unit for p in self.combinations.values()]
-        return posterior_figure(self.posterior, ('b', 'a', 'c', *self._rest()), units)
+        with speaking(self.motion):
+            return posterior_figure(self.posterior, ('b', 'a', 'c', *self._rest()), units)
 
     def _rest(self) -> list[str]:
         return list(self.combinations)[len(NAMES) :]
@@ -217,7 +218,10 @@ def combinations(
         notes=(COST, *_pushed(given), *(line for line in found.notes if line not in told)),
         converged=converged,
         effects=found.effects,
-        sources=tuple(replace(s, stiffness_n_per_m=None) for s in found.sources),
+        sources=tuple(
+            replace(s, stiffness_n_per_m=None, motion=r.motion)
+            for s, r in zip(found.sources, given, strict=True)
+        ),
         tracking=found.tracking,
         evaluations=found.evaluations,
         seconds=found.seconds,

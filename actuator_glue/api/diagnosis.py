@@ -32,6 +32,7 @@ from actuator_glue.effects import save_effects
 from actuator_glue.errors import InputError
 from actuator_glue.given import take_numbers
 from actuator_glue.model.effects import CATALOGUE
+from actuator_glue.motion import METRES, speaking, spoken
 from actuator_glue.records import Record
 
 if TYPE_CHECKING:
@@ -54,10 +55,16 @@ class Diagnosis(PosteriorModel, DiagnosisData):
 
     Attributes:
         tracking: how the augmented model follows the command of each fitted record.
+        motion: what the records measure: 'm', or 'deg', 'counts' and so on, see `Record`.
     """
 
     schema: ClassVar[str] = SCHEMA
     tracking: tuple[RecordTracking, ...] = ()
+    motion: str = METRES
+
+    def summary(self) -> str:
+        """Return the first line for people: the verdict, and the error before and after."""
+        return spoken(DiagnosisData.summary(self), self.motion)
 
     def to_json(self) -> Json:
         """Return the object of schema `actuator_glue.diagnosis/1` (curves and draws left out)."""
@@ -66,21 +73,23 @@ class Diagnosis(PosteriorModel, DiagnosisData):
         return {
             **DiagnosisData.to_json(self),
             'tracking': [asdict(of) for of in self.tracking],
+            'motion': self.motion,
             **({'definitions': own} if own else {}),
         }
 
     def to_dataframe(self) -> DataFrame:
-        """Return a table of the sizes, a row for each parameter by its name, in SI units.
+        """Return a table of the sizes, a row for each parameter by its name.
 
         Columns: `effect` (empty for Eq. (2)'s own), `probability` of that effect (NaN for a
         learned term), `alternatives` that these records cannot tell from it, `unit`, `mean`,
         `stddev`, `lower` and `upper` (95 % interval), `identified`, and of Eq. (2)'s parameters
-        `before`: the mean without any addition.
+        `before`: the mean without any addition. SI units, or what `unit` says where the records
+        move in degrees, counts or volts.
 
         Raises:
             InputError: pandas is not installed.
         """
-        rows = [
+        rows: list[dict[str, Any]] = [
             _row('', n, p) | {'before': _mean(self.base_before, n)} for n, p in self.base.items()
         ]
         for effect in self.effects:
@@ -92,6 +101,8 @@ class Diagnosis(PosteriorModel, DiagnosisData):
                 }
                 for name, p in effect.parameters.items()
             ]
+        for row in rows:
+            row['unit'] = spoken(row['unit'], self.motion)
         return frame(rows, 'parameter')
 
     def save_effects(self, path: Path | str) -> Path:
@@ -176,7 +187,8 @@ class Diagnosis(PosteriorModel, DiagnosisData):
         """Return a figure of the predictive bands before and after, where they differ most."""
         from actuator_glue.report.diagnosis_figures import bands
 
-        return bands(self)
+        with speaking(self.motion):
+            return bands(self)
 
     def brief(self) -> list[html.Block]:
         """Return verdict, effects and advice."""
@@ -315,6 +327,10 @@ def diagnose(
     started = time.perf_counter()
     given = records_given(records, stiffness)
     held = [] if holdout is None else records_given(holdout, name='holdout')
+    if held and held[0].motion != given[0].motion:
+        raise InputError(
+            f'holdout: moves in {held[0].motion}, and the records move in {given[0].motion}'
+        )
     overall = ShareDone()
     with (
         shown('diagnose', 1.0, False if callable(progress) else progress) as bar,
@@ -339,7 +355,7 @@ def diagnose(
     values = {f.name: getattr(found, f.name) for f in fields(found)}
     values['seconds'] = time.perf_counter() - started
     values['provenance'] = provenance([*given, *held], options.seed)
-    return Diagnosis(**values, tracking=_tracking(found, given))
+    return Diagnosis(**values, tracking=_tracking(found, given), motion=given[0].motion)
 
 
 def _tracking(found: DiagnosisData, records: Sequence[Record]) -> tuple[RecordTracking, ...]:

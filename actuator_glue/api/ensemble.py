@@ -97,6 +97,7 @@ def commanded(
                 check_stiffness(record.known_stiffness() if stiffness is None else stiffness),
                 hold=hold or record.hold,
                 source=record.source,
+                motion=record.motion,
             ),
             True,
         )

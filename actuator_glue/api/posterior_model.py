@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -69,15 +70,21 @@ class PosteriorModel(Result):
                 says, else 'zoh'.
 
         Raises:
-            InputError: no stiffness, samples without a rate, or draws that diverge.
+            InputError: no stiffness, samples without a rate, a record that moves in another unit,
+                or draws that diverge.
 
         Example:
             >>> posterior.predict(Command('earthquake'), 250e3).plot()  # doctest: +SKIP
         """
         of = self.drawn()
         record, measured = commanded(command, stiffness, rate, hold)
+        if measured and record.motion != self.motion:
+            raise InputError(
+                f'the command moves in {record.motion}, and what was fitted moves in {self.motion}'
+            )
         moved = simulated(evenly(of.draws), of.names, of.structure, record)
-        return prediction(record, moved, of.residual, measured=measured, problems=of.problems)
+        found = prediction(record, moved, of.residual, measured=measured, problems=of.problems)
+        return replace(found, motion=self.motion)
 
     def frequency_response(
         self, stiffness: float, frequencies: ArrayLike | None = None

@@ -131,5 +131,4 @@ def prediction(
         measured=record.measured if measured else None,
         residual_known=residual is not None,
         problems=problems,
-        motion=record.motion,
     )

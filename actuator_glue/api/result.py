@@ -33,8 +33,8 @@ class Result(ABC):
     @property
     def motion(self) -> str:
         """What its records measure: 'm', or 'deg', 'counts' and so on, which texts speak in."""
-        records = getattr(self, 'records', ())
-        return records[0].motion if records else METRES
+        sources = getattr(self, 'sources', ())
+        return sources[0].motion if sources else METRES
 
     @abstractmethod
     def to_json(self) -> dict[str, Any]:

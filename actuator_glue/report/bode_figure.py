@@ -63,9 +63,7 @@ def bode(responses: Sequence[Bode]) -> Figure:
         low, high = of.frequency[[0, -1]]
         if high > low:
             column[-1].set_xlim(low, high)
-    for axes, text in zip(
-        grid[:, 0], ('gain [-]', 'phase [degrees]', 'delay [ms]'), strict=True
-    ):
+    for axes, text in zip(grid[:, 0], ('gain [-]', 'phase [degrees]', 'delay [ms]'), strict=True):
         axes.set_ylabel(text)
     named = {
         name: handle

@@ -13,6 +13,7 @@ from typing import ParamSpec, TypeVar
 
 import matplotlib.style
 import numpy as np
+from matplotlib.backend_bases import RendererBase
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from numpy.typing import ArrayLike
@@ -105,6 +106,11 @@ class Drawing(Figure):
     """
 
     motion: str
+
+    def draw(self, renderer: RendererBase) -> None:
+        """Draw it, whoever asks."""
+        _speak(self)
+        super().draw(renderer)
 
     def _repr_png_(self) -> bytes:
         return png(self)

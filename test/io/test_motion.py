@@ -1,6 +1,7 @@
 """Records that move in degrees, counts or volts: kept, spoken, and never mixed with metres."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import matplotlib as mpl
 import numpy as np
 import pytest
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 import actuator_glue as ag
 from actuator_glue.cli.main import main
@@ -17,6 +19,7 @@ from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.io.export import write
 from actuator_glue.motion import speaking, spoken
 from actuator_glue.records import Record
+from actuator_glue.report import style
 from actuator_glue.report.style import png
 
 RATE, COUNT = 200.0, 2000
@@ -129,7 +132,7 @@ def test_arrays_may_be_angles() -> None:
     np.testing.assert_allclose(made.command, COMMAND, atol=1e-15)
 
 
-def test_a_calibration_speaks_it() -> None:
+def test_a_calibration_speaks_it(tmp_path: Path) -> None:
     """The same numbers as in metres, with other units; kept where it is saved."""
     test = ag.simulate(ag.Command(rate=RATE, duration=10.0), stiffness=0.0, seed=3)
     options = {'evaluations': 12_000, 'seed': 5}
@@ -139,3 +142,71 @@ def test_a_calibration_speaks_it() -> None:
     assert turned.motion == 'deg'
     assert ' mm' in repr(plain)
     assert repr(turned) == spoken(repr(plain), 'deg') != repr(plain)
+    # Pictures, predictions and tables, and after it was saved and read.
+    again = ag.Calibration.load(turned.save(tmp_path / 'turned.npz'))
+    for found in (turned, again):
+        assert found.motion == 'deg'
+        assert not in_metres(found.plot())
+        moved = found.predict(ag.Command('sine', rate=RATE, duration=1.0), 0.0)
+        assert moved.plot().axes[0].get_ylabel() == 'displacement [deg]'
+        assert ' mdeg ' in repr(moved)
+        assert found.to_dataframe()['unit']['alpha_2'] == 'Nm/kdeg'
+        assert not in_metres(found.plot_bands(replace(test, motion='deg')))
+    with pytest.raises(InputError, match='and what was fitted moves in deg'):
+        turned.predict(test)
+
+
+def in_metres(figure: Figure) -> list[str]:
+    """Return the texts of a figure that speak of metres or newtons."""
+    texts = [text.get_text() for text in figure.findobj(Text)]
+    assert any('deg' in text for text in texts)
+    return [text for text in texts if re.search(r'\b([um]?m|k?N)(/|\b)(?!s)', text)]
+
+
+@pytest.mark.parametrize(
+    ('unit', 'axis', 'size'), [('deg', 'deg', 2.0), ('counts', 'kcounts', 0.002), ('V', 'V', 2.0)]
+)
+def test_a_picture_speaks_it(unit: str, axis: str, size: float, tmp_path: Path) -> None:
+    """Labels and numbers are those of the file; before it is shown, and as it is written."""
+    given = size / 2e-3 * COMMAND if axis == unit else 2.0 * COMMAND / 2e-3
+    shown = ag.plot(Record.from_arrays(TIME, given, 0.5 * given, unit=unit))
+    assert {a.get_ylabel() for a in shown.axes} - {''} == {
+        f'displacement [{axis}]',
+        f'tracking\nerror [{axis}]',
+    }
+    command, measured = (np.asarray(line.get_ydata()) for line in shown.axes[0].lines)
+    assert np.abs(command).max() == pytest.approx(size, rel=1e-3)
+    np.testing.assert_allclose(measured, 0.5 * command)
+    shown.axes[0].set_title('limit [mm]')
+    shown.savefig(tmp_path / 'a.png')  # not through our own writer
+    assert shown.axes[0].get_title() == f'limit [{axis}]'
+    assert [t.get_text() for t in shown.legends[0].get_texts()] == ['command', 'measured']
+
+
+def test_the_command_plot_speaks_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each record in its own unit, whatever comes before it."""
+    seen: list[list[str]] = []
+    monkeypatch.setattr(
+        style, 'save', lambda figure, path: seen.append([a.get_ylabel() for a in figure.axes])
+    )
+    write(tmp_path / 'a.csv', record('m'))
+    write(tmp_path / 'b.csv', record('V'))
+    files = [str(tmp_path / name) for name in ('a.csv', 'b.csv')]
+    assert main(['plot', *files, '--out', str(tmp_path)]) == 0
+    assert [labels[0] for labels in seen] == ['displacement [mm]', 'displacement [V]']
+
+
+def test_a_diagnosis_speaks_it(tmp_path: Path) -> None:
+    """Headline, picture, report and table, from the library as from the command line."""
+    test = ag.simulate(ag.Command(rate=RATE, duration=8.0), stiffness=0.0, seed=3)
+    with pytest.raises(InputError, match='holdout: moves in m, and the records move in deg'):
+        ag.diagnose(replace(test, motion='deg'), test)
+    found = ag.diagnose(replace(test, motion='deg'), effort=0.05, jobs=1)
+    assert found.to_json()['motion'] == 'deg'
+    assert ' mdeg' in found.summary() and ' um' not in found.summary()
+    assert not in_metres(found.plot())
+    again = ag.Diagnosis.load(found.save(tmp_path / 'd.npz'))
+    page = again.report(tmp_path / 'd.html').read_text('utf-8')
+    told = re.sub(r'<style.*?</style>|data:image/png;base64,[^"]*', '', page, flags=re.DOTALL)
+    assert 'mdeg' in told
+    assert not re.findall(r'[^<>]*\d (?:um|mm|kN)\b[^<>]*', told)
