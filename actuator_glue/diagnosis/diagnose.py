@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from actuator_glue.diagnosis import (
     advice,
-    alternatives,
     companions,
     discrepancy,
     findings,
@@ -26,6 +25,7 @@ from actuator_glue.diagnosis import (
     verdict,
     wrong_setup,
 )
+from actuator_glue.diagnosis.alternatives import alternatives
 from actuator_glue.diagnosis.detect import alarm_of
 from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.estimate import Estimate
@@ -34,6 +34,7 @@ from actuator_glue.diagnosis.force import check_forces
 from actuator_glue.diagnosis.held_out import COMPLETE
 from actuator_glue.diagnosis.hold import with_the_right_hold
 from actuator_glue.diagnosis.learned import term as learned_term
+from actuator_glue.diagnosis.mixture import Mixture, mixed
 from actuator_glue.diagnosis.next_experiment import Experiment, ranked
 from actuator_glue.diagnosis.onset_search import since_onset
 from actuator_glue.diagnosis.pipeline import (
@@ -152,23 +153,25 @@ def diagnose(
     )
     space = Space(after.model, data.duration)
     open_ridge = ridge.left_open(space, after.model, scorer, after.theta)
-    others = alternatives.alternatives(result)
+    others = alternatives(result)
     larger = final
     if decision.verdict in COMPLETE and not effort.over:
         larger = companions.with_companions(result.selection, final)
-    told = draws
+    told, mixture = draws, Mixture.of(draws.points, final.effects)
     # Chains that met nowhere give no interval that anything beside, or in place, could widen.
     nowhere = bool(draws.unmet) and all(draws.unmet)
     if larger is not final and not nowhere:
         known_alone = posterior.identified(space, draws.points, open_ridge).tolist()
         told = sample(larger, settings.evaluations)
+        mixture = Mixture.of(told.points, larger.effects)
         if like := companions.alike(result.selection.search, final, larger):
-            points = alternatives.mixed(told.points, larger, like, lambda t: sample(t).points, rng)
-            told = told._replace(points=points)
+            mixture = mixed(mixture, larger, like, lambda t: sample(t).points, rng)
+        told = told._replace(points=mixture.points)
         told = companions.reduced(told, larger, final, known_alone)
-    mixed = told.points
+        mixture = replace(mixture, points=told.points)
     if not nowhere:
-        mixed = alternatives.mixed(mixed, final, others, lambda t: sample(t).points, rng)
+        mixture = mixed(mixture, final, others, lambda t: sample(t).points, rng)
+    spread = mixture.points
     error = reconciled.reached_by_both(error, found.material, scorer, prepared.held, before, after)
     judged = verdict.conclude(decision.verdict, bool(decision.names), error, found.material)
     if other is not None and any(map(learned_term.is_learned, final.structure.entries)):
@@ -178,9 +181,9 @@ def diagnose(
     if judged not in COMPLETE:
         search, left = result.selection.search, decision.left
         form = model_form.open_form(search, final, left, space, scorer)
-        mixed = model_form.widened(mixed, form, space, rng)
-    mixed, fixed = posterior.opened(space, mixed, open_ridge, told.unmet, rng)
-    estimates = _estimates(space, after.model, mixed, fixed)
+        spread = model_form.widened(spread, form, space, rng)
+    spread, fixed = posterior.opened(space, spread, open_ridge, told.unmet, rng)
+    estimates = _estimates(space, after.model, spread, fixed)
     held_at = _pressed(space, after)
     plain = Space(before.model, data.duration)
     plain_ridge = ridge.left_open(plain, before.model, scorer, before.theta)
@@ -243,7 +246,9 @@ def diagnose(
             result.selection.search.left_at_most(math.inf), scorer, final.effects
         ),
         names=tuple(p.name for p in after.model.parameters),
-        posterior=mixed,
+        posterior=spread,
+        which=mixture.which,
+        mixture=mixture.structures,
         joint=after.draws,
         rhat=draws.rhat,
         sampler=draws.told(),

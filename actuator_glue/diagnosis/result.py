@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass, field
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from actuator_glue.diagnosis.alarm import Alarm
 from actuator_glue.diagnosis.estimate import Estimate, Json
@@ -14,6 +15,7 @@ from actuator_glue.diagnosis.finding import Candidate, Finding
 from actuator_glue.diagnosis.headline import headline
 from actuator_glue.diagnosis.held_out import COMPLETE, HeldOutError, Verdict
 from actuator_glue.diagnosis.learned.term import LearnedTerm
+from actuator_glue.diagnosis.mixture import shares
 from actuator_glue.diagnosis.next_experiment import Experiment
 from actuator_glue.diagnosis.onset.onset import Onset
 from actuator_glue.diagnosis.response import Response
@@ -77,6 +79,8 @@ class DiagnosisData:
         posterior: draws of base and effect parameters over all structures that may be the
             machine's, shape (m, p): told intervals are their quantiles. What these records leave
             open is spread as far as it is, one parameter at a time.
+        which: of each of these draws the structure that it is of, index in `mixture`, shape (m,).
+        mixture: effects of the structures that draws are of.
         joint: draws under the structure that is told alone, shape (n, p), to simulate with.
         rhat: largest R-hat of chains; NaN where the draws are not of chains.
         sampler: what drew them (`method`: 'importance', 'dream', 'laplace') and how well.
@@ -133,6 +137,8 @@ class DiagnosisData:
     structures: tuple[Row, ...] = ()
     effort: float = 0.0
     sampler: Json = field(default_factory=dict)
+    which: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
+    mixture: tuple[tuple[str, ...], ...] = ()
     joint: Array = field(default_factory=lambda: np.empty((0, 0)))
 
     def to_json(self) -> Json:
@@ -157,6 +163,10 @@ class DiagnosisData:
             'experiments': [e.to_json() for e in self.experiments],
             'rhat': json_value(self.rhat),
             'sampler': self.sampler,
+            'mixture': [
+                {'effects': list(effects), 'weight': weight}
+                for effects, weight in shares(self.which, self.mixture)
+            ],
             'sampling': list(self.sampling),
             'at_bound': [p.to_json() for p in self.at_bound],
             'structure': list(self.structure),

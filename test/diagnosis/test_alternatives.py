@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis import alternatives, posterior
+from actuator_glue.diagnosis import alternatives, mixture, posterior
 from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.identifiable import Working
 from actuator_glue.inference.least_squares.space import Space
@@ -51,21 +51,30 @@ def test_parameters_are_those_of_all_structures() -> None:
     """Two thirds of the draws are those told, a third the alternative's, as far as it has them."""
     rng = np.random.default_rng(1)
     draws = np.tile([1.0, 1.0, 1.0, 1.0, 7.0, 8.0], (3000, 1))
-    final: Any = SimpleNamespace(model=Structure(('delay', 'backlash')))
-    other: Any = SimpleNamespace(model=Structure(('sensor-lag', 'backlash')))
+    names, instead = ('delay', 'backlash'), ('sensor-lag', 'backlash')
+    final: Any = SimpleNamespace(model=Structure(names), effects=names)
+    other: Any = SimpleNamespace(model=Structure(instead), effects=instead)
     asked = []
 
     def sample(trial: Any) -> np.ndarray:
         asked.append(trial)
         return np.tile([2.0, 2.0, 2.0, 2.0, 9.0, 3.0], (10, 1))
 
-    mixed = alternatives.mixed(draws, final, [(other, 0.5), (final, 1e-6)], sample, rng)
+    alone = mixture.Mixture.of(draws, names)
+    both = mixture.mixed(alone, final, [(other, 0.5), (final, 1e-6)], sample, rng)
     assert asked == [other]
+    mixed = both.points
+    assert (np.array(both.structures)[both.which] == instead).all(axis=1).tolist() == (
+        mixed[:, 0] == 2.0
+    ).tolist()
+    (first, large), (second, small) = mixture.shares(both.which, both.structures)
+    assert (first, second) == (names, instead)
+    assert large + small == 1.0 and small == np.mean(mixed[:, 0] == 2.0)
     assert np.mean(mixed[:, 0] == 2.0) == pytest.approx(1 / 3, abs=0.03)
     assert (mixed[:, :4] == mixed[:, :1]).all()
     assert (mixed[:, 5] == np.where(mixed[:, 0] == 2.0, 3.0, 8.0)).all()  # play is in both
     assert (mixed[:, 4] == 7.0).all()  # the delay is its own
-    assert (alternatives.mixed(draws, final, [], sample, rng) == draws).all()
+    assert (mixture.mixed(alone, final, [], sample, rng).points == draws).all()
 
 
 def test_what_an_allowance_moves_is_not_known_better() -> None:
