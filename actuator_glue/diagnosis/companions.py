@@ -69,7 +69,7 @@ def _weight_of_its_kind(search: Search, trials: Sequence[Trial]) -> float:
 def alike(search: Search, final: Trial, larger: Trial) -> list[tuple[Trial, float]]:
     """Return structures with an indistinguishable effect for a companion, and their odds.
 
-    Intervals average over indistinguishable effects (mixture.mixed): beta_1 differs between
+    Intervals average over indistinguishable effects (mixed_draws.mixed): beta_1 differs between
     the lag of a valve and one of the transducer.
 
     Args:

@@ -34,7 +34,7 @@ from actuator_glue.diagnosis.force import check_forces
 from actuator_glue.diagnosis.held_out import COMPLETE
 from actuator_glue.diagnosis.hold import with_the_right_hold
 from actuator_glue.diagnosis.learned import term as learned_term
-from actuator_glue.diagnosis.mixture import Mixture, mixed
+from actuator_glue.diagnosis.mixed_draws import MixedDraws, mixed
 from actuator_glue.diagnosis.next_experiment import Experiment, ranked
 from actuator_glue.diagnosis.onset_search import since_onset
 from actuator_glue.diagnosis.pipeline import (
@@ -157,13 +157,13 @@ def diagnose(
     larger = final
     if decision.verdict in COMPLETE and not effort.over:
         larger = companions.with_companions(result.selection, final)
-    told, mixture = draws, Mixture.of(draws.points, final.effects)
+    told, mixture = draws, MixedDraws.of(draws.points, final.effects)
     # Chains that met nowhere give no interval that anything beside, or in place, could widen.
     nowhere = bool(draws.unmet) and all(draws.unmet)
     if larger is not final and not nowhere:
         known_alone = posterior.identified(space, draws.points, open_ridge).tolist()
         told = sample(larger, settings.evaluations)
-        mixture = Mixture.of(told.points, larger.effects)
+        mixture = MixedDraws.of(told.points, larger.effects)
         if like := companions.alike(result.selection.search, final, larger):
             mixture = mixed(mixture, larger, like, lambda t: sample(t).points, rng)
         told = told._replace(points=mixture.points)

@@ -15,7 +15,7 @@ from actuator_glue.diagnosis.finding import Candidate, Finding
 from actuator_glue.diagnosis.headline import headline
 from actuator_glue.diagnosis.held_out import COMPLETE, HeldOutError, Verdict
 from actuator_glue.diagnosis.learned.term import LearnedTerm
-from actuator_glue.diagnosis.mixture import shares
+from actuator_glue.diagnosis.mixed_draws import shares
 from actuator_glue.diagnosis.next_experiment import Experiment
 from actuator_glue.diagnosis.onset.onset import Onset
 from actuator_glue.diagnosis.response import Response

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis import alternatives, mixture, posterior
+from actuator_glue.diagnosis import alternatives, mixed_draws, posterior
 from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.identifiable import Working
 from actuator_glue.inference.least_squares.space import Space
@@ -60,21 +60,21 @@ def test_parameters_are_those_of_all_structures() -> None:
         asked.append(trial)
         return np.tile([2.0, 2.0, 2.0, 2.0, 9.0, 3.0], (10, 1))
 
-    alone = mixture.Mixture.of(draws, names)
-    both = mixture.mixed(alone, final, [(other, 0.5), (final, 1e-6)], sample, rng)
+    alone = mixed_draws.MixedDraws.of(draws, names)
+    both = mixed_draws.mixed(alone, final, [(other, 0.5), (final, 1e-6)], sample, rng)
     assert asked == [other]
     mixed = both.points
     assert (np.array(both.structures)[both.which] == instead).all(axis=1).tolist() == (
         mixed[:, 0] == 2.0
     ).tolist()
-    (first, large), (second, small) = mixture.shares(both.which, both.structures)
+    (first, large), (second, small) = mixed_draws.shares(both.which, both.structures)
     assert (first, second) == (names, instead)
     assert large + small == 1.0 and small == np.mean(mixed[:, 0] == 2.0)
     assert np.mean(mixed[:, 0] == 2.0) == pytest.approx(1 / 3, abs=0.03)
     assert (mixed[:, :4] == mixed[:, :1]).all()
     assert (mixed[:, 5] == np.where(mixed[:, 0] == 2.0, 3.0, 8.0)).all()  # play is in both
     assert (mixed[:, 4] == 7.0).all()  # the delay is its own
-    assert (mixture.mixed(alone, final, [], sample, rng).points == draws).all()
+    assert (mixed_draws.mixed(alone, final, [], sample, rng).points == draws).all()
 
 
 def test_what_an_allowance_moves_is_not_known_better() -> None:

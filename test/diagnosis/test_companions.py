@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import two_sweeps
 
-from actuator_glue.diagnosis import companions, discrepancy, mixture, posterior
+from actuator_glue.diagnosis import companions, discrepancy, mixed_draws, posterior
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.posterior import Draws
 from actuator_glue.diagnosis.selection import Selection
@@ -86,8 +86,8 @@ def test_one_of_a_kind_stands_for_what_is_like_it(rng_seed: int) -> None:
         return sampled(selection, found, trial).points
 
     rng = np.random.default_rng(rng_seed)
-    alone = mixture.Mixture.of(draws(larger), larger.effects)
-    both = mixture.mixed(alone, larger, like, draws, rng).points
+    alone = mixed_draws.MixedDraws.of(draws(larger), larger.effects)
+    both = mixed_draws.mixed(alone, larger, like, draws, rng).points
     without, beside = (
         np.quantile(points[:, 0], [0.025, 0.5, 0.975]) for points in (draws(found.final), both)
     )

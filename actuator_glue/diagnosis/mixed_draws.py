@@ -15,7 +15,7 @@ _ROUND = 1e-3  # odds below it move no interval
 
 
 @dataclass(frozen=True)
-class Mixture:
+class MixedDraws:
     """Draws over structures; each knows the one that it is of.
 
     Attributes:
@@ -29,7 +29,7 @@ class Mixture:
     structures: tuple[tuple[str, ...], ...]
 
     @classmethod
-    def of(cls, points: Array, effects: tuple[str, ...]) -> Mixture:
+    def of(cls, points: Array, effects: tuple[str, ...]) -> MixedDraws:
         """Return draws (m, p) of one structure."""
         return cls(points, np.zeros(len(points), dtype=np.intp), (effects,))
 
@@ -49,12 +49,12 @@ def shares(
 
 
 def mixed(
-    draws: Mixture,
+    draws: MixedDraws,
     told: Trial,
     others: Sequence[tuple[Trial, float]],
     sample: Callable[[Trial], Array],
     rng: np.random.Generator,
-) -> Mixture:
+) -> MixedDraws:
     """Return draws of the shared parameters over all plausible structures.
 
     The size of an effect that an alternative lacks is that which it has where its name is right.
@@ -81,4 +81,4 @@ def mixed(
         if trial.effects not in structures:
             structures.append(trial.effects)
         which[mine] = structures.index(trial.effects)
-    return Mixture(points, which, tuple(structures))
+    return MixedDraws(points, which, tuple(structures))
