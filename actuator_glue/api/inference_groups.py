@@ -10,7 +10,6 @@ import numpy as np
 
 from actuator_glue.api.calibration_data import CalibrationData
 from actuator_glue.api.ensemble import SIZE
-from actuator_glue.diagnosis.result import Trace
 from actuator_glue.hybrid.actuator import table_of
 from actuator_glue.inference.likelihood import PHI
 from actuator_glue.inference.predictive import ResidualModel, predictive_draws
@@ -22,8 +21,8 @@ if TYPE_CHECKING:
     import arviz
     import xarray
 
-_SAMPLES = 2000  # of a record
-_BLOCK = 1.0  # s of a term of the log likelihood
+SAMPLES = 2000  # of a record
+BLOCK = 1.0  # s of a term of the log likelihood
 _AT_ONCE = 20  # draws that are simulated at once
 
 
@@ -48,26 +47,7 @@ def groups(found: CalibrationData) -> arviz.InferenceData:
     return data
 
 
-def traces(parts: Sequence[Trace]) -> dict[str, xarray.Dataset]:
-    """Return the groups of what was observed, of the parts of a diagnosis' records."""
-    observed: dict[str, _Column] = {}
-    constant: dict[str, _Column] = {}
-    for number, of in enumerate(parts, 1):
-        step = max(1, -(-len(of.time) // _SAMPLES))
-        some = slice(None, None, step)
-        when = of.time[some]
-        observed[f'measured_{number}'] = _Column(number, when, of.measured[some])
-        for name in ('command', 'before', 'after'):
-            constant[f'{name}_{number}'] = _Column(number, when, getattr(of, name)[some])
-    told = {'source': [p.source for p in parts], 'held_out': [int(p.held_out) for p in parts]}
-    told['stiffness_n_per_m'] = [p.stiffness for p in parts]
-    return {
-        'observed_data': _dataset(observed, (), told),
-        'constant_data': _dataset(constant, (), told),
-    }
-
-
-class _Column:
+class GroupColumn:
     """Values of one record at some of its times, last axis; before it the draws, if any."""
 
     def __init__(self, record: int, time: Array, values: Array, dim: str = 'time') -> None:
@@ -75,8 +55,8 @@ class _Column:
         self.time, self.values = time, values
 
 
-def _dataset(
-    columns: Mapping[str, _Column], draws: Sequence[int], attributes: Mapping[str, Any]
+def dataset(
+    columns: Mapping[str, GroupColumn], draws: Sequence[int], attributes: Mapping[str, Any]
 ) -> xarray.Dataset:
     """Return columns as a group; draws are numbers of steps, none for what was observed."""
     import xarray
@@ -101,16 +81,16 @@ def _of_records(found: CalibrationData) -> dict[str, xarray.Dataset]:
     shape = (len(used), chains)
     phi = rows[:, found.names.index(PHI.name)] if PHI.name in found.names else None
     likelihood = _Likelihood(found, len(rows))
-    predicted: dict[str, _Column] = {}
-    observed: dict[str, _Column] = {}
-    constant: dict[str, _Column] = {}
+    predicted: dict[str, GroupColumn] = {}
+    observed: dict[str, GroupColumn] = {}
+    constant: dict[str, GroupColumn] = {}
     rng = np.random.default_rng(found.seed)
     structure = Structure(found.effects)
     table = table_of(rows, found.names, structure)
     initial: Initial = 'rest' if found.initial == 'rest' else 'measured'
     for number, record in enumerate(found.records, 1):
         settle = round(found.settle / record.period)
-        some = np.arange(settle, len(record), max(1, -(-(len(record) - settle) // _SAMPLES)))
+        some = np.arange(settle, len(record), max(1, -(-(len(record) - settle) // SAMPLES)))
         kept = np.empty((len(rows), len(some)))
         for start in range(0, len(rows), _AT_ONCE):
             part = slice(start, start + _AT_ONCE)
@@ -119,34 +99,34 @@ def _of_records(found: CalibrationData) -> dict[str, xarray.Dataset]:
             error = record.measured[settle:] - moved[:, settle:]
             likelihood.add(part, number - 1, error, None if phi is None else phi[part])
         if found.residual is not None:
-            apart = _at_step(found.residual, int(some[1] - some[0]) if len(some) > 1 else 1)
+            apart = at_step(found.residual, int(some[1] - some[0]) if len(some) > 1 else 1)
             kept = predictive_draws(rng, kept, apart)
         name, when = f'measured_{number}', record.time[some]
         by_chain = kept.reshape(*shape, -1).swapaxes(0, 1)
-        predicted[name] = _Column(number, when, by_chain)
-        observed[name] = _Column(number, when, record.measured[some])
-        constant[f'command_{number}'] = _Column(number, when, record.command[some])
+        predicted[name] = GroupColumn(number, when, by_chain)
+        observed[name] = GroupColumn(number, when, record.measured[some])
+        constant[f'command_{number}'] = GroupColumn(number, when, record.command[some])
     told: dict[str, Any] = {
         'source': [r.source for r in found.records],
         'stiffness_n_per_m': [float(r.known_stiffness()) for r in found.records],
     }
     blocks = {
-        f'measured_{number}': _Column(
+        f'measured_{number}': GroupColumn(
             number, when, terms.reshape(*shape, -1).swapaxes(0, 1), 'block'
         )
         for number, (when, terms) in enumerate(likelihood.terms(phi), 1)
     }
     return {
-        'posterior_predictive': _dataset(predicted, used.tolist(), told),
-        'log_likelihood': _dataset(
-            blocks, used.tolist(), {**told, 'block_s': _BLOCK, 'of': 'displacement'}
+        'posterior_predictive': dataset(predicted, used.tolist(), told),
+        'log_likelihood': dataset(
+            blocks, used.tolist(), {**told, 'block_s': BLOCK, 'of': 'displacement'}
         ),
-        'observed_data': _dataset(observed, (), told),
-        'constant_data': _dataset(constant, (), told),
+        'observed_data': dataset(observed, (), told),
+        'constant_data': dataset(constant, (), told),
     }
 
 
-def _at_step(residual: ResidualModel, step: int) -> ResidualModel:
+def at_step(residual: ResidualModel, step: int) -> ResidualModel:
     """Return the residual of every so many-th sample, its level as well known as before."""
     if step == 1:
         return residual
@@ -167,7 +147,7 @@ class _Likelihood:
         self._starts = []
         for record in found.records:
             settle = round(found.settle / record.period)
-            size = max(1, round(_BLOCK / record.period))
+            size = max(1, round(BLOCK / record.period))
             self._starts.append(np.arange(0, len(record) - settle, size))
         shapes = [(draws, len(starts)) for starts in self._starts]
         self._sum = [np.zeros(shape) for shape in shapes]

@@ -15,7 +15,6 @@ import numpy as np
 
 from actuator_glue.errors import InputError
 from actuator_glue.model.effects import CATALOGUE
-from actuator_glue.records import Array
 
 T = TypeVar('T')
 _CONTENT = 'content'
@@ -100,7 +99,7 @@ def _pack(value: Any, arrays: dict[str, Any]) -> Any:
 
 
 def _unpack(kind: Any, value: Any, arrays: Any) -> Any:
-    if kind == Array:
+    if typing.get_origin(kind) is np.ndarray:
         return np.asarray(arrays[value])
     if dataclasses.is_dataclass(kind) and isinstance(kind, type):
         hints = typing.get_type_hints(kind)
