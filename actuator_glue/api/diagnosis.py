@@ -181,8 +181,9 @@ class Diagnosis(PosteriorModel, DiagnosisData):
         structure that is told, whose parameters are coordinates (intervals that are told average
         over other structures, too): `posterior_predictive` (simulated measurements) and
         `log_likelihood`, the density of the displacement with an AR(1) residual as the held-out
-        part shows it, in terms of a second each. Both are left out where the simulation cannot be made again: of models
-        with settings of single records, and of what appeared in the middle of a record.
+        part shows it, in terms of a second each. Both are left out where the simulation
+        cannot be made again: of models with settings of single records, and of what appeared in
+        the middle of a record.
         """
         import arviz as az
 
