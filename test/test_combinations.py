@@ -1,20 +1,35 @@
 """What holds where the specimen's stiffness is not known, against the truth that was simulated."""
 
+import html
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy
 
 import actuator_glue as ag
-from actuator_glue.api.combinations import NAMES, Combinations
+from actuator_glue.api.combinations import Combinations
+from actuator_glue.api.combinations_data import COMBINATIONS
 from actuator_glue.cli.main import main
 from actuator_glue.errors import InputError
 from actuator_glue.io.export import write
+from actuator_glue.report.quantity import plain
 
 # Table 2 of the paper with a leakage that shows.
 THETA = np.array([116.0, 9.0e8, 2.4e5, 8.0])
+ORDER = (
+    'the specimen stiffness is not known',
+    'How sure: +-',
+    'rms [um]',
+    'Parameters before',
+    'Delay: ',
+    'Next: actuator-glue',
+    'b, a and c of x/u',
+    'Tracking of',
+)
 SHORT = {'evaluations': 16_000, 'seed': 2}
 
 
@@ -36,7 +51,7 @@ def test_the_combinations_are_those_of_the_actuator(stiffness: float) -> None:
     """Whatever the stiffness is; what the record says of it is left aside."""
     record = replace(simulated(stiffness), force=None)
     found = ag.combinations(record, **SHORT)
-    assert list(found.combinations) == list(NAMES)
+    assert list(found.combinations) == list(COMBINATIONS)
     mean = np.array([p.mean for p in found.combinations.values()])
     spread = np.array([p.stddev for p in found.combinations.values()])
     off = np.abs(mean - truth(stiffness)) / spread
@@ -67,6 +82,26 @@ def test_what_it_is_told_and_kept(tmp_path: Path, capsys: pytest.CaptureFixture[
         assert p.mean == told['combinations'][name]['mean']
     page = (tmp_path / 'a.html').read_text()
     assert 'no hybrid test' in page
+    assert not kept.records and not kept.residuals
+    # The same things in the same order as of every calibration; a picture before any table.
+    words = re.sub(r'<style.*?</style>|data:image[^"]*|<[^>]*>', '', page, flags=re.DOTALL)
+    for text in (said.out, html.unescape(words)):
+        places = [text.index(part) for part in ORDER]
+        assert places == sorted(places)
+    assert page.index('How sure') < page.index('<img') < page.index('<table')
+    assert said.out.startswith('the model fits: ')
+    rms = f'{1e6 * told["error"]["rms_m"]:.1f}'
+    assert re.search(rf'after: the best draw +{rms} *\n', said.out)
+    (following,) = re.findall(r'Next: (.*)', said.out)
+    assert re.fullmatch(
+        rf'actuator-glue calibrate {tmp_path}/a.csv --stiffness 2[45]\d000', following
+    )
+    for name, p in kept.combinations.items():
+        low, high = np.quantile(
+            kept.posterior[:, list(kept.combinations).index(name)], [0.025, 0.975]
+        )
+        assert f'({plain(low, 4)} to {plain(high, 4)})' in said.out
+        assert p.unit in ('1/s', '1/s^2')
     # Others ask for the stiffness, and say what there is without.
     assert main(['diagnose', str(tmp_path / 'a.csv'), '--stiffness', 'unknown']) == 2
     assert '`calibrate --stiffness unknown` tells what holds' in capsys.readouterr().err
@@ -94,3 +129,32 @@ def test_a_shaking_table_is_a_free_actuator_with_a_payload() -> None:
     found = ag.calibrate(table, effects='payload-inertia', evaluations=80_000, seed=2)
     assert found.error.rms_m < 0.2 * plain.error.rms_m
     assert found.error.rms_m == pytest.approx(1e-5, rel=0.1)
+
+
+@pytest.mark.parametrize('unknown', [False, True])
+def test_draws_are_saved_for_matlab(
+    unknown: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By the suffix, as `save_mat` writes them: the response of the model is that of the draws."""
+    write(tmp_path / 'a.csv', simulated(250e3))
+    words = ['calibrate', str(tmp_path / 'a.csv'), '--evaluations', '16000', '--stiffness']
+    words.append('unknown' if unknown else '250e3')
+    for name in ('a.csv.gz', 'a.txt', 'draws'):
+        assert main([*words, '--save', str(tmp_path / name)]) == 2
+        assert 'saved as .npz, for `plot`' in capsys.readouterr().err
+        assert not (tmp_path / name).exists()
+    out = tmp_path / 'a.mat'
+    assert main([*words, '--save', str(out), '--json', str(tmp_path / 'a.json')]) in (0, 1)
+    kept = scipy.io.loadmat(out)
+    told = json.loads((tmp_path / 'a.json').read_text())
+    sizes = told['combinations' if unknown else 'parameters']
+    assert [str(n[0]) for n in kept['names'].ravel()] == list(sizes)
+    np.testing.assert_allclose(kept['mean'].ravel(), [p['mean'] for p in sizes.values()])
+    model = kept['model'][0, 0]
+    assert np.isnan(model['stiffness']).all() if unknown else model['stiffness'] == 250e3
+    assert len(model['num_draws']) == len(kept['draws'])
+    # Both are x/u of the one specimen that was tested.
+    s = 2j * np.pi * 3.0
+    b, a, c = truth(250e3)
+    answer = np.polyval(model['num'].ravel(), s) / np.polyval(model['den'].ravel(), s)
+    assert answer == pytest.approx(b / (s**2 + a * s + b + c), rel=0.01)

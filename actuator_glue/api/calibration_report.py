@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from actuator_glue.api import judgement, tracking
 from actuator_glue.api.calibration_data import CalibrationData
+from actuator_glue.api.calibration_parts import FitError, Marginal
 from actuator_glue.api.ensemble import evenly, simulated
+from actuator_glue.diagnosis.residual_structure import ResidualStructure
 from actuator_glue.inference.bands import band
 from actuator_glue.inference.predictive import fit_residual, total_band
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
-from actuator_glue.records import Record, source_name
+from actuator_glue.records import Array, Record, source_name
 from actuator_glue.report import html
 from actuator_glue.report.first_page import FirstPage, command
 from actuator_glue.report.posterior_figure import posterior_figure
@@ -89,15 +91,14 @@ def moments_title(found: CalibrationData) -> str:
     return f'Posterior moments, {len(found.sources)} record(s){force}, {how}'
 
 
-def error_line(found: CalibrationData) -> str:
+def error_line(error: FitError, left: ResidualStructure | None) -> str:
     """Return the error of the best draw in one line."""
-    share = found.error.nrmse
+    share = error.nrmse
     percent = '-' if share is None else f'{100 * share:.2f} %'
     line = (
-        f'error of the best draw: {1e3 * found.error.rms_m:.4g} mm rms, {percent} of the spread '
-        'measured'
+        f'error of the best draw: {1e3 * error.rms_m:.4g} mm rms, {percent} of the spread measured'
     )
-    return line if found.structure is None else f'{line}; {found.structure.amounts()}'
+    return line if left is None else f'{line}; {left.amounts()}'
 
 
 def first_page(found: CalibrationData, hybrid: str = '', *, drawn: bool = True) -> FirstPage:
@@ -109,7 +110,7 @@ def first_page(found: CalibrationData, hybrid: str = '', *, drawn: bool = True) 
         drawn: with a picture, where the records are known, and symbols for names; on a terminal
             neither.
     """
-    verdict = found.problems or (f'the model fits: {error_line(found)}',)
+    verdict = found.problems or (f'the model fits: {error_line(found.error, found.structure)}',)
     picture = None
     if drawn and found.records:
         picture = html.Picture.of(
@@ -118,26 +119,45 @@ def first_page(found: CalibrationData, hybrid: str = '', *, drawn: bool = True) 
         )
     return FirstPage(
         tuple(verdict),
-        _certainty(found, word if drawn else str),
+        certainty(
+            found.parameters,
+            found.posterior,
+            [p.name for p in found.at_bound if p.physical],
+            found.problems,
+            word if drawn else str,
+        ),
         picture,
-        _errors(found),
+        errors(found.error, found.structure),
         _parameters(found, word if drawn else str),
-        _delay(found),
+        delays(found.tracking),
         (),
         hybrid,
         next_command(found),
     )
 
 
-def _certainty(found: CalibrationData, name: Callable[[str], str]) -> str:
-    """Return the widest interval over its mean, and what that is."""
-    if found.problems:
+def certainty(
+    parameters: Mapping[str, Marginal],
+    draws: Array,
+    at_zero: Sequence[str],
+    problems: Sequence[str],
+    name: Callable[[str], str] = str,
+) -> str:
+    """Return the widest interval over its mean, and what that is.
+
+    Args:
+        parameters: posterior of each.
+        draws: shape (m, p), in their order.
+        at_zero: parameters that lie at zero, where nothing is below.
+        problems: why the posterior must not be used.
+        name: what a parameter is called.
+    """
+    if problems:
         return 'not at all, as long as that stands: the intervals are those of a wrong model'
-    ends = np.quantile(found.posterior, (0.025, 0.975), axis=0).T
-    at_zero = {p.name for p in found.at_bound if p.physical}
+    ends = np.quantile(draws, (0.025, 0.975), axis=0).T
     shares = {
         n: 50.0 * (high - low) / abs(p.mean)
-        for (n, p), (low, high) in zip(found.parameters.items(), ends, strict=True)
+        for (n, p), (low, high) in zip(parameters.items(), ends, strict=True)
         if p.mean and n not in at_zero
     }
     worst = max(shares, key=shares.__getitem__)
@@ -148,14 +168,14 @@ def _certainty(found: CalibrationData, name: Callable[[str], str]) -> str:
     )
 
 
-def _errors(found: CalibrationData) -> html.Table:
+def errors(error: FitError, left: ResidualStructure | None) -> html.Table:
+    """Return the error before and after, and what it is made of."""
     rows = []
-    left = found.structure
     if left is not None:
         rows.append(['before: the command itself, no model', f'{1e6 * left.command_rms_m:.1f}'])
-    rows.append(['after: the best draw', f'{1e6 * found.error.rms_m:.1f}'])
-    if len(found.error.records) > 1:
-        for of in found.error.records:
+    rows.append(['after: the best draw', f'{1e6 * error.rms_m:.1f}'])
+    if len(error.records) > 1:
+        for of in error.records:
             name = source_name(of.source) or 'a record'
             rows.append([f'... in {name}', f'{1e6 * of.rms_m:.1f}'])
     if left is not None:
@@ -180,9 +200,10 @@ def _parameters(found: CalibrationData, name: Callable[[str], str]) -> html.Tabl
     return html.Table(header, rows, caption, prose=True)
 
 
-def _delay(found: CalibrationData) -> str:
+def delays(tracked: Sequence[tracking.RecordTracking]) -> str:
+    """Return the delay in each record in a line; empty where it is not known."""
     told = []
-    for of in found.tracking:
+    for of in tracked:
         known = (('delay_at_5_hz_s', ' at 5 Hz'), ('fei_delay_s', ' over the record'))
         for key, where in known:
             if key in of.predicted:
@@ -243,7 +264,7 @@ def brief(found: CalibrationData) -> list[html.Block]:
     """Return problems, moments, error and notes."""
     blocks: list[html.Block] = [html.Note(line) for line in found.problems]
     blocks.append(html.Table(HEADER, moment_rows(found), moments_title(found)))
-    blocks.append(html.Text(error_line(found)))
+    blocks.append(html.Text(error_line(found.error, found.structure)))
     blocks += tracking.tables(found.tracking)
     return [*blocks, *(html.Note(line) for line in found.notes)]
 

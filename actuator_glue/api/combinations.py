@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Unpack
 
 import numpy as np
 
-from actuator_glue.api import judgement, tracking
+from actuator_glue.api import judgement, store
 from actuator_glue.api.calibration import calibrate
 from actuator_glue.api.calibration_options import CalibrationChanges, CalibrationOptions
-from actuator_glue.api.calibration_parts import CalibratedRecord, FitError, Marginal
+from actuator_glue.api.calibration_parts import Marginal
+from actuator_glue.api.calibration_result import Calibration
+from actuator_glue.api.combinations_data import COMBINATIONS, CombinationsData
 from actuator_glue.api.given import Records, records_given
+from actuator_glue.api.matlab import Exported, TransferFunction, write_mat
 from actuator_glue.api.options import chosen, takes
 from actuator_glue.api.result import Result
-from actuator_glue.api.tracking import RecordTracking
 from actuator_glue.errors import InputError
 from actuator_glue.hygiene.checks import pull
 from actuator_glue.inference.moments import moments
+from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.motion import METRES, speaking
 from actuator_glue.records import Array, Record, source_name
@@ -27,16 +32,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from actuator_glue.report import html
+    from actuator_glue.report.first_page import FirstPage
 
 # A stiffness that stands for the one nobody knows [N/m]: whatever that is, some parameters inside
 # the box of Table 3 move as the actuator does. Nothing that is told depends on it.
 _STAND_IN = 250e3
-# Of the transfer function of Eq. (2), b / (s^2 + a s + b + c), in the order of the draws.
-NAMES = {
-    'alpha_1_beta_0 / (alpha_2 + k)': '1/s^2',
-    'beta_1 + alpha_3 k / (alpha_2 + k)': '1/s',
-    'beta_1 alpha_3 k / (alpha_2 + k)': '1/s^2',
-}
 COST = (
     'the specimen stiffness is not known: alpha_1_beta_0, alpha_2 and alpha_3 cannot be told apart'
     ' from it. What is told holds for this specimen alone: it predicts no other stiffness, no '
@@ -45,49 +45,18 @@ COST = (
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Combinations(Result):
+class Combinations(Result, CombinationsData):
     """What is known of an actuator under a specimen of a stiffness that is not.
 
-    Attributes:
-        combinations: posterior of each combination by name: those of the transfer function
-            b / (s^2 + a s + b + c), and the parameters of effects.
-        draws: shape (steps, chains, p), in their order.
-        error: free-run error of the best draw.
-        problems: why they must not be used as they stand; empty where they may.
-        notes: what is not known, and what was done to the records.
-        converged: R-hat of every combination is at most 1.01.
-        effects: effects of the model beyond Eq. (2).
-        sources: the records, described.
-        records: the records themselves; empty after `load`.
-        tracking: how the actuator follows the command of each record.
-        evaluations: likelihood evaluations.
-        seconds: how long it took.
+    Its numbers are those of `CombinationsData`: `combinations` by name, `draws`, `problems`, ...
     """
 
     schema: ClassVar[str] = 'actuator_glue.combinations/1'
-
-    combinations: dict[str, Marginal]
-    draws: Array
-    error: FitError
-    problems: tuple[str, ...]
-    notes: tuple[str, ...]
-    converged: bool
-    effects: tuple[str, ...]
-    sources: tuple[CalibratedRecord, ...]
-    tracking: tuple[RecordTracking, ...]
-    evaluations: int
-    seconds: float
-    records: tuple[Record, ...] = ()
 
     @property
     def model_effects(self) -> tuple[str, ...]:
         """Effects of the model beyond Eq. (2)."""
         return self.effects
-
-    @property
-    def posterior(self) -> Array:
-        """All draws, shape (m, p)."""
-        return self.draws.reshape(-1, self.draws.shape[-1])
 
     def to_json(self) -> dict[str, Any]:
         """Return the object of schema `actuator_glue.combinations/1` (draws left out)."""
@@ -95,6 +64,7 @@ class Combinations(Result):
             'schema': self.schema,
             'combinations': {name: asdict(p) for name, p in self.combinations.items()},
             'error': asdict(self.error),
+            'structure': None if self.structure is None else self.structure.to_json(),
             'problems': list(self.problems),
             'notes': list(self.notes),
             'converged': self.converged,
@@ -105,59 +75,53 @@ class Combinations(Result):
             'seconds': self.seconds,
         }
 
+    def save(self, path: Path | str) -> Path:
+        """Write everything but the records to one .npz file, nothing of it pickled.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        kept = replace(self, records=(), residuals=())
+        return store.save(path, self.schema, kept, self.effects)
+
+    def save_mat(self, path: Path | str) -> Path:
+        """Write draws and model to a .mat file for MATLAB; return its path.
+
+        `draws` (m x p), `names`, `units`, `mean`, `covariance`, and `model`: b / (s^2 + a s + b +
+        c) of the one specimen that was tested, as `tf(model.num, model.den)` takes it; its
+        `stiffness` is NaN.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        units = [p.unit for p in self.combinations.values()]
+        of = Exported(self.posterior, tuple(self.combinations), units, self.effects, self.problems)
+        return write_mat(path, of, [_transfer(self)])
+
     def plot(self) -> Figure:
         """Return a figure of the distribution of each combination, and of each pair."""
-        from actuator_glue.report.posterior_figure import posterior_figure
+        from actuator_glue.api.combinations_report import figure
 
-        units = [p.unit for p in self.combinations.values()]
         with speaking(self.motion):
-            return posterior_figure(self.posterior, ('b', 'a', 'c', *self._rest()), units)
-
-    def _rest(self) -> list[str]:
-        return list(self.combinations)[len(NAMES) :]
-
-    def rows(self) -> list[tuple[str, ...]]:
-        """Return a row of text for each combination: name, unit, mean, sd, R-hat."""
-        return [
-            (name, p.unit, f'{p.mean:.5g}', f'{p.stddev:.3g}', f'{p.rhat:.4f}')
-            for name, p in self.combinations.items()
-        ]
-
-    def error_line(self) -> str:
-        """Return the error of the best draw in a line."""
-        share = self.error.nrmse
-        spread = '' if share is None else f', {100.0 * share:.2f} % of the spread measured'
-        return f'error of the best draw: {1e3 * self.error.rms_m:.4g} mm rms{spread}'
+            return figure(self)
 
     def brief(self) -> list[html.Block]:
         """Return problems, combinations, error and what they cost."""
-        from actuator_glue.report import html
+        from actuator_glue.api.combinations_report import brief
 
-        return [
-            *(html.Note(line) for line in self.problems),
-            html.Table(HEADER, self.rows(), TITLE),
-            html.Text(self.error_line()),
-            *tracking.tables(self.tracking),
-            *(html.Note(line) for line in self.notes),
-        ]
+        return brief(self)
+
+    def first_page(self) -> FirstPage:
+        """Return what a person is told first, without a picture."""
+        from actuator_glue.api.combinations_report import first_page
+
+        return first_page(self, drawn=False)
 
     def page(self) -> html.Page:
         """Return the report."""
-        from actuator_glue.report import html
+        from actuator_glue.api.combinations_report import page
 
-        picture = html.Picture.of(
-            self.plot(), 'Distribution of each combination; b, a, c as above.'
-        )
-        sections = [
-            html.Section('The answer', self.brief()),
-            html.Section('Posterior', [picture]),
-        ]
-        made = f'{self.evaluations} evaluations'
-        return html.Page('Calibration without a stiffness', self.notes[0], sections, made)
-
-
-HEADER = ('combination', 'unit', 'mean', 'sd', 'R-hat')
-TITLE = 'b, a and c of x/u = b / (s^2 + a s + b + c), Eq. (2), and effects'
+        return page(self)
 
 
 @takes(CalibrationOptions)
@@ -210,12 +174,13 @@ def combinations(
         found.at_bound,
     )
     converged = judgement.converged(known)
+    found_pull, told_pull = _pushed(given)
     return Combinations(
         combinations=known,
         draws=draws,
         error=found.error,
         problems=tuple(judgement.problems((), known, found.error, None, found.structure)),
-        notes=(COST, *_pushed(given), *(line for line in found.notes if line not in told)),
+        notes=(COST, *told_pull, *(line for line in found.notes if line not in told)),
         converged=converged,
         effects=found.effects,
         sources=tuple(
@@ -226,6 +191,31 @@ def combinations(
         evaluations=found.evaluations,
         seconds=found.seconds,
         records=tuple(given),
+        structure=found.structure,
+        residuals=_residuals(found),
+        pull=found_pull,
+    )
+
+
+def _residuals(found: Calibration) -> tuple[Array, ...]:
+    """Return what the best draw leaves of each record [m]."""
+    structure = Structure(found.effects)
+    initial: Initial = 'rest' if found.initial == 'rest' else 'measured'
+    out = []
+    for record in found.records:
+        moved = structure.simulate(found.best, record, initial=initial)
+        out.append((record.measured - np.ravel(moved))[round(found.settle / record.period) :])
+    return tuple(out)
+
+
+def _transfer(found: CombinationsData) -> TransferFunction:
+    """Return b / (s^2 + a s + b + c) of the mean of the draws, and of each."""
+    draws, names = found.posterior, list(found.combinations)
+    late = float(draws[:, names.index('delay')].mean()) if 'delay' in names else 0.0
+    b, a, c = draws[:, :3].T
+    den = np.column_stack([np.ones_like(b), a, b + c])
+    return TransferFunction(
+        math.nan, b.mean(keepdims=True), den.mean(axis=0), late, b[:, None], den
     )
 
 
@@ -238,13 +228,15 @@ def _combined(draws: Array) -> Array:
     return np.concatenate([made, draws[..., 4:]], axis=-1)
 
 
-def _marginals(draws: Array, best: Array, found: Any, units: list[str]) -> dict[str, Marginal]:
+def _marginals(
+    draws: Array, best: Array, found: Calibration, units: list[str]
+) -> dict[str, Marginal]:
     import arviz as az
 
     flat = draws.reshape(-1, draws.shape[-1])
-    bounds = [(0.0, float('inf'))] * len(NAMES)
+    bounds = [(0.0, float('inf'))] * len(COMBINATIONS)
     bounds += [p.bounds for p in list(found.parameters.values())[4:]]
-    names = [*NAMES, *list(found.parameters)[4:]]
+    names = [*COMBINATIONS, *list(found.parameters)[4:]]
     found_moments = moments(flat, flat.min(axis=0), flat.max(axis=0))
     data = az.convert_to_dataset({'theta': np.swapaxes(draws, 0, 1)})
     rhat, ess = az.rhat(data)['theta'].values, az.ess(data)['theta'].values
@@ -261,19 +253,20 @@ def _marginals(draws: Array, best: Array, found: Any, units: list[str]) -> dict[
             bounds=bounds[i],
             prior_dominated=False,
         )
-        for i, (name, unit) in enumerate(zip(names, [*NAMES.values(), *units], strict=True))
+        for i, (name, unit) in enumerate(zip(names, [*COMBINATIONS.values(), *units], strict=True))
     }
 
 
-def _pushed(records: list[Record]) -> list[str]:
-    """Return what the recorded forces say of the stiffness."""
-    told = []
+def _pushed(records: list[Record]) -> tuple[float | None, list[str]]:
+    """Return what the recorded forces say of the stiffness [N/m], and that for people."""
+    seen, told = [], []
     for number, record in enumerate(records, start=1):
         found = pull(record)
         if found is not None and record.motion == METRES:
+            seen.append(abs(found))
             name = source_name(record.source) or f'record {number}'
             told.append(
                 f'{name}: force over displacement is {abs(found):.3g} N/m; --stiffness '
                 f'{abs(found):.3g} would tell all that two tests can'
             )
-    return told
+    return float(np.median(seen)) if seen else None, told

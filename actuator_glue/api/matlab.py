@@ -32,6 +32,35 @@ class Exported(NamedTuple):
     problems: Sequence[str]
 
 
+class TransferFunction(NamedTuple):
+    """A model as MATLAB takes it, descending powers of s.
+
+    Attributes:
+        stiffness: of the specimen [N/m]; NaN where it is not known.
+        num, den: polynomials of the mean of the draws.
+        delay: of the command [s].
+        num_draws, den_draws: polynomials of each draw, a row each.
+    """
+
+    stiffness: float
+    num: Array
+    den: Array
+    delay: float
+    num_draws: Array
+    den_draws: Array
+
+
+def under(of: Exported, stiffness: float) -> TransferFunction:
+    """Return Eq. (2a) of a posterior under a stiffness [N/m]."""
+    names = list(of.names)
+    columns = [names.index(name) for name in NAMES]
+    mean = of.draws.mean(axis=0)
+    late = float(mean[names.index('delay')]) if 'delay' in names else 0.0
+    drawn = [polynomials(theta, stiffness) for theta in of.draws[:, columns]]
+    rows = np.array([n for n, _ in drawn]), np.array([d for _, d in drawn])
+    return TransferFunction(stiffness, *polynomials(mean[columns], stiffness), late, *rows)
+
+
 def polynomials(theta: Array, stiffness: float) -> tuple[Array, Array]:
     """Return numerator and denominator of Eq. (2a), descending powers of s.
 
@@ -48,8 +77,8 @@ def polynomials(theta: Array, stiffness: float) -> tuple[Array, Array]:
     return np.array([gain]), np.array([k + alpha_2, middle, beta_1 * alpha_3 * k + gain])
 
 
-def write_mat(path: Path | str, of: Exported, stiffness: Sequence[float]) -> Path:
-    """Write draws and the mean model under some stiffnesses to a .mat file; return its path.
+def write_mat(path: Path | str, of: Exported, models: Sequence[TransferFunction]) -> Path:
+    """Write draws and models under some stiffnesses to a .mat file; return its path.
 
     Variables: `draws` (m x p), `names`, `units`, `effects`, `problems` (cells), `mean`, `stddev`
     (1 x p), `covariance` (p x p), `model`: a struct for each stiffness with `stiffness`, `num`,
@@ -59,30 +88,22 @@ def write_mat(path: Path | str, of: Exported, stiffness: Sequence[float]) -> Pat
     Args:
         path: where to.
         of: the posterior.
-        stiffness: of specimens [N/m].
+        models: one for each stiffness.
 
     Raises:
         InputError: the file cannot be written.
     """
-    names = list(of.names)
-    columns = [names.index(name) for name in NAMES]
-    base = of.draws[:, columns]
-    mean = of.draws.mean(axis=0)
-    late = float(mean[names.index('delay')]) if 'delay' in names else 0.0
-    fields = ('stiffness', 'num', 'den', 'delay', 'num_draws', 'den_draws')
-    model = np.zeros((1, len(stiffness)), dtype=[(field, object) for field in fields])
-    for i, k in enumerate(stiffness):
-        num, den = polynomials(mean[columns], k)
-        drawn = [polynomials(theta, k) for theta in base]
-        rows = np.array([n for n, _ in drawn]), np.array([d for _, d in drawn])
-        model[0, i] = (float(k), num, den, late, *rows)
+    kinds = [(name, object) for name in TransferFunction._fields]
+    model = np.zeros((1, len(models)), dtype=kinds)
+    for i, each in enumerate(models):
+        model[0, i] = tuple(each)
     content = {
         'draws': of.draws,
-        'names': _cells(names),
+        'names': _cells(of.names),
         'units': _cells(of.units),
         'effects': _cells(of.effects),
         'problems': _cells(of.problems),
-        'mean': mean,
+        'mean': of.draws.mean(axis=0),
         'stddev': of.draws.std(axis=0),
         'covariance': np.atleast_2d(np.cov(of.draws, rowvar=False)),
         'model': model,

@@ -17,7 +17,7 @@ from actuator_glue.api.ensemble import GivenCommand, commanded, evenly, simulate
 from actuator_glue.api.frequency_response import FrequencyResponse
 from actuator_glue.api.given import OneRecord, one_record_given
 from actuator_glue.api.hybrid_meaning import hybrid_meaning
-from actuator_glue.api.matlab import Exported, write_mat
+from actuator_glue.api.matlab import Exported, under, write_mat
 from actuator_glue.api.prediction import Prediction, prediction
 from actuator_glue.api.result import Result
 from actuator_glue.errors import InputError
@@ -218,8 +218,5 @@ class PosteriorModel(Result):
         """
         of = self.drawn()
         several = of.stiffness if stiffness is None else np.ravel(np.asarray(stiffness))
-        return write_mat(
-            path,
-            Exported(of.draws, of.names, of.units, of.structure.effects, of.problems),
-            [check_stiffness(k) for k in several],
-        )
+        what = Exported(of.draws, of.names, of.units, of.structure.effects, of.problems)
+        return write_mat(path, what, [under(what, check_stiffness(float(k))) for k in several])

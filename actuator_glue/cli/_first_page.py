@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from actuator_glue.cli._output import say, table
 
 if TYPE_CHECKING:
-    from actuator_glue.api.posterior_model import PosteriorModel
+    from actuator_glue.report.first_page import FirstPage
 
 # Options of reading, which the next command needs as this one did.
 _READING = ('channels', 'hold', 'resample', 'split', 'effects_file')
@@ -25,15 +25,10 @@ def add_partition(parser: argparse.ArgumentParser) -> None:
     )
 
 
-def show_first(found: PosteriorModel, args: argparse.Namespace) -> None:
-    """Print the first page of a result.
-
-    Raises:
-        InputError: a partition that cannot be used.
-    """
+def show_first(page: FirstPage, args: argparse.Namespace) -> None:
+    """Print the first page of a result."""
     from actuator_glue.report.html import Picture, Table
 
-    page = found.first_page(args.partition)
     page = page._replace(command=_as_read(page.command, args))
     for block in page.blocks():
         if isinstance(block, Table):

@@ -7,7 +7,8 @@ hold, or a bound holds a parameter; the first line says so. 2: the input cannot 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from actuator_glue.arguments import Output, number, number_or_auto
@@ -22,6 +23,7 @@ from actuator_glue.io.json_file import write_json
 if TYPE_CHECKING:
     from actuator_glue.api.calibration_options import CalibrationOptions
     from actuator_glue.api.calibration_result import Calibration
+    from actuator_glue.api.combinations import Combinations
     from actuator_glue.records import Record
 
 EXAMPLES = (
@@ -106,8 +108,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         '--save',
         '--draws',
         type=Output,
-        metavar='OUT.npz',
-        help='save draws, bounds, units and provenance, for `plot --draws` and for others',
+        metavar='OUT.npz|OUT.mat',
+        help='save draws, bounds, units and provenance, for `plot --draws` and for others (.npz), '
+        'or draws and models for MATLAB (.mat)',
     )
     parser.add_argument(
         '--report', type=Output, metavar='OUT.html', help='also write a report, one HTML file'
@@ -121,6 +124,7 @@ def run(args: argparse.Namespace) -> int:
     Raises:
         InputError: a record, option or output cannot be used.
     """
+    _check_save(args.save)
     load_effects(args)
 
     from actuator_glue.api.calibration import calibrate
@@ -146,7 +150,7 @@ def run(args: argparse.Namespace) -> int:
         found = calibrate(records, options, progress=done)
     content = found.to_json()
     failed = beside(args.json, lambda out: write_json(content, out))
-    failed = beside(args.save, found.save) or failed
+    failed = beside(args.save, _saving(found, args)) or failed
     _show(found, args)
     failed = beside(args.report, lambda out: found.report(out, args.partition)) or failed
     return failed or (1 if found.problems else 0)
@@ -156,7 +160,8 @@ def _combinations(
     records: list[Record], options: CalibrationOptions, args: argparse.Namespace
 ) -> int:
     """Print what holds without a stiffness, and return the exit code."""
-    from actuator_glue.api.combinations import HEADER, TITLE, combinations
+    from actuator_glue.api.combinations import combinations
+    from actuator_glue.api.combinations_report import HEADER, TITLE, rows
     from actuator_glue.api.tracking import HEADER as TRACKING
 
     if args.partition is not None:
@@ -170,17 +175,35 @@ def _combinations(
         found = combinations(records, options, progress=done)
     content = found.to_json()
     failed = beside(args.json, lambda out: write_json(content, out))
-    failed = beside(args.save, found.save) or failed
-    for line in found.problems:
-        say(line, args)
-    table(TITLE, HEADER, found.rows(), args)
-    say(found.error_line(), args)
+    failed = beside(args.save, _saving(found, args)) or failed
+    show_first(found.first_page(), args)
+    table(TITLE, HEADER, rows(found), args)
     for of in found.tracking:
         table(of.title, TRACKING, of.rows(), args)
-    for line in found.notes:
+    say(f'{found.evaluations} evaluations in {found.seconds:.1f} s', args)
+    for line in found.notes[1:]:
         note(line)
     failed = beside(args.report, found.report) or failed
     return failed or (1 if found.problems else 0)
+
+
+def _saving(found: Calibration | Combinations, args: argparse.Namespace) -> Callable[[str], Path]:
+    """Return what writes the draws as the suffix of the file says."""
+    as_mat = args.save is not None and Path(args.save).suffix.lower() == '.mat'
+    return found.save_mat if as_mat else found.save
+
+
+def _check_save(out: str | None) -> None:
+    """Refuse a file of draws that no program would know by its name, before any work.
+
+    Raises:
+        InputError: neither .npz nor .mat.
+    """
+    if out is not None and Path(out).suffix.lower() not in ('.npz', '.mat'):
+        raise InputError(
+            f'--save {out}: draws are saved as .npz, for `plot`, `rths` and `--prior`, or as '
+            '.mat, for MATLAB; give a name that ends in one of these'
+        )
 
 
 def bounds(given: Sequence[str]) -> dict[str, tuple[float, float]]:
@@ -210,7 +233,7 @@ def _show(found: Calibration, args: argparse.Namespace) -> None:
     )
     from actuator_glue.api.tracking import HEADER as TRACKING
 
-    show_first(found, args)
+    show_first(found.first_page(args.partition), args)
     rows: list[tuple[str, ...]] = moment_rows(found)
     columns: tuple[str, ...] = HEADER
     mostly = ['prior' if p.prior_dominated else '' for p in found.parameters.values()]

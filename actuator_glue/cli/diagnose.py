@@ -147,7 +147,7 @@ def _load(args: argparse.Namespace) -> tuple[list[Record], list[Record]]:
 
 
 def _show(found: Diagnosis, args: argparse.Namespace) -> None:
-    show_first(found, args)
+    show_first(found.first_page(args.partition), args)
     table(
         'Candidates, Eq. (2) + one effect, refitted',
         ['effect', 'rms um', 'score nats'],

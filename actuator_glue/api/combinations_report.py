@@ -1,0 +1,151 @@
+"""What holds without a stiffness, as pages and pictures: in the order of every calibration."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from actuator_glue.api import judgement, tracking
+from actuator_glue.api.calibration_report import certainty, delays, error_line, errors
+from actuator_glue.api.combinations_data import COMBINATIONS, CombinationsData
+from actuator_glue.inference.at_bound import pressed
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import source_name
+from actuator_glue.report import html
+from actuator_glue.report.first_page import FirstPage, command
+from actuator_glue.report.posterior_figure import posterior_figure
+from actuator_glue.report.quantity import said_in, spread
+from actuator_glue.report.residual_figure import Left, residual_figure
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+HEADER = ('combination', 'unit', 'mean', 'sd', 'R-hat')
+TITLE = 'b, a and c of x/u = b / (s^2 + a s + b + c), Eq. (2), and effects'
+_LETTERS = ('b', 'a', 'c')
+_PANELS = 4  # records in the first picture
+_FAR = 100.0  # times the largest draw: no bound of a combination
+
+
+def figure(found: CombinationsData) -> Figure:
+    """Draw the distribution of each combination, and each pair of them."""
+    units = [p.unit for p in found.combinations.values()]
+    rest = list(found.combinations)[len(COMBINATIONS) :]
+    return posterior_figure(found.posterior, (*_LETTERS, *rest), units)
+
+
+def rows(found: CombinationsData) -> list[tuple[str, ...]]:
+    """Return a row of text for each combination, under HEADER."""
+    return [
+        (name, p.unit, f'{p.mean:.5g}', f'{p.stddev:.3g}', f'{p.rhat:.4f}')
+        for name, p in found.combinations.items()
+    ]
+
+
+def first_page(found: CombinationsData, *, drawn: bool = True) -> FirstPage:
+    """Return what a person is told first.
+
+    Args:
+        found: what is known.
+        drawn: with a picture, where the records are known.
+    """
+    verdict = found.problems or (f'the model fits: {error_line(found.error, found.structure)}',)
+    picture = None
+    if drawn and found.residuals:
+        picture = html.Picture.of(
+            residual_figure(_left(found)),
+            'What the best draw leaves of each record; grey is noise, which no model explains.',
+        )
+    return FirstPage(
+        (*verdict, found.notes[0]),
+        certainty(found.combinations, found.posterior, _at_zero(found), found.problems),
+        picture,
+        errors(found.error, found.structure),
+        _parameters(found),
+        delays(found.tracking),
+        command=next_command(found),
+    )
+
+
+def _at_zero(found: CombinationsData) -> list[str]:
+    draws = found.posterior
+    low = np.array([p.bounds[0] for p in found.combinations.values()])
+    high = np.array([p.bounds[1] for p in found.combinations.values()])
+    high = np.where(np.isfinite(high), high, _FAR * np.abs(draws).max(axis=0))
+    return [p.name for p in pressed(draws, tuple(found.combinations), low, high) if p.physical]
+
+
+def _left(found: CombinationsData) -> list[Left]:
+    noise = None if found.structure is None else found.structure.noise_m
+    out = []
+    for record, error in list(zip(found.records, found.residuals, strict=True))[:_PANELS]:
+        title = f'{source_name(record.source) or "record"}: k not known'
+        out.append(Left(title, record.time[len(record) - len(error) :], error, noise))
+    return out
+
+
+def _parameters(found: CombinationsData) -> html.Table:
+    meanings = {p.name: p.meaning for p in Structure(found.effects).parameters}
+    meanings |= dict(
+        zip(
+            COMBINATIONS,
+            (f'{letter} of the transfer function' for letter in _LETTERS),
+            strict=True,
+        )
+    )
+    ends = np.quantile(found.posterior, (0.025, 0.975), axis=0).T
+    told = []
+    for (name, p), (low, high) in zip(found.combinations.items(), ends, strict=True):
+        before = 'not negative'
+        if np.isfinite(p.bounds[1]):
+            factor, unit = said_in(p.unit, *p.bounds)
+            before = f'{factor * p.bounds[0]:.3g} to {factor * p.bounds[1]:.3g} {unit}'.rstrip()
+        after = spread(p.mean, float(low), float(high), p.unit)
+        told.append([name, meanings.get(name, ''), before, after])
+    header = ['parameter', 'what it is', 'before', 'after']
+    caption = 'Parameters before (bounds) and after (means, 95 % intervals).'
+    return html.Table(header, told, caption, prose=True)
+
+
+def next_command(found: CombinationsData) -> str:
+    """Return what to type next: with a stiffness, or of a free actuator."""
+    tests = [(s.source, None) for s in found.sources]
+    effects = [text for name in found.effects for text in ('--effect', name)]
+    if any(not p.rhat <= judgement.APART for p in found.combinations.values()):
+        more = ['--evaluations', str(2 * found.evaluations)]
+        return command('calibrate', tests, '--stiffness', 'unknown', *effects, *more)
+    if found.pull is not None:
+        known = [(source, float(f'{found.pull:.3g}')) for source, _ in tests]
+        return command('calibrate', known, *effects)
+    return command('calibrate', [('FREE.csv', 0.0)], *effects)
+
+
+def brief(found: CombinationsData) -> list[html.Block]:
+    """Return problems, combinations, error and what they cost."""
+    return [
+        *(html.Note(line) for line in found.problems),
+        html.Table(HEADER, rows(found), TITLE),
+        html.Text(error_line(found.error, found.structure)),
+        *tracking.tables(found.tracking),
+        *(html.Note(line) for line in found.notes),
+    ]
+
+
+def page(found: CombinationsData) -> html.Page:
+    """Return the report: the answer, the posterior, and how the actuator follows its command."""
+    first = first_page(found)
+    posterior: list[html.Block] = [
+        html.Table(HEADER, rows(found), TITLE),
+        html.Picture.of(figure(found), 'Distribution of each combination; b, a, c as above.'),
+        *(html.Note(line) for line in found.notes[1:]),
+    ]
+    sections = [
+        html.Section('The answer', first.blocks(headline=False)),
+        html.Section('Posterior', posterior),
+    ]
+    if found.tracking:
+        tables = tracking.tables(found.tracking)
+        sections.append(html.Section('How the actuator follows its command', tables))
+    made = f'{found.evaluations} evaluations'
+    return html.Page('Calibration without a stiffness', first.verdict[0], sections, made)
