@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -42,18 +44,61 @@ def connected(scheduler: str | None, workers: int | None) -> Iterator[Client]:
             yield client
         return
     count = workers or len(os.sched_getaffinity(0))
-    # A record's memory and threads are held to by the process it is computed in.
-    with (
-        distributed.LocalCluster(
-            n_workers=count,
-            threads_per_worker=1,
-            processes=True,
-            memory_limit=0,
-            host='127.0.0.1',
-            dashboard_address=None,
-            env=dict.fromkeys(THREADS, '1'),
-            silence_logs='CRITICAL',
-        ) as cluster,
-        distributed.Client(cluster) as client,
-    ):
+    with _cluster(count) as address, distributed.Client(address) as client:
         yield client
+
+
+@contextmanager
+def _cluster(workers: int) -> Iterator[str]:
+    """Yield the address of a cluster of processes of this machine.
+
+    A process of its own starts it: workers that this one started would run the script anew that
+    asks for them. It ends with this process, however that ends, and Ctrl-C is not for it.
+
+    Raises:
+        InputError: it could not be started.
+    """
+    with subprocess.Popen(
+        [sys.executable, '-m', __name__, str(workers)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        start_new_session=True,
+    ) as process:
+        assert process.stdin is not None and process.stdout is not None
+        try:
+            address = process.stdout.readline().decode().strip()
+            if not address:
+                raise InputError(
+                    f'a cluster of {workers} processes could not be started on this machine'
+                )
+            yield address
+        finally:
+            process.stdin.close()  # until then it serves
+            try:
+                process.wait(_PATIENCE)
+            except subprocess.TimeoutExpired:
+                process.kill()
+
+
+def _serve(workers: int) -> None:
+    """Have workers on this machine until standard input ends; the address is told first."""
+    from distributed import LocalCluster
+
+    # A record's memory and threads are held to by the process it is computed in.
+    with LocalCluster(
+        n_workers=workers,
+        threads_per_worker=1,
+        processes=True,
+        memory_limit=0,
+        host='127.0.0.1',
+        dashboard_address=None,
+        env=dict.fromkeys(THREADS, '1'),
+        silence_logs='CRITICAL',
+    ) as cluster:
+        sys.stdout.write(f'{cluster.scheduler_address}\n')
+        sys.stdout.flush()
+        sys.stdin.buffer.read()
+
+
+if __name__ == '__main__':
+    _serve(int(sys.argv[1]))

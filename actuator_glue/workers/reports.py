@@ -32,8 +32,7 @@ class Reports:
 
     A process and not a thread: two threads would hand the interpreter's lock to and fro for longer
     than a report takes. Until the process is ready, and should it die, reports are computed here.
-    A script that uses this keeps its own work behind `if __name__ == '__main__'`, as always with
-    `multiprocessing`. Use as a context manager.
+    Use as a context manager.
 
     Args:
         limits: as `job.report` takes it. To carry all limits of bands takes as long as to read

@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
-import multiprocessing
 import os
 import queue
 import signal
+import subprocess
+import sys
 import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from multiprocessing import resource_tracker
-from multiprocessing.connection import Connection
+from multiprocessing.connection import Connection, Pipe
 from typing import Any, NamedTuple
 
 from actuator_glue.model.effects import CATALOGUE
 
 # Messages from the worker: (kind, payload).
 DONE, FAILED, PROGRESS, DIED = 'done', 'failed', 'progress', 'died'
+
+# What the process begins with, given the descriptor of its end of the pipe.
+_PROGRAM = (
+    'import sys; from multiprocessing.connection import Connection; '
+    'pipe = Connection(int(sys.argv[1])); sys.path[:] = pipe.recv(); '
+    f'from {__name__} import serve; serve(pipe)'
+)
 
 Tell = Callable[[Any], None]
 
@@ -34,8 +42,9 @@ class Answer(NamedTuple):
 class Worker:
     """Runs picklable functions, one at a time, in a process of its own.
 
-    The process is started afresh, not forked, because forked threads of DDS would be dead locks.
-    It ends with its parent, however that ends.
+    The process is started afresh, not forked, because forked threads of DDS would be dead locks;
+    and not by `multiprocessing`, which would run the script anew that asks for it. It ends with
+    its parent, however that ends.
 
     Args:
         answer: called from a thread with each Answer.
@@ -51,6 +60,8 @@ class Worker:
         self._nice = nice
         self._tasks: queue.SimpleQueue[Any] = queue.SimpleQueue()
         self.ready = threading.Event()
+        self._process: subprocess.Popen[bytes] | None = None
+        atexit.register(self.close, 0.0)
         self._start()
 
     def submit(self, function: Callable[..., Any], *args: Any) -> None:
@@ -68,25 +79,27 @@ class Worker:
 
     def close(self, patience: float = 0.5) -> None:
         """End the process, after so many seconds at the latest; what it computes is lost."""
+        atexit.unregister(self.close)
         self._end(patience)
 
     def _start(self) -> None:
-        context = multiprocessing.get_context('spawn')
         self.ready.clear()
         # Closed with the last reference to it: never while a thread still reads.
-        ours, theirs = context.Pipe()
-        self._process: Any = context.Process(
-            target=_serve, args=(theirs, self._warm, self._nice), daemon=True, name='worker'
-        )
-        # It begins with Ctrl-C blocked: its imports shall not be cut, with a traceback each. The
-        # tracker comes first: what starts it unblocks the signal again.
-        resource_tracker.ensure_running()
+        ours, theirs = Pipe()
+        # It begins with Ctrl-C blocked: its imports shall not be cut, with a traceback each.
         masked = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
         try:
-            self._process.start()
+            self._process = subprocess.Popen(
+                [sys.executable, '-c', _PROGRAM, str(theirs.fileno())],
+                stdin=subprocess.DEVNULL,
+                pass_fds=[theirs.fileno()],
+            )
         finally:
             signal.pthread_sigmask(signal.SIG_SETMASK, masked)
         theirs.close()
+        with suppress(OSError):  # a process that died is told where its answers are read
+            for begin in (sys.path, (self._warm, self._nice)):
+                ours.send(begin)
         # The tasks of an ended process are not the next one's.
         self._tasks = queue.SimpleQueue()
         for name, target, args in (
@@ -101,10 +114,12 @@ class Worker:
         self._tasks.put(None)
         if process is None:
             return
-        process.join(patience)
-        if process.is_alive():
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(patience)
+        if process.poll() is None:
             process.kill()
-            process.join(2.0)
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(2.0)
 
     def _hand_over(self, pipe: Connection, tasks: queue.SimpleQueue[Any]) -> None:
         with suppress(OSError):  # a process that died is told where its answers are read
@@ -112,7 +127,7 @@ class Worker:
                 pipe.send(task)
             pipe.send(None)
 
-    def _listen(self, pipe: Connection, process: Any) -> None:
+    def _listen(self, pipe: Connection, process: subprocess.Popen[bytes]) -> None:
         while True:
             try:
                 answer = pipe.recv()
@@ -125,18 +140,17 @@ class Worker:
             else:
                 self._answer(Answer(*answer))
         if process is self._process:
-            process.join(1.0)
-            self._answer(Answer(DIED, f'the worker process ended ({process.exitcode})', 0.0))
+            with suppress(subprocess.TimeoutExpired):
+                process.wait(1.0)
+            self._answer(Answer(DIED, f'the worker process ended ({process.returncode})', 0.0))
 
 
-def _serve(pipe: Connection, warm: Callable[[], None] | None, nice: int) -> None:
+def serve(pipe: Connection) -> None:
+    """Do what is asked for through a pipe until it closes; first of all warm up, more nicely."""
     # Ctrl-C reaches the whole group: the node decides when its worker ends.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT, signal.SIGTERM})
-    if nice:
-        os.nice(nice)
-
     started = time.monotonic()
 
     def tell(payload: Any) -> None:
@@ -144,6 +158,9 @@ def _serve(pipe: Connection, warm: Callable[[], None] | None, nice: int) -> None
 
     # Whoever asked has gone: nothing is left to answer.
     with suppress(EOFError, BrokenPipeError, ConnectionResetError):
+        warm, nice = pipe.recv()
+        if nice:
+            os.nice(nice)
         if warm is not None:
             warm()
         # What is there now stays: going through it for garbage takes 100 ms, two deadlines.

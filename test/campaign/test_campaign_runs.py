@@ -140,6 +140,25 @@ def test_one_and_two_workers_make_the_same_rows(records: Path, tmp_path: Path) -
     assert list(two.failures['group']) == ['north/broken.csv']
 
 
+@pytest.mark.slow
+def test_a_script_needs_no_guard(records: Path, tmp_path: Path) -> None:
+    """It runs once, from its first line to its last, and says nothing that is not its own."""
+    script = tmp_path / 'mine.py'
+    script.write_text(
+        f"""
+import actuator_glue as ag
+print('begins')
+found = ag.campaign({str(records)!r}, {str(tmp_path / 'out')!r}, workers=2, analysis={ANALYSIS!r})
+print('rows', len(found.table), set(found.table['failure']))
+"""
+    )
+    done = subprocess.run(
+        [sys.executable, script], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, '')
+    assert done.stdout.splitlines() == ['begins', "rows 12 {''}"]
+
+
 @pytest.fixture(scope='module')
 def here() -> Iterator[str]:
     """Address of a scheduler and two workers in this process: they start in a moment."""

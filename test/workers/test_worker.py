@@ -2,6 +2,8 @@
 
 import os
 import signal
+import subprocess
+import sys
 import threading
 import time
 from pathlib import Path
@@ -101,5 +103,31 @@ def test_it_is_closed_twice_or_before_it_has_begun(answers):
     process = worker._process
     worker.close(patience=0.0)
     worker.close()
-    process.join(5.0)
-    assert process.exitcode is not None and not answers
+    assert process.wait(5.0) is not None and not answers
+
+
+SCRIPT = """
+import os, sys, time
+import actuator_glue as ag
+print('begins', os.getpid())
+record = ag.simulate(ag.Command(rate=100.0, duration=12.0, high=5.0), stiffness=250e3, seed=3)
+found = ag.replay(record, window=3.0, hop=0.5, evaluations=6000)
+from actuator_glue.workers.reports import Reports
+with Reports() as reports:  # long enough for whatever a process of its own would do
+    print('ready', reports.wait(60.0) or len(os.sched_getaffinity(0)) < 2)
+print('windows', len(found.windows))
+left = Reports()  # that nobody closes
+"""
+
+
+def test_a_script_needs_no_guard(tmp_path):
+    """It runs once, from its first line to its last, and says nothing that is not its own."""
+    script = tmp_path / 'mine.py'
+    script.write_text(SCRIPT)
+    done = subprocess.run(
+        [sys.executable, script], capture_output=True, text=True, timeout=120, check=False
+    )
+    assert (done.returncode, done.stderr) == (0, '')
+    lines = done.stdout.splitlines()
+    assert [line.split()[0] for line in lines] == ['begins', 'ready', 'windows']
+    assert lines[1] == 'ready True' and int(lines[2].split()[1]) > 10
