@@ -1,7 +1,8 @@
 """Run the blocks of docs/tutorial.md in an empty folder, as a reader would type them.
 
-Each command prints what it prints; exit code 1 is an answer, anything above ends the run. With
---write the page gets below every block what it printed.
+Each command prints what it prints, and how long it took. The first one that ends with another exit
+code than 0, or than `<!-- exit code N -->` above its block says, ends the run. With --write the
+page gets below every block what it printed.
 """
 
 from __future__ import annotations
@@ -15,7 +16,11 @@ import time
 from pathlib import Path
 
 PAGE = Path(__file__).resolve().parent.parent / 'docs' / 'tutorial.md'
-BLOCK = re.compile(r'^```sh\n(.*?)^```\n(?:\n```\n.*?^```\n)?', re.MULTILINE | re.DOTALL)
+BLOCK = re.compile(
+    r'(?P<above>^<!-- exit code (?P<code>\d+) -->\n\n)?'
+    r'^```sh\n(?P<lines>.*?)^```\n(?:\n```\n.*?^```\n)?',
+    re.MULTILINE | re.DOTALL,
+)
 
 
 def commands(block: str) -> list[str]:
@@ -23,11 +28,11 @@ def commands(block: str) -> list[str]:
     return [line for line in block.replace('\\\n', ' ').splitlines() if line.strip()]
 
 
-def run(line: str, folder: Path) -> str:
+def run(line: str, folder: Path, expected: int) -> str:
     """Run a line in a folder and return what it printed.
 
     Raises:
-        SystemExit: it ended with more than 1.
+        SystemExit: it ended with another exit code.
     """
     begin = time.monotonic()
     print(f'$ {line}', flush=True)
@@ -41,8 +46,8 @@ def run(line: str, folder: Path) -> str:
         check=False,
     )
     print(f'{done.stdout}[{time.monotonic() - begin:.0f} s]', flush=True)
-    if done.returncode > 1:
-        raise SystemExit(f'{line}: exit code {done.returncode}')
+    if done.returncode != expected:
+        raise SystemExit(f'{line}: exit code {done.returncode}, not {expected}')
     return '\n'.join(text.rstrip() for text in done.stdout.strip().splitlines())
 
 
@@ -56,8 +61,9 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
 
         def printed(found: re.Match[str]) -> str:
-            said = '\n'.join(filter(None, (run(c, Path(folder)) for c in commands(found[1]))))
-            return f'```sh\n{found[1]}```\n\n```\n{said}\n```\n'
+            lines, code = found['lines'], int(found['code'] or 0)
+            said = '\n'.join(filter(None, (run(c, Path(folder), code) for c in commands(lines))))
+            return f'{found["above"] or ""}```sh\n{lines}```\n\n```\n{said}\n```\n'
 
         renewed = BLOCK.sub(printed, text)
     if args.write:

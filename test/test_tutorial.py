@@ -23,6 +23,8 @@ echo two
 
 between
 
+<!-- exit code 1 -->
+
 ```sh
 false
 ```
@@ -36,7 +38,7 @@ what it printed last year
 def test_what_blocks_print_is_written_below_them(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    """In their order, once, however often; exit code 1 is an answer, more ends the run."""
+    """In their order, once, however often; another exit code than the page says ends the run."""
     page = tmp_path / 'page.md'
     page.write_text(PAGE)
     monkeypatch.setattr(sys, 'argv', ['run_tutorial', '--page', str(page), '--write'])
@@ -46,11 +48,16 @@ def test_what_blocks_print_is_written_below_them(
         assert text.count('```sh') == 2
         assert '```\n\n```\none\ntwo\n```\n\nbetween' in text
         assert 'last year' not in text
+        assert text.count('<!-- exit code 1 -->') == 1
     assert '$ echo two' in capsys.readouterr().out
-    page.write_text('```sh\nexit 3\n```\n')
-    with pytest.raises(SystemExit, match='exit code 3'):
-        run_tutorial.main()
-    assert page.read_text() == '```sh\nexit 3\n```\n'
+    for block, said in (
+        ('```sh\nexit 3\n```\n', 'exit 3: exit code 3, not 0'),
+        ('<!-- exit code 1 -->\n\n```sh\ntrue\n```\n', 'true: exit code 0, not 1'),
+    ):
+        page.write_text(block)
+        with pytest.raises(SystemExit, match=said):
+            run_tutorial.main()
+        assert page.read_text() == block
 
 
 @pytest.mark.slow
