@@ -1,0 +1,71 @@
+"""Reports on a phone: nothing of them is wider than it, and no number is broken."""
+
+import asyncio
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from browser import PROGRAM, Browser
+
+import actuator_glue as ag
+
+WIDTH = 390
+# Page; boxes whose tables scroll; numbers of tables that stand on more than a line.
+MEASURE = """(() => {
+  const lines = (cell) => {
+    const all = document.createRange();
+    all.selectNodeContents(cell);
+    return new Set([...all.getClientRects()].map((r) => Math.round(r.top))).size;
+  };
+  const number = (cell) => /^-?[0-9.e+-]+$/.test(cell.textContent.trim());
+  return {
+    page: document.documentElement.scrollWidth,
+    boxes: [...document.querySelectorAll('.scroll')]
+      .filter((box) => box.scrollWidth > box.clientWidth).map((box) => box.textContent),
+    tables: document.querySelectorAll('.scroll').length,
+    broken: [...document.querySelectorAll('td')]
+      .filter((cell) => number(cell) && lines(cell) > 1).map((cell) => cell.textContent),
+  };
+})()"""
+
+
+def late(k: float, seed: int) -> ag.Record:
+    """Return a test whose name is as long as those of a laboratory."""
+    command = ag.Command(rate=200.0, duration=10.0)
+    record = ag.simulate(command, stiffness=k, effects=['delay'], seed=seed)
+    return replace(record, source=f'2026-03-01_actuator_north_k_{k:.0f}_monday_morning.csv')
+
+
+async def measured(page: Path) -> dict[str, Any]:
+    """Return what a browser makes of a page on a phone."""
+    async with Browser() as browser:
+        await browser.call(
+            'Emulation.setDeviceMetricsOverride',
+            width=WIDTH,
+            height=844,
+            deviceScaleFactor=1,
+            mobile=True,
+        )
+        await browser.open(page.as_uri())
+        await browser.until('document.readyState === "complete"')
+        found: dict[str, Any] = await browser.value(MEASURE)
+        return found
+
+
+@pytest.mark.skipif(PROGRAM is None, reason='no Chromium on this computer')
+@pytest.mark.parametrize(
+    'which', ['calibration', pytest.param('diagnosis', marks=pytest.mark.slow)]
+)
+def test_a_report_fits_a_phone(which: str, tmp_path: Path) -> None:
+    """Rows of many columns are stacked; what is left scrolls nowhere."""
+    records = [late(0.0, 1), late(250e3, 2)]
+    if which == 'calibration':
+        result: Any = ag.calibrate(records[1], evaluations=12_000)
+    else:
+        result = ag.diagnose(records, effort=0.05, jobs=1)
+    found = asyncio.run(measured(result.report(tmp_path / 'report.html')))
+    assert found['tables'] >= 4
+    assert found['page'] <= WIDTH
+    assert found['boxes'] == []
+    assert found['broken'] == []
