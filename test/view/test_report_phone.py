@@ -30,10 +30,10 @@ MEASURE = """(() => {
 })()"""
 
 
-def late(k: float, seed: int) -> ag.Record:
+def made(k: float, *effects: str) -> ag.Record:
     """Return a test whose name is as long as those of a laboratory."""
     command = ag.Command(rate=200.0, duration=10.0)
-    record = ag.simulate(command, stiffness=k, effects=['delay'], seed=seed)
+    record = ag.simulate(command, stiffness=k, effects=effects, seed=3)
     return replace(record, source=f'2026-03-01_actuator_north_k_{k:.0f}_monday_morning.csv')
 
 
@@ -59,11 +59,10 @@ async def measured(page: Path) -> dict[str, Any]:
 )
 def test_a_report_fits_a_phone(which: str, tmp_path: Path) -> None:
     """Rows of many columns are stacked; what is left scrolls nowhere."""
-    records = [late(0.0, 1), late(250e3, 2)]
     if which == 'calibration':
-        result: Any = ag.calibrate(records[1], evaluations=12_000)
+        result: Any = ag.calibrate(made(250e3), evaluations=12_000)
     else:
-        result = ag.diagnose(records, effort=0.05, jobs=1)
+        result = ag.diagnose([made(0.0, 'delay'), made(250e3, 'delay')], effort=0.05, jobs=1)
     found = asyncio.run(measured(result.report(tmp_path / 'report.html')))
     assert found['tables'] >= 4
     assert found['page'] <= WIDTH
