@@ -165,7 +165,7 @@ def test_a_replay_is_kept_and_shown(record: ag.Record, tmp_path: Path) -> None:
     assert again.windows == found.windows
     page = dataclasses.replace(again, effects=()).report(tmp_path / 'replay.html').read_text()
     assert page.count('<img') == 1
-    assert f'<td>{found.windows[-1].end_s:.2f}</td>' in page
+    assert f'>{found.windows[-1].end_s:.2f}</td>' in page
 
 
 def written(tmp_path: Path, *command: object) -> dict[str, object]:

@@ -26,6 +26,7 @@ from actuator_glue.diagnosis.residual_structure import residual_structure
 from actuator_glue.errors import InputError
 from actuator_glue.hygiene.clean import clean, common_initial
 from actuator_glue.hygiene.despike import despiked
+from actuator_glue.hygiene.unlike_rest import unlike_rest
 from actuator_glue.inference.at_bound import pressed
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.choice import ModelChoice, choose_model
@@ -118,6 +119,7 @@ def calibrate(
     structure = Structure(model.effects)
     best = chains.best[: len(structure.names)]
     left = residual_structure(cleaned, initial, settle, structure, best)
+    unlike = () if left is None else unlike_rest(tests, left.noise_m)
     forces: tuple[RecordForce, ...] = ()
     if options.use_force:
         forces = force_errors(model, chains.best, cleaned, initial, settle)
@@ -129,7 +131,7 @@ def calibrate(
         error=fit,
         structure=left,
         at_bound=at_bound,
-        problems=tuple(judgement.problems(at_bound, parameters, fit, prior, left)),
+        problems=tuple(judgement.problems(at_bound, parameters, fit, prior, left, unlike)),
         notes=(
             *judgement.remarks(
                 cleaned, parameters, chains.posterior(), converged, at_bound, prior

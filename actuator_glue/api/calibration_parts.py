@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
 
 import numpy as np
 
@@ -39,6 +41,20 @@ class Marginal:
     unit: str
     bounds: tuple[float, float]
     prior_dominated: bool
+
+
+def marginals_json(parameters: Mapping[str, Marginal], draws: Array) -> dict[str, Any]:
+    """Return parameters as JSON, each with its 95 % interval `lower` to `upper`.
+
+    Args:
+        parameters: posterior of each.
+        draws: shape (m, p), in their order.
+    """
+    ends = np.quantile(draws, (0.025, 0.975), axis=0).T
+    return {
+        name: {**asdict(p), 'lower': float(low), 'upper': float(high)}
+        for (name, p), (low, high) in zip(parameters.items(), ends, strict=True)
+    }
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ import numpy as np
 
 from actuator_glue.api import store
 from actuator_glue.api.calibration_data import CalibrationData
+from actuator_glue.api.calibration_parts import marginals_json
 from actuator_glue.api.drawn import Drawn
 from actuator_glue.api.frame import frame
 from actuator_glue.api.given import OneRecord, one_record_given
@@ -110,7 +111,7 @@ class Calibration(PosteriorModel, CalibrationData):
         """Return the object of schema `actuator_glue.calibration/1` (draws left out)."""
         return {
             'schema': self.schema,
-            'parameters': {n: asdict(p) for n, p in self.parameters.items()},
+            'parameters': marginals_json(self.parameters, self.posterior),
             'evaluations': self.evaluations,
             'seconds': self.seconds,
             'compile_seconds': self.compile_seconds,

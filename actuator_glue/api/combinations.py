@@ -13,7 +13,7 @@ import numpy as np
 from actuator_glue.api import judgement, store
 from actuator_glue.api.calibration import calibrate
 from actuator_glue.api.calibration_options import CalibrationChanges, CalibrationOptions
-from actuator_glue.api.calibration_parts import Marginal
+from actuator_glue.api.calibration_parts import Marginal, marginals_json
 from actuator_glue.api.calibration_result import Calibration
 from actuator_glue.api.combinations_data import COMBINATIONS, CombinationsData
 from actuator_glue.api.given import Records, records_given
@@ -22,6 +22,7 @@ from actuator_glue.api.options import chosen, takes
 from actuator_glue.api.result import Result
 from actuator_glue.errors import InputError
 from actuator_glue.hygiene.checks import pull
+from actuator_glue.hygiene.unlike_rest import unlike_rest
 from actuator_glue.inference.moments import moments
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
@@ -62,7 +63,7 @@ class Combinations(Result, CombinationsData):
         """Return the object of schema `actuator_glue.combinations/1` (draws left out)."""
         return {
             'schema': self.schema,
-            'combinations': {name: asdict(p) for name, p in self.combinations.items()},
+            'combinations': marginals_json(self.combinations, self.posterior),
             'error': asdict(self.error),
             'structure': None if self.structure is None else self.structure.to_json(),
             'problems': list(self.problems),
@@ -174,12 +175,14 @@ def combinations(
         found.at_bound,
     )
     converged = judgement.converged(known)
+    left = found.structure
+    unlike = () if left is None else unlike_rest(given, left.noise_m)
     found_pull, told_pull = _pushed(given)
     return Combinations(
         combinations=known,
         draws=draws,
         error=found.error,
-        problems=tuple(judgement.problems((), known, found.error, None, found.structure)),
+        problems=tuple(judgement.problems((), known, found.error, None, found.structure, unlike)),
         notes=(COST, *told_pull, *(line for line in found.notes if line not in told)),
         converged=converged,
         effects=found.effects,

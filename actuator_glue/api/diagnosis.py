@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypedDict, Unpack
 from actuator_glue.api import store
 from actuator_glue.api.bar import shown
 from actuator_glue.api.callbacks import harmless
+from actuator_glue.api.doubt import doubts
 from actuator_glue.api.drawn import Drawn
 from actuator_glue.api.ensemble import residual_of
 from actuator_glue.api.frame import frame
@@ -377,6 +378,9 @@ def diagnose(
             prior=given_prior(options.prior, options.drift, options.prior_age),
         )
     values = {f.name: getattr(found, f.name) for f in fields(found)}
+    if found.complete and (told := doubts(found, [*given, *held])):
+        values['verdict'] = 'unexplained'
+        values['advice'] = (*told, *found.advice)
     values['seconds'] = time.perf_counter() - started
     values['provenance'] = provenance([*given, *held], options.seed)
     return Diagnosis(

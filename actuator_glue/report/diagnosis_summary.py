@@ -74,6 +74,13 @@ def _names(found: DiagnosisData) -> list[Block]:
     return [Table(header, rows, 'What is missing, and how sure its name is.', prose=True)]
 
 
+def _meaning(found: DiagnosisData) -> str:
+    """Return what the verdict means, in a sentence."""
+    if found.verdict == 'missing-effect' and all(e.noise is not None for e in found.effects):
+        return 'The model is enough for what moves; what is named below is in what measures it.'
+    return _MEANS[found.verdict]
+
+
 def certainty(found: DiagnosisData) -> str:
     """Return how sure the answer is: one number, and what it is a number of."""
     inside = f'{100 * found.coverage[1]:.0f} % of what was held out lies in the 95 % band'
@@ -197,7 +204,7 @@ def first_page(found: DiagnosisData, hybrid: str = '', *, drawn: bool = True) ->
             'error over all of them; grey is noise, which no model explains.',
         )
     return FirstPage(
-        (found.summary(), _MEANS[found.verdict]),
+        (found.summary(), _meaning(found)),
         certainty(found),
         picture,
         _error(found),
