@@ -11,8 +11,6 @@ from __future__ import annotations
 
 from actuator_glue.diagnosis.companions import SEEN, beside
 from actuator_glue.diagnosis.model_selection import ModelSelection
-from actuator_glue.diagnosis.pairs import price
-from actuator_glue.diagnosis.score import evidence
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
 
@@ -46,7 +44,7 @@ def _with_more(selection: ModelSelection, final: Trial) -> Trial | None:
 
 
 def _better(selection: ModelSelection, with_more: Trial, name: str, best: Trial) -> Trial:
-    """Return a structure with another name in the place of one, where that says surely more.
+    """Return a structure with another name in the place of one, where that has more weight.
 
     Args:
         selection: what judges.
@@ -57,14 +55,9 @@ def _better(selection: ModelSelection, with_more: Trial, name: str, best: Trial)
     search = selection.search
     rest = search.without(with_more, name)
     names = search.screened(rest, search.others(with_more))[: selection.settings.tried]
-    least = selection.nats + price(len(search.names))
     for trial in search.additions(rest, names, below=with_more.mean_square):
-        if len(trial.fit.theta) > len(with_more.fit.theta):
-            continue
-        ahead = evidence(trial.scores, with_more.scores) > least
-        ahead = ahead and evidence(trial.scores, best.scores) > 0.0
-        enough = ahead and selection.left(trial) < selection.material
+        enough = selection.left(trial) < selection.material
         # Each of the two must matter beside the other.
-        if enough and selection.pruned(trial) is trial:
+        if enough and selection.behind(trial, best) < 0.0 and selection.pruned(trial) is trial:
             best = trial
     return best

@@ -21,9 +21,7 @@ class Rival:
         stderr: standard error of that over the blocks [nats].
         excess: rms error it leaves beyond the best [m].
         tied: these data cannot tell it from the best.
-        weight: its share among all rivals and none of them, with equal odds for rivals that leave
-            as good as the same error; it decides which of the tied names is told.
-        probability: the same, with smaller odds for such a rival, as it has been right less often.
+        probability: its share of the weight among all rivals and none of them.
         limit: where it is a richer form of the best, the parameter that makes it one and the
             limit of its 95 % interval away from the value at which it is the best.
     """
@@ -33,7 +31,6 @@ class Rival:
     stderr: float
     excess: float
     tied: bool
-    weight: float
     probability: float
     limit: tuple[str, float] | None = None
 

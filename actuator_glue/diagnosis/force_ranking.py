@@ -12,9 +12,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.force import newtons_per_metre, with_forces
-from actuator_glue.diagnosis.ranking import compare, worth
+from actuator_glue.diagnosis.ranking import compare, weights, worth
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
@@ -78,7 +80,8 @@ def _ranked(
     scorer = _scorer(both, best.fit, settings)
     alone, *trials = (replace(t, scores=scorer.block_scores(t.fit)) for t in tried)
     trials.sort(key=lambda t: -float(t.scores.sum()))
-    rivals = compare(alone, trials[0], trials[1:], scorer, settings)
+    known = weights(np.stack([t.scores for t in (*trials, alone)]))
+    rivals = compare(alone, trials[0], trials[1:], known[1:] / known[0], scorer, settings)
     size = newtons_per_metre(both)
     force = slice(search.data.target.size, None)
     errors = {t.added: size * rms(t.fit.error[force]) for t in trials}

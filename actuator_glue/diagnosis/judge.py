@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
@@ -12,6 +13,7 @@ from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.search import Search, by_score
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.diagnosis.weights import TELLING, price
 from actuator_glue.inference.least_squares.fit import Fit
 
 # Of what matters: two that remove this share each remove what matters.
@@ -90,6 +92,39 @@ class Judge:
         extra = len(larger.fit.theta) - len(smaller.fit.theta)
         nats = evidence(larger.scores, smaller.scores) - extra - cost
         return removed(smaller, larger) >= threshold and nats >= self.nats
+
+    def behind(self, trial: Trial, other: Trial, alike: float = 0.0) -> float:
+        """Return by how many nats a structure's weight is below another's (see weights.py).
+
+        Args:
+            trial: the structure.
+            other: the one that it is held against.
+            alike: rms error that tells the two apart by one nat, where it is not for what matters
+                to say [m].
+        """
+        search, scorer = self.search, self.search.scorer
+        assert scorer is not None
+        left, theirs = (scorer.left_out_error(t.fit) for t in (trial, other))
+        tells = math.hypot(TELLING * self.material, alike)
+        mine, prices = (
+            price(t.structure, search.entries, len(search.names)) for t in (trial, other)
+        )
+        return (left**2 - theirs**2) / tells**2 + mine - prices
+
+    def odds(self, rest: Trial, best: Trial, trials: Sequence[Trial]) -> list[float]:
+        """Return the weights of rivals in the place of an effect, and of none, beside its own.
+
+        Equations for the same thing differ by a share of what they explain, too, which is none
+        of the machine's.
+
+        Args:
+            rest: the structure without the effect.
+            best: with it.
+            trials: with another in its place.
+        """
+        alike = self.settings.tie_share * removed(rest, best)
+        behind = [*(self.behind(t, best, alike) for t in trials), self.behind(rest, best)]
+        return [math.exp(-max(b, 0.0)) for b in behind]
 
     def part(self) -> float:
         """Error that one of two effects must remove which matter only together [m]."""

@@ -30,6 +30,7 @@ _REFITS = 4  # per structure and turn
 # Another shape of the same cause removes so much of what matters; and more than means over samples
 # and the steps of a simulation leave, of the stroke.
 _SHAPED, _STEPS = 0.1, 3e-4
+_NEARLY = 0.1  # of what names remove: a description that removes less more says the same
 
 
 def ways(found: Selection) -> list[Way]:
@@ -207,7 +208,7 @@ def _additions(
                         worth.append(begun)
                 if not whole or not selection.better(trial, start, least, cost):
                     continue
-                tied = selection.settings.tie_share * removed(start, trial)
+                tied = _NEARLY * removed(start, trial)
                 least = max(tied, selection.material) if complete else tied
             if selection.better(trial, best, least, cost):
                 worth.append(trial)
@@ -239,7 +240,7 @@ def _displaces(selection: ModelSelection, trial: Trial, best: Trial) -> bool:
     for name in best.effects:
         if name not in after.effects and not is_learned(search.entries[name]):
             rest = search.without(rest, name)
-    nearly = 1.0 - selection.settings.tie_share
+    nearly = 1.0 - _NEARLY
     alike = removed(best, after) < selection.material
     return alike and removed(rest, best) ** 2 > nearly * removed(rest, after) ** 2
 

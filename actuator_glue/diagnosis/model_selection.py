@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from actuator_glue.diagnosis import false_alarms, pairs, ranking, simplest
+from actuator_glue.diagnosis import false_alarms, pairs, ranking
 from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.judge import Judge
-from actuator_glue.diagnosis.ranking import compare, removed, spokesman, standard_error, worth
-from actuator_glue.diagnosis.score import evidence
+from actuator_glue.diagnosis.ranking import compare, removed, worth
 from actuator_glue.diagnosis.search import Search, by_score
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.stages import EFFECTS, Progress
@@ -20,7 +19,6 @@ from actuator_glue.diagnosis.trial import Trial
 _SWAPS = 4
 # Where something material remains what swaps mend terms may, too: fewer of both are tried.
 _OPEN, _OPEN_TRIED = 2, 3
-_SURE = 2.0  # standard errors over the blocks: what is less is not told apart
 
 
 class ModelSelection(Judge):
@@ -127,7 +125,7 @@ class ModelSelection(Judge):
         for name in current.effects:
             current = self.search.polish(replace(current, added=name))
         current = self.search.finished(current, finely=self.left(current) >= self.material)
-        current, rivals = self.spoken(*self.settle(current))
+        current, rivals = self.settle(current)
         gains, nats = worth(self.search, current)
         return Selection(
             base, tuple(singles), current, rivals, gains, nats,
@@ -143,26 +141,22 @@ class ModelSelection(Judge):
         return current
 
     def settle(self, current: Trial) -> tuple[Trial, dict[str, tuple[Rival, ...]]]:
-        """Swap members for better rivals until none is better; return rivals of each member."""
+        """Go on to what has more weight with one member exchanged, until nothing has.
+
+        Returns:
+            The structure, and the rivals of each of its members.
+        """
         for attempt in range(_SWAPS):
             rivals: dict[str, tuple[Rival, ...]] = {}
             best, complete = current, self.left(current) < self.material
             most = self.settings.tried if complete else _OPEN_TRIED
             for name in current.effects:
                 rest = self.search.without(current, name)
-                names = self.search.others(current)
-                if len(current.effects) > 1:
-                    names = self.search.screened(rest, names)[:most]
-                below = ranking.left_by_rivals(rest, current)
-                trials = self.search.additions(rest, names, below=below)
-                two = pairs.rivals(self.search, name, trials, most, below, complete)
-                rivals[name] = self._rivals(rest, current, name, [*trials, *two])
-                for trial in (*trials, *pairs.ahead(self, current, name, rivals[name], two)):
-                    pressed = ranking.pressed_form(self.search, trial, trial.added, name)
-                    if not pressed and self._ahead(trial, best, complete):
+                trials = self._in_place(current, rest, name, most, complete)
+                rivals[name] = self._rivals(rest, current, name, trials)
+                for trial in trials:
+                    if self.behind(trial, best) < 0.0 and pairs.both_worth(self, trial):
                         best = trial
-            if best is current:
-                best = simplest.instead(self, current, rivals, complete)
             # The last members stay, so that the rivals told are theirs.
             last = attempt == (_SWAPS if complete else _OPEN) - 1 or self.search.effort.over
             if best is current or last:
@@ -171,64 +165,26 @@ class ModelSelection(Judge):
             current = self.pruned(best)
         return current, rivals
 
-    def _ahead(self, trial: Trial, best: Trial, complete: bool) -> bool:
-        """Whether a structure is better: by nats, which are those of noise.
-
-        One with more parameters must be beyond a tie, or the simpler one takes its place back.
-        A material residual never replaces an immaterial one.
-        Where more remains than noise nats are of misfit, at the frequencies with the least of it:
-        the smaller error on blocks left out is better then, unless the blocks exclude it though
-        all that remains counts as noise.
-        """
-        if complete:
-            richer = len(trial.fit.theta) > len(best.fit.theta)
-            if richer and evidence(trial.scores, best.scores) < self.settings.tie_nats:
-                return False
-            if trial.scores.sum() <= best.scores.sum():
-                return False
-            return removed(trial, best) < self.material or self.left(trial) < self.material
-        scorer = self.search.with_misfit(best)
-        gain = scorer.block_scores(trial.fit) - scorer.block_scores(best.fit)
-        excluded = gain.sum() < -_SURE * standard_error(gain)
-        return not excluded and scorer.left_out_error(trial.fit) < scorer.left_out_error(best.fit)
-
-    def spoken(
-        self, current: Trial, rivals: dict[str, tuple[Rival, ...]]
-    ) -> tuple[Trial, dict[str, tuple[Rival, ...]]]:
-        """Name one of the tied effects: of the group that has most of the weight."""
-        groups = {name: effect.group for name, effect in self.search.entries.items()}
-        for name, row in list(rivals.items()):
-            other = spokesman(name, row, groups)
-            rest = [n for n in current.effects if n != name]
-            known = [self.search.known((*rest, *r.effects)) for r in row]
-            best = self.search.known((*rest, other))
-            if other == name or best is None:
-                continue
-            trials = [
-                replace(t, added=r.name)
-                for t, r in zip(known, row, strict=True)
-                if t is not None and other not in r.effects
-            ]
-            alone = self.search.without(current, name)
-            rivals = {n: r for n, r in rivals.items() if n != name}
-            rivals[other] = self._rivals(alone, replace(best, added=other), other, trials)
-            current = best
-        return current, rivals
+    def _in_place(
+        self, current: Trial, rest: Trial, name: str, most: int, complete: bool
+    ) -> list[Trial]:
+        """Refit with what promises most in the place of a member: one effect, or two."""
+        names = self.search.others(current)
+        if len(current.effects) > 1:
+            names = self.search.screened(rest, names)[:most]
+        below = ranking.left_by_rivals(rest, current)
+        trials = self.search.additions(rest, names, below=below)
+        return [*trials, *pairs.rivals(self.search, name, trials, most, below, complete)]
 
     def _rivals(
         self, rest: Trial, best: Trial, name: str, trials: Sequence[Trial]
     ) -> tuple[Rival, ...]:
-        """Say how far behind the best each rival is; misfit that remains counts as noise."""
-        scorer = self.search.scorer
+        """Say how likely each rival is; misfit that remains counts as noise."""
+        odds, scorer = self.odds(rest, best, trials), self.search.scorer
         assert scorer is not None
-        whole: list[bool] = []
         if self.left(best) >= self.material:
-            whole = [pairs.whole(self, t, best) for t in trials]
             scorer = self.search.with_misfit(best)
             rest, best, *trials = (
                 replace(t, scores=scorer.block_scores(t.fit)) for t in (rest, best, *trials)
             )
-        cost = pairs.price(len(self.search.names))
-        pressed = [ranking.pressed_form(self.search, t, t.added, name) for t in trials]
-        best = replace(best, added=name)
-        return compare(rest, best, trials, scorer, self.settings, cost, whole, pressed)
+        return compare(rest, replace(best, added=name), trials, odds, scorer, self.settings)

@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 
 from actuator_glue.diagnosis.candidates import FAULTS, FEEDBACK
-from actuator_glue.diagnosis.finding import BESIDE, Rival
+from actuator_glue.diagnosis.finding import BESIDE
 from actuator_glue.diagnosis.judge import Judge
 from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.search import Search
@@ -61,43 +61,12 @@ def rivals(
     return list(search.each(refitted, wanted))
 
 
-def ahead(
-    judge: Judge,
-    current: Trial,
-    name: str,
-    row: Sequence[Rival],
-    two: Sequence[Trial],
-) -> list[Trial]:
-    """Return the pairs that take an effect's place, best first.
-
-    Beside them it is no alternative any more, or they remove as much more as an addition must.
-    Both of a pair's effects are significant; it takes a place and adds no parameter, so that
-    only together they must be material.
-
-    Args:
-        judge: what judges.
-        current: the structure with the effect.
-        name: the effect.
-        row: weights of all its rivals.
-        two: pairs refitted in its place.
-    """
-    known = {r.name: r.weight for r in row}
-    least = math.exp(judge.settings.tie_nats) * known[name]
-    cost, material = price(len(judge.search.names)), judge.material
-    better = (t for t in two if known[t.added] > least or judge.better(t, current, material, cost))
-    return [t for t in sorted(better, key=lambda t: -known[t.added]) if both_worth(judge, t)]
-
-
 def both_worth(judge: Judge, pair: Trial) -> bool:
-    """Whether each of a pair that was added last is significant beside the other."""
+    """Whether each effect that was added last is significant beside the other, if two were."""
     names = pair.added.split(BESIDE)
+    if len(names) == 1:
+        return True
     return all(judge.better(pair, judge.search.without(pair, n), 0.0) for n in names)
-
-
-def whole(judge: Judge, trial: Trial, best: Trial) -> bool:
-    """Whether a structure is a pair that leaves nothing material, and less than another."""
-    less = BESIDE in trial.added and trial.mean_square < best.mean_square
-    return less and judge.left(trial) < judge.material
 
 
 def screened(

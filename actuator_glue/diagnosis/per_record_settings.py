@@ -157,7 +157,7 @@ def _attribution(
             tied = trial is not best and nats < _TIED
             excess = removed(trial, best)
             share = float(weight)
-            rivals.append(Rival(trial.added, nats, stderr, excess, tied, share, share))
+            rivals.append(Rival(trial.added, nats, stderr, excess, tied, share))
     gained = evidence(best.scores, start.scores)
     kept = {n: found.rivals[n] for n in start.effects}
     return replace(

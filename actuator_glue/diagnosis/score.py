@@ -44,6 +44,9 @@ class Scorer:
     _known: WeakKeyDictionary[Fit, Array] = field(
         default_factory=WeakKeyDictionary, init=False, compare=False, repr=False
     )
+    _errors: WeakKeyDictionary[Fit, float] = field(
+        default_factory=WeakKeyDictionary, init=False, compare=False, repr=False
+    )
 
     @classmethod
     def of(cls, data: Data, splits: list[Split], *, misfit: bool = False) -> Scorer:
@@ -93,6 +96,11 @@ class Scorer:
 
         What is compared in metres is fitted in metres, as the structures themselves are.
         """
+        if fit not in self._errors:
+            self._errors[fit] = self._left_out_error(fit)
+        return self._errors[fit]
+
+    def _left_out_error(self, fit: Fit) -> float:
         total, moves = 0.0, self.moves(fit, *_plain(fit), self.blocks)
         for block, move in zip(self.blocks, moves, strict=True):
             e = fit.error[block]

@@ -16,10 +16,9 @@ class Thresholds:
         false_alarms: probability of an addition on a healthy machine (diagnosis/false_alarms.py).
         nats: smallest out-of-sample evidence for another hold, one record's own setting, or a
             generic surrogate.
-        tie_nats: two effects cannot be told apart below this evidence,
-        tie_share: or where they differ by less than this share of what the better one removes.
-        mistaken: odds on a rival that leaves the same error and that the blocks exclude, or that
-            holds the effect and gains nothing by it.
+        tie_nats: two effects cannot be told apart where their weights differ by less.
+        tie_share: between equations for the same thing an error of this share of what they remove
+            costs a nat.
         left_noise: the model is unexplained where structure above this share of the noise
         left_share: and above this share of the structure found at first remains;
         beaten_noise, beaten_share: as left_noise and left_share, where a generic surrogate
@@ -43,8 +42,7 @@ class Thresholds:
     false_alarms: float = 0.01
     nats: float = 10.0
     tie_nats: float = 4.0
-    tie_share: float = 0.1
-    mistaken: float = 0.25
+    tie_share: float = 0.05
     left_noise: float = 0.6
     left_share: float = 0.3
     beaten_noise: float = 0.3

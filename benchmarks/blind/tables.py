@@ -1,14 +1,10 @@
-"""Replay the choice of a structure from stored tables: `tables.py FOLDER... [--c 4]`.
+"""Replay the choice of a structure from stored tables: `tables.py FOLDER... [--telling 0.05]`.
 
 Campaigns leave the table of all structures that each diagnosis refitted. Here a rule chooses from
-it again, without any refit: a minute for hundreds of machines. The rule is one coarsened weight
-(Miller & Dunson 2019, J. Am. Stat. Assoc. 114:1113): for structure S with p parameters and an
-error e of what was left out,
-
-    log w = -c (e^2 - min e^2) / m^2 - p - log(structures of as many effects that there are)
-
-where m is what matters. It is held against the structure that the diagnosis told: how often both
-agree, how often either is the machine's, and what either leaves of the held-out record.
+it again, without any refit: a minute for hundreds of machines. The rule is the weight that the
+diagnosis goes by (actuator_glue/diagnosis/weights.py), with another error that tells if asked
+for. It is held against the structure that was told: how often both agree, how often either is the
+machine's, and what either leaves of the held-out record.
 """
 
 from __future__ import annotations
@@ -28,6 +24,7 @@ from reliability import answers
 from score import share
 
 from actuator_glue.diagnosis.candidates import mean_effects
+from actuator_glue.diagnosis.weights import TELLING, price
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.structure import Structure
@@ -36,18 +33,17 @@ from actuator_glue.records import Array, Record
 Json = dict[str, Any]
 
 
-def weights(rows: Sequence[Json], material: float, c: float, searched: int) -> Array:
-    """Return the coarsened weight of every row of a table (K,), which sum to one.
+def weights(rows: Sequence[Json], tells: float, searched: int) -> Array:
+    """Return the weight of every row of a table (K,); they sum to one.
 
     Args:
-        rows: structures with `effects`, `parameters` and `left_out` [m].
-        material: what matters [m].
-        c: nats that an error of just what matters costs.
+        rows: structures with `effects` and `left_out` [m].
+        tells: error that costs a nat [m].
         searched: how many effects there are to choose from.
     """
     left = np.array([math.inf if r['left_out'] is None else r['left_out'] for r in rows])
-    price = [len(r['parameters']) + math.log(math.comb(searched, len(r['effects']))) for r in rows]
-    log_w = -c * (left**2 - np.min(left) ** 2) / material**2 - np.array(price)
+    cost = [price(Structure(r['effects']), CATALOGUE, searched) for r in rows]
+    log_w = -((left**2 - np.min(left) ** 2) / tells**2) - np.array(cost)
     w = np.exp(log_w - log_w.max())
     return np.asarray(w / w.sum())
 
@@ -62,17 +58,17 @@ def held_out(case: Case, row: Json) -> float:
     return float(np.sqrt(np.mean(error**2)))
 
 
-def replay(result: Json, generator: str, c: float) -> Json | None:
+def replay(result: Json, generator: str, telling: float) -> Json | None:
     """Choose again from one machine's table; None where it holds terms of no catalogue."""
     found = result['diagnosis']
     rows = [r for r in found['structures'] if set(r['effects']) <= set(CATALOGUE)]
     told = next((r for r in rows if r['chosen']), None)
     if told is None or not rows:
         return None
-    w = weights(rows, found['alarm']['threshold'], c, len(mean_effects()))
+    w = weights(rows, telling * found['alarm']['threshold'], len(mean_effects()))
     chosen = rows[int(np.argmax(w))]
     truth = {catalogued(n) for n in result['effects']}
-    moved = {n for n in truth if n in mean_effects(reserved=True)}
+    moved = truth & {*mean_effects(), *mean_effects(reserved=True)}
     case = import_module(generator).build(result['seed'])
     return {
         'seed': result['seed'],
@@ -92,9 +88,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('folders', nargs='+', type=Path, help='OUT of campaigns of one generator')
     parser.add_argument('--generator', default='cases')
-    parser.add_argument('--c', type=float, default=4.0, help='nats for what just matters')
+    parser.add_argument(
+        '--telling', type=float, default=TELLING, help='of what matters: error that costs a nat'
+    )
     args = parser.parse_args()
-    table = [replay(r, args.generator, args.c) for r in answers(args.folders)]
+    table = [replay(r, args.generator, args.telling) for r in answers(args.folders)]
     rows = [row for row in table if row is not None]
     if not rows:
         raise SystemExit('no stored table of these folders can be replayed')

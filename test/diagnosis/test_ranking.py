@@ -9,7 +9,6 @@ import pytest
 from scipy import stats
 
 from actuator_glue.diagnosis import false_alarms, ranking, verdict
-from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.held_out import HeldOutError
 from actuator_glue.diagnosis.ranking import standard_error, weights
 from actuator_glue.diagnosis.score import Scorer, splits_of
@@ -69,100 +68,6 @@ def test_the_best_of_many_candidates_by_chance() -> None:
     assert alone == pytest.approx(0.5 * stats.chi2.isf(0.01, 1), rel=0.05)
 
 
-def test_names_that_are_tied_by_size_share_the_probability() -> None:
-    """What is told as 'cannot be told apart' is not told as certain: 80 nats, 1 % of the error."""
-    known = ranking._tolerant(np.array([1.0, 1e-30, 0.0]), [1e-8], 1e-6)
-    assert known == pytest.approx([0.5, 0.5, 0.0], abs=1e-3)
-    apart = ranking._tolerant(np.array([1.0, 1e-30, 0.0]), [3e-6], 1e-6)
-    assert apart == pytest.approx([1.0, 0.0, 0.0])
-
-
-def test_an_alternative_has_a_probability() -> None:
-    """A rival that every block excludes is none, however unevenly the blocks do.
-
-    Two blocks hold nearly all the evidence, so that its standard error is near its sum.
-    """
-    against = np.full(15, 400.0)
-    against[:2] = 45e3
-    rest = trial('', 40e-6, np.full(15, -10e3) - against)
-    best = trial('backlash', 5e-6, np.zeros(15))
-    far = trial('specimen-hardening', 32e-6, -against)
-    alike = trial('coulomb-friction', 5.2e-6, np.full(15, -20.0))
-    level = cast('Scorer', None)  # none of these is a richer form of another
-    found = ranking.compare(rest, best, [far, alike], level, Thresholds())
-    told = {r.name: r for r in found}
-    assert told['specimen-hardening'].nats < 2.0 * told['specimen-hardening'].stderr
-    assert not told['specimen-hardening'].tied
-    assert told['specimen-hardening'].probability < 1e-6
-    assert told['coulomb-friction'].tied
-    assert told['coulomb-friction'].weight > 0.4
-    assert 0.1 < told['coulomb-friction'].probability < 0.2
-
-
-def test_a_rival_that_only_shares_is_told_by_how_often_such_are_right(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """Excluded by the blocks, or a richer form that gains nothing: a quarter of the odds.
-
-    Who speaks for what is tied is still decided by equal shares.
-    """
-    even = np.zeros(15)
-    rest, best = trial('', 40e-6, np.full(15, -500.0)), trial('coulomb-friction', 10e-6, even)
-    level = cast('Scorer', None)
-    behind = trial('specimen-yield', 10e-6, np.full(15, -2.0))
-    richer = trial('stribeck-friction', 10e-6, even, 6)
-    ahead = trial('stribeck-friction', 10e-6, np.full(15, 0.01), 6)
-    for other, limit, share in (
-        (behind, None, 0.25),
-        (richer, ('slope', 0.1), 0.25),
-        (ahead, ('slope', 0.1), 1.0),
-    ):
-        monkeypatch.setattr(ranking, '_limit', lambda t, name, scorer, limit=limit: limit)
-        told = ranking.compare(rest, best, [other], level, Thresholds())
-        first, second = (next(r for r in told if r.name == t.added) for t in (best, other))
-        assert second.probability / first.probability == pytest.approx(share, rel=0.2)
-        assert second.weight / first.weight == pytest.approx(1.0, rel=0.2)
-        assert second.tied
-
-
-def test_one_stretch_alone_excludes_no_rival() -> None:
-    """A hundred nats of one block and next to nothing of the others: both names are possible."""
-    level, even = cast('Scorer', None), np.zeros(15)
-    rest, best = trial('', 40e-6, np.full(15, -500.0)), trial('delay', 10e-6, even)
-    against = np.full(15, 0.1)
-    for blocks, least, most in ((1, 0.1, 0.3), (2, 0.0, 0.01)):
-        against[:blocks] = 100.0
-        lag = trial('sensor-lag', 14e-6, -against)
-        found = ranking.compare(rest, best, [lag], level, Thresholds())
-        told = {r.name: r for r in found}['sensor-lag']
-        assert told.nats == pytest.approx(against.sum() - 100.0)
-        assert told.tied is (blocks == 1) and least <= told.probability <= most
-
-
-def test_one_stretch_alone_puts_nothing_richer_ahead() -> None:
-    """A hundred nats of one block for more parameters: both names are as likely without it."""
-    level, even = cast('Scorer', None), np.zeros(15)
-    rest, best = trial('', 40e-6, np.full(15, -500.0)), trial('viscous-damping', 10e-6, even)
-    once = np.where(np.arange(15) == 3, 100.0, 0.0)
-    for size, share in ((6, 0.5), (5, 0.0)):
-        payload = trial('payload-inertia', 4e-6, once, size)
-        found = ranking.compare(rest, best, [payload], level, Thresholds())
-        told = {r.name: r.probability for r in found}
-        assert told['viscous-damping'] == pytest.approx(share, abs=0.2)
-
-
-def test_a_richer_form_at_its_bound_takes_no_weight_of_the_name_that_it_mends() -> None:
-    """Ten nats in each block ahead: half of the weight that both have stays the name's."""
-    level, even = cast('Scorer', None), np.zeros(15)
-    rest, best = trial('', 40e-6, np.full(15, -500.0)), trial('coulomb-friction', 10e-6, even)
-    form = trial('delay', 4e-6, np.full(15, 10.0), 6)
-    for pressed, share in ((False, 0.0), (True, 0.5)):
-        found = ranking.compare(rest, best, [form], level, Thresholds(), pressed=[pressed])
-        told = {r.name: r.probability for r in found}
-        assert told['coulomb-friction'] == pytest.approx(share, abs=1e-6)
-        assert sum(told.values()) == pytest.approx(1.0)
-
-
 def test_held_out_records_that_contradict_lower_the_certainty() -> None:
     """Names that leave three times the noise where nothing was fitted are not certain."""
     error = HeldOutError(95e-6, (0, 1), 31e-6, (25e-6, 37e-6), 10e-6, 0.9, (0.8, 1.0), 95e-6)
@@ -179,39 +84,26 @@ def test_held_out_records_that_contradict_lower_the_certainty() -> None:
     assert verdict.certainty(0.95, nothing, 5e-6) == 0.0
 
 
-def test_three_of_a_kind_speak_for_what_is_tied() -> None:
-    """Damping ahead by a hair of three lags is told as a lag; ahead of one, as damping."""
-    groups = dict.fromkeys(('delay', 'sensor-lag', 'valve-lag'), 'lag') | {'damping': 'damping'}
-    names = ('damping', 'valve-lag', 'delay', 'sensor-lag')
-    shares = (0.35, 0.25, 0.2, 0.1)
-    rows = [Rival(n, 0.0, 0.0, 0.0, True, p, p) for n, p in zip(names, shares, strict=True)]
-    assert ranking.spokesman('damping', rows, groups) == 'valve-lag'
-    assert ranking.spokesman('damping', rows[:2], groups) == 'damping'
-    apart = [rows[0], *(replace(r, tied=False) for r in rows[1:])]
-    assert ranking.spokesman('damping', apart, groups) == 'damping'
-
-
-def test_a_pair_pays_for_being_one_of_many() -> None:
-    """As good by blocks and error, one of ten pairs to an effect has a tenth of its weight."""
+def test_shares_are_odds_that_sum_to_one() -> None:
+    """Half as likely, a tenth, none of them; a pair has the names of both."""
     level, even = cast('Scorer', None), np.zeros(15)
     rest, best = trial('', 40e-6, np.full(15, -500.0)), trial('payload-inertia', 10e-6, even)
-    pair = trial('viscous-damping + delay', 10e-6, even)
-    found = ranking.compare(rest, best, [pair], level, Thresholds(), float(np.log(10.0)))
-    told = {r.name: r for r in found}
-    assert told['payload-inertia'].probability == pytest.approx(10 / 11, rel=1e-3)
-    assert told['viscous-damping + delay'].probability == pytest.approx(1 / 11, rel=1e-3)
-    assert told['viscous-damping + delay'].effects == ('viscous-damping', 'delay')
-    assert told['viscous-damping + delay'].tied
+    two = trial('viscous-damping + delay', 10e-6, even - 1.0)
+    one = trial('delay', 37e-6, even)
+    found = ranking.compare(rest, best, [one, two], (0.1, 0.5, 0.4), level, Thresholds())
+    assert [r.name for r in found] == ['payload-inertia', 'viscous-damping + delay', 'delay']
+    assert [r.probability for r in found] == pytest.approx([0.5, 0.25, 0.05])
+    assert found[1].effects == ('viscous-damping', 'delay')
+    assert found[1].nats == pytest.approx(14.0)
+    # What removes less than half is no rival, however likely.
+    assert [r.tied for r in found] == [True, True, False]
 
 
-@pytest.mark.parametrize('other', ['viscous-damping + delay', 'delay'])
-def test_what_is_behind_keeps_its_share_where_their_errors_are_alike(other: str) -> None:
-    """300 nats behind what does not speak: half the weight at the same error, or none."""
-    level, ahead = cast('Scorer', None), np.full(15, 20.0)
-    rest, best = trial('', 40e-6, np.full(15, -500.0)), trial('payload-inertia', 10e-6, 0 * ahead)
-    for rms, low, high in ((9.99e-6, 0.45, 0.5), (4e-6, 0.0, 1e-6)):
-        pair = trial(other, rms, ahead)
-        found = ranking.compare(rest, best, [pair], level, Thresholds(), float(np.log(10.0)))
-        told = {r.name: r.probability for r in found}
-        assert low <= told['payload-inertia'] <= high
-        assert told[other] == pytest.approx(1 - told['payload-inertia'])
+def test_what_has_next_to_no_weight_is_no_alternative() -> None:
+    """Four nats behind."""
+    level, even = cast('Scorer', None), np.zeros(15)
+    rest, best = trial('', 40e-6, np.full(15, -500.0)), trial('delay', 10e-6, even)
+    rivals = trial('sensor-lag', 10e-6, even), trial('valve-lag', 10e-6, even)
+    odds = (np.exp(-3.9), np.exp(-4.1), 0.0)
+    found = ranking.compare(rest, best, rivals, odds, level, Thresholds())
+    assert [r.tied for r in found] == [True, True, False]

@@ -1,0 +1,87 @@
+"""One weight for every structure: what it leaves against what it costs."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from trials import ENTRIES, trial
+
+from actuator_glue.diagnosis.judge import Judge
+from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.diagnosis.weights import price
+from actuator_glue.inference.least_squares.fit import Fit
+from actuator_glue.model.effects import CATALOGUE
+from actuator_glue.model.structure import Structure
+
+
+class Left:
+    """A search whose structures leave what their fit does."""
+
+    names = tuple(f'effect {i}' for i in range(30))
+    entries = ENTRIES
+
+    @property
+    def scorer(self) -> 'Left':
+        """The one that scores."""
+        return self
+
+    def left_out_error(self, fit: Fit) -> float:
+        """Return the rms error of blocks left out [m]."""
+        return fit.rms
+
+
+@pytest.fixture
+def judge() -> Judge:
+    """One to whom 10 um matter."""
+    found = Judge(Left(), Thresholds())
+    found.material = 1e-5
+    return found
+
+
+def test_more_parameters_and_more_choices_cost() -> None:
+    """A nat for each parameter; 30 effects to choose from, 435 pairs of them; forms are many."""
+    base, delay = (price(Structure(e), CATALOGUE, 30) for e in ((), ('delay',)))
+    assert base == 4.0
+    assert delay == pytest.approx(5.0 + math.log(30.0))
+    two = price(Structure(('delay', 'viscous-damping')), CATALOGUE, 30)
+    assert two == pytest.approx(6.0 + math.log(435.0))
+    forms = [e for e in ENTRIES.values() if e.name.startswith('learned')]
+    term = Structure([forms[0]])
+    assert price(term, ENTRIES, 30) == pytest.approx(len(term.parameters) + math.log(len(forms)))
+
+
+def test_a_tenth_of_what_matters_costs_four_nats(judge: Judge) -> None:
+    """Beside the same number of parameters; the best is behind nothing."""
+    best = trial(('delay',), 1e-5)
+    left = math.hypot(1e-5, 0.1 * judge.material)
+    other = trial(('sensor-lag',), left)
+    assert judge.behind(other, best) == pytest.approx(4.0)
+    assert judge.behind(best, other) == pytest.approx(-4.0)
+    richer = trial(('stribeck-friction',), 1e-5)
+    assert judge.behind(richer, trial(('coulomb-friction',), 1e-5)) == pytest.approx(2.0)
+
+
+def test_equations_for_one_thing_differ_by_a_share_of_what_they_explain(judge: Judge) -> None:
+    """Beside 400 um explained 30 um more hardly tell a name; beside 40 um they do."""
+    best = trial(('backlash',), 1e-5)
+    rival = trial(('coulomb-friction',), math.hypot(1e-5, 3e-5))
+    many, few = (trial((), math.hypot(1e-5, size)) for size in (4e-4, 4e-5))
+    (share, none), (apart, _) = (judge.odds(rest, best, [rival]) for rest in (many, few))
+    assert share > 0.1 > 1e-3 > apart
+    assert none == 0.0
+
+
+def test_what_fits_better_by_chance_is_no_more_likely_than_what_is_told(judge: Judge) -> None:
+    """A rival that the search did not go on to has half the weight at most."""
+    best, ahead = trial(('delay',), 1.1e-5), trial(('sensor-lag',), 1e-5)
+    assert judge.odds(trial((), 1e-4), best, [ahead])[0] == 1.0
+
+
+def test_a_structure_that_diverges_has_no_weight(judge: Judge) -> None:
+    """Its error is no number."""
+    best = trial(('delay',), 1e-5)
+    lost = replace(best, fit=replace(best.fit, error=np.full_like(best.fit.error, np.inf)))
+    assert isinstance(lost, Trial)
+    assert judge.odds(trial((), 1e-4), best, [lost])[0] == 0.0
