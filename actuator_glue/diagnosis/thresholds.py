@@ -42,7 +42,7 @@ class Thresholds:
     false_alarms: float = 0.01
     nats: float = 10.0
     tie_nats: float = 4.0
-    tie_share: float = 0.05
+    tie_share: float = 0.03
     left_noise: float = 0.6
     left_share: float = 0.3
     beaten_noise: float = 0.3

@@ -64,9 +64,9 @@ def test_a_tenth_of_what_matters_costs_four_nats(judge: Judge) -> None:
 
 
 def test_equations_for_one_thing_differ_by_a_share_of_what_they_explain(judge: Judge) -> None:
-    """Beside 400 um explained 30 um more hardly tell a name; beside 40 um they do."""
+    """Beside 400 um explained 15 um more hardly tell a name; beside 40 um they do."""
     best = trial(('backlash',), 1e-5)
-    rival = trial(('coulomb-friction',), math.hypot(1e-5, 3e-5))
+    rival = trial(('coulomb-friction',), math.hypot(1e-5, 1.5e-5))
     many, few = (trial((), math.hypot(1e-5, size)) for size in (4e-4, 4e-5))
     (share, none), (apart, _) = (judge.odds(rest, best, [rival]) for rest in (many, few))
     assert share > 0.1 > 1e-3 > apart
