@@ -14,7 +14,7 @@ ROS := . install/setup.bash &&
 .DEFAULT_GOAL := help
 SAFETY_STAMP := .venv/safety
 
-.PHONY: help setup demo test coverage test-slow lint bench soak fuzz audit reproduce study-rths tables scores docs news clean
+.PHONY: help setup demo follow test coverage test-slow lint bench soak fuzz audit reproduce study-rths tables scores docs news clean
 
 help: ## show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 20
@@ -38,6 +38,9 @@ demo: $(ROS_STAMP) ## about a minute of real nodes; results in out/demo
 	@$(ROS) $(BIN)/python -m examples.demonstration --force --out out/demo \
 		$(if $(DATA),--data '$(DATA)') $(if $(CHANNELS),--channels '$(CHANNELS)') \
 		$(if $(STIFFNESS),--stiffness '$(STIFFNESS)') $(DEMO_ARGS)
+
+follow: ## the tutorial, word for word, in an empty container (root, ten minutes)
+	@scripts/follow_tutorial.sh
 
 test: $(ROS_STAMP) ## all tests but the slow ones
 	@$(ROS) $(BIN)/python -m pytest -n 3 --dist loadfile --durations 10 $(PYTEST_ARGS)
