@@ -32,6 +32,7 @@ def size(mean: float, unit: str) -> Estimate:
 def diagnosis() -> ag.Diagnosis:
     """Return a diagnosis of which the sizes alone are known."""
     found = ag.Diagnosis.__new__(ag.Diagnosis)
+    object.__setattr__(found, 'motion', 'm')
     play = Finding(
         'backlash', ('coulomb-friction',), 0.9, '', {'backlash': size(4e-5, 'm')}, 0, 0, 0
     )

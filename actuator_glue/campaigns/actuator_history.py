@@ -23,6 +23,7 @@ if TYPE_CHECKING:
 
 # A day is an outlier where chance puts one of as many days so far out in one of 20 histories.
 _OUTLIERS = 0.05
+_MOST = 100.0  # logarithm: farther off is no number to be told
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,8 +217,15 @@ def _far(series: Series, together: Pooled) -> list[str]:
         distance = float(deviation @ np.linalg.solve(spread, deviation))
         worst = int(np.argmax(np.abs(deviation) / np.sqrt(np.diag(spread))))
         told.append(
-            f'{series.names[worst]} {100.0 * np.expm1(deviation[worst]):+.1f} % off its level'
+            f'{series.names[worst]} {_off(float(deviation[worst]))} its level'
             if distance > limit
             else ''
         )
     return told
+
+
+def _off(logarithm: float) -> str:
+    """Say how far a number is from another: in percent, or how many times it is that."""
+    if abs(logarithm) < 1.0:
+        return f'{100.0 * np.expm1(logarithm):+.1f} % off'
+    return f'{np.exp(min(logarithm, _MOST)):.2g} times'

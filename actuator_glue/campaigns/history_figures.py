@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from actuator_glue.campaigns.actuator_history import ActuatorHistory
 from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array
 from actuator_glue.report import style
+
+if TYPE_CHECKING:
+    from actuator_glue.campaigns.actuator_history import ActuatorHistory
 
 _DAY = 'datetime64[D]'
 

@@ -6,18 +6,20 @@ import math
 import os
 from html import escape
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 from urllib.parse import quote
 
 import numpy as np
 
 from actuator_glue.campaigns import history_figures as figures
-from actuator_glue.campaigns.actuator_history import ActuatorHistory
 from actuator_glue.campaigns.change_points import A_YEAR
 from actuator_glue.campaigns.effect_spells import EffectHistory
 from actuator_glue.model.parameters import BASE
 from actuator_glue.report.html import Block, Note, Page, Picture, Section, Table, Text
 from actuator_glue.report.quantity import plain, said, said_in, spread, word
+
+if TYPE_CHECKING:
+    from actuator_glue.campaigns.actuator_history import ActuatorHistory
 
 # What stands behind a parameter that moved, for a mechanic.
 _LOOK_AT = {
