@@ -341,8 +341,12 @@ def _due(state: LiveState) -> str:
     paused = seconds < state.looked + settings.pause
     if state.reason and not paused and seconds >= state.ready:
         return state.reason
-    if state.left_open and seconds >= 2.0 * state.looked:
-        return 'names are tied or structure remains, and there are twice as many data'
+    if seconds >= 2.0 * state.looked:
+        if state.left_open:
+            return 'names are tied or structure remains, and there are twice as many data'
+        if state.weights and state.weights[0][0]:
+            # What grows with time is small at first, and windows follow a slow change.
+            return 'there are twice as many data as what was added was found in'
     # Before the first one there is nothing to look at again.
     again = max(state.alarm, state.looked) + max(settings.pause, state.looked - state.alarm)
     if seconds >= again:

@@ -91,6 +91,18 @@ def test_it_looks_again_at_twice_the_data_while_something_is_open():
     assert looks(actions) == []
 
 
+def test_what_was_added_is_looked_at_again_in_twice_the_data():
+    """A gain that drifts is small at first, and windows follow it: no alarm would tell."""
+    state, _ = run(broken(20.0), live.Concluded(proposal('backlash')))
+    carried = live.Estimated(False, ((PLAY, 0.99), (frozenset(), 0.01)))
+    state, actions = run(state, carried, live.Received(39.9))
+    assert looks(actions) == []
+    state, actions = run(state, live.Received(40.0))
+    assert looks(actions) == ['there are twice as many data as what was added was found in']
+    state, actions = run(state, live.Concluded(proposal('backlash', 'gain-drift')))
+    assert carries(actions) == [('backlash', 'gain-drift')]
+
+
 def test_a_contradicted_prior_is_looked_into_and_once():
     state, _ = run(broken(), live.Concluded(proposal('coulomb-friction')))
     wrong = live.Estimated(True, ((frozenset({'coulomb-friction'}), 1.0),))
