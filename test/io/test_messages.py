@@ -189,8 +189,8 @@ def test_a_definition_that_says_nothing_changes_nothing(text: str) -> None:
 
 
 def test_bags_of_older_messages_are_read() -> None:
-    """The recorded session was made before effects had limits and posteriors their doubts."""
-    found = list(decoded(ROOT / 'bags' / 'session', ('Diagnosis', 'PosteriorMoments')))
+    """This session was recorded before effects had limits and posteriors their doubts."""
+    found = list(decoded(ROOT / 'bags' / 'older_session', ('Diagnosis', 'PosteriorMoments')))
     (diagnosis,) = [m for name, m in found if name.endswith('Diagnosis')]
     assert [e.name for e in diagnosis.effects] == ['backlash']
     assert diagnosis.effects[0].mean[0] == pytest.approx(4.06e-5, rel=0.01)

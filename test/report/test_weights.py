@@ -36,9 +36,16 @@ def test_only_the_last_are_shown() -> None:
 
 
 def test_what_a_bag_carried() -> None:
-    """The reference session: Eq. (2) first, play in its place at 26 s; of an older version."""
-    (course,) = weights.of_bag(SESSION).values()
+    """A session of an older version: Eq. (2) first, play in its place at 26 s."""
+    (course,) = weights.of_bag(SESSION.with_name('older_session')).values()
     first, second = spells(course)
     assert first == Spell(first.start_s, first.stop_s, {'Eq. (2)': 1.0}, {'Eq. (2)': 1.0})
     assert (first.start_s, second.told()) == (pytest.approx(5.0), 'backlash 100 %')
     assert first.stop_s < second.start_s < 30.0 and second.stop_s == pytest.approx(41.0)
+
+
+def test_weights_move_over_the_reference_session() -> None:
+    """Play comes in beside Eq. (2), which leaves within three windows."""
+    (course,) = weights.of_bag(SESSION).values()
+    told = [s.told() for s in spells(course)]
+    assert told == ['Eq. (2) 100 %', 'backlash 97 %, Eq. (2) 3 %', 'backlash 100 %']
