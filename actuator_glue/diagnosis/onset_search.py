@@ -75,7 +75,8 @@ def _since(
         search: searches the data since a moment.
     """
     before, since = moment.split(first.data)
-    if moments.counted(since) < moments.SHORTEST:
+    held = first.prepared.since(moment).held
+    if moments.counted(since) < moments.SHORTEST or moments.counted(held) < moments.HELD:
         return None
     second = search(moment)
     found, base = second.found, None

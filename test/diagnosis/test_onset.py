@@ -4,14 +4,17 @@ import json
 from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from actuator_glue.diagnosis.diagnose import diagnose
-from actuator_glue.diagnosis.onset.moments import Moment
+from actuator_glue.diagnosis.onset.moments import SHORTEST, Moment
 from actuator_glue.diagnosis.onset.onset import Appeared, dated
+from actuator_glue.diagnosis.onset_search import _since
+from actuator_glue.diagnosis.preparation import prepare
 from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
@@ -46,6 +49,24 @@ def diagnosed(
     noise = 3e-6 * np.random.default_rng(1).standard_normal(len(T))
     record = replace(bare, measured=off + share * (on - off) + noise)
     return diagnose([record], settings=Thresholds(evaluations=0))
+
+
+def test_a_change_after_which_nothing_is_held_out_is_not_told() -> None:
+    """A stream that is looked at while it runs: of blocks held out the last one is before it."""
+    n = round(57.0 * RATE)
+    command = 2e-3 * np.sin(2 * np.pi * 0.02 * (np.arange(n) / RATE) ** 2)
+    prepared = prepare([Record(command, np.roll(command, 3), 1 / RATE, stiffness=250e3)], [])
+    first: Any = SimpleNamespace(prepared=prepared, data=prepared.fit)
+
+    def search(moment: Moment) -> Any:
+        raise LookupError
+
+    last = prepared.held.masks[0].nonzero()[0][-1] / RATE
+    assert 57.0 - last > SHORTEST
+    late = Moment(0, last + 0.1)
+    assert _since(first, late, None, Thresholds(), search) is None
+    with pytest.raises(LookupError):
+        _since(first, Moment(0, last - 2.0), None, Thresholds(), search)
 
 
 @pytest.mark.slow

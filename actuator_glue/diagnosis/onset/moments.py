@@ -20,6 +20,7 @@ from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 
 SHORTEST = 5.0  # s on either side
+HELD = 1.0  # s after it that decided nothing: of what none is left nothing can be told
 _STEP = 0.25  # s between the times tried
 _EARLIER = (1.0, 0.75, 0.5, 0.35)
 _LEFT_NOISE = 0.6  # structure before it, of the noise, at most
