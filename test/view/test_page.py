@@ -242,6 +242,7 @@ def test_explanations_and_their_weights(tmp_path: Path) -> None:
 
 
 @browser
+@pytest.mark.slow
 def test_keys_wheel_and_drag() -> None:
     """They move and zoom; what stands under the pointer stays; the whole test leads anywhere."""
 
