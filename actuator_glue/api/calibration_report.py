@@ -101,6 +101,21 @@ def error_line(error: FitError, left: ResidualStructure | None) -> str:
     return line if left is None else f'{line}; {left.amounts()}'
 
 
+def verdict(
+    problems: Sequence[str], error: FitError, left: ResidualStructure | None
+) -> tuple[str, ...]:
+    """Return why a posterior must not be used, or that the model fits."""
+    return tuple(problems) or (f'the model fits: {error_line(error, left)}',)
+
+
+def residuals(left: Sequence[Left]) -> html.Picture:
+    """Draw what the best draw leaves of each record."""
+    return html.Picture.of(
+        residual_figure(left),
+        'What the best draw leaves of each record; grey is noise, which no model explains.',
+    )
+
+
 def first_page(found: CalibrationData, hybrid: str = '', *, drawn: bool = True) -> FirstPage:
     """Return what a person is told first.
 
@@ -110,15 +125,8 @@ def first_page(found: CalibrationData, hybrid: str = '', *, drawn: bool = True) 
         drawn: with a picture, where the records are known, and symbols for names; on a terminal
             neither.
     """
-    verdict = found.problems or (f'the model fits: {error_line(found.error, found.structure)}',)
-    picture = None
-    if drawn and found.records:
-        picture = html.Picture.of(
-            residual_figure(_left(found)),
-            'What the best draw leaves of each record; grey is noise, which no model explains.',
-        )
     return FirstPage(
-        tuple(verdict),
+        verdict(found.problems, found.error, found.structure),
         certainty(
             found.parameters,
             found.posterior,
@@ -126,7 +134,7 @@ def first_page(found: CalibrationData, hybrid: str = '', *, drawn: bool = True) 
             found.problems,
             word if drawn else str,
         ),
-        picture,
+        residuals(_left(found)) if drawn and found.records else None,
         errors(found.error, found.structure),
         _parameters(found, word if drawn else str),
         delays(found.tracking),

@@ -7,7 +7,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from actuator_glue.api import judgement, tracking
-from actuator_glue.api.calibration_report import certainty, delays, error_line, errors
+from actuator_glue.api.calibration_report import (
+    certainty,
+    delays,
+    error_line,
+    errors,
+    residuals,
+    verdict,
+)
 from actuator_glue.api.combinations_data import COMBINATIONS, CombinationsData
 from actuator_glue.inference.at_bound import pressed
 from actuator_glue.model.structure import Structure
@@ -16,7 +23,7 @@ from actuator_glue.report import html
 from actuator_glue.report.first_page import FirstPage, command
 from actuator_glue.report.posterior_figure import posterior_figure
 from actuator_glue.report.quantity import said_in, spread
-from actuator_glue.report.residual_figure import Left, residual_figure
+from actuator_glue.report.residual_figure import Left
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -50,17 +57,10 @@ def first_page(found: CombinationsData, *, drawn: bool = True) -> FirstPage:
         found: what is known.
         drawn: with a picture, where the records are known.
     """
-    verdict = found.problems or (f'the model fits: {error_line(found.error, found.structure)}',)
-    picture = None
-    if drawn and found.residuals:
-        picture = html.Picture.of(
-            residual_figure(_left(found)),
-            'What the best draw leaves of each record; grey is noise, which no model explains.',
-        )
     return FirstPage(
-        (*verdict, found.notes[0]),
+        (*verdict(found.problems, found.error, found.structure), found.notes[0]),
         certainty(found.combinations, found.posterior, _at_zero(found), found.problems),
-        picture,
+        residuals(_left(found)) if drawn and found.residuals else None,
         errors(found.error, found.structure),
         _parameters(found),
         delays(found.tracking),

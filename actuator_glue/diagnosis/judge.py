@@ -99,8 +99,8 @@ class Judge:
         Args:
             trial: the structure.
             other: the one that it is held against.
-            alike: rms error that tells the two apart by one nat, where it is not for what matters
-                to say [m].
+            alike: rms error that costs a nat between equations for the same thing, beside that
+                of what matters [m].
         """
         search, scorer = self.search, self.search.scorer
         assert scorer is not None
@@ -114,8 +114,8 @@ class Judge:
     def odds(self, rest: Trial, best: Trial, trials: Sequence[Trial]) -> list[float]:
         """Return the weights of rivals in the place of an effect, and of none, beside its own.
 
-        Equations for the same thing differ by a share of what they explain, too, which is none
-        of the machine's.
+        Equations for the same thing are told apart less sharply, the more they explain: none of
+        them is exactly the machine's.
 
         Args:
             rest: the structure without the effect.

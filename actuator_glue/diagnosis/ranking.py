@@ -1,8 +1,8 @@
-"""How sure a ranking is: rival structures, their distance with its standard error, their weights.
+"""How sure a ranking is: rivals with their shares of the weight, and weights from block scores.
 
-Scores come block by block, so that the spread over blocks says how far a ranking is chance, and
-so do the weights. A rival is tied by its weight alone: what is told as an alternative has a
-probability, and what has none is no alternative.
+What is told as an alternative has a probability, and what has none is no alternative (weights.py).
+Where the question is chance alone, scores come block by block, so that the spread over blocks says
+how far a ranking is chance.
 """
 
 from __future__ import annotations
@@ -105,7 +105,7 @@ def compare(
     """
     explained, total = removed(rest, best), 1.0 + sum(odds)
     out = [Rival(best.added, 0.0, 0.0, 0.0, True, 1.0 / total)]
-    for trial, share in zip(trials, odds, strict=False):
+    for trial, share in zip(trials, odds[:-1], strict=True):
         near = share > math.exp(-settings.tie_nats)
         tied = near and removed(rest, trial) > _SAME * explained
         nats = max(0.0, evidence(best.scores, trial.scores))

@@ -71,6 +71,16 @@ class Browser:
             await self.call(f'{domain}.enable')
         return self
 
+    async def screen(self, width: int, height: int, *, mobile: bool) -> None:
+        """Have a screen of this size [px]."""
+        await self.call(
+            'Emulation.setDeviceMetricsOverride',
+            width=width,
+            height=height,
+            deviceScaleFactor=1,
+            mobile=mobile,
+        )
+
     async def __aexit__(self, *_: object) -> None:
         """End it."""
         self._reader.cancel()

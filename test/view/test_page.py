@@ -153,13 +153,7 @@ def test_no_width_makes_the_chart_grow(width: int, tmp_path: Path) -> None:
 
     async def look() -> None:
         async with Browser() as page:
-            await page.call(
-                'Emulation.setDeviceMetricsOverride',
-                width=width,
-                height=900,
-                deviceScaleFactor=1,
-                mobile=width < 1000,
-            )
+            await page.screen(width, 900, mobile=width < 1000)
             await page.open(url)
             await page.until('document.body.dataset.frames > 5')
             first = await page.value(sizes)
@@ -202,13 +196,7 @@ def test_explanations_and_their_weights(tmp_path: Path) -> None:
 
     async def look() -> None:
         async with Browser() as page:
-            await page.call(
-                'Emulation.setDeviceMetricsOverride',
-                width=1440,
-                height=900,
-                deviceScaleFactor=1,
-                mobile=False,
-            )
+            await page.screen(1440, 900, mobile=False)
             await page.open(url)
             await page.until('document.body.dataset.frames > 1 && weights.chart')
             picture = await page.picture()
@@ -313,13 +301,7 @@ def test_ten_minutes_add_nothing_to_the_page() -> None:
         async with Browser() as page:
             await page.call('Network.disable')
             await page.call('Performance.enable')
-            await page.call(
-                'Emulation.setDeviceMetricsOverride',
-                width=390,
-                height=844,
-                deviceScaleFactor=1,
-                mobile=True,
-            )
+            await page.screen(390, 844, mobile=True)
             await page.open(url)
             kept = []
             for seconds in range(120, 721, 40):

@@ -40,13 +40,7 @@ def made(k: float, *effects: str) -> ag.Record:
 async def measured(page: Path) -> dict[str, Any]:
     """Return what a browser makes of a page on a phone."""
     async with Browser() as browser:
-        await browser.call(
-            'Emulation.setDeviceMetricsOverride',
-            width=WIDTH,
-            height=844,
-            deviceScaleFactor=1,
-            mobile=True,
-        )
+        await browser.screen(WIDTH, 844, mobile=True)
         await browser.open(page.as_uri())
         await browser.until('document.readyState === "complete"')
         found: dict[str, Any] = await browser.value(MEASURE)
