@@ -34,7 +34,7 @@ $(ROS_STAMP): $(VENV_STAMP) scripts/build_ros.sh scripts/warm_up.py setup.py set
 	@touch $@
 
 # make demo DATA=record.csv CHANNELS=map.yaml STIFFNESS=250e3 runs on a laboratory file instead of the simulator.
-demo: $(ROS_STAMP) ## about a minute of real nodes; results in out/demo
+demo: $(ROS_STAMP) ## 90 s of real nodes, three minutes in all; results in out/demo
 	@$(ROS) $(BIN)/python -m examples.demonstration --force --out out/demo \
 		$(if $(DATA),--data '$(DATA)') $(if $(CHANNELS),--channels '$(CHANNELS)') \
 		$(if $(STIFFNESS),--stiffness '$(STIFFNESS)') $(DEMO_ARGS)

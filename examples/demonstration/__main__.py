@@ -1,4 +1,4 @@
-"""Run the suite as real nodes for a minute; replay, report, and diagnose what the model lacks.
+"""Run the suite as real nodes for 90 s; replay, report, and diagnose what the model lacks.
 
 Exit codes: 0 done; 1 a sample was lost, the replay differs, or the live chain did not find what
 is hidden; 2 the input cannot be used.
@@ -48,7 +48,7 @@ def parser() -> argparse.ArgumentParser:
     )
     add('--hold', choices=('zoh', 'linear'), help='how the command runs between its samples')
     for name, value, unit, meaning in (
-        ('--seconds', 60.0, 'S', 'length of the test'),
+        ('--seconds', sources.PROMISED_SECONDS, 'S', 'length of the test'),
         ('--rate', 1000.0, 'HZ', 'rate of the simulator'),
         ('--window', 5.0, 'S', 'length of a window'),
         ('--hop', 1.0, 'S', 'time from one window to the next'),
