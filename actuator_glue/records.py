@@ -164,6 +164,27 @@ def check_period(period: float, source: str = '') -> float:
     return period
 
 
+def check_motion(motion: str, stiffness: float | None, source: str = '') -> str:
+    """Return what moves, metres or another motion, that can have a specimen stiffness [N/m].
+
+    Raises:
+        InputError: neither 'm' nor one of `motion.WRITTEN`, or a stiffness of what does not move
+            in metres.
+    """
+    where = f'{source}: ' if source else ''
+    if motion != METRES and motion not in WRITTEN:
+        raise InputError(
+            f'{where}motion {motion!r} is unknown; use one of {", ".join((METRES, *WRITTEN))}'
+        )
+    if stiffness and motion != METRES:
+        raise InputError(
+            f'{where}the specimen stiffness is {stiffness:g} N/m, and the motion is in {motion}: '
+            f'give 0 for a free actuator, or the mm per {motion} as `scale`, with `unit: mm`, in '
+            'a channel map'
+        )
+    return motion
+
+
 def check_hold(hold: str, source: str = '') -> Hold:
     """Return how a command runs between its samples.
 
@@ -214,11 +235,7 @@ class Record:
     def __post_init__(self) -> None:
         where = f'{self.source}: ' if self.source else ''
         put = object.__setattr__
-        if self.motion != METRES and self.motion not in WRITTEN:
-            raise InputError(
-                f'{where}motion {self.motion!r} is unknown; use one of '
-                f'{", ".join((METRES, *WRITTEN))}'
-            )
+        check_motion(self.motion, None, self.source)
         for name in ('command', 'measured'):
             column = _column(
                 getattr(self, name), name, 'm', MAX_DISPLACEMENT, self.source, self.motion
@@ -235,12 +252,7 @@ class Record:
         check_hold(self.hold, self.source)
         if self.stiffness is not None:
             put(self, 'stiffness', check_stiffness(self.stiffness, self.source))
-            if self.stiffness and self.motion != METRES:
-                raise InputError(
-                    f'{where}the specimen stiffness is {self.stiffness:g} N/m, and the motion is '
-                    f'in {self.motion}: give 0 for a free actuator, or the mm per {self.motion} '
-                    'as `scale`, with `unit: mm`, in a channel map'
-                )
+            check_motion(self.motion, self.stiffness, self.source)
 
     @classmethod
     def from_arrays(

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from actuator_glue.errors import InputError
-from actuator_glue.records import Hold, check_stiffness
+from actuator_glue.motion import METRES
+from actuator_glue.records import Hold, check_motion, check_stiffness
 
 MAX_INDEX = 2**62
 # What a stiffness is in a message in which nobody fills it [N/m]: a message's default can be any
@@ -30,9 +31,11 @@ class StreamSetup:
         hold: how the command runs between its samples.
         index: running index of the first sample it holds for.
         source: plant or file, for people.
+        motion: what command and measured are, as in `Record`.
 
     Raises:
-        InputError: negative stiffness, absurd period, unknown hold.
+        InputError: negative stiffness, absurd period, unknown hold or motion, or a stiffness of
+            what does not move in metres.
     """
 
     stiffness: float | None
@@ -41,11 +44,13 @@ class StreamSetup:
     hold: Hold = 'zoh'
     index: int = 0
     source: str = ''
+    motion: str = METRES
 
     def __post_init__(self) -> None:
         where = f'test set-up of {self.actuator!r}'
         if self.stiffness is not None:
             object.__setattr__(self, 'stiffness', check_stiffness(self.stiffness, where))
+        check_motion(self.motion, self.stiffness, where)
         if not (np.isfinite(self.period) and 1e-6 <= self.period <= 10.0):
             raise InputError(f'{where}: sample period {self.period:g} s is outside [1e-6, 10] s')
         if self.hold not in ('zoh', 'linear'):
@@ -55,11 +60,12 @@ class StreamSetup:
 
     def same_test(self, other: StreamSetup) -> bool:
         """Whether samples under both set-ups may be fitted together."""
-        return (self.stiffness, self.period, self.actuator, self.hold) == (
+        return (self.stiffness, self.period, self.actuator, self.hold, self.motion) == (
             other.stiffness,
             other.period,
             other.actuator,
             other.hold,
+            other.motion,
         )
 
 
@@ -72,7 +78,7 @@ def from_message(message: Any) -> StreamSetup:
     """Return the set-up of a TestSetup.
 
     Raises:
-        InputError: negative stiffness, absurd rate, unknown hold.
+        InputError: negative stiffness, absurd rate, unknown hold or motion.
     """
     rate = float(message.rate)
     name = str(message.actuator or message.header.frame_id)
@@ -85,6 +91,7 @@ def from_message(message: Any) -> StreamSetup:
         hold=message.hold,
         index=int(message.index),
         source=str(message.source),
+        motion=str(message.motion) or METRES,
     )
 
 

@@ -119,11 +119,12 @@ class _Segment:
             start_ns=self.first.stamp_ns,
             first_index=self.first.index,
             source=source,
+            motion=setup.motion if setup else METRES,
         )
 
 
 def _test(setup: StreamSetup | None) -> tuple[object, ...]:
-    return (setup.stiffness, setup.hold, setup.actuator) if setup else ()
+    return (setup.stiffness, setup.hold, setup.actuator, setup.motion) if setup else ()
 
 
 def read_records(
@@ -342,15 +343,10 @@ def write_record(
         progress: called with the number of samples written since the last call.
 
     Raises:
-        InputError: disk full, a block of less than one sample, or a motion that is not in metres.
+        InputError: disk full, or a block of less than one sample.
     """
     if block < 1:
         raise InputError(f'a block of {block} samples is impossible; use at least 1')
-    if record.motion != METRES:
-        raise InputError(
-            f'{record.source or "record"}: its motion is in {record.motion}, and messages are in '
-            'metres; write a file, or give a `scale` in a channel map'
-        )
     samples, setup = f'{namespace}/samples', f'{namespace}/test_setup'
     writer.add_topic(setup, TEST_SETUP, qos=(LATCHED,))
     writer.add_topic(samples, SAMPLE_BLOCK)
@@ -383,4 +379,5 @@ def _setup_message(record: Record) -> Any:
         hold=record.hold,
         index=record.first_index,
         source=record.source,
+        motion=record.motion,
     )

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from actuator_glue.motion import METRES
 from actuator_glue.nodes import topics
 from actuator_glue.nodes.messages import publish
 from actuator_glue.online.conversion import Fields, Head
@@ -34,7 +35,14 @@ class BlockPublisher:
         """Acquisition time of a sample [ns]."""
         return self._start_ns + round((index - self._first) * self.period * 1e9)
 
-    def setup(self, stiffness: float | None, hold: Hold, index: int, source: str) -> None:
+    def setup(
+        self,
+        stiffness: float | None,
+        hold: Hold,
+        index: int,
+        source: str,
+        motion: str = METRES,
+    ) -> None:
         """Announce the test set-up that holds from a sample on."""
         fields: Fields = {
             'actuator': self.actuator,
@@ -43,6 +51,7 @@ class BlockPublisher:
             'hold': hold,
             'index': index,
             'source': source,
+            'motion': motion,
         }
         publish(self._setup, Head(self.stamp_ns(index), self.actuator), fields)
 

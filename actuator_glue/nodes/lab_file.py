@@ -79,7 +79,9 @@ class FileSource:
         size = self._values['block']
         ahead = round(self._values['preview'] * record.rate)
         self._start_clock(record, record.first_index)
-        self._out.setup(record.stiffness, record.hold, record.first_index, record.source)
+        self._out.setup(
+            record.stiffness, record.hold, record.first_index, record.source, record.motion
+        )
         if not offset:
             self._node.introduce()
             self._start_clock(record, record.first_index)

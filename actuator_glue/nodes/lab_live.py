@@ -15,6 +15,7 @@ from actuator_glue.nodes.blocks import BlockPublisher
 from actuator_glue.nodes.health import ERROR
 from actuator_glue.nodes.pacer import Step
 from actuator_glue.nodes.streamer import Streamer
+from actuator_glue.records import check_motion
 from actuator_glue.streams.address import Allowed
 from actuator_glue.streams.layout import PLAIN
 from actuator_glue.streams.layout_file import read_layout
@@ -80,6 +81,7 @@ class LiveSource:
         given = values['specimen_stiffness']
         self._stiffness = layout.stiffness if given < 0.0 else given
         self._hold = layout.hold or 'zoh' if values['hold'] == 'file' else values['hold']
+        self._motion = check_motion(layout.motion, self._stiffness, str(self._address))
         self._actuator = values['actuator'] or layout.actuator
         self._period = 1.0 / rate
         self._pause = min(0.5 * values['block'] * self._period, LOOK)
@@ -155,7 +157,7 @@ class LiveSource:
     def _announce(self) -> None:
         now = self._node.get_clock().now().nanoseconds
         self._out.begin(self._actuator, self._period, now)
-        self._out.setup(self._stiffness, self._hold, 0, str(self._address))
+        self._out.setup(self._stiffness, self._hold, 0, str(self._address), self._motion)
 
     def _publish(self, found: list[Samples]) -> None:
         for samples in found:

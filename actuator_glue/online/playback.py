@@ -94,6 +94,7 @@ def stream(record: Record, block: int = 64) -> Iterator[Item]:
         record.hold,
         record.first_index,
         record.source,
+        record.motion,
     )
     for start in range(0, len(record), block):
         part = slice(start, start + block)

@@ -257,6 +257,7 @@ class SlidingWindows:
                 first_index=block.index + stop - count,
                 hold=setup.hold,
                 actuator=setup.actuator,
+                motion=setup.motion,
             )
 
         record = last(self._window)

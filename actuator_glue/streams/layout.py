@@ -10,7 +10,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.io.units import FLOAT32_COUNTS, ROLES, factor
+from actuator_glue.io.units import FLOAT32_COUNTS, ROLES, common_motion, of_file
 from actuator_glue.records import Array, Hold
 
 TYPES = {
@@ -58,13 +58,13 @@ class Field:
         return self.name in ROLES or self.name == 'counter'
 
     def si(self, values: NDArray[Any]) -> Array:
-        """Return values as sent in SI units."""
-        gain = factor(self.name, self.unit, self.name)
+        """Return values as sent in SI units, or in what stands for them (`motion`)."""
+        gain = of_file(self.name, self.unit, self.name)
         return (np.asarray(values, dtype=np.float64) * self.scale + self.offset) * gain
 
     def sent(self, values: Array) -> Array:
         """Return values in SI units as they are sent."""
-        gain = factor(self.name, self.unit, self.name)
+        gain = of_file(self.name, self.unit, self.name)
         return (values / gain - self.offset) / self.scale
 
 
@@ -128,6 +128,18 @@ class Layout:
     def fields(self) -> dict[str, Field]:
         """Fields that are more than stepped over, by name."""
         return {f.name: f for f in (*self.packet, *self.sample) if f.role}
+
+    @property
+    def motion(self) -> str:
+        """What command and measured are in: metres, or another motion.
+
+        Raises:
+            InputError: two that differ, or a torque where nothing turns.
+        """
+        return common_motion(
+            {name: field.unit or '' for name, field in self.fields.items()},
+            f'{self.source}: layout',
+        )
 
     @property
     def modulus(self) -> int | None:

@@ -7,9 +7,9 @@ from pathlib import Path
 from reprlib import repr as brief
 
 from actuator_glue.errors import InputError
-from actuator_glue.io.units import ROLES, factor
+from actuator_glue.io.units import ROLES, of_file
 from actuator_glue.io.yaml_file import located, mapping, number, parse, read_text, whole
-from actuator_glue.records import check_stiffness
+from actuator_glue.records import check_motion, check_stiffness
 from actuator_glue.streams.layout import TYPES, Field, Layout
 
 NEEDED = ('command', 'measured')
@@ -90,7 +90,7 @@ def _field(content: object, where: str) -> Field:
     made = Field(**{k: v for k, v in values.items() if v is not None})
     if made.name in ROLES:
         unit = values.get('unit')
-        factor(made.name, str(unit) if unit else None, f'{where}: {made.name}')
+        of_file(made.name, str(unit) if unit else None, f'{where}: {made.name}')
         if made.scale == 0.0:
             raise InputError(f'{where}: scale is 0; every value would be the same')
     if made.role and made.count != 1:
@@ -106,6 +106,7 @@ def _check(made: Layout, where: str) -> None:
     for name in NEEDED:
         if name not in [f.name for f in made.sample]:
             raise InputError(f'{where}: sample has no field called {name}')
+    check_motion(made.motion, made.stiffness, where)
     if any(f.name in (*NEEDED, 'force') for f in made.packet):
         raise InputError(f'{where}: packet holds counter, time and what is stepped over only')
     size = sum(int(TYPES[f.type][1]) * f.count for f in made.packet)

@@ -42,8 +42,14 @@ def check(record: Record, layout: Layout) -> None:
     """Refuse a record that a layout cannot carry.
 
     Raises:
-        InputError: another rate, no force where one is to be sent.
+        InputError: another rate or motion, no force where one is to be sent.
     """
+    if record.motion != layout.motion:
+        raise InputError(
+            f'{record.source}: its motion is in {record.motion}, and '
+            f'{layout.source or "a packet without a layout"} carries {layout.motion}; give a '
+            f'layout in which command and measured have `unit: {record.motion}`'
+        )
     if layout.rate is not None and abs(record.rate / layout.rate - 1.0) > 1e-6:
         raise InputError(
             f'{record.source}: {record.rate:g} Hz, but {layout.source} says {layout.rate:g} Hz'

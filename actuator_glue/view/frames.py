@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.errors import InputError
+from actuator_glue.motion import METRES, spoken
 from actuator_glue.report.quantity import said_in, word
 from actuator_glue.view.history import ROWS, History
 from actuator_glue.view.intake import Intake
@@ -25,6 +26,7 @@ from actuator_glue.view.trends import TrendColumn
 _POINTS = 4000  # at most, whatever the page asks for
 _TRENDS = 600  # rows of trends
 _ENTRIES = 60  # of the log
+_UNITS = ('mm', 'um', 'kN')  # in which curves are drawn
 _PAUSE = 0.5  # s, from one sending of trends to the next while a page follows
 
 
@@ -97,15 +99,19 @@ class Frames:
                 'stop': stop * period,
                 'oldest': history.oldest * period,
                 'newest': newest * period,
-                'state': _state(history, stop),
             }
+            state = _state(history, stop)
+            motion = state.get('setup', {}).get('motion', METRES)
+            content['units'] = {unit: spoken(unit, motion) for unit in _UNITS}
+            content['state'] = _said(state, motion)
             key = _key(history, stop)
             # Twenty windows a second would have it draw the whole test anew twenty times.
             self.owing = key != self._sent and wanted.stop is None and now < self._due
             if key != self._sent and not self.owing:
                 self._sent, self._due = key, now + _PAUSE
-                content['trends'], numbers = _trends(history, stop)
-                content['log'] = history.log.told(stop, history.period, _ENTRIES)
+                trends, numbers = _trends(history, stop)
+                log = history.log.told(stop, history.period, _ENTRIES)
+                content |= {'trends': _said(trends, motion), 'log': _said(log, motion)}
         # Single precision counts from the start of what is shown: whole microseconds stay.
         rows = np.vstack([curves.times - start * period, curves.rows])
         text = json.dumps(content, allow_nan=False).encode()
@@ -137,6 +143,17 @@ def _state(history: History, place: int) -> dict[str, Any]:
     for one in _parameters(state):
         one['word'] = word(one['name'])
     return state
+
+
+def _said(told: Any, motion: str) -> Any:
+    """Return what JSON can hold with all sizes in its texts in the units of a motion."""
+    if motion == METRES:
+        return told
+    if isinstance(told, dict):
+        return {key: _said(value, motion) for key, value in told.items()}
+    if isinstance(told, list):
+        return [_said(value, motion) for value in told]
+    return spoken(told, motion) if isinstance(told, str) else told
 
 
 def _parameters(state: dict[str, Any]) -> list[dict[str, Any]]:

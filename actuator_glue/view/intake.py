@@ -23,6 +23,7 @@ from actuator_glue.io.bag_reader import (
 )
 from actuator_glue.io.bag_samples import topics_of_actuator
 from actuator_glue.io.messages import deserialize, full_name
+from actuator_glue.motion import METRES
 from actuator_glue.sample_block import Block, from_message
 from actuator_glue.setups import known_stiffness
 from actuator_glue.view.explanations import Explanation, diagnosed, explanations, number, said
@@ -105,6 +106,7 @@ class Intake:
             'stiffness': known_stiffness(setup.specimen_stiffness),
             'rate': number(setup.rate),
             'source': setup.source,
+            'motion': setup.motion or METRES,
         }
         self._tell('setup', content)
 

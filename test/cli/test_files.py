@@ -91,6 +91,7 @@ def test_a_bad_set_up_is_told_and_the_rest_is_used(run, tmp_path: Path, short_ba
         specimen_stiffness=0.0,
         hold='cubic',
         source='',
+        motion='',
     )
     block = messages.message(
         'SampleBlock',

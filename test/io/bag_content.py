@@ -30,4 +30,5 @@ def setup(record: Record, at: int, stiffness: float) -> object:
         hold=record.hold,
         index=at,
         source='',
+        motion=record.motion,
     )

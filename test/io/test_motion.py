@@ -14,14 +14,19 @@ from matplotlib.text import Text
 import actuator_glue as ag
 from actuator_glue.cli.main import main
 from actuator_glue.errors import InputError
-from actuator_glue.io.bag_records import write_record
+from actuator_glue.io.bag_reader import decoded
+from actuator_glue.io.bag_records import read_records, write_record
 from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.io.export import write
 from actuator_glue.motion import speaking, spoken
+from actuator_glue.online.collect import Collector
+from actuator_glue.online.playback import stream
 from actuator_glue.records import Record
 from actuator_glue.report import style
 from actuator_glue.report.style import png
+from actuator_glue.setups import StreamSetup, from_message
 
+BAGS = Path(__file__).resolve().parents[2] / 'bags'
 RATE, COUNT = 200.0, 2000
 TIME = np.arange(COUNT) / RATE
 COMMAND = 2e-3 * np.sin(0.3 * TIME**2)
@@ -83,6 +88,32 @@ def test_files_keep_it(tmp_path: Path, motion: str, suffix: str) -> None:
     assert repr(back).endswith(f'zoh, in {motion})')
 
 
+@pytest.mark.parametrize('motion', ['m', 'deg', 'counts'])
+def test_bags_keep_it(tmp_path: Path, motion: str) -> None:
+    """Bit for bit; and a bag of before it was told is in metres."""
+    with BagWriter(tmp_path / 'bag') as bag:
+        write_record(bag, record(motion))
+    (back,) = read_records(tmp_path / 'bag')
+    assert back.motion == motion
+    np.testing.assert_array_equal(back.measured, MEASURED)
+    (set_up,) = (m for _, m in decoded(tmp_path / 'bag', ('TestSetup',)))
+    assert set_up.motion == motion
+    (streamed,) = (item for item in stream(back) if isinstance(item, StreamSetup))
+    assert streamed.same_test(from_message(set_up))
+    (older,) = (m for _, m in decoded(BAGS / 'free', ('TestSetup',)))
+    assert older.motion == ''
+    assert from_message(older).motion == 'm'
+    assert not streamed.same_test(replace(streamed, motion='V'))
+
+
+def test_windows_of_a_stream_move_as_it_does() -> None:
+    """What is kept of it for a diagnosis speaks its unit."""
+    collector = Collector(5.0)
+    for item in stream(record('deg')):
+        (collector.setup if isinstance(item, StreamSetup) else collector.push)(item)
+    assert {kept.motion for kept in collector.records()} == {'deg'}
+
+
 def test_commands_speak_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Ranges, limits and refusals; the next command is in metres again."""
     write(tmp_path / 'a.csv', record('counts', force=np.ones(COUNT)))
@@ -102,13 +133,13 @@ def test_commands_speak_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
 
 
 def test_what_metres_alone_can_have_is_refused(tmp_path: Path) -> None:
-    """A stiffness in N/m, a bag, tests of two motions together, channels of two, a torque."""
+    """A stiffness in N/m, tests of two motions together, channels of two, a torque."""
     with pytest.raises(InputError, match='the motion is in deg: give 0'):
         replace(record(), stiffness=250e3)
     with pytest.raises(InputError, match="motion 'furlong' is unknown"):
         record('furlong')
-    with BagWriter(tmp_path / 'bag') as bag, pytest.raises(InputError, match='are in metres'):
-        write_record(bag, record())
+    with pytest.raises(InputError, match=r"set-up of 'a': .* and the motion is in deg"):
+        StreamSetup(250e3, 1.0 / RATE, 'a', motion='deg')
     with pytest.raises(InputError, match='one moves in deg and another in m;'):
         ag.calibrate([record(), replace(record('m'), command=-COMMAND)])
     head = 'time_s,{},{}{}\n' + '\n'.join(f'{i * 0.01},{i % 7},{i % 5},0' for i in range(99))

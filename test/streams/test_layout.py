@@ -2,22 +2,25 @@
 
 import struct
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from streaming import layout
+from streaming import layout, record
 
 from actuator_glue.errors import InputError
 from actuator_glue.streams.layout import PLAIN, TYPES
 from actuator_glue.streams.layout_file import parse_layout, read_layout
 from actuator_glue.streams.lines import Lines
 from actuator_glue.streams.packed import Packed
+from actuator_glue.streams.play import check
 from actuator_glue.streams.reception import Reception
 
 ROOT = Path(__file__).resolve().parents[2]
+TURNING = [{'name': 'command', 'unit': 'rad'}, {'name': 'measured', 'unit': 'deg'}]
 BOTH = [{'name': 'command', 'unit': 'mm'}, {'name': 'measured', 'unit': 'mm'}]
 
 
@@ -67,11 +70,27 @@ def test_what_is_no_shipped_layout_is_said_with_those_that_are(name, tmp_path, m
         ({'sample': BOTH, 'packet': [BOTH[0]]}, 'two fields are called command'),
         ({'sample': [{'name': 'x', 'count': 10_001}, *BOTH]}, 'at least 1'),
         ({'sample': BOTH, 'stiffness': -1}, 'stiffness'),
+        ({'sample': [{'name': 'command', 'unit': 'deg'}, BOTH[1]]}, 'command has unit .deg.'),
+        ({'sample': TURNING, 'stiffness': 1e5}, 'the motion is in deg: give 0'),
     ],
 )
 def test_what_cannot_be_is_refused_with_a_reason(content, told):
     with pytest.raises(InputError, match=told):
         parse_layout(content, 'test')
+
+
+def test_a_stream_of_angles_says_so():
+    """One degree stands as 1e-3 m; a record of metres is not sent as angles, nor the reverse."""
+    found = layout(TURNING)
+    assert found.motion == 'deg' and PLAIN.motion == 'm'
+    rows, _ = found.rows({'command': np.array([np.pi]), 'measured': np.array([90.0])}, 0, 1e3)
+    np.testing.assert_allclose([rows.command[0], rows.measured[0]], [0.18, 0.09])
+    turned = replace(record(), stiffness=0.0, motion='deg')
+    check(turned, found)
+    with pytest.raises(InputError, match='is in deg, and a packet without a layout carries m'):
+        check(turned, PLAIN)
+    with pytest.raises(InputError, match='is in m, and test carries deg'):
+        check(record(), found)
 
 
 def test_a_packet_as_a_controller_packs_it():

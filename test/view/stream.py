@@ -137,14 +137,15 @@ def health(
     return Message(status=[Message(name=name, level=level, message=message, values=values)])
 
 
-def setup() -> Any:
+def setup(motion: str = '', stiffness: float = 250e3) -> Any:
     """Return a TestSetup."""
     return Message(
         actuator='north',
         header=Message(frame_id=''),
-        specimen_stiffness=250e3,
+        specimen_stiffness=stiffness,
         rate=RATE,
         source='a test',
+        motion=motion,
     )
 
 

@@ -5,7 +5,17 @@ import struct
 
 import numpy as np
 import pytest
-from stream import RATE, band, block, carried, feed, intake, posterior
+from stream import (
+    RATE,
+    band,
+    block,
+    carried,
+    diagnosis,
+    feed,
+    intake,
+    posterior,
+    setup,
+)
 
 from actuator_glue.errors import InputError
 from actuator_glue.view.frames import Frames, Wanted, frame, parse_wanted
@@ -63,6 +73,26 @@ def test_a_frame_is_what_was_measured() -> None:
     np.testing.assert_allclose(row(rows, 'residual_upper'), 400.0, atol=1e-2)
     assert head['state']['posterior']['parameters'][0]['mean'] == 123.4
     assert head['state']['setup']['stiffness'] == 250e3
+
+
+def test_degrees_are_told_as_degrees() -> None:
+    """Units of curves, parameters, what happened and what was found; numbers stay."""
+    made = intake(5.0)
+    made.take('TestSetup', setup('deg', 0.0))
+    made.take('PosteriorMoments', posterior(9, backlash=1.0))
+    made.take('Diagnosis', diagnosis('error 36.2 -> 10.0 um'))
+    plain, _ = decode(frame(intake(5.0), Wanted()))
+    head, rows = decode(frame(made, Wanted(None, 1.0, 4000)))
+    assert plain['units'] == {'mm': 'mm', 'um': 'um', 'kN': 'kN'}
+    assert head['units'] == {'mm': 'deg', 'um': 'mdeg', 'kN': 'kNm'}
+    assert row(rows, 'command').max() == pytest.approx(2.0, rel=1e-3)
+    (one,) = head['state']['posterior']['structures']
+    assert [(p['mean'], p['unit']) for p in one['parameters']] == [(123.4, '1/s'), (40.0, 'mdeg')]
+    assert head['state']['diagnosis']['summary'] == 'error 36.2 -> 10.0 mdeg'
+    assert head['state']['diagnosis']['experiments'][0].startswith('a slow triangle wave')
+    assert ' of 0.5 deg without' in head['state']['diagnosis']['experiments'][0]
+    assert 'error 36.2 -> 10.0 mdeg (asked for)' in [entry['text'] for entry in head['log']]
+    assert head['state']['setup']['actuator'] == 'north'
 
 
 def test_the_past_has_its_own_state() -> None:

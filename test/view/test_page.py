@@ -3,6 +3,7 @@
 import asyncio
 import json
 import os
+import re
 import threading
 import time
 from pathlib import Path
@@ -12,7 +13,7 @@ import aiohttp
 import numpy as np
 import pytest
 from browser import PROGRAM, Browser
-from stream import feed, health, intake
+from stream import feed, health, intake, setup
 
 from actuator_glue.errors import InputError
 from actuator_glue.view.intake import Intake, read_bag
@@ -50,6 +51,17 @@ TOLD = (
     'all explanations, by their weights',
     '102.0 s diagnosis: missing: backlash',
     '/estimator: R-hat high',
+)
+TURNING = (
+    'north, no specimen',
+    'displacement [deg]',
+    'residual [mdeg]',
+    'tracking error [deg]',
+    'force [kNm]',
+    'mean width 0.8 deg',
+    'backlash 40 \u00b1 1 mdeg',
+    'coulomb force 812 Nm',
+    'of 0.5 deg without specimen',
 )
 # How long a page is watched, e.g. PAGE_MINUTES=60; and in how many spells.
 MINUTES = int(os.environ.get('PAGE_MINUTES', '3'))
@@ -179,6 +191,31 @@ def test_no_width_makes_the_chart_grow(width: int, tmp_path: Path) -> None:
 
     with Live() as url:
         asyncio.run(look())
+
+
+@browser
+def test_a_page_speaks_the_unit_of_the_motion(tmp_path: Path) -> None:
+    """Degrees on every axis, in every text; nothing is said in metres or newtons."""
+
+    async def look() -> None:
+        async with Browser() as page:
+            await page.screen(1440, 900, mobile=False)
+            await page.open(server.url)
+            await page.until('document.body.dataset.frames > 1')
+            (await page.picture()).save(tmp_path / 'page.png')
+            text = (await page.value('document.body.innerText')).replace('\xa0', ' ')
+            for words in TURNING:
+                assert words in text, words
+            assert not re.findall(r'.*\b(?:um|mm|kN|N/m)\b(?!/).*', text)
+            assert not page.faults
+
+    made = intake(60.0)
+    made.take('TestSetup', setup('deg', 0.0))
+    server = PageServer(made, 0)
+    try:
+        asyncio.run(look())
+    finally:
+        server.close()
 
 
 def weight_at(time: float, weight: float) -> str:

@@ -26,7 +26,7 @@ const stroke = (color, width, dash) =>
 const roomy = (_, least, most) => least == null ? [-1, 1] : uPlot.rangeNum(least, most, 0.08, true);
 
 class Panel {
-  // title; keys: [{label, color, line, dash, series}]; series, bands, hooks: of uPlot;
+  // title, or what returns it; keys: [{label, color, line, dash, series}]; series, bands, hooks: of uPlot;
   // x(): range; y(u, least, most): range, where it is not automatic; axis: times are told below;
   // steps: of the numbers at the left, where not all will do;
   // sync: name of those whose cursors go together; readout(u, index): text under the pointer.
@@ -35,15 +35,21 @@ class Panel {
     this.options = options;
     this.keys = (options.keys || []).map((key) => this.key(key));
     this.readout = make('span', {className: 'readout'});
-    this.title = make('b', {textContent: options.title});
+    this.title = make('b');
     this.caption = make('figcaption', {}, this.title, ...this.keys, this.readout);
     this.box = make('div', {className: 'chart'});
     this.figure = make('figure', {}, this.caption, this.box);
     this.box.setAttribute('role', 'img');
-    this.box.setAttribute('aria-label', options.title);
+    this.rename();
     parent.append(this.figure);
     this.resized = new ResizeObserver(() => { if (this.data) this.draw(); });
     this.resized.observe(this.box);
+  }
+
+  rename() {
+    const {title} = this.options;
+    this.title.textContent = typeof title === 'string' ? title : title();
+    this.box.setAttribute('aria-label', this.title.textContent);
   }
 
   key({label, color, line, dash, series}) {

@@ -8,13 +8,15 @@ const course = {start: 0, stop: 1};
 
 // What is measured is drawn last, so that no band hides it.
 const shown = () => [last.start, last.stop];
-const mm = (v) => v == null ? '-' : `${v.toFixed(4)} mm`;
-const um = (v) => v == null ? '-' : `${v.toFixed(1)} um`;
+// What moves need be no metres: in which units mm, um and kN are said is told by the server.
+let units = {mm: 'mm', um: 'um', kN: 'kN'};
+const mm = (v) => v == null ? '-' : `${v.toFixed(4)} ${units.mm}`;
+const um = (v) => v == null ? '-' : `${v.toFixed(1)} ${units.um}`;
 const edge = stroke(COLOR.edge, 0.6), median = stroke(COLOR.edge, 0.8, [2, 3]);
 const BAND = {label: 'band', color: COLOR.band, series: [1, 3]};
 const panels = {
   motion: [['lower', 'median', 'upper', 'command', 'measured'], new Panel($('samples'), {
-    title: 'displacement [mm]', axis: true, x: shown, sync: 'samples',
+    title: () => `displacement [${units.mm}]`, axis: true, x: shown, sync: 'samples',
     keys: [BAND, {label: 'its median', color: COLOR.edge, line: true, dash: true, series: [2]},
       {label: 'command', color: COLOR.command, line: true, dash: true, series: [4]},
       {label: 'measured', color: COLOR.measured, line: true, series: [5]}],
@@ -23,7 +25,7 @@ const panels = {
     readout: (u, i) => `${u.data[0][i].toFixed(3)} s: ${mm(u.data[5][i])}, command ${mm(u.data[4][i])}`,
   })],
   residual: [['residual_lower', 'residual_upper', 'residual'], new Panel($('samples'), {
-    title: 'residual [um]', x: shown, sync: 'samples',
+    title: () => `residual [${units.um}]`, x: shown, sync: 'samples',
     keys: [{...BAND, series: [1, 2]},
       {label: 'measured less the median', color: COLOR.measured, line: true, series: [3]}],
     series: [edge, edge, stroke(COLOR.measured, 1)], bands: [{series: [2, 1], fill: COLOR.band}],
@@ -31,15 +33,15 @@ const panels = {
       `${um(u.data[3][i])}, band ${um(u.data[1][i])} to ${um(u.data[2][i])}`,
   })],
   error: [['error'], new Panel($('samples'), {
-    title: 'tracking error [mm]', x: shown, sync: 'samples',
+    title: () => `tracking error [${units.mm}]`, x: shown, sync: 'samples',
     keys: [{label: 'command less measured', color: COLOR.command, line: true, series: [1]}],
     series: [stroke(COLOR.command, 1.2)], readout: (u, i) => mm(u.data[1][i]),
   })],
   force: [['force'], new Panel($('samples'), {
-    title: 'force [kN]', x: shown, sync: 'samples',
+    title: () => `force [${units.kN}]`, x: shown, sync: 'samples',
     keys: [{label: 'measured', color: COLOR.force, line: true, series: [1]}],
     series: [stroke(COLOR.force, 1.2)],
-    readout: (u, i) => u.data[1][i] == null ? '' : `${digits(u.data[1][i], 4)} kN`,
+    readout: (u, i) => u.data[1][i] == null ? '' : `${digits(u.data[1][i], 4)} ${units.kN}`,
   })],
 };
 const whole = () => [course.start, course.stop];
@@ -57,6 +59,7 @@ function take(buffer) {
     at += 4 * count;
     return found;
   };
+  speak(head.units);
   const data = head.rows.map(() => row(head.count));
   const before = last;
   last = head;
@@ -78,6 +81,12 @@ function take(buffer) {
   tell(head);
   document.body.dataset.frames = Number(document.body.dataset.frames || 0) + 1;
   document.body.dataset.stop = head.stop;
+}
+
+function speak(told) {
+  if (units.mm === told.mm) return;
+  units = told;
+  for (const [, panel] of Object.values(panels)) panel.rename();
 }
 
 // Whether the pictures of the whole test change by a pixel.
@@ -133,8 +142,8 @@ const percent = (share) => share == null ? '-' : `${digits(100 * share, share > 
 function tell(head) {
   const s = head.state;
   text('title', head.title);
-  text('setup', !s.setup ? '' : `${s.setup.actuator}, specimen ${s.setup.stiffness == null
-    ? 'stiffness not known' : `${digits(s.setup.stiffness / 1e3, 4)} kN/m`}`);
+  text('setup', !s.setup ? '' : `${s.setup.actuator}, ` + (s.setup.stiffness == null ? 'specimen stiffness not known'
+    : s.setup.stiffness ? `specimen ${digits(s.setup.stiffness / 1e3, 4)} kN/m` : 'no specimen'));
   text('span', wanted.span < 60 ? `${wanted.span} s` : `${wanted.span / 60} min`);
   text('clock', `${head.stop.toFixed(2)} s of ${head.newest.toFixed(2)} s`);
   const slider = $('time');
@@ -150,7 +159,7 @@ function tell(head) {
   text('whose', s.posterior && s.posterior.structures.length > 1 ? 'all explanations, by their weights' : '');
   text('coverage', !s.coverage ? 'no scored band yet' : `${digits(100 * s.coverage.mean, 3)} % inside the ` +
     `${digits(100 * s.coverage.level, 3)} % band over ${s.coverage.windows} window(s), last ` +
-    `${digits(100 * s.coverage.last, 3)} %; mean width ${digits(1e3 * s.coverage.width, 3)} mm` +
+    `${digits(100 * s.coverage.last, 3)} %; mean width ${digits(1e3 * s.coverage.width, 3)} ${units.mm}` +
     (s.coverage.forecast ? '; fixed before the data' : ''));
   text('response', !s.response ? 'no frequency response yet' :
     `at ${digits(s.response.frequency, 3)} Hz: delay ` +
