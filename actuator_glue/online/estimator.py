@@ -38,6 +38,9 @@ from actuator_glue.setups import StreamSetup
 MAX_FROZEN = 8
 # After a stall of the whole computer several hops arrive at once.
 MAX_WAITING = 4
+# Times the budget that a window may take at most, after others that ended without a posterior,
+# and what remains of that with each that has one.
+MOST_PATIENCE, _CALMER = 8.0, 0.8
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -131,6 +134,18 @@ class _Before:
     epoch: int
 
 
+def _patience(before: float, result: WindowResult | WindowFit) -> float:
+    """Return how many times the budget the next window may take.
+
+    Twice as many after one that ended without a posterior for want of time, of the likeliest
+    structure or of another whose turn it was: else the next one begins, and ends, where that did.
+    Fewer again after each that has all.
+    """
+    if result.starved or any(one.starved for one in result.rivals):
+        return min(2.0 * before, MOST_PATIENCE)
+    return before if result.failure else max(1.0, _CALMER * before)
+
+
 class Estimator:
     """Windows, warm start and forecasts; knows no clock, no process and no ROS.
 
@@ -167,6 +182,7 @@ class Estimator:
         self._applied = 0  # of the schedule's models
         self._course = ReplayPosition()
         self._before: _Before | None = None
+        self._patience = 1.0
         self._frozen: list[FrozenPosterior] = []
         self._judged_to: int | None = None
         self._pending: Proposal | None = None
@@ -301,14 +317,16 @@ class Estimator:
             prior=prior,
             standing=member.frozen if member.epoch == window.epoch else None,
             waited=member.waited,
+            patience=self._patience,
         )
 
     def finish(self, result: WindowResult | WindowFit) -> list[Event]:
         """Take the result of the running job, or its first part, all that the next one needs."""
         self.running = None
         window = result.window
+        self._patience = _patience(self._patience, result)
         if result.failure:
-            # A replay leaves such windows out: nothing may depend on them.
+            # A replay leaves such windows out: nothing but their time may depend on them.
             return [Failed(window.number, window.record.first_index, result.failure)]
         self._frozen = [
             f for f in self._frozen if f.segment == window.segment and f.stop > window.end

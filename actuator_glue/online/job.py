@@ -15,6 +15,7 @@ from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.inference.convergence import rhat_and_ess
 from actuator_glue.inference.moments import Moments, moments
+from actuator_glue.inference.posterior import NoPosteriorError
 from actuator_glue.inference.prior_conflict import Conflict
 from actuator_glue.online import fitting, sampling
 from actuator_glue.online.forecast import FrozenPosterior, WindowPrediction, predictions
@@ -66,6 +67,7 @@ class WindowResult:
         learned: the posterior, for the priors of later windows.
         conflict: how far the window contradicts its prior.
         failure: why there is no posterior; empty where there is one.
+        starved: the sampling ended before it had reached the posterior.
         rivals: first parts of the other structures that are carried, without their chains.
         errors: as in `WindowFit`.
         structures: effects of each structure that the numbers above are a mixture of, the
@@ -100,6 +102,7 @@ class WindowResult:
     learned: Carried | None = None
     conflict: Conflict | None = None
     failure: str = ''
+    starved: bool = False
     rivals: tuple[WindowFit, ...] = ()
     errors: tuple[float, ...] = ()
     structures: tuple[tuple[str, ...], ...] = ()
@@ -128,8 +131,9 @@ def fit(job: Job, expired: Expired | None = None) -> WindowFit:
 
     Where several structures are carried, those without effects come first, for they are quick.
     The likeliest has all the time that is left then; of the others, who waited longest first,
-    those that there is still time for. Who has waited `PATIENCE` windows has half of the time.
-    One that is not sampled keeps its posterior, and forecasts with it.
+    those that there is still time for. Who has waited `PATIENCE` windows has half of the time,
+    where the likeliest has reached its posterior in the other half. One that is not sampled keeps
+    its posterior, and forecasts with it.
     """
     jobs = (job, *job.rivals)
     found = [
@@ -141,12 +145,13 @@ def fit(job: Job, expired: Expired | None = None) -> WindowFit:
     due = stepped[0] if stepped and jobs[stepped[0]].waited >= PATIENCE else None
     quick = [i for i in range(len(jobs)) if not jobs[i].model.effects]
     for i in dict.fromkeys((*quick, 0, *stepped)):
-        if i > 0 and i != due and _no_time(jobs[i], expired):
+        if i > 0 and _no_time(jobs[i], expired, 1.0 if i == due else _BEGIN):
+            found[i] = replace(found[i], starved=i == due)
             continue
         if i > 0 and jobs[i].stop_at == 0:
             continue
         share = _BEGIN if i == 0 and due is not None else 1.0
-        sampled = _fit(jobs[i], None if expired is None else partial(expired, share))
+        sampled = _fit(jobs[i], None if expired is None else partial(_spent, expired, share))
         if i == 0 and sampled.failure:
             return sampled
         found[i] = (
@@ -165,11 +170,17 @@ def fit(job: Job, expired: Expired | None = None) -> WindowFit:
     )
 
 
-def _fit(job: Job, expired: Callable[[], bool] | None) -> WindowFit:
+def _spent(expired: Expired, share: float, reached: bool) -> bool:
+    """Whether a structure's share of the time is spent: all of it until it has a posterior."""
+    return expired(share if reached else 1.0)
+
+
+def _fit(job: Job, expired: Callable[[bool], bool] | None) -> WindowFit:
     try:
         return sampling.fit(job, expired)
     except InputError as error:
-        return WindowFit(job.window, job.model, failure=str(error))
+        starved = isinstance(error, NoPosteriorError)
+        return WindowFit(job.window, job.model, failure=str(error), starved=starved)
 
 
 def _warm(fitted: WindowFit) -> bool:
@@ -177,9 +188,9 @@ def _warm(fitted: WindowFit) -> bool:
     return fitted.chains is not None and fitted.chains.annealed
 
 
-def _no_time(job: Job, expired: Expired | None) -> bool:
-    """Whether a structure is passed over in this window."""
-    return expired is not None and bool(job.model.effects) and expired(_BEGIN)
+def _no_time(job: Job, expired: Expired | None, share: float) -> bool:
+    """Whether a structure is passed over in this window: a share of the time is spent."""
+    return expired is not None and bool(job.model.effects) and expired(share)
 
 
 def _errors(job: Job) -> tuple[float, ...]:
@@ -231,6 +242,7 @@ def _failed(job: Job, fitted: WindowFit, reason: str) -> WindowResult:
         learned=fitted.learned,
         conflict=fitted.conflict,
         failure=reason,
+        starved=fitted.starved,
         rivals=_lean(fitted),
         errors=fitted.errors,
     )

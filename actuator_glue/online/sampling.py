@@ -62,6 +62,8 @@ class Job:
         proposal: what is carried from this window on, where that is new.
         standing: the structure's last posterior; it forecasts with that where it is not sampled.
         waited: windows that it has not been sampled in.
+        patience: times the budget that it may take, for want of time left those before it without
+            a posterior.
     """
 
     window: Window
@@ -78,6 +80,7 @@ class Job:
     proposal: Proposal | None = None
     standing: FrozenPosterior | None = None
     waited: int = 0
+    patience: float = 1.0
 
     @property
     def evaluations(self) -> int:
@@ -90,7 +93,7 @@ class Job:
     def seconds(self) -> float:
         """Longest time the window may be computed [s]."""
         budget = self.settings.time_budget
-        return max(budget, FIRST) if self.afresh else budget
+        return self.patience * (max(budget, FIRST) if self.afresh else budget)
 
     @property
     def forecast(self) -> tuple[int, int]:
@@ -125,6 +128,7 @@ class WindowFit:
         conflict: how far the window contradicts its prior; None where that is the box.
         complete: the sampling was not ended early.
         failure: why there is nothing of all this; empty where there is.
+        starved: there is nothing because the sampling ended before it had reached the posterior.
         rivals: the same of the other structures that are carried.
         errors: mean square error of the forecasts that the window has judged, of each structure,
             the likeliest first [m^2]; empty where only one is carried or there were none.
@@ -142,16 +146,18 @@ class WindowFit:
     conflict: Conflict | None = None
     complete: bool = False
     failure: str = ''
+    starved: bool = False
     rivals: tuple[WindowFit, ...] = ()
     errors: tuple[float, ...] = ()
 
 
-def fit(job: Job, expired: Callable[[], bool] | None = None) -> WindowFit:
+def fit(job: Job, expired: Callable[[bool], bool] | None = None) -> WindowFit:
     """Sample one window.
 
     Args:
         job: what to compute.
-        expired: tells that the time budget is spent; None never stops early.
+        expired: tells that the time is spent, and takes whether the posterior has been reached;
+            None never stops early.
 
     Raises:
         InputError: the window calibrates nothing.
@@ -266,7 +272,9 @@ def _target(job: Job, shaping: float, near: Array | None) -> Target:
     ).target()
 
 
-def _sample(job: Job, target: Target, expired: Callable[[], bool] | None) -> tuple[Chains, bool]:
+def _sample(
+    job: Job, target: Target, expired: Callable[[bool], bool] | None
+) -> tuple[Chains, bool]:
     """Return chains of physical parameters, and whether they are all that was wanted."""
     settings, record = job.settings, job.window.record
     archive = job.archive
@@ -294,12 +302,15 @@ def _sample(job: Job, target: Target, expired: Callable[[], bool] | None) -> tup
     return chains, complete
 
 
-def _stop(job: Job, expired: Callable[[], bool] | None) -> Callable[[State], bool] | None:
+def _stop(job: Job, expired: Callable[[bool], bool] | None) -> Callable[[State], bool] | None:
     """What ends the sampling early: the evaluations of the run that is repeated, or the clock."""
     if job.stop_at is not None:
         at = job.stop_at
         return lambda state: state.evaluations >= at
-    return None if expired is None else lambda _: expired()
+    if expired is None:
+        return None
+    # So many steps after it has adapted are a posterior, if a rough one.
+    return lambda state: expired(state.made >= state.settings.adaptation + ADAPT)
 
 
 def _sampler(job: Job) -> SamplerSettings:

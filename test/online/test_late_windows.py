@@ -8,9 +8,11 @@ from online_streams import SETTINGS, record
 
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.online.estimator import Estimator, Schedule
-from actuator_glue.online.job import WindowResult, run
+from actuator_glue.online.job import PATIENCE, WindowResult, fit, run
 from actuator_glue.online.playback import stream
+from actuator_glue.online.sampling import ADAPT
 from actuator_glue.online.stream import Dropped, Preview
+from actuator_glue.online.structures import Proposal, Proposed
 from actuator_glue.setups import StreamSetup
 
 
@@ -84,3 +86,53 @@ def test_a_window_ends_when_its_draws_will_do():
         assert few.evaluations < 0.9 * all_of_them.evaluations
         assert few.ess.min() >= 200 and few.rhat.max() <= 0.5 * (1.0 + SETTINGS.rhat_limit)
         assert not few.stopped_early and not all_of_them.stopped_early
+
+
+def test_a_window_without_time_is_followed_by_one_that_has_more():
+    """On a busy computer the next one would end where that did, and so on for ever."""
+    estimator = Estimator(SETTINGS, choose_model(), live=True)
+    waits = iter(stream(record(30.0), 100))
+
+    def job():
+        while (found := estimator.next_job()) is None:
+            item = next(waits)
+            estimator.setup(item) if isinstance(item, StreamSetup) else estimator.push(item)
+        return found
+
+    first = job().seconds
+    for times in (2.0, 4.0, 8.0, 8.0):
+        result = run(estimator.running, lambda share: True)
+        assert result.starved and 'give it more time' in result.failure
+        estimator.finish(result)
+        assert job().seconds == times * first
+    estimator.finish(run(estimator.running))
+    # Not the first one of its model any more: the budget, and what remains of the patience.
+    assert job().seconds == 0.8 * 8.0 * SETTINGS.time_budget
+    for _ in range(12):
+        estimator.finish(run(estimator.running))
+        job()
+    assert estimator.running.seconds == SETTINGS.time_budget
+
+
+def test_a_rival_takes_half_of_the_time_only_from_a_posterior():
+    """Whose turn it is waits where the likeliest has none yet, and the next window has more."""
+    both = Proposal(
+        (Proposed(choose_model(('delay',)), 0.5), Proposed(choose_model(('bias',)), 0.5))
+    )
+    estimator = Estimator(SETTINGS, both, live=True)
+    for item in stream(record(2.5), 100):
+        estimator.setup(item) if isinstance(item, StreamSetup) else estimator.push(item)
+    job = estimator.next_job()
+    job = replace(job, rivals=tuple(replace(one, waited=PATIENCE) for one in job.rivals))
+    shares = []
+
+    def expired(share):
+        shares.append(share)
+        return len(shares) > 150 if share == 1.0 else share == 0.5
+
+    fitted = fit(job, expired)
+    # All of it until there is a posterior, then half: the other half is the rival's.
+    assert shares[0] == 1.0 and shares.index(0.5) >= 2 * ADAPT
+    assert not fitted.failure
+    late = fit(job, lambda share: True)
+    assert late.starved and late.failure
