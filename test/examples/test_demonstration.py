@@ -300,7 +300,8 @@ def windows(effects: list[list[str]], inside: list[bool]) -> SimpleNamespace:
         for i, (names, right) in enumerate(zip(effects, inside, strict=True))
     ]
     record = SimpleNamespace(first_index=0)
-    return SimpleNamespace(posteriors=posteriors, record=record, truth=truth)
+    health = {'estimator': {'windows dropped': '3', 'windows failed': '0'}}
+    return SimpleNamespace(posteriors=posteriors, record=record, truth=truth, health=health)
 
 
 @pytest.mark.parametrize(
@@ -332,6 +333,9 @@ def test_the_live_chain_is_held_to_what_it_promises(
     assert outcome.explanations()[0] == (5.0, 'Eq. (2) 100%')
     assert outcome.explanations()[1] == (10.0, 'backlash 100%')
     assert not replace(outcome, hidden=()).broken_promises()
+    assert outcome.answered == 15 / 18
+    content.health['estimator']['windows failed'] = '20'
+    assert '39% of the windows have a posterior, not 50%' in outcome.broken_promises()
 
 
 def test_only_the_default_demonstration_promises_what_it_finds(tmp_path: Path) -> None:
