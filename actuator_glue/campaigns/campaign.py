@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import sys
@@ -28,9 +29,9 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 ANALYSIS = 'actuator_glue.campaigns.analysis:analysed'
-# Tasks given to the scheduler for each thread: the next are there when one ends, and it never
-# knows of many.
-_AHEAD = 4
+# Tasks given to the scheduler for each thread, again when half of them have ended: the next are
+# there when one ends, it never knows of many, and it is asked seldom (it keeps a note each time).
+_AHEAD = 8
 # How often the number of workers is asked for [s].
 _RECOUNT = 5.0
 
@@ -176,40 +177,44 @@ class _CampaignRun:
         while following < len(tasks) or flying:
             if time.monotonic() - counted > _RECOUNT:
                 room, counted = _AHEAD * max(sum(client.nthreads().values()), 1), time.monotonic()
-            while following < len(tasks) and len(flying) < room:
-                task = tasks[following]
-                future = client.submit(
+            if following < len(tasks) and len(flying) <= room // 2:
+                new = tasks[following : following + room - len(flying)]
+                futures = client.map(
                     carry_out,
-                    task.to_json(),
-                    str(self.rows.folder),
-                    (self.recipe.seconds, self.recipe.memory_gb),
-                    self.analysis,
-                    self.again,
-                    key=(name, following),
+                    # A text each: dask looks through anything else for tasks.
+                    [json.dumps(task.to_json()) for task in new],
+                    key=[(name, i) for i in range(following, following + len(new))],
                     pure=False,
+                    folder=str(self.rows.folder),
+                    limits=(self.recipe.seconds, self.recipe.memory_gb),
+                    analysis=self.analysis,
+                    again=self.again,
                 )
-                flying[future.key] = task
-                future.add_done_callback(ended.put)
-                following += 1
-            try:
-                future = ended.get(timeout=_RECOUNT)
-            except Empty:
-                continue
-            task = flying.pop(future.key)
-            key, bad, computed = self._outcome(future, task)
-            future.release()
-            keys[task.group] = key
-            told.add(computed=computed, failed=bad)
+                following += len(new)
+                flying |= {f.key: task for f, task in zip(futures, new, strict=True)}
+                for future in futures:
+                    future.add_done_callback(ended.put)
+            done = {f.key: f for f in _ended(ended)}
+            # One question for all that ended meanwhile: the more workers, the fewer a task.
+            answers = self._answers(client, done)
+            for key, future in done.items():
+                task = flying.pop(key)
+                row, bad, computed = answers.get(key) or self._lost(future, task)
+                future.release()
+                keys[task.group] = row
+                told.add(computed=computed, failed=bad)
 
-    def _outcome(self, future: Any, task: Task) -> tuple[str, bool, bool]:
-        """Return what `carry_out` did; a row of its own where no worker outlived the task.
+    def _answers(self, client: Any, done: dict[Any, Any]) -> dict[Any, tuple[str, bool, bool]]:
+        """Return what `carry_out` said of the tasks that it did."""
+        finished = {key: f for key, f in done.items() if f.status == 'finished'}
+        return client.gather(finished, errors='skip') if finished else {}
+
+    def _lost(self, future: Any, task: Task) -> tuple[str, bool, bool]:
+        """Return a row of its own for a task that no worker outlived.
 
         Raises:
             InputError: the scheduler has gone, or a worker cannot write to the folder.
         """
-        if future.status == 'finished':
-            done: tuple[str, bool, bool] = future.result()
-            return done
         if future.status != 'error':
             raise InputError(
                 'the scheduler has gone, with what its workers had in hand; rows that were made '
@@ -226,3 +231,14 @@ class _CampaignRun:
         found = {'failure': 'every worker that was given it ended'}
         self.rows.write(key, row_of(task, key, hashes, found, 0.0))
         return key, True, True
+
+
+def _ended(queue: SimpleQueue[Any]) -> list[Any]:
+    """Return what has ended, after a wait for the first of it; nothing if none comes."""
+    found: list[Any] = []
+    try:
+        found.append(queue.get(timeout=_RECOUNT))
+        while True:
+            found.append(queue.get_nowait())
+    except Empty:
+        return found

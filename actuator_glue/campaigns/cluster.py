@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
@@ -16,6 +17,14 @@ from actuator_glue.errors import InputError
 if TYPE_CHECKING:
     from distributed import Client
 
+# Of dask: it watches every thread 100 times a second and keeps long logs, all for a dashboard that
+# a campaign has not. Schedulers and workers that others start take them from their environment.
+SETTINGS = {
+    'distributed.worker.profile.enabled': False,
+    'distributed.admin.low-level-log-length': 100,
+    'distributed.admin.system-monitor.log-length': 100,
+}
+_FORGET = 10.0  # s, between
 _PATIENCE = 30.0  # s, for a scheduler to answer
 
 
@@ -82,9 +91,12 @@ def _cluster(workers: int) -> Iterator[str]:
 
 def _serve(workers: int) -> None:
     """Have workers on this machine until standard input ends; the address is told first."""
+    import dask
     from distributed import LocalCluster
 
+    dask.config.set(SETTINGS)
     # A record's memory and threads are held to by the process it is computed in.
+    ended = threading.Event()
     with LocalCluster(
         n_workers=workers,
         threads_per_worker=1,
@@ -92,12 +104,28 @@ def _serve(workers: int) -> None:
         memory_limit=0,
         host='127.0.0.1',
         dashboard_address=None,
+        # Any port that is free: another campaign may have the usual one.
+        scheduler_kwargs={'dashboard_address': '127.0.0.1:0'},
         env=dict.fromkeys(THREADS, '1'),
         silence_logs='CRITICAL',
     ) as cluster:
         sys.stdout.write(f'{cluster.scheduler_address}\n')
         sys.stdout.flush()
+        threading.Thread(target=_keep_forgetting, args=[ended], daemon=True).start()
         sys.stdin.buffer.read()
+        ended.set()
+
+
+def _keep_forgetting(ended: threading.Event) -> None:
+    while not ended.wait(_FORGET):
+        forget_names()
+
+
+def forget_names() -> None:
+    """Have dask forget the names of tasks that have ended: it keeps 100 000, in each process."""
+    from dask.utils import key_split
+
+    key_split.cache_clear()
 
 
 if __name__ == '__main__':

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import json
 import threading
 import time
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Any
 
 from actuator_glue import __version__
 from actuator_glue.campaigns.analysis import BETWEEN
+from actuator_glue.campaigns.cluster import forget_names
 from actuator_glue.campaigns.grouping import Task
 from actuator_glue.campaigns.record_process import RecordLimits, RecordProcess
 from actuator_glue.campaigns.rows import Row, RowFolder, content, fingerprint, key_of
@@ -19,12 +20,12 @@ _OF_THREAD = threading.local()
 
 
 def carry_out(
-    value: dict[str, Any], folder: str, limits: tuple[float, float], analysis: str, again: bool
+    value: str, folder: str, limits: tuple[float, float], analysis: str, again: bool
 ) -> tuple[str, bool, bool]:
     """Leave the row of a task in the folder of its campaign.
 
     Args:
-        value: the task, as `Task.to_json` writes it.
+        value: the task, JSON of `Task.to_json`.
         folder: of the campaign; every worker sees it under this path.
         limits: time [s] and memory [GB] that it may take.
         analysis: `module:function` that makes the row.
@@ -33,7 +34,8 @@ def carry_out(
     Returns:
         The row's key, whether it failed, and whether it was computed now.
     """
-    task, rows = Task.from_json(value), RowFolder(folder)
+    forget_names()
+    task, rows = Task.from_json(json.loads(value)), RowFolder(folder)
     hashes = content(task)
     key = key_of(task, hashes)
     known = rows.read(key)

@@ -36,4 +36,5 @@ def tiny(task: Task, folder: Path, key: str) -> dict[str, Any]:
         'root': len(texts[0]) ** 0.5,
         'threads': os.environ['OPENBLAS_NUM_THREADS'],
         'process': os.getpid(),
+        'job': os.environ.get('SLURM_JOB_ID', ''),
     }
