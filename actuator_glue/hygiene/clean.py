@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
-from actuator_glue.hygiene import frozen, glitches
+from actuator_glue.hygiene import glitches, slow_channel
 from actuator_glue.hygiene.checks import check, refuse_repeats, where
 from actuator_glue.model.exact import Initial
 from actuator_glue.records import Record
@@ -96,23 +96,9 @@ def clean(
     for i, record in enumerate(every):
         check(record, i + 1)
     refuse_repeats(records, holdout)
-    every, notes = _filled(every)
+    every, notes = slow_channel.measured_filled(every)
     every, more = zeroed(every)
-    every, glitches_told = glitches.mended(every, [initial_state(r) for r in every])
-    return every, [*glitches_told, *notes, *more]
-
-
-def _filled(records: Sequence[Record]) -> tuple[list[Record], list[str]]:
-    """Fill in channels of displacement that are slower than their recorder: no delay is left."""
-    out, notes = [], []
-    for i, record in enumerate(records):
-        every = frozen.every_which(record.measured)
-        if every > 1:
-            notes.append(
-                f'{where(record, i + 1)}: the measured displacement changes in one sample of '
-                f'{every} only, its channel gives {record.rate / every:.4g} Hz of '
-                f'{record.rate:.4g}; a cubic runs between its changes'
-            )
-            record = replace(record, measured=frozen.filled(record.measured, every))
-        out.append(record)
-    return out, notes
+    initials = [initial_state(r) for r in every]
+    every, filled = slow_channel.command_filled(every, initials)
+    every, glitches_told = glitches.mended(every, initials)
+    return every, [*glitches_told, *notes, *filled, *more]

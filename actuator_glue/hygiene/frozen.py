@@ -1,4 +1,4 @@
-"""Readings that stand still although the piston must move, and channels slower than a recorder.
+"""Readings that stand still although the piston must move.
 
 A converter that hangs, or a packet that is sent again, repeats one value exactly. A piston that
 play or friction holds still does not: what a model then misses is part of its whole residual, and
@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from actuator_glue.records import Array, Record
@@ -19,8 +18,6 @@ from actuator_glue.records import Array, Record
 _REPEATS = 3  # equal readings at least
 _BEYOND = 8.0  # times the residual's robust size
 _STEPS = 2.0  # of the channel's grid
-_REGULAR = 0.98  # of a slow channel's changes come in step with it
-_SLOWEST = 50  # samples from one change of a slow channel to the next
 
 
 @dataclass(frozen=True)
@@ -81,27 +78,3 @@ def bridged(record: Record, found: Frozen, output: Array, samples_each: int = 1)
     at = np.arange(len(record))
     off = record.measured - output
     return np.where(out, output + np.interp(at, at[~out], off[~out]), record.measured)
-
-
-def every_which(values: Array) -> int:
-    """Return after how many samples a channel (n,) changes; 1 if it may change at each."""
-    moved = values[1:] != values[:-1]
-    if 1.5 * np.count_nonzero(moved) > len(values) + 2:  # half of the changes follow another
-        return 1
-    at = np.flatnonzero(moved) + 1
-    if len(at) < _SLOWEST:
-        return 1
-    every = round(float(np.median(np.diff(at))))
-    if not 2 <= every <= _SLOWEST:
-        return 1
-    in_step = np.bincount(at % every, minlength=every).max() / len(at)
-    return every if in_step >= _REGULAR else 1
-
-
-def filled(values: Array, every: int) -> Array:
-    """Return a channel (n,) that changes at every `every`-th sample, smooth between them."""
-    at = np.flatnonzero(np.diff(values)) + 1
-    first = int(np.bincount(at % every, minlength=every).argmax())
-    known = np.arange(first, len(values), every)
-    places = np.clip(np.arange(len(values)), known[0], known[-1])
-    return np.asarray(scipy.interpolate.CubicSpline(known, values[known])(places))

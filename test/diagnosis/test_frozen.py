@@ -1,4 +1,4 @@
-"""Readings that repeat: a channel that froze is bridged and told, one that is slow is told."""
+"""Readings that repeat: a channel that froze is bridged and told."""
 
 from dataclasses import replace
 
@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from actuator_glue.diagnosis.preparation import prepare
-from actuator_glue.hygiene import frozen
 from actuator_glue.hygiene.despike import despiked
 from actuator_glue.inference.least_squares.fit import base_fit
 from actuator_glue.model.structure import Structure
@@ -64,20 +63,3 @@ def test_a_piston_that_stands_still_is_no_frozen_channel(
     y = np.round(x / grid) * grid if grid else x
     record = replace(machine(1000.0, 2)[0], measured=y)
     assert not any('frozen' in n for n in prepare([record], []).notes)
-
-
-@pytest.mark.parametrize('every', [2, 5])
-def test_a_channel_slower_than_its_recorder_leaves_no_delay(every: int) -> None:
-    record, _ = machine(1000.0, 3)
-    y = np.repeat(record.measured[::every], every)[: len(record)]
-    grid = np.round(record.measured / 2e-5) * 2e-5
-    assert frozen.every_which(record.measured) == frozen.every_which(grid) == 1
-    slow = replace(record, measured=y)
-    assert frozen.every_which(y) == every
-    (note,) = (n for n in prepare([slow], []).notes if 'one sample of' in n)
-    assert f'of {every} only' in note
-    assert f'{1000 / every:.4g} Hz' in note
-    whole = base_fit(prepare([record], []).fit).theta
-    found = base_fit(prepare([slow], []).fit).theta
-    # The noise of fewer samples moves it by some thousandths, the staircase by more than a tenth.
-    assert found[0] == pytest.approx(whole[0], rel=0.02)
