@@ -11,6 +11,7 @@ import numpy as np
 from actuator_glue.campaigns.grouping import Task
 from actuator_glue.errors import InputError
 from actuator_glue.io.calendar_time import calendar_time
+from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.parameters import NAMES
 from actuator_glue.records import Array, Record, source_name
 
@@ -55,14 +56,16 @@ def analysed(task: Task, keep: Path, key: str) -> Row:
         _whole(keep / 'draws' / f'{key}.npz', found.save)
         row['draws'] = f'draws/{key}.npz'
     left = found.structure is not None and not found.structure.intervals_hold
+    named: Sequence[str] = ()
     if wanted['diagnose'] == 'always' or (wanted['diagnose'] == 'structure' and left):
         diagnosis = _diagnosed(fitted, held, wanted)
+        named = diagnosis.model_effects
         row |= _told(diagnosis) | _tracked(diagnosis.tracking, stiffest)
         if wanted['reports']:
             _whole(keep / 'reports' / f'{key}.html', diagnosis.report)
             row['report'] = f'reports/{key}.html'
     if wanted.get('partition') is not None:
-        row |= _judged(found, wanted)
+        row |= judged(found, fitted, named, wanted)
     return row
 
 
@@ -182,11 +185,31 @@ def _tracked(tracking: Sequence[RecordTracking], source: str) -> Row:
     return row
 
 
-def _judged(found: Calibration, wanted: Mapping[str, Any]) -> Row:
-    """Return P(unstable) and delay margin of the recipe's hybrid test."""
+def judged(
+    found: Calibration,
+    records: Sequence[Record],
+    named: Sequence[str],
+    wanted: Mapping[str, Any],
+) -> Row:
+    """Return P(unstable) and delay margin of the recipe's hybrid test.
+
+    Args:
+        found: calibration of the records.
+        records: those that it was fitted to.
+        named: effects that a diagnosis named. Those of a linear loop, a delay say, decide whether
+            it is stable: the records are calibrated again with them.
+        wanted: `Recipe.analysis`.
+    """
+    from actuator_glue.api.calibration import calibrate
     from actuator_glue.api.rths import rths
     from actuator_glue.io.partition import parse_partition
 
+    linear = [n for n in named if n in CATALOGUE and CATALOGUE[n].linear]
+    if set(linear) - set(found.effects):
+        effects = list(dict.fromkeys([*found.effects, *linear]))
+        # With the usual effort: the recipe's may not be enough for more parameters.
+        options = {n: v for n, v in wanted['calibrate'].items() if n != 'evaluations'}
+        found = calibrate(records, **{**options, 'effects': effects})
     partition = parse_partition(wanted['partition'], wanted['partition_name'])
     stable = rths(partition, found)
     row: Row = {

@@ -20,7 +20,7 @@ def text(laboratory: dict, tiny: list[dict], groups: int) -> str:
         tiny: samples of `benchmarks.laboratory.tiny_tasks`.
         groups: of records.
     """
-    during = [s for s in tiny[:-1] if s['tasks']]
+    during = [s for s in tiny if s['tasks']]
     first, last = during[0], during[-1]
     tasks = last['tasks'] - first['tasks']
     # One process each: what it takes of a processor bounds how many tasks it hands out.

@@ -1,7 +1,7 @@
 """What a scheduler costs a task, and whether memory stays flat: many records that take no time.
 
-`python -m benchmarks.laboratory.tiny_tasks --tasks 100000 --workers 1`. Scheduler and workers are
-processes of their own. Writes tiny_tasks.json and tiny_tasks.md.
+`python -m benchmarks.laboratory.tiny_tasks --tasks 100000 --workers 1`. Writes tiny_tasks.json and
+tiny_tasks.md.
 """
 
 from __future__ import annotations
@@ -9,8 +9,6 @@ from __future__ import annotations
 import argparse
 import json
 import os
-import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -18,8 +16,8 @@ from typing import Any
 import actuator_glue as ag
 from actuator_glue.campaigns.grouping import Task
 from actuator_glue.campaigns.progress_file import Progress
-from actuator_glue.campaigns.record_process import THREADS
 
+NAMES = ('client', 'scheduler', 'worker', 'record')
 _PAGE = os.sysconf('SC_PAGE_SIZE') / 1e6  # MB
 
 
@@ -39,12 +37,22 @@ def worked(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf('SC_CLK_TCK')
 
 
-def start(*args: object) -> subprocess.Popen[bytes]:
-    """Start a program of dask, its threads pinned."""
-    environment = {**os.environ, **dict.fromkeys(THREADS, '1')}
-    return subprocess.Popen(
-        [sys.executable, '-m', *map(str, args)], env=environment, stderr=subprocess.DEVNULL
-    )
+def processes() -> dict[str, int]:
+    """Return the processes of the campaign that this one runs, as far as they have started."""
+    found, parent = {NAMES[0]: os.getpid()}, os.getpid()
+    for name, says in (
+        ('scheduler', 'actuator_glue.campaigns.cluster'),
+        ('worker', 'spawn_main'),
+        ('record', 'actuator_glue.campaigns.record_process'),
+    ):
+        children = Path(f'/proc/{parent}/task').glob('*/children')
+        for pid in map(int, ' '.join(c.read_text('utf-8') for c in children).split()):
+            if says in Path(f'/proc/{pid}/cmdline').read_text('utf-8'):
+                found[name] = parent = pid
+                break
+        else:
+            break
+    return found
 
 
 def main() -> int:
@@ -58,55 +66,27 @@ def main() -> int:
         path = args.out / 'records' / f'{i // 1000:04d}' / f'{i:07d}.csv'
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(str(i))
-    place = args.out / 'scheduler.json'
-    place.unlink(missing_ok=True)
-    scheduler = start(
-        'distributed.cli.dask_scheduler',
-        '--scheduler-file',
-        place,
-        '--host',
-        '127.0.0.1',
-        '--port',
-        '0',
-        '--no-dashboard',
-    )
-    while not (place.exists() and place.read_text('utf-8').endswith('}')):
-        time.sleep(0.1)
-    address = json.loads(place.read_text('utf-8'))['address']
-    workers = [
-        start(
-            'distributed.cli.dask_worker',
-            address,
-            '--nthreads',
-            '1',
-            '--no-dashboard',
-            '--no-nanny',
-            '--host',
-            '127.0.0.1',
-        )
-        for _ in range(args.workers)
-    ]
     samples: list[dict[str, float]] = []
     began = time.perf_counter()
 
     def look(now: Progress) -> None:
-        memory = {'client': os.getpid(), 'scheduler': scheduler.pid, 'worker': workers[0].pid}
-        sizes = {name: resident(pid) for name, pid in memory.items()}
-        times = {f'{name}_cpu': worked(pid) for name, pid in memory.items()}
-        at = {'tasks': now.done, 'seconds': time.perf_counter() - began}
-        samples.append({**at, **sizes, **times})
+        try:
+            of = processes()
+            sizes = {name: resident(pid) for name, pid in of.items()}
+            times = {f'{name}_cpu': worked(pid) for name, pid in of.items()}
+        except OSError:  # one has ended in between
+            return
+        if len(of) == len(NAMES):
+            at = {'tasks': now.done, 'seconds': time.perf_counter() - began}
+            samples.append({**at, **sizes, **times})
 
-    try:
-        ag.campaign(
-            args.out / 'records',
-            args.out / 'out',
-            scheduler=address,
-            progress=look,
-            analysis='benchmarks.laboratory.tiny_tasks:nothing',
-        )
-    finally:
-        for process in (*workers, scheduler):
-            process.terminate()
+    ag.campaign(
+        args.out / 'records',
+        args.out / 'out',
+        workers=args.workers,
+        progress=look,
+        analysis='benchmarks.laboratory.tiny_tasks:nothing',
+    )
     (args.out / 'tiny_tasks.json').write_text(json.dumps(samples, indent=1) + '\n')
     table = text(samples, args.tasks, args.workers)
     (args.out / 'tiny_tasks.md').write_text(table)
@@ -115,26 +95,24 @@ def main() -> int:
 
 
 def text(samples: list[dict[str, float]], tasks: int, workers: int) -> str:
-    """Return memory over the run as a table of Markdown; the last look is at the result."""
-    during = [s for s in samples[:-1] if s['tasks']] or samples
+    """Return memory over the run as a table of Markdown."""
+    during = [s for s in samples if s['tasks']] or samples
     first, last = during[0], during[-1]
 
     def each(name: str) -> float:
         return 1e3 * (last[name] - first[name]) / max(last['tasks'] - first['tasks'], 1)
 
-    shares = ', '.join(f'{n} {each(f"{n}_cpu"):.2f} ms' for n in ('client', 'scheduler', 'worker'))
+    shares = ', '.join(f'{n} {each(f"{n}_cpu"):.2f} ms' for n in NAMES)
     lines = [
         f'{tasks} tasks, {workers} worker(s): {each("seconds"):.1f} ms a task by the clock; '
         f'processor time: {shares}',
         '',
-        '| tasks done | client [MB] | scheduler [MB] | worker [MB] |',
-        '|---|---|---|---|',
+        f'| tasks done | {" | ".join(f"{n} [MB]" for n in NAMES)} |',
+        f'|{"---|" * (1 + len(NAMES))}',
     ]
-    for share in (0.0, 0.25, 0.5, 0.75, 1.0):
+    for share in (0.0, 0.125, 0.25, 0.5, 0.75, 1.0):
         s = min(during, key=lambda s: abs(s['tasks'] - share * last['tasks']))
-        lines.append(
-            f'| {s["tasks"]:.0f} | {s["client"]:.0f} | {s["scheduler"]:.0f} | {s["worker"]:.0f} |'
-        )
+        lines.append(f'| {s["tasks"]:.0f} | {" | ".join(f"{s[n]:.0f}" for n in NAMES)} |')
     return '\n'.join(lines) + '\n'
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import actuator_glue as ag
-from actuator_glue.campaigns.analysis import analysed, pooling
+from actuator_glue.campaigns.analysis import analysed, judged, pooling
 from actuator_glue.campaigns.grouping import tasks_of
 from actuator_glue.campaigns.recipe import parse_recipe
 from actuator_glue.io.export import write
@@ -53,6 +53,22 @@ def test_a_row_says_what_the_calibration_says(folder: Path, tmp_path: Path) -> N
     assert row['duration_s'] == pytest.approx(sum(r.duration for r in records))
     assert 0.0 < row['delay_at_5_hz_s_lower'] < row['delay_at_5_hz_s_mean']
     assert np.array_equal(ag.Calibration.load(tmp_path / row['draws']).draws, alone.draws)
+
+
+@pytest.mark.slow
+def test_a_delay_that_was_named_is_in_the_margin(folder: Path) -> None:
+    """4 ms of it cost 4 ms of the margin; play, which no linear loop has, costs nothing."""
+    (task,) = tasks_of([folder], parse_recipe(RECIPE, folder))
+    wanted = {**task.analysis, 'calibrate': {'evaluations': 8000, 'seed': 7}}
+    margins = []
+    for late in ({}, {'delay': {'delay': 4e-3}}):
+        test = ag.simulate(
+            ag.Command(rate=100.0, duration=8.0), stiffness=250e3, seed=3, effects=late
+        )
+        found = ag.calibrate(test, evaluations=8000, seed=7)
+        row = judged(found, [test], ('backlash', *late), wanted)
+        margins.append(row['margin_s_mean'])
+    assert margins[0] - margins[1] == pytest.approx(4e-3, abs=0.5e-3)
 
 
 def test_what_is_held_out_is_not_fitted(folder: Path, tmp_path: Path) -> None:
