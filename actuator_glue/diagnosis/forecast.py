@@ -4,8 +4,8 @@ Under a random command what a wrong model leaves has the same spectrum at all ti
 from the motion, which the model knows. A ridge regression on generic features of the motion and
 on the motion's past (a finite impulse response for each stiffness, as long as a lightly damped
 mode rings) forecasts it, and no noise: nothing that was measured is among the features. The sizes
-that weights are expected to have are those of the largest marginal likelihood (MacKay 1992;
-impulse responses that fade: Chen, Ohlsson & Ljung 2012), of the other stretches alone, too.
+that weights are expected to have are those of the largest marginal likelihood of other stretches, too
+(MacKay 1992; impulse responses that fade: Chen, Ohlsson & Ljung 2012).
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
+from typing import Any
 
 import numpy as np
 import scipy
@@ -33,6 +34,7 @@ _FOLDS = 6  # each is forecast by the others; their blocks lie spread over all r
 # motion. 128 at 10 Hz reach back by 3 s.
 _LAGS, _ALL_LAGS, _PER_PERIOD = 128, 384, 4.0
 _FADING = (0.1, 0.5, 2.0)  # s in which the expected square of an impulse response fades
+_KEPT = 8_000_000  # numbers of features that are kept at most: 64 MB, whitened ones among them
 # Expected squares of weights, of features of unit power and in units of the noise.
 _SIZES = (0.0, 1e-3, 1e-2, 0.1, 1.0, 10.0)
 _NONE = 1e-4  # weights that are expected this much smaller than the largest are not asked for
@@ -48,19 +50,19 @@ def stationary(data: Data) -> list[bool]:
     return [m.noise**2 > _STATIONARY * m.mean_square for m in motions]
 
 
-def noise(data: Data, scorer: Scorer, theta: Array, fit: Fit, nats: float) -> Array:
+def noise(features: Features, scorer: Scorer, fit: Fit, nats: float) -> Array:
     """Return how much noise there is at most in each record, (records,) [m].
 
     That is the error of its forecasts; infinite where they are no better than chance.
 
     Args:
-        data: the counted samples.
+        features: of the motion.
         scorer: noise and blocks.
-        theta: Eq. (2), whose motion gives the features (4,).
         fit: the structure whose residual is forecast.
         nats: evidence of any addition.
     """
-    error, alone, forecast = fit.error, *left_out(data, scorer, theta, fit)
+    data = features.data
+    error, alone, forecast = fit.error, *left_out(features, scorer, fit)
     white, gains = [scorer.whiten(e) for e in (alone, forecast)], []
     squares = error**2
     for block in scorer.blocks:
@@ -74,42 +76,144 @@ def noise(data: Data, scorer: Scorer, theta: Array, fit: Fit, nats: float) -> Ar
     return np.array([np.sqrt(np.mean(s)) for s in data.split(squares)])
 
 
-def left_out(data: Data, scorer: Scorer, theta: Array, fit: Fit) -> tuple[Array, Array]:
+def left_out(features: Features, scorer: Scorer, fit: Fit) -> tuple[Array, Array]:
     """Return what forecasts of left-out stretches leave of a structure's residual, (N,) [m].
 
     Without features, of the structure refitted alone, and with them.
 
     Args:
-        data: the counted samples.
+        features: of the motion.
         scorer: noise and blocks.
-        theta: Eq. (2), whose motion gives the features (4,).
         fit: the structure.
     """
-    past = _Past(data, theta)
-    names, products = _products(past, scorer, fit)
-    own, fold_of = len(fit.jacobian), np.empty(fit.error.size, dtype=np.intp)
+    data, past = features.data, features.past
+    products = features.products(scorer, fit)
+    own, names = len(fit.jacobian), features.names
+    counts = np.zeros(_FOLDS)
     for fold, block, _, _ in _blocks(data, scorer):
-        fold_of[block] = fold
+        counts[fold] += block.stop - block.start
     scale = np.sqrt(np.einsum('frr->r', products) / fit.error.size)
     scale[-1] = 1.0
     scale[scale < 1e-12 * scale.max()] = 1.0
     products /= np.outer(scale, scale)
     lags, alone = np.tile(past.lags, past.count), np.append(np.arange(own), -1)
-    weights, few = np.empty((_FOLDS, len(scale) - 1)), np.empty((_FOLDS, own))
-    for fold, rest in enumerate(products.sum(axis=0) - products):
-        count = float(np.sum(fold_of != fold))
-        weights[fold] = _weights(rest, count, own, lags) / scale[:-1]
-        few[fold] = _weights(rest[np.ix_(alone, alone)], count, own, lags[:0]) / scale[:own]
+    whole = products.sum(axis=0)
+    # What a block holds has no say in its forecast: each half of the folds has sizes of the other.
+    sizes = [
+        _sizes(products[other::2].sum(axis=0), float(counts[other::2].sum()), own, lags)
+        for other in (1, 0)
+    ]
     before, after = fit.error.copy(), fit.error.copy()
-    for i, name, feature in library(data, theta, plays=True):
-        part = data.parts[i]
-        after[part] -= weights[fold_of[part], own + names.index(name)] * feature
+    weights = np.empty((_FOLDS, len(scale) - 1))
+    for fold, count in enumerate(counts.sum() - counts):
+        rest = whole - products[fold]
+        weights[fold] = _weights(rest, float(count), own, sizes[fold % 2]) / scale[:-1]
+    few = [_alone((whole - one)[np.ix_(alone, alone)]) / scale[:own] for one in products]
+    fold_of = np.empty(fit.error.size, dtype=np.intp)
     for fold, block, record, at in _blocks(data, scorer):
+        fold_of[block] = fold
         before[block] -= few[fold] @ fit.jacobian[:, block]
         after[block] -= weights[fold, :own] @ fit.jacobian[:, block]
         columns = past.columns(record, own + len(names))
         after[block] -= weights[fold, columns] @ past.rows(record, past.motions[record], at)
+    for i, name, feature in features.library():
+        part = data.parts[i]
+        after[part] -= weights[fold_of[part], own + names.index(name)] * feature
     return before, after
+
+
+@dataclass
+class Features:
+    """What residuals are forecast from: features of the motion that Eq. (2) simulates, its past.
+
+    They are the same for every structure, so they are computed once where memory allows.
+
+    Attributes:
+        data: the counted samples.
+        theta: Eq. (2) (4,).
+    """
+
+    data: Data
+    theta: Array
+    _kept: list[tuple[int, str, NDArray[np.float32]]] | None = None
+    _white: tuple[tuple[Array, ...], list[NDArray[np.float32]], Array] | None = None
+
+    @cached_property
+    def past(self) -> _Past:
+        """The motion's past."""
+        return _Past(self.data, self.theta)
+
+    @cached_property
+    def names(self) -> list[str]:
+        """Names of the features, in their order."""
+        return list(dict.fromkeys(name for _, name, _ in self.library()))
+
+    def library(self) -> Iterator[tuple[int, str, NDArray[np.floating[Any]]]]:
+        """Yield record, name and values (n,) of every feature."""
+        if self._kept is not None:
+            yield from self._kept
+            return
+        kept, room = list[tuple[int, str, NDArray[np.float32]]](), _KEPT
+        for i, name, feature in library(self.data, self.theta, plays=True):
+            room -= feature.size
+            if room >= 0:
+                kept.append((i, name, feature.astype(np.float32)))
+            yield i, name, feature
+        if room >= 0:
+            self._kept = kept
+
+    def products(self, scorer: Scorer, fit: Fit) -> Array:
+        """Products of all rows with each other in each fold, whitened, (_FOLDS, r, r).
+
+        Rows are the structure's Jacobian, features, the motion's past under each stiffness, and
+        the residual.
+
+        Args:
+            scorer: noise and blocks.
+            fit: the structure.
+        """
+        table, known = self._whitened(scorer)
+        error, jacobian = scorer.whiten(fit.error), scorer.whiten(fit.jacobian)
+        own, past = len(jacobian), self.past
+        size = own + len(known[0]) + 1
+        out = np.zeros((_FOLDS, size, size))
+        out[:, own:-1, own:-1] = known
+        ends = np.append(np.arange(own), size - 1)
+        moved = [whiten(x, taps) for x, taps in zip(past.motions, scorer.taps, strict=True)]
+        for fold, block, record, at in _blocks(self.data, scorer):
+            rows = np.concatenate([jacobian[:, block], error[None, block]])
+            columns = past.columns(record, own + len(table))
+            out[fold][np.ix_(ends, ends)] += rows @ rows.T
+            out[fold][ends, own : own + len(table)] += rows @ _block(table, block).T
+            out[fold][ends, columns] += rows @ past.rows(record, moved[record], at).T
+        out[:, own:-1, ends] = out[:, ends, own:-1].swapaxes(1, 2)
+        return out
+
+    def _whitened(self, scorer: Scorer) -> tuple[list[NDArray[np.float32]], Array]:
+        """Features (N,), whitened and in short numbers, and their products with the past's."""
+        if self._white is not None and self._white[0] is scorer.taps:
+            return self._white[1:]
+        self._white, data, past = None, self.data, self.past
+        table: dict[str, NDArray[np.float32]] = {}
+        for i, name, feature in self.library():
+            row = table.setdefault(name, np.empty(data.target.size, dtype=np.float32))
+            row[data.parts[i]] = whiten(feature.astype(np.float64), scorer.taps[i])
+        rows, first = list(table.values()), len(table)
+        size = first + past.count * len(past.lags)
+        products = np.zeros((_FOLDS, size, size))
+        moved = [whiten(x, taps) for x, taps in zip(past.motions, scorer.taps, strict=True)]
+        for fold, block, record, at in _blocks(data, scorer):
+            both = np.concatenate([_block(rows, block), past.rows(record, moved[record], at)])
+            columns = past.columns(record, first)
+            index = np.concatenate([np.arange(first), np.r_[columns]])
+            products[fold][np.ix_(index, index)] += both @ both.T
+        if self._kept is not None:
+            self._white = scorer.taps, rows, products
+        return rows, products
+
+
+def _block(rows: list[NDArray[np.float32]], block: slice) -> Array:
+    return np.array([row[block] for row in rows], dtype=np.float64)
 
 
 @dataclass(frozen=True)
@@ -170,37 +274,28 @@ def _blocks(data: Data, scorer: Scorer) -> Iterator[tuple[int, slice, int, NDArr
         yield i % _FOLDS, block, record, counted[record][block.start - begin : block.stop - begin]
 
 
-def _products(past: _Past, scorer: Scorer, fit: Fit) -> tuple[list[str], Array]:
-    """Products of all rows with each other in each fold, whitened, (_FOLDS, r, r).
+def _alone(products: Array) -> Array:
+    """Return the weights of a structure's own rows, (own,), which are free."""
+    return np.asarray(scipy.linalg.cho_solve(_firm(products[:-1, :-1]), products[:-1, -1]))
 
-    Rows are the structure's Jacobian, features, the motion's past under each stiffness, and the
-    residual. Features are kept in short numbers.
 
-    Returns:
-        Names of the features, and the products.
+def _firm(own: Array) -> tuple[Array, bool]:
+    """Factor the products of free rows.
+
+    Where a structure does not move at all none of its parameters takes anything up.
     """
-    data = past.data
-    error, own = scorer.whiten(fit.error), scorer.whiten(fit.jacobian)
-    table: dict[str, NDArray[np.float32]] = {}
-    for i, name, feature in library(data, past.theta, plays=True):
-        row = table.setdefault(name, np.empty(len(error), dtype=np.float32))
-        row[data.parts[i]] = whiten(feature, scorer.taps[i])
-    first = len(own) + len(table)
-    size = first + past.count * len(past.lags) + 1
-    out = np.zeros((_FOLDS, size, size))
-    moved = [whiten(x, taps) for x, taps in zip(past.motions, scorer.taps, strict=True)]
-    for fold, block, record, at in _blocks(data, scorer):
-        features = np.array([row[block] for row in table.values()], dtype=np.float64)
-        lagged = past.rows(record, moved[record], at)
-        rows = np.concatenate([own[:, block], features, lagged, error[None, block]])
-        columns = past.columns(record, first)
-        index = np.concatenate([np.arange(first), np.r_[columns], [size - 1]])
-        out[fold][np.ix_(index, index)] += rows @ rows.T
-    return list(table), out
+    least = 1e-9 * np.trace(own) / len(own) or 1.0
+    return scipy.linalg.cho_factor(own + least * np.eye(len(own)))
 
 
-def _weights(products: Array, count: float, own: int, lags: Array) -> Array:
-    """Return weights of rows, (r - 1,), under the prior of largest marginal likelihood.
+def _beside(products: Array, own: int) -> Array:
+    """Products of all other rows without what the first, free ones take up of them."""
+    taken = scipy.linalg.cho_solve(_firm(products[:own, :own]), products[:own, own:])
+    return np.asarray(products[own:, own:] - products[own:, :own] @ taken)
+
+
+def _sizes(products: Array, count: float, own: int, lags: Array) -> Array:
+    """Return the expected squares of weights, (r - 1 - own,), of largest marginal likelihood.
 
     Args:
         products: of rows and, last, the residual with each other, (r, r).
@@ -208,27 +303,26 @@ def _weights(products: Array, count: float, own: int, lags: Array) -> Array:
         own: how many of the rows are free: the structure's own.
         lags: of the last rows; those between are features of the present motion, (l,) [s].
     """
-    # Where a structure does not move at all none of its parameters takes anything up.
-    least = 1e-9 * np.trace(products[:own, :own]) / own or 1.0
-    firm = products[:own, :own] + least * np.eye(own)
-    given = scipy.linalg.cho_factor(firm)
-    free = products[own:, own:] - products[own:, :own] @ scipy.linalg.cho_solve(
-        given, products[:own, own:]
-    )
+    free = _beside(products, own)
     features = len(free) - 1 - len(lags)
 
-    def tried(present: float, past: float, fading: float) -> tuple[float, Array]:
-        sizes = np.append(np.full(features, present), past * np.exp(-lags / fading))
-        return _ridge(free, count, np.sqrt(sizes))
+    def sized(present: float, past: float, fading: float) -> Array:
+        return np.append(np.full(features, present), past * np.exp(-lags / fading))
 
-    # Sizes of features, of lags, of features beside lags.
-    best = max(((s, 0.0, 1.0) for s in _SIZES), key=lambda o: tried(*o)[0])
-    ways = [(best[0], s, fading) for s, fading in product(_SIZES, _FADING)]
-    best = max(ways, key=lambda o: tried(*o)[0])
-    best = max(((s, *best[1:]) for s in _SIZES), key=lambda o: tried(*o)[0])
-    others = tried(*best)[1]
+    def likelihood(way: tuple[float, float, float]) -> float:
+        return _ridge(free, count, np.sqrt(sized(*way)))[0]
+
+    # Of features, of lags, of features beside lags.
+    best = max(((s, 0.0, 1.0) for s in _SIZES), key=likelihood)
+    best = max(((best[0], s, fading) for s, fading in product(_SIZES, _FADING)), key=likelihood)
+    return sized(*max(((s, *best[1:]) for s in _SIZES), key=likelihood))
+
+
+def _weights(products: Array, count: float, own: int, sizes: Array) -> Array:
+    """Return weights of rows, (r - 1,), of which those behind the `own` have expected squares."""
+    others = _ridge(_beside(products, own), count, np.sqrt(sizes))[1]
     pull = products[:own, -1] - products[:own, own:-1] @ others
-    return np.append(scipy.linalg.cho_solve(given, pull), others)
+    return np.append(scipy.linalg.cho_solve(_firm(products[:own, :own]), pull), others)
 
 
 def _ridge(products: Array, count: float, sizes: Array) -> tuple[float, Array]:

@@ -63,14 +63,17 @@ class Judge:
         data, scorer = self.search.data, self.search.scorer
         splits = splits_of(data, fit.error)
         if any(self._stationary) and scorer is not None:
-            theta = self.search.scale().theta
-            most = forecast.noise(data, scorer, theta, fit, self.settings.nats)
+            most = forecast.noise(self._features, scorer, fit, self.settings.nats)
             splits = [
                 replace(s, noise=min(s.noise, limit)) if asked else s
                 for s, limit, asked in zip(splits, most, self._stationary, strict=True)
             ]
         self._known = fit, pooled(data, splits)
         return self._known[1]
+
+    @cached_property
+    def _features(self) -> forecast.Features:
+        return forecast.Features(self.search.data, self.search.scale().theta)
 
     @cached_property
     def _stationary(self) -> list[bool]:

@@ -203,7 +203,9 @@ def _noise(data: Data, structure: Structure, found: Fit, settings: Thresholds) -
     )
     if worth < _WHITE * found.error.size and not _plain(found, noise, sizes, settings):
         scorer = Scorer.of(data, splits)
-        most = forecast.noise(data, scorer, found.theta[:4], found, settings.nats)
+        most = forecast.noise(
+            forecast.Features(data, found.theta[:4]), scorer, found, settings.nats
+        )
         noise = np.minimum(noise, most)
     return np.repeat(noise**2, sizes)
 

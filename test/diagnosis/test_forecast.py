@@ -68,10 +68,11 @@ def test_noise_is_not_forecast(rng_seed: int) -> None:
     assert found.noise == pytest.approx(NOISE, rel=0.05)
     assert found.first < found.material
     base, data = found.search.base(), found.search.data
+    features = forecast.Features(data, base.theta)
     for pole in (0.0, 0.0, 0.9, 0.9):
         error = signal.lfilter([NOISE], [1.0, -pole], rng.standard_normal(base.error.size))
         scorer = Scorer.of(data, splits_of(data, error))
-        most = forecast.noise(data, scorer, base.theta, replace(base, error=error), 10.0)
+        most = forecast.noise(features, scorer, replace(base, error=error), 10.0)
         assert np.isinf(most).all()
 
 
@@ -87,9 +88,9 @@ def test_a_forecast_does_not_see_what_it_forecasts(rng_seed: int) -> None:
     block, error = scorer.blocks[5], base.error.copy()
     added = 0.1 * data.target[block][::-1]
     error[block] += added
+    features = forecast.Features(data, base.theta)
     before, after = (
-        forecast.left_out(data, scorer, base.theta, replace(base, error=e))[1]
-        for e in (base.error, error)
+        forecast.left_out(features, scorer, replace(base, error=e))[1] for e in (base.error, error)
     )
     assert np.std((after - before)[block] - added) < 0.01 * added.std()
 
@@ -100,5 +101,5 @@ def test_a_structure_that_does_not_move_takes_nothing_up(rng_seed: int) -> None:
     base, data, scorer = found.search.base(), found.search.data, found.search.scorer
     assert scorer is not None
     still = replace(base, slopes=np.zeros_like(base.slopes))
-    scores, left = forecast.left_out(data, scorer, base.theta, still)
+    scores, left = forecast.left_out(forecast.Features(data, base.theta), scorer, still)
     assert np.isfinite(scores).all() and np.isfinite(left).all()
