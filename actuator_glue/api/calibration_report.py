@@ -216,8 +216,7 @@ def delays(tracked: Sequence[tracking.RecordTracking]) -> str:
         for key, where in known:
             if key in of.predicted:
                 d = of.predicted[key]
-                interval = f'{1e3 * d.lower:.2f} to {1e3 * d.upper:.2f}'
-                told.append(f'{1e3 * d.median:.2f} ms ({interval}){where} in {of.source}')
+                told.append(f'{spread(d.median, d.lower, d.upper, "s")}{where} in {of.source}')
                 break
     return '; '.join(told)
 
@@ -277,9 +276,15 @@ def brief(found: CalibrationData) -> list[html.Block]:
     return [*blocks, *(html.Note(line) for line in found.notes)]
 
 
-def page(found: CalibrationData, hybrid: str = '') -> html.Page:
-    """Return the report of a calibration; `hybrid` tells what it means for a hybrid test."""
-    first = first_page(found, hybrid)
+def page(found: CalibrationData, hybrid: str = '', next_command: str = '') -> html.Page:
+    """Return the report of a calibration.
+
+    Args:
+        found: the calibration.
+        hybrid: what it means for a hybrid test.
+        next_command: what to type next; empty for a command over the same files.
+    """
+    first = first_page(found, hybrid).ending_with(next_command)
     picture = html.Picture.of(
         posterior(found), 'Distribution of each parameter, and of each pair.'
     )

@@ -184,12 +184,15 @@ class Calibration(PosteriorModel, CalibrationData):
 
         return first_page(self, self.hybrid(partition), drawn=False)
 
-    def page(self, partition: Partition | Path | str | None = None) -> html.Page:
+    def page(
+        self, partition: Partition | Path | str | None = None, next_command: str = ''
+    ) -> html.Page:
         """Return the report: the answer, the posterior, and its bands over the records.
 
         Args:
             partition: as `first_page` takes it.
+            next_command: as `report` takes it.
         """
         from actuator_glue.api.calibration_report import page
 
-        return page(self, self.hybrid(partition))
+        return page(self, self.hybrid(partition), next_command)

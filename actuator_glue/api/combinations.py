@@ -118,11 +118,27 @@ class Combinations(Result, CombinationsData):
 
         return first_page(self, drawn=False)
 
-    def page(self) -> html.Page:
-        """Return the report."""
+    def page(self, next_command: str = '') -> html.Page:
+        """Return the report; `next_command` as `report` takes it."""
         from actuator_glue.api.combinations_report import page
 
-        return page(self)
+        return page(self, next_command)
+
+    def report(self, path: Path | str, next_command: str = '') -> Path:
+        """Write a report, one HTML file, and return its path.
+
+        Args:
+            path: where to.
+            next_command: what the first page says to type next; empty for a command over the
+                same files.
+
+        Raises:
+            InputError: the file cannot be written.
+        """
+        from actuator_glue.report import html
+
+        with speaking(self.motion):
+            return html.write(Path(path), self.page(next_command))
 
 
 @takes(CalibrationOptions)

@@ -132,9 +132,14 @@ def brief(found: CombinationsData) -> list[html.Block]:
     ]
 
 
-def page(found: CombinationsData) -> html.Page:
-    """Return the report: the answer, the posterior, and how the actuator follows its command."""
-    first = first_page(found)
+def page(found: CombinationsData, next_command: str = '') -> html.Page:
+    """Return the report: the answer, the posterior, and how the actuator follows its command.
+
+    Args:
+        found: what is known.
+        next_command: what to type next; empty for a command over the same files.
+    """
+    first = first_page(found).ending_with(next_command)
     posterior: list[html.Block] = [
         html.Table(HEADER, rows(found), TITLE),
         html.Picture.of(figure(found), 'Distribution of each combination; b, a, c as above.'),

@@ -227,15 +227,18 @@ class Diagnosis(PosteriorModel, DiagnosisData):
 
         return first_page(self, self.hybrid(partition), drawn=False)
 
-    def page(self, partition: Partition | Path | str | None = None) -> html.Page:
+    def page(
+        self, partition: Partition | Path | str | None = None, next_command: str = ''
+    ) -> html.Page:
         """Return the report.
 
         Args:
             partition: as `first_page` takes it.
+            next_command: as `report` takes it.
         """
         from actuator_glue.report.diagnosis_report import page
 
-        return page(self, tables(self.tracking), self.hybrid(partition))
+        return page(self, tables(self.tracking), self.hybrid(partition), next_command)
 
 
 def _row(effect: str, name: str, size: Estimate) -> dict[str, Any]:

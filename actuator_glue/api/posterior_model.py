@@ -161,15 +161,24 @@ class PosteriorModel(Result):
         """
 
     @abstractmethod
-    def page(self, partition: Partition | Path | str | None = None) -> html.Page:
-        """Return its report; with a partition, what the actuator means for that hybrid test."""
+    def page(
+        self, partition: Partition | Path | str | None = None, next_command: str = ''
+    ) -> html.Page:
+        """Return its report; the arguments are those of `report`."""
 
-    def report(self, path: Path | str, partition: Partition | Path | str | None = None) -> Path:
+    def report(
+        self,
+        path: Path | str,
+        partition: Partition | Path | str | None = None,
+        next_command: str = '',
+    ) -> Path:
         """Write a report, one HTML file, and return its path.
 
         Args:
             path: where to.
             partition: a hybrid test, of which the first page tells what the actuator means for it.
+            next_command: what the first page says to type next; empty for a command over the
+                same files.
 
         Raises:
             InputError: the file cannot be written, or a partition that cannot be used.
@@ -177,7 +186,7 @@ class PosteriorModel(Result):
         from actuator_glue.report import html
 
         with speaking(self.motion):
-            return html.write(Path(path), self.page(partition))
+            return html.write(Path(path), self.page(partition, next_command))
 
     def state_space(self, stiffness: float, draw: str | int = 'mean') -> control.StateSpace:
         """Return x/u as a `control.StateSpace`; see `transfer_function`."""

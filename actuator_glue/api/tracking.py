@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from actuator_glue.api.spread import Spread, spread
+from actuator_glue.diagnosis.response import amplitude_of, harmonic
 from actuator_glue.hybrid.actuator import actuator, table_of
 from actuator_glue.hybrid.indicators import TargetMotion
 from actuator_glue.hybrid.stability import tracking
 from actuator_glue.hygiene.clean import clean, common_initial, initial_state
 from actuator_glue.hygiene.despike import despiked
 from actuator_glue.inference.least_squares.data import LANES, SETTLE, chunks
+from actuator_glue.model.effects import scale
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.online.job import WindowResult
@@ -24,7 +26,9 @@ if TYPE_CHECKING:
     from actuator_glue.report import html
 
 FREQUENCIES = (1.0, 5.0, 10.0)  # Hz
-_DRAWS = 100
+_DRAWS = 100  # that are simulated over the record
+# That are asked for delay and amplitude: 2.5 % of fewer are too few for the end of an interval.
+_ANSWERS = 400
 _WINDOW_DRAWS = 40  # of a window, which has little time
 HEADER = ('number', 'unit', 'measured', 'median', '2.5 %', '97.5 %')
 # Name in JSON: text, unit and factor for people.
@@ -94,7 +98,8 @@ def records_tracking(
     """Return how the actuator follows the command of each record, whoever asks.
 
     Numbers of one record are those of one set of samples: at the rate it was sampled with, without
-    impulses, and without what lets a state that is not known be forgotten.
+    impulses, and without what lets a state that is not known be forgotten. Delay and amplitude of
+    a model that is not linear are those of sines as large as the test had them.
 
     Args:
         draws: shape (m, p), SI units.
@@ -107,7 +112,8 @@ def records_tracking(
         initial = initial_state(record)
         settle = 0 if initial == 'rest' else round(SETTLE / record.period)
         settle = min(settle, len(record) // 2)
-        out.append(record_tracking(draws, names, structure, record, initial, settle))
+        of = record_tracking(draws, names, structure, record, initial, settle)
+        out.append(replace(of, predicted=_sines(draws, names, structure, record) | of.predicted))
     return tuple(out)
 
 
@@ -136,17 +142,17 @@ def record_tracking(
         frequencies: where delay and amplitude are told [Hz].
         origin: time of its first sample since the test began [s].
     """
-    rows = np.linspace(0, len(draws) - 1, min(_DRAWS, len(draws))).astype(np.intp)
-    some = table_of(draws[rows], names, structure)  # without parameters of the likelihood
-    stiffness = np.full(len(some), record.known_stiffness())
     predicted: dict[str, Any] = {}
     if structure.linear:
-        linear = actuator(some, structure.names, structure.entries, stiffness)
+        many = _some(draws, names, structure, _ANSWERS)
+        stiffness = np.full(len(many), record.known_stiffness())
+        linear = actuator(many, structure.names, structure.entries, stiffness)
         found = tracking(linear, frequencies)
         for i, f in enumerate(frequencies):
             predicted[f'delay_at_{f:g}_hz_s'] = spread(found.delay[:, i])
             predicted[f'amplitude_at_{f:g}_hz'] = spread(found.amplitude[:, i])
         predicted['bandwidth_hz'] = spread(found.bandwidth)
+    some = _some(draws, names, structure, _DRAWS)
     counted = record.slice(settle, len(record))
     drawn: list[dict[str, float]] = []
     if np.ptp(counted.command) > 0.0:
@@ -160,6 +166,35 @@ def record_tracking(
     if drawn:
         predicted |= {n: spread(np.array([d[n] for d in drawn])) for n in drawn[0]}
     return RecordTracking(source_name(record.source), predicted, measured)
+
+
+def _some(draws: Array, names: Sequence[str], structure: Structure, most: int) -> Array:
+    """Return some of the draws, without parameters of the likelihood."""
+    rows = np.linspace(0, len(draws) - 1, min(most, len(draws))).astype(np.intp)
+    return table_of(draws[rows], names, structure)
+
+
+def _sines(
+    draws: Array, names: Sequence[str], structure: Structure, record: Record
+) -> dict[str, Spread]:
+    """Return delay and amplitude of a model that is not linear, of sines as large as a test's."""
+    if structure.linear:
+        return {}
+    table = _some(draws, names, structure, _ANSWERS)
+    sizes = scale([record], table[:, :4].mean(axis=0))
+    out = {}
+    for hertz in FREQUENCIES:
+        size = amplitude_of(sizes, hertz)
+        answer = harmonic(structure, table, size, hertz, record.known_stiffness())
+        answer = answer[np.isfinite(answer)]
+        if len(answer):
+            lag = -np.angle(answer)
+            # No delay is negative by more than a quarter of a turn, nor are two draws' far apart.
+            lag += 2.0 * np.pi * (np.median(lag) < -0.5 * np.pi)
+            lag = np.median(lag) + np.angle(np.exp(1j * (lag - np.median(lag))))
+            out[f'delay_at_{hertz:g}_hz_s'] = spread(lag / (2.0 * np.pi * hertz))
+            out[f'amplitude_at_{hertz:g}_hz'] = spread(np.abs(answer))
+    return out
 
 
 def window_tracking(

@@ -151,8 +151,9 @@ def run(args: argparse.Namespace) -> int:
     content = found.to_json()
     failed = beside(args.json, lambda out: write_json(content, out))
     failed = beside(args.save, _saving(found, args)) or failed
-    _show(found, args)
-    failed = beside(args.report, lambda out: found.report(out, args.partition)) or failed
+    following = _show(found, args)
+    drawn = beside(args.report, lambda out: found.report(out, args.partition, following))
+    failed = drawn or failed
     return failed or (1 if found.problems else 0)
 
 
@@ -176,14 +177,14 @@ def _combinations(
     content = found.to_json()
     failed = beside(args.json, lambda out: write_json(content, out))
     failed = beside(args.save, _saving(found, args)) or failed
-    show_first(found.first_page(), args)
+    following = show_first(found.first_page(), args)
     table(TITLE, HEADER, rows(found), args)
     for of in found.tracking:
         table(of.title, TRACKING, of.rows(), args)
     say(f'{found.evaluations} evaluations in {found.seconds:.1f} s', args)
     for line in found.notes[1:]:
         note(line)
-    failed = beside(args.report, found.report) or failed
+    failed = beside(args.report, lambda out: found.report(out, following)) or failed
     return failed or (1 if found.problems else 0)
 
 
@@ -225,7 +226,8 @@ def bounds(given: Sequence[str]) -> dict[str, tuple[float, float]]:
     return out
 
 
-def _show(found: Calibration, args: argparse.Namespace) -> None:
+def _show(found: Calibration, args: argparse.Namespace) -> str:
+    """Print the answer; return the command that it says to type next."""
     from actuator_glue.api.calibration_report import (
         HEADER,
         moment_rows,
@@ -233,7 +235,7 @@ def _show(found: Calibration, args: argparse.Namespace) -> None:
     )
     from actuator_glue.api.tracking import HEADER as TRACKING
 
-    show_first(found.first_page(args.partition), args)
+    following = show_first(found.first_page(args.partition), args)
     rows: list[tuple[str, ...]] = moment_rows(found)
     columns: tuple[str, ...] = HEADER
     mostly = ['prior' if p.prior_dominated else '' for p in found.parameters.values()]
@@ -248,3 +250,4 @@ def _show(found: Calibration, args: argparse.Namespace) -> None:
         say(f'{found.compile_seconds:.1f} s of compilation besides, once per installation', args)
     for line in found.notes:
         note(line)
+    return following

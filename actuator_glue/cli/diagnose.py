@@ -119,10 +119,11 @@ def run(args: argparse.Namespace) -> int:
     failed = beside(args.json, lambda out: write_json(content, out))
     if found.learned:
         failed = beside(args.save_effects, found.save_effects) or failed
-    _show(found, args)
+    following = _show(found, args)
     if args.save_effects is not None and not found.learned:
         note(f'{args.save_effects}: not written, for no term was learned')
-    failed = beside(args.report, lambda out: found.report(out, args.partition)) or failed
+    drawn = beside(args.report, lambda out: found.report(out, args.partition, following))
+    failed = drawn or failed
     return failed or (0 if found.complete else 1)
 
 
@@ -146,8 +147,15 @@ def _load(args: argparse.Namespace) -> tuple[list[Record], list[Record]]:
     return records, [replace(r, stiffness=last) if r.stiffness is None else r for r in held]
 
 
-def _show(found: Diagnosis, args: argparse.Namespace) -> None:
-    show_first(found.first_page(args.partition), args)
+def _show(found: Diagnosis, args: argparse.Namespace) -> str:
+    """Print the answer; return the command that it says to type next."""
+    from actuator_glue.report.diagnosis_summary import next_command
+
+    page = found.first_page(args.partition)
+    if found.learned and args.save_effects is not None:
+        with_them = next_command(replace(found, learned=()))
+        page = page.ending_with(f'{with_them} --effects-file {shlex.quote(args.save_effects)}')
+    following = show_first(page, args)
     table(
         'Candidates, Eq. (2) + one effect, refitted',
         ['effect', 'rms um', 'score nats'],
@@ -156,3 +164,4 @@ def _show(found: Diagnosis, args: argparse.Namespace) -> None:
     )
     for line in found.advice:
         note(line)
+    return following

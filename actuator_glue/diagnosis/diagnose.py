@@ -62,6 +62,9 @@ from actuator_glue.inference.prior_use import GivenPrior
 from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array, Record
 
+# Draws that are run with sines: the ends of an interval over 32 of them leave out 11 %, not 5 %.
+_RESPONSES = 400
+
 
 def diagnose(
     records: Sequence[Record],
@@ -235,7 +238,13 @@ def diagnose(
         learned=learned,
         base_before={n: e for n, e in estimates_before.items() if n in estimates},
         responses=tuple(
-            response.of(after.model, after.theta, after.draws[:: len(after.draws) // 32], sizes, k)
+            response.of(
+                after.model,
+                after.theta,
+                after.draws[:: max(len(after.draws) // _RESPONSES, 1)],
+                sizes,
+                k,
+            )
             for k in sorted({r.known_stiffness() for r in data.records})
         ),
         experiments=experiments,

@@ -101,8 +101,8 @@ def of(model: Model, theta: Array, draws: Array, scale: Scale, stiffness: float)
     table = np.concatenate([theta[None], draws])
     sines = []
     for hertz in FREQUENCIES:
-        size = _amplitude(scale, hertz)
-        answer = _harmonic(model, table, size, hertz, stiffness)
+        size = amplitude_of(scale, hertz)
+        answer = harmonic(model, table, size, hertz, stiffness)
         gain, phase = np.abs(answer), np.angle(answer)
         # Phases run away from the best one's by less than half a turn.
         phase = phase[0] + np.angle(np.exp(1j * (phase - phase[0])))
@@ -126,12 +126,21 @@ def _interval(values: Array) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def _amplitude(scale: Scale, hertz: float) -> float:
+def amplitude_of(scale: Scale, hertz: float) -> float:
+    """Return how large a sine is [m] that exceeds neither stroke nor speed of a test."""
     return min(scale.stroke, scale.velocity / (2.0 * math.pi * hertz))
 
 
-def _harmonic(model: Model, table: Array, size: float, hertz: float, stiffness: float) -> Array:
-    """Complex gain (m,) of the first harmonic of a sine."""
+def harmonic(model: Model, table: Array, size: float, hertz: float, stiffness: float) -> Array:
+    """Complex gain (m,) of the first harmonic of a sine, from simulations that it settles in.
+
+    Args:
+        model: Eq. (2) with effects.
+        table: its parameters (m, p).
+        size: amplitude of the sine of command [m].
+        hertz: its frequency [Hz].
+        stiffness: of the specimen [N/m].
+    """
     period = 1.0 / max(_SLOWEST, _RATE * hertz)
     before = math.ceil(_SETTLE * hertz)
     per = round(1.0 / hertz / period)
@@ -149,7 +158,7 @@ def _bandwidth(model: Model, theta: Array, scale: Scale, stiffness: float) -> fl
     grid = np.geomspace(FREQUENCIES[0], _HIGHEST, _GRID)
     gains = np.array(
         [
-            abs(_harmonic(model, theta[None], _amplitude(scale, f), float(f), stiffness)[0])
+            abs(harmonic(model, theta[None], amplitude_of(scale, f), float(f), stiffness)[0])
             for f in grid
         ]
     )

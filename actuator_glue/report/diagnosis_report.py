@@ -224,15 +224,22 @@ def brief(found: DiagnosisData) -> list[Block]:
     return [*first_page(found, drawn=False).blocks(), *(Note(line) for line in told)]
 
 
-def page(found: DiagnosisData, tracking: Sequence[Block] = (), hybrid: str = '') -> Page:
+def page(
+    found: DiagnosisData,
+    tracking: Sequence[Block] = (),
+    hybrid: str = '',
+    next_command: str = '',
+) -> Page:
     """Return the report of a diagnosis.
 
     Args:
         found: the diagnosis.
         tracking: tells how it follows its command.
         hybrid: what it means for a hybrid test.
+        next_command: what to type next; empty for a command over the same files.
     """
-    first = Section('The answer', first_page(found, hybrid).blocks(headline=False))
+    told = first_page(found, hybrid).ending_with(next_command)
+    first = Section('The answer', told.blocks(headline=False))
     evidence = [_error(found), _effects(found), _residual(found), _records(found)]
     if tracking:
         evidence.insert(2, Section('How the actuator follows its command', tracking))

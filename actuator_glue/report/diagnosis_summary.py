@@ -148,10 +148,7 @@ def delay(found: DiagnosisData) -> str:
         if known:
             s = min(known, key=lambda s: abs(s.frequency - _TOLD))
             where = 'free' if r.stiffness == 0.0 else f'with {r.stiffness / 1e3:g} kN/m'
-            told.append(
-                f'{1e3 * s.delay:.2f} ms ({_range(s.delay_ci, 1e3, 2)}) at {s.frequency:g} Hz '
-                f'{where}'
-            )
+            told.append(f'{spread(s.delay, *s.delay_ci, "s")} at {s.frequency:g} Hz {where}')
     return '; '.join(told)
 
 

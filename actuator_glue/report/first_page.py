@@ -38,6 +38,10 @@ class FirstPage(NamedTuple):
     hybrid: str = ''
     command: str = ''
 
+    def ending_with(self, command: str) -> FirstPage:
+        """Return the page with another command to type next; as it is for an empty one."""
+        return self._replace(command=command) if command else self
+
     def blocks(self, *, headline: bool = True) -> list[Block]:
         """Return the page; without its headline where that stands above already."""
         lines = self.verdict if headline else self.verdict[1:]

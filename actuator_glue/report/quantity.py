@@ -26,6 +26,7 @@ _SAID: dict[str, tuple[tuple[float, str, float], ...]] = {
 }
 
 
+_MOST_DIGITS = 8  # of a double, more would be noise of the arithmetic
 _SYMBOLS = {
     'beta_1': '\u03b2\u2081',
     'alpha_1_beta_0': '\u03b1\u2081\u03b2\u2080',
@@ -82,7 +83,13 @@ def plain(value: float, digits: int = 3) -> str:
 
 
 def spread(mean: float, lower: float, upper: float, unit: str, digits: int = 4) -> str:
-    """Return a size with its interval as people say it: '41 um (40.2 to 41.9)'."""
+    """Return a size with its interval as people say it: '41 um (40.2 to 41.9)'.
+
+    Where so many digits leave nothing of a narrow interval there are more: two of its width.
+    """
+    width = upper - lower
+    if math.isfinite(mean) and 0.0 < width < abs(mean):
+        digits = min(max(digits, math.floor(math.log10(abs(mean) / width)) + 2), _MOST_DIGITS)
     factor, name = said_in(unit, mean, lower, upper)
     low, high = (plain(factor * v, digits) for v in (lower, upper))
     return f'{plain(factor * mean, digits)} {name}'.rstrip() + f' ({low} to {high})'

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 import actuator_glue as ag
+from actuator_glue.cli._first_page import _as_asked
 from actuator_glue.cli.main import build_parser, main
 from actuator_glue.io.export import write
 from actuator_glue.report.first_page import command
@@ -66,14 +67,18 @@ def test_terminal_and_report_agree(
     told = json.loads((folder / 'c.json').read_text())
     (following,) = re.findall(r'Next: (.*)', said)
     assert following == (
-        'actuator-glue diagnose free.csv clamped.csv --stiffness 0 250000 --report report.html'
+        'actuator-glue diagnose free.csv clamped.csv --stiffness 0 250000 --report report.html '
+        f'--partition {PARTITION}'
     )
     assert following in page
     words = shlex.split(following)
     assert build_parser(words[1]).parse_args(words[1:]).run
     delay = told['tracking'][1]['predicted']['delay_at_5_hz_s']
     for text in (said, page):
-        assert f'{1e3 * delay["median"]:.2f} ms' in text
+        (shown,) = re.findall(r'(\S+) ms \((\S+) to (\S+)\) at 5 Hz in clamped.csv', text)
+        limits = [1e3 * delay[key] for key in ('median', 'lower', 'upper')]
+        assert [float(v) for v in shown] == pytest.approx(limits, abs=6e-3)
+        assert len(set(shown)) == 3
         assert f'{1e6 * told["error"]["rms_m"]:.1f}' in text
         assert 'it is unstable without a compensator' in text  # 67 ms in a loop that bears 15
     mean, sd = (told['parameters']['beta_1'][key] for key in ('mean', 'stddev'))
@@ -84,16 +89,71 @@ def test_terminal_and_report_agree(
 def test_the_next_command_reads_as_this_one_did(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """With its channel map; where the posterior has not met, with more evaluations."""
+    """With its channel map, in the report, too; where chains have not met, with more of them."""
     monkeypatch.chdir(folder)
     (folder / 'map.yaml').write_text(
         'time: {column: time_s, unit: s}\ncommand: {column: command_mm, unit: mm}\n'
         'measured: {column: measured_mm, unit: mm}\n'
     )
     line = ['calibrate', 'clamped.csv', '--stiffness', '250e3', '--channels', 'map.yaml']
-    assert main([*line, '--evaluations', '12000']) in (0, 1)
+    assert main([*line, '--evaluations', '12000', '--report', 'm.html']) in (0, 1)
     (following,) = re.findall(r'Next: (.*)', capsys.readouterr().out)
     assert following.endswith('--channels map.yaml') and '--stiffness 250000' in following
+    assert following in text_of(folder / 'm.html')
+
+
+@pytest.mark.parametrize(
+    ('typed', 'said', 'told'),
+    [
+        (
+            'calibrate a.csv --resample 27 --resample-by lines --use-force --seed 3 --settle 1',
+            'diagnose a.csv --report report.html',
+            '--resample 27 --resample-by lines --use-force --seed 3',
+        ),
+        (
+            'calibrate a.csv --bounds x=0:1 --bounds y=0:2 --likelihood ar1 --settle 0.5',
+            'calibrate a.csv --evaluations 120000',
+            '--likelihood ar1 --settle 0.5 --bounds x=0:1 --bounds y=0:2',
+        ),
+        (
+            'calibrate a.csv --evaluations 60001',
+            'calibrate a.csv --evaluations 120002',
+            '',
+        ),
+        (
+            'diagnose a.csv --prior m.npz --prior-age 24h --split --effects-file "my own.yaml"',
+            'calibrate a.csv --effect backlash --save posterior.npz',
+            "--split --effects-file 'my own.yaml' --prior m.npz --prior-age 86400s",
+        ),
+        ('diagnose a.csv --drift 0.1 --resample-by lines --jobs 1', 'calibrate a.csv', ''),
+        (
+            'diagnose a.csv --stiffness 0 --holdout b.csv --json - --force --hold linear',
+            'diagnose a.csv --stiffness 5 --hold zoh',
+            '',
+        ),
+    ],
+)
+def test_what_was_asked_for_is_asked_again(typed: str, said: str, told: str) -> None:
+    """Options that the next command has, too; those it says itself stand; it can be typed."""
+    words = shlex.split(typed)
+    args = build_parser(words[0]).parse_args(words)
+    following = _as_asked(f'actuator-glue {said}', args)
+    assert following == f'actuator-glue {said} {told}'.rstrip()
+    words = shlex.split(following)[1:]
+    assert build_parser(words[0]).parse_args(words).run
+
+
+def test_draws_that_are_kept_are_looked_at() -> None:
+    """No second run of what was saved; draws for MATLAB are none that a command reads."""
+    args = build_parser('calibrate').parse_args(
+        ['calibrate', 'a.csv', '--channels', 'map.yaml', '--save', 'tuesday.npz']
+    )
+    said = 'actuator-glue calibrate a.csv --stiffness 0 --effect backlash --save posterior.npz'
+    assert _as_asked(said, args) == (
+        'actuator-glue plot a.csv --stiffness 0 --draws tuesday.npz --channels map.yaml'
+    )
+    args.save = 'tuesday.mat'
+    assert _as_asked(said, args) == f'{said} --channels map.yaml'
 
 
 @pytest.mark.parametrize(

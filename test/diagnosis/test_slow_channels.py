@@ -28,7 +28,7 @@ def machine(held_command: Array | None = None, top: float = 6.0, seed: int = 3) 
 
 
 def held(values: Array, every: float, first: float = 0.0) -> Array:
-    """Return the readings of a controller that takes one at each `every`-th sample, from one on."""
+    """Return the readings that a controller takes at each `every`-th sample, from one on."""
     at = np.arange(len(values))
     taken = first + every * np.floor((at - first) / every)
     return np.interp(taken, at, values)
@@ -104,7 +104,9 @@ def test_a_calibration_is_told_too() -> None:
     """The same record, the same answer, in seconds."""
     record = machine()
     channels = (held(c, 20.0) for c in (record.command, record.measured))
-    stepped = replace(record, **dict(zip(('command', 'measured'), channels)), hold='zoh')
+    stepped = replace(
+        record, **dict(zip(('command', 'measured'), channels, strict=True)), hold='zoh'
+    )
     answer = ag.calibrate(stepped.slice(0, 6000), evaluations=6000)
     assert sum('one sample of 20 only' in note for note in answer.notes) == 2
     assert answer.error.rms_m < 1.5 * NOISE
@@ -115,7 +117,9 @@ def test_a_diagnosis_of_held_channels_finds_nothing_that_is_not_there() -> None:
     """Steps of a record alone sent the search through all effects, for minutes."""
     record = machine()
     channels = (held(c, 20.0) for c in (record.command, record.measured))
-    stepped = replace(record, **dict(zip(('command', 'measured'), channels)), hold='zoh')
+    stepped = replace(
+        record, **dict(zip(('command', 'measured'), channels, strict=True)), hold='zoh'
+    )
     answer = ag.diagnose(stepped, jobs=1)
     assert answer.verdict == 'none'
     assert answer.seconds < 60.0
