@@ -8,7 +8,7 @@ with the weight of its name.
 
 from __future__ import annotations
 
-from actuator_glue.diagnosis.pipeline import Conclusion
+from actuator_glue.diagnosis.conclusion import Conclusion
 from actuator_glue.diagnosis.trial import Trial
 
 _LEAST = 1e-3  # probability that odds are taken against

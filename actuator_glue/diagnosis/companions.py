@@ -17,7 +17,6 @@ from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.posterior import Draws
 from actuator_glue.diagnosis.ranking import removed, weights
 from actuator_glue.diagnosis.search import Search
-from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import rms
@@ -102,23 +101,6 @@ def beside(
     ranked = search.screened(current, names)[: selection.settings.tried]
     below = current.mean_square - least**2
     return search.additions(current, ranked, valves=False, below=below)
-
-
-def that_matter(selection: ModelSelection, found: Selection) -> Selection | None:
-    """Return a selection with further effects that turn out to matter, or None.
-
-    Structure is told from noise by its spectrum, and may pass for less than what an effect is
-    found to take away: what removes that much is an addition like any other.
-
-    Args:
-        selection: the model selection that ended with `found`.
-        found: what leaves nothing material.
-    """
-    current = found.final
-    larger = with_companions(selection, current, selection.material)
-    if not current.effects or larger is current:
-        return None
-    return selection.concluded(larger, selection.search.trial(()), found.singles)
 
 
 def _of_one_kind(search: Search, name: str, final: Trial) -> bool:

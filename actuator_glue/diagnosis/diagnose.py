@@ -26,24 +26,17 @@ from actuator_glue.diagnosis import (
     wrong_setup,
 )
 from actuator_glue.diagnosis.alternatives import alternatives
+from actuator_glue.diagnosis.conclusion import Conclusion
 from actuator_glue.diagnosis.detect import alarm_of
 from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.first_look import FirstLook
 from actuator_glue.diagnosis.force import check_forces
 from actuator_glue.diagnosis.held_out import COMPLETE
-from actuator_glue.diagnosis.hold import with_the_right_hold
 from actuator_glue.diagnosis.learned import term as learned_term
 from actuator_glue.diagnosis.mixed_draws import MixedDraws, mixed
 from actuator_glue.diagnosis.next_experiment import Experiment, ranked
-from actuator_glue.diagnosis.onset_search import since_onset
-from actuator_glue.diagnosis.pipeline import (
-    Conclusion,
-    as_given,
-    conclude,
-    with_learned_terms,
-    with_what_matters,
-)
+from actuator_glue.diagnosis.pipeline import as_given, conclude
 from actuator_glue.diagnosis.preparation import prepare
 from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.diagnosis.stages import Progress, Stage
@@ -111,13 +104,7 @@ def diagnose(
         # What a wrong set-up leaves is nothing that the actuator does.
         result = as_given(ready, settings, each, tell, effort)
     else:
-        first = conclude(ready, settings, each, tell, effort)
-        # What acts all the time comes before what appears.
-        always = with_the_right_hold(first, settings, each, tell)
-        result = since_onset(always, settings, each, tell)
-        if result is not always:
-            result = with_learned_terms(result)
-        result = with_what_matters(result)
+        result = conclude(ready, settings, each, tell, effort)
     prepared, data, scorer = result.prepared, result.data, result.scorer
     found, decision = result.found, result.decision
     stretches = homogeneity.agreement(decision.final, scorer)
@@ -266,6 +253,7 @@ def diagnose(
             *traces(prepared.fit, False, curves),
             *traces(prepared.held, True, curves),
         ),
+        history=result.history,
         surrogate=result.generic.to_json(),
         remaining=decision.remaining,
         at_bound=held_at,

@@ -8,7 +8,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from actuator_glue.diagnosis import per_record_settings
 from actuator_glue.diagnosis.completeness import Decision
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.finding import Candidate, Finding, Rival
@@ -16,6 +15,7 @@ from actuator_glue.diagnosis.homogeneity import Homogeneity
 from actuator_glue.diagnosis.learned import term as learned_term
 from actuator_glue.diagnosis.learned.forms import CAUSES
 from actuator_glue.diagnosis.measured.measurement import Measured
+from actuator_glue.diagnosis.one_record import OneRecord
 from actuator_glue.diagnosis.ranking import standard_error, weights
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
@@ -101,7 +101,7 @@ def _cause(name: str, rivals: tuple[Rival, ...]) -> str:
 
 def _records_of(trial: Trial, name: str) -> tuple[str, ...]:
     """Records that alone have an effect; none where all have it."""
-    if not isinstance(trial.own, per_record_settings.OneRecord) or trial.own.own != name:
+    if not isinstance(trial.own, OneRecord) or trial.own.own != name:
         return ()
     return (trial.own.records[0].source or 'one record',)
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import replace
 
 from actuator_glue.diagnosis import false_alarms, pairs, ranking
 from actuator_glue.diagnosis.finding import Rival
+from actuator_glue.diagnosis.history import SearchStep
 from actuator_glue.diagnosis.judge import Judge
 from actuator_glue.diagnosis.ranking import compare, removed, worth
 from actuator_glue.diagnosis.search import Search, by_score
@@ -27,6 +29,12 @@ class ModelSelection(Judge):
     def __init__(self, search: Search, settings: Thresholds, progress: Progress) -> None:
         super().__init__(search, settings)
         self.progress = progress
+
+    def apart(self) -> ModelSelection:
+        """Return a selection to go on with: what it adds and its noise are its own."""
+        other = copy(self)
+        other.search = replace(self.search.wider(()), entries=dict(self.search.entries))
+        return other
 
     def extend(self, beam: Sequence[Trial], stage: int) -> list[Trial]:
         """Refit every structure of the beam with its most promising further effects."""
@@ -68,6 +76,7 @@ class ModelSelection(Judge):
         base, singles = self.search.trial(()), self.rescored(singles)
         self.nats = false_alarms.threshold(*self.search.signatures(), s.false_alarms)
         current, ranked, threshold = base, list(singles), self.material
+        steps = [SearchStep.to(base, 'Eq. (2) alone')]
         for stage in range(1, s.most + 1):
             best = self._first_worth(ranked, current, threshold)
             if best is None and self.left(current) >= self.material:
@@ -76,6 +85,7 @@ class ModelSelection(Judge):
             if best is None:
                 break
             current = self._at_its_optimum(best)
+            steps.append(SearchStep.to(current, f'with {best.added}'))
             base, singles = self.search.trial(()), self.rescored(singles)
             threshold = self.material
             if self.left(current) < max(threshold, s.left_share * self.first):
@@ -88,7 +98,12 @@ class ModelSelection(Judge):
                 self.renoise(self._nearest(ranked))
                 ranked = self.rescored(ranked)
             current = self.search.trial(current.effects, current.added)
-        return self.concluded(current, base, singles)
+        found = self.concluded(current, base, singles)
+        if set(found.final.effects) != set(current.effects):
+            steps.append(
+                SearchStep.to(found.final, 'each held against its absence and its rivals')
+            )
+        return replace(found, steps=tuple(steps))
 
     def _first_worth(
         self, ranked: Sequence[Trial], current: Trial, threshold: float

@@ -14,6 +14,7 @@ from actuator_glue.diagnosis.estimate import Estimate, Json
 from actuator_glue.diagnosis.finding import Candidate, Finding
 from actuator_glue.diagnosis.headline import headline
 from actuator_glue.diagnosis.held_out import COMPLETE, HeldOutError, Verdict
+from actuator_glue.diagnosis.history import SearchStep
 from actuator_glue.diagnosis.learned.term import LearnedTerm
 from actuator_glue.diagnosis.mixed_draws import shares
 from actuator_glue.diagnosis.next_experiment import Experiment
@@ -103,6 +104,7 @@ class DiagnosisData:
         setup: another set-up of the records that explains them far better than the one given.
         structures: all structures that the search which led to the answer refitted, least error
             left out first.
+        history: the steps that led to the answer, in order; the last one is the answer.
         effort: what the search cost, of what it may; it ended early where that is 1 and more.
     """
 
@@ -135,6 +137,7 @@ class DiagnosisData:
     prior: PriorUse | None = None
     setup: WrongSetup | None = None
     structures: tuple[Row, ...] = ()
+    history: tuple[SearchStep, ...] = ()
     effort: float = 0.0
     sampler: Json = field(default_factory=dict)
     which: NDArray[np.intp] = field(default_factory=lambda: np.empty(0, dtype=np.intp))
@@ -175,6 +178,7 @@ class DiagnosisData:
             'prior': asdict(self.prior) if self.prior else None,
             'setup': self.setup.to_json() if self.setup else None,
             'structures': [row.to_json() for row in self.structures],
+            'history': [step.to_json() for step in self.history],
             'surrogate': self.surrogate,
             'remaining': self.remaining,
             'advice': list(self.advice),

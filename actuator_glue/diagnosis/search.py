@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Sequence
+from copy import copy
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from typing import Any
 from weakref import WeakKeyDictionary
@@ -104,6 +105,11 @@ class Search:
     def others(self, trial: Trial) -> list[str]:
         """Return the names that a structure does not have."""
         return [n for n in self.names if n not in trial.effects]
+
+    def wider(self, names: Sequence[str]) -> Search:
+        """Return a search that tries further effects; what was refitted is known to it."""
+        own = {f.name: copy(getattr(self, f.name)) for f in fields(self) if f.name[0] == '_'}
+        return replace(self, names=(*self.names, *names), **own)
 
     def left_at_most(self, mean_square: float) -> list[tuple[Structure, Fit]]:
         """Return all refitted structures that leave no more than a mean squared error [m^2]."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from actuator_glue.diagnosis.finding import Rival
+from actuator_glue.diagnosis.history import SearchStep
 from actuator_glue.diagnosis.trial import Trial
 
 
@@ -24,6 +25,7 @@ class Selection:
         noise: rms of what no structure explains [m].
         material: materiality threshold [m].
         nats: evidence that any addition must have.
+        steps: of the search that added one effect at a time; none where something else led here.
     """
 
     base: Trial
@@ -37,3 +39,4 @@ class Selection:
     noise: float
     material: float
     nats: float
+    steps: tuple[SearchStep, ...] = ()

@@ -111,7 +111,7 @@ def find(
     """Return a set-up that explains records far better than the one given; None for none.
 
     A command that was given as held and runs linearly is found with what else it leads to
-    (diagnosis/hold.py); here the other way round, or beside exchanged stiffnesses.
+    (moves/other_hold.py); here the other way round, or beside exchanged stiffnesses.
 
     Args:
         data: the fitting part.

@@ -16,6 +16,7 @@ from actuator_glue_msgs.srv import SetModel
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 
 from actuator_glue import sample_block
+from actuator_glue.diagnosis.stages import ShareDone
 from actuator_glue.errors import InputError
 from actuator_glue.nodes import diagnoser_worker, own_effects, spin, topics
 from actuator_glue.nodes.explained import Explained
@@ -211,7 +212,7 @@ class DiagnoserNode(WorkingNode):
 
     def _start(self, request: diagnoser_worker.Request) -> None:
         self._request = request
-        self._overall = diagnoser_worker.Overall()
+        self._overall = ShareDone()
         self._last = time.monotonic()
         self.worker.submit(diagnoser_worker.work, request)
 

@@ -88,26 +88,6 @@ class Outcome:
     reason: str = ''
 
 
-class Overall:
-    """The share of a diagnosis that is done; grows only.
-
-    How many stages there are shows on the way: each takes a fifth of what was left before it.
-    """
-
-    def __init__(self) -> None:
-        self._stages: set[str] = set()
-        self._before = self._done = 0.0
-
-    def __call__(self, stage: str, share: float) -> float:
-        """Take the share of a stage that is done; return that of the whole."""
-        if stage not in self._stages:
-            self._stages.add(stage)
-            self._before = self._done
-        width = 1.0 if stage == 'done' else 0.2
-        self._done = max(self._done, self._before + width * share * (1.0 - self._before))
-        return self._done
-
-
 def asked(goal: Any, live: tuple[Record, ...]) -> Request:
     """Return the request of a Diagnose goal.
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.json_value import Json
+from actuator_glue.online.stream import structure_name
 from actuator_glue.records import source_name
 from actuator_glue.report import diagnosis_figures as figures
 from actuator_glue.report.diagnosis_summary import advice, closing, first_page
@@ -150,6 +151,31 @@ def _effects(found: DiagnosisData) -> Section:
     return Section('What is missing', blocks)
 
 
+def _search(found: DiagnosisData) -> Section:
+    rows = [
+        [
+            step.what,
+            structure_name(step.effects),
+            str(step.parameters),
+            _um(step.error),
+        ]
+        for step in found.history
+    ]
+    header = ['step', 'structure', 'parameters', 'leaves [um]']
+    return Section(
+        'How it was found',
+        [
+            Table(
+                header,
+                rows,
+                'Steps that were taken on the fitting part, noise included in what they leave; '
+                f'{len(found.structures)} structures were refitted for the last search alone.',
+                prose=True,
+            )
+        ],
+    )
+
+
 def _residual(found: DiagnosisData) -> Section:
     a = found.alarm
     tests = [
@@ -241,6 +267,8 @@ def page(
     told = first_page(found, hybrid).ending_with(next_command)
     first = Section('The answer', told.blocks(headline=False))
     evidence = [_error(found), _effects(found), _residual(found), _records(found)]
+    if found.history:
+        evidence.insert(2, _search(found))
     if tracking:
         evidence.insert(2, Section('How the actuator follows its command', tracking))
     sections = [first, *advice(found), *evidence, *closing(found)]

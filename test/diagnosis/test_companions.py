@@ -9,6 +9,7 @@ import two_sweeps
 
 from actuator_glue.diagnosis import companions, discrepancy, mixed_draws, posterior
 from actuator_glue.diagnosis.model_selection import ModelSelection
+from actuator_glue.diagnosis.moves.that_matter import that_matter
 from actuator_glue.diagnosis.posterior import Draws
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
@@ -103,9 +104,9 @@ def test_one_of_a_kind_stands_for_what_is_like_it(rng_seed: int) -> None:
 def test_what_removes_what_matters_is_added() -> None:
     """Though the rest passed for noise: where 1 um mattered the gap's 1.7 um would."""
     selection, found = selected(GAP)
-    assert companions.that_matter(selection, found) is None
+    assert that_matter(selection, found) is None
     selection.material = 1e-6
-    larger = companions.that_matter(selection, found)
+    larger = that_matter(selection, found)
     assert larger is not None
     assert larger.final.effects == ('viscous-damping', 'specimen-gap')
     assert set(larger.rivals) == set(larger.final.effects)

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis import learning
 from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.learned.forms import forms
+from actuator_glue.diagnosis.moves import describe
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.errors import InputError
 from actuator_glue.model.effects import CATALOGUE, Effect, Scale
@@ -167,7 +167,7 @@ def few_forms(monkeypatch: pytest.MonkeyPatch) -> None:
     def sensors(scale: Scale, known: Container[str] = ()) -> tuple[Effect, ...]:
         return tuple(effect for effect in forms(scale, known) if effect.place == 'sensor')
 
-    monkeypatch.setattr(learning, 'forms', sensors)
+    monkeypatch.setattr(describe, 'forms', sensors)
 
 
 @pytest.mark.slow

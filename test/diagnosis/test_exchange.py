@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from two_sweeps import motions, selected_of, sweep
 
-from actuator_glue.diagnosis import exchange
+from actuator_glue.diagnosis.moves import two_for_one
 
 NAMES = ('gain-drift', 'clock-skew', 'valve-lag', 'gain', 'bias', 'supply-droop')
 THETA = np.array([85.0, 2.5e10, 4.7e6, 4.2])
@@ -19,7 +19,7 @@ def test_two_take_the_place_of_a_name_that_seems_enough() -> None:
     selection, found = selected_of(NAMES, machine)
     assert found.final.effects == ('gain-drift',)
     assert found.left < found.material
-    told = exchange.exchanged(selection, found)
+    told = two_for_one.exchanged(selection, found)
     assert told is not None
     assert told.final.effects == ('valve-lag', 'clock-skew')
     assert told.final.fit.theta[4:] == pytest.approx([LAG, SKEW], rel=0.1)
@@ -30,4 +30,4 @@ def test_a_right_name_is_not_exchanged() -> None:
     machine = motions({'gain-drift': 0.05}, THETA, sweep(2e-3, 8.0, 40.0), STIFFNESSES)
     selection, found = selected_of(NAMES, machine)
     assert found.final.effects == ('gain-drift',)
-    assert exchange.exchanged(selection, found) is None
+    assert two_for_one.exchanged(selection, found) is None

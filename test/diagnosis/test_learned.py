@@ -18,6 +18,7 @@ from actuator_glue.diagnosis import diagnose as core
 from actuator_glue.diagnosis import pipeline
 from actuator_glue.diagnosis.learned.forms import forms
 from actuator_glue.diagnosis.learned.term import LearnedTerm
+from actuator_glue.diagnosis.moves import reserved
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.errors import InputError
 from actuator_glue.model.effects import CATALOGUE, Scale
@@ -63,7 +64,8 @@ def found() -> Diagnosis:
     records = machine(0, 1.0, 2e-4, PLANTS[1], 1, 128.0, 24.0)
     names = tuple(n for n in pipeline.mean_effects() if n != 'sensor-curve')
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pipeline, 'mean_effects', lambda reserved=False: () if reserved else names)
+        for place in (pipeline, reserved):
+            patch.setattr(place, 'mean_effects', lambda reserved=False: () if reserved else names)
         plain = core.diagnose(records[:2], records[2], settings=replace(QUICK, most=1))
     return Diagnosis(**{f.name: getattr(plain, f.name) for f in fields(plain)})
 
@@ -72,6 +74,8 @@ def test_a_cubic_transducer_is_described(found: Diagnosis) -> None:
     """Equation, size, range and held-out error; the name has no probability."""
     assert found.verdict == 'missing-effect'
     assert found.structure == ('learned-sensor-y3',)
+    assert found.history[0].effects == () and found.history[-1].what == 'learned terms'
+    assert found.history[-1].effects == found.structure
     assert found.error.after < 1.1 * NOISE < 0.8 * found.error.before
     (term,) = found.learned
     (size,) = term.parameters.values()

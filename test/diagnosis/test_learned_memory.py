@@ -8,8 +8,8 @@ from smooth_machines import piston
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.learned.forms import forms
 from actuator_glue.diagnosis.learned.term import described
-from actuator_glue.diagnosis.learning import _plainer
 from actuator_glue.diagnosis.model_selection import ModelSelection
+from actuator_glue.diagnosis.moves.describe import _plainer
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.thresholds import Thresholds

@@ -7,9 +7,9 @@ import pytest
 from scipy import signal
 from trials import ENTRIES, THETA, trial
 
-from actuator_glue.diagnosis import learning
 from actuator_glue.diagnosis.candidates import mean_effects
 from actuator_glue.diagnosis.model_selection import ModelSelection
+from actuator_glue.diagnosis.moves import describe
 from actuator_glue.diagnosis.score import Scorer, pooled, splits_of
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -117,7 +117,7 @@ def test_a_term_takes_no_place_of_what_has_a_name(
     best = trial(('flow-asymmetry',), named)
     both = trial(('flow-asymmetry', 'learned-valve-e2'), term)
     found = Displaced(term)
-    assert learning._displaces(found, both, best) is displaces
+    assert describe._displaces(found, both, best) is displaces
 
 
 @pytest.mark.parametrize('seed', [1, 2])

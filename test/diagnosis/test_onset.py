@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from actuator_glue.diagnosis.diagnose import diagnose
+from actuator_glue.diagnosis.moves.since_onset import _since
 from actuator_glue.diagnosis.onset.moments import SHORTEST, Moment
 from actuator_glue.diagnosis.onset.onset import Appeared, dated
-from actuator_glue.diagnosis.onset_search import _since
 from actuator_glue.diagnosis.preparation import prepare
 from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.diagnosis.thresholds import Thresholds

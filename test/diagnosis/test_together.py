@@ -3,8 +3,8 @@
 import pytest
 import two_sweeps
 
-from actuator_glue.diagnosis import together
 from actuator_glue.diagnosis.model_selection import ModelSelection
+from actuator_glue.diagnosis.moves import two_effects
 from actuator_glue.diagnosis.ranking import removed
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -26,7 +26,7 @@ def test_two_that_hide_each_other_are_found() -> None:
     assert found.final.effects == ()
     assert found.left > Thresholds().left_noise * found.noise
     assert all(removed(found.base, t) < found.material for t in found.singles)
-    chosen = together.explained(selection, found)
+    chosen = two_effects.explained(selection, found)
     assert chosen is not None
     assert chosen.final.effects == ('delay', 'supply-droop')
     assert chosen.left < chosen.material
@@ -38,7 +38,7 @@ def test_one_alone_is_no_pair() -> None:
     """A quarter of the delay makes less than matters: nothing is added, nor beside it."""
     selection, found = selected(0.25 * DELAY, 0.0)
     assert found.final.effects == ()
-    assert together.explained(selection, found) is None
+    assert two_effects.explained(selection, found) is None
 
 
 def test_a_member_that_matters_alone_needs_more() -> None:

@@ -7,10 +7,10 @@ from smooth_machines import piston
 
 from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.model_selection import ModelSelection
+from actuator_glue.diagnosis.moves.feedback import in_the_loop
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
-from actuator_glue.diagnosis.transducer import in_the_loop
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.records import Array, Record
 

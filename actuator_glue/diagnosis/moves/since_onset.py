@@ -6,47 +6,54 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 
+from actuator_glue.diagnosis.conclusion import Conclusion
+from actuator_glue.diagnosis.moves.learned_terms import LEARNED_TERMS
+from actuator_glue.diagnosis.moves.move import Asking, after, follow
 from actuator_glue.diagnosis.onset import moments
 from actuator_glue.diagnosis.onset.moments import Moment
 from actuator_glue.diagnosis.onset.onset import Appeared
-from actuator_glue.diagnosis.pipeline import Conclusion, conclude
-from actuator_glue.diagnosis.stages import Progress
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.inference.least_squares.data import SETTLE, Data
-from actuator_glue.inference.least_squares.each import Each
 from actuator_glue.inference.least_squares.fit import Fit
 
 Quiet = tuple[Data, Fit]
 _OTHERS = 2  # moments at most before which more acts than Eq. (2)
 
 
-def since_onset(first: Conclusion, settings: Thresholds, each: Each, tell: Progress) -> Conclusion:
+def since_onset(first: Conclusion, asking: Asking) -> Conclusion | None:
     """Detect effects that start mid-record.
 
     Taken where Eq. (2), or what acts all the time, up to a moment, and what is found in the data
     since then, leave materially less than effects that act all the time.
     """
+    since = _appeared(first, asking)
+    if since is None:
+        return None
+    told = after(first, since, 'the data since something appeared')
+    return follow(told, LEARNED_TERMS, asking)
+
+
+def _appeared(first: Conclusion, asking: Asking) -> Conclusion | None:
     found = first.found
     final = found.final
     if first.decision.verdict == 'none':
-        return first
+        return None
     if first.decision.left < found.material:
         # The answer is complete: only what it found can still have changed, and materially so.
         least = final.fit.error.size * found.material**2
         changed = moments.changes(first.data, final.fit.error, final.fit.jacobian)
         if all(removed < least for _, removed in changed):
-            return first
+            return None
 
     def search(moment: Moment) -> Conclusion:
-        tell('onset', 0.0)
-        since = first.prepared.since(moment)
-        return conclude(since, settings, each, tell, first.effort, fixed=True)
+        asking.tell('onset', 0.0)
+        return asking.conclude(first.prepared.since(moment))
 
-    best, least = first, math.inf
+    best, least = None, math.inf
     for moment, quiet in _asked(first):
         if first.effort.over:
             break
-        told = _since(first, moment, quiet, settings, search)
+        told = _since(first, moment, quiet, asking.settings, search)
         if told is None:
             continue
         if told.decision.verdict != 'unexplained':

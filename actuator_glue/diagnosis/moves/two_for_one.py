@@ -4,7 +4,7 @@ A gain that drifts may leave what passes for noise where a slow valve and a cloc
 are the machine's: each of them alone is worse than the wrong name. What is there beside that name
 beyond chance, though too little to matter, tells: with it another name may stand for the rest, as
 many parameters and more evidence. Names of more than one parameter have pairs as rivals
-(pairs.py).
+(diagnosis/pairs.py).
 """
 
 from __future__ import annotations

@@ -14,10 +14,12 @@ from collections.abc import Callable, Sequence
 from functools import partial
 
 from actuator_glue.diagnosis import learned_first
+from actuator_glue.diagnosis.conclusion import Conclusion
 from actuator_glue.diagnosis.learned.forms import forms
 from actuator_glue.diagnosis.learned.friction import DRY, FALLING, SHAPES
 from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.model_selection import ModelSelection
+from actuator_glue.diagnosis.moves.move import Asking
 from actuator_glue.diagnosis.ranking import MUCH, decisive, least_removed, removed
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
@@ -31,6 +33,29 @@ _REFITS = 4  # per structure and turn
 # and the steps of a simulation leave, of the stroke.
 _SHAPED, _STEPS = 0.1, 3e-4
 _NEARLY = 0.1  # of what names remove: a description that removes less more says the same
+
+
+def plainer(result: Conclusion, asking: Asking) -> Conclusion | None:
+    """Return a description in place of names that leave nothing material, where it is better."""
+    selection = result.selection.apart()  # forms and their signatures serve all ways
+    for way in ways(result.found):
+        if result.effort.over:
+            break
+        if other := result.complete(selection, way(selection, result.found)):
+            return other
+    return None
+
+
+def with_terms(result: Conclusion, asking: Asking) -> Conclusion | None:
+    """Describe by learned terms material structure that the catalogue leaves, or names badly.
+
+    Another shape of a cause that was named comes before further terms.
+    """
+    selection, found = result.selection, result.found
+    described = reshaped(selection, found)
+    if described is None or described.left >= described.material:
+        described = learned(selection, described or found) or described
+    return None if described is None else result.of(selection, described)
 
 
 def ways(found: Selection) -> list[Way]:

@@ -6,25 +6,18 @@ from dataclasses import replace
 
 import numpy as np
 
+from actuator_glue.diagnosis.conclusion import Conclusion
 from actuator_glue.diagnosis.measured import hum
-from actuator_glue.diagnosis.pipeline import (
-    Conclusion,
-    conclude,
-    with_learned_terms,
-)
+from actuator_glue.diagnosis.moves.learned_terms import LEARNED_TERMS
+from actuator_glue.diagnosis.moves.move import Asking, after, follow
 from actuator_glue.diagnosis.preparation import Prepared
 from actuator_glue.diagnosis.score import evidence
 from actuator_glue.diagnosis.search import Search
-from actuator_glue.diagnosis.stages import Progress
-from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.wrong_setup import WrongSetup
-from actuator_glue.inference.least_squares.each import Each
 from actuator_glue.inference.least_squares.fit import Fit, fit
 
 
-def with_the_right_hold(
-    first: Conclusion, settings: Thresholds, each: Each, tell: Progress
-) -> Conclusion:
+def with_the_right_hold(first: Conclusion, asking: Asking) -> Conclusion:
     """Decide whether the command was held or ran linearly; learn terms with that hold.
 
     The wrong hold is a lead of half a sample: no effect of the catalogue, but something will be
@@ -34,23 +27,21 @@ def with_the_right_hold(
     explains neither, terms are learned with both: what it lacks may look like the other hold,
     which must explain more beyond chance then, or all that remains with fewer parameters.
     """
-    other = _linearly(first, settings, each, tell)
+    other = _linearly(first, asking)
     if other is None:
-        return with_learned_terms(first)
-    described = with_learned_terms(other)
+        return follow(first, LEARNED_TERMS, asking)
+    described = follow(other, LEARNED_TERMS, asking)
     if first.decision.verdict != 'unexplained':
         return described
-    held = with_learned_terms(first)
+    held = follow(first, LEARNED_TERMS, asking)
     fewer = len(described.found.final.fit.theta) < len(held.found.final.fit.theta)
     whole = described.decision.verdict != 'unexplained'
     # A hold is a plainer answer than a term that leads by half a sample as well.
-    least = 0.0 if whole and fewer else settings.nats
+    least = 0.0 if whole and fewer else asking.settings.nats
     return described if _gained(held, described) >= least else held
 
 
-def _linearly(
-    first: Conclusion, settings: Thresholds, each: Each, tell: Progress
-) -> Conclusion | None:
+def _linearly(first: Conclusion, asking: Asking) -> Conclusion | None:
     """Return what is found with the other hold, where that explains more.
 
     An answer that leaves nothing and explains less with the other hold is not searched for again:
@@ -66,15 +57,16 @@ def _linearly(
     before = first.found.base.mean_square + (first.line.rms**2 if first.line else 0.0)
     if before - base.rms**2 < first.found.material**2:
         return None
-    tell('other hold', 0.0)
+    asking.tell('other hold', 0.0)
     if first.decision.verdict == 'missing-effect' and _explains_less(first, other, base):
         return None
-    second = conclude(other, settings, each, tell, first.effort, fixed=True)
-    if _gained(first, second) < settings.nats:
+    second = asking.conclude(other)
+    if _gained(first, second) < asking.settings.nats:
         return None
     errors, enough = (before**0.5, base.rms), second.decision.verdict == 'none'
     setup = WrongSetup.between(prepared.fit, other.fit, errors, enough, taken=True)
-    return replace(second, prepared=replace(second.prepared, setup=setup))
+    second = replace(second, prepared=replace(second.prepared, setup=setup))
+    return after(first, second, 'the command runs linearly between its samples')
 
 
 def _gained(first: Conclusion, second: Conclusion) -> float:

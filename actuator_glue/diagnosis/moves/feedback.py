@@ -10,11 +10,35 @@ from __future__ import annotations
 import math
 
 from actuator_glue.diagnosis.candidates import FAULTS, FEEDBACK
+from actuator_glue.diagnosis.conclusion import Conclusion
 from actuator_glue.diagnosis.model_selection import ModelSelection
+from actuator_glue.diagnosis.moves import describe
+from actuator_glue.diagnosis.moves.move import Asking
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
 
 _OWN = 2  # parameters: of the least fault and of the share that is fed back
+
+
+def fed_back(result: Conclusion, asking: Asking) -> Conclusion | None:
+    """Return the answer with a fault of the transducer inside the controller's loop.
+
+    Or one with learned terms in place of all that it explains, where that is better.
+    """
+    found = in_the_loop(result.selection, result.found)
+    if found is None:
+        return None
+    return _described(result, found) or result.of(result.selection, found)
+
+
+def _described(result: Conclusion, inside: Selection) -> Conclusion | None:
+    if inside.left >= result.selection.material:
+        return None
+    selection = result.selection.apart()
+    found = describe.learned(selection, result.found)
+    if found is None or not describe.as_good_and_plainer(selection, found, inside):
+        return None
+    return result.complete(selection, found)
 
 
 def in_the_loop(selection: ModelSelection, found: Selection) -> Selection | None:

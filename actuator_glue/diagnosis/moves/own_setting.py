@@ -12,7 +12,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from actuator_glue.diagnosis.conclusion import Conclusion
 from actuator_glue.diagnosis.finding import Rival
+from actuator_glue.diagnosis.moves.move import Asking
+from actuator_glue.diagnosis.one_record import OneRecord
 from actuator_glue.diagnosis.ranking import removed, standard_error, weights
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.search import Search
@@ -22,49 +25,19 @@ from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import fit
 from actuator_glue.model.effects import CATALOGUE
-from actuator_glue.model.exact import Initial
-from actuator_glue.model.parameters import Parameter
 from actuator_glue.model.structure import Structure
-from actuator_glue.records import Array, Record
+from actuator_glue.records import Record
 
 SETTINGS = ('gain', 'bias', 'delay', 'clock-skew')
 _TIED = 4.0  # nats
 
 
-class OneRecord:
-    """A structure one of whose effects acts in some records only.
-
-    Args:
-        effects: all effects.
-        own: the effect that acts in `records` only.
-        records: these records.
-    """
-
-    def __init__(self, effects: tuple[str, ...], own: str, records: tuple[Record, ...]) -> None:
-        self._inner = Structure(effects)
-        self.own, self.records = own, records
-        self._off = [float(p.neutral or 0.0) for p in CATALOGUE[own].parameters]
-
-    @property
-    def parameters(self) -> tuple[Parameter, ...]:
-        """Those of the structure, in its order."""
-        return self._inner.parameters
-
-    def simulate(
-        self,
-        theta: Array,
-        record: Record,
-        *,
-        initial: Initial = 'rest',
-        origin: float = 0.0,
-        force: bool = False,
-    ) -> Array:
-        """Free-run sensor output [m] or force [N], the effect neutral in other records."""
-        table = np.array(np.atleast_2d(theta))
-        if not any(record is r for r in self.records):
-            table[:, self._inner.columns(self.own)] = self._off
-        out = self._inner.simulate(table, record, initial=initial, origin=origin, force=force)
-        return out.reshape(*np.shape(theta)[:-1], len(record))
+def own_setting(result: Conclusion, asking: Asking) -> Conclusion | None:
+    """Return the answer with one record's own setting in it, where that explains the records."""
+    asking.tell('one record', 0.0)
+    limit, held = result.decision.limit, result.prepared.held.records
+    found = setting(result.selection.search, result.found, limit, held, asking.settings)
+    return None if found is None else result.of(result.selection, found)
 
 
 def _members(data: Data, held: Sequence[Record], index: int) -> tuple[Record, ...]:

@@ -1,0 +1,124 @@
+"""What the fitting part of the records says, with all that it was concluded from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from actuator_glue.diagnosis import force_ranking, recorded, regression
+from actuator_glue.diagnosis.completeness import Decision, decide
+from actuator_glue.diagnosis.effort import Effort
+from actuator_glue.diagnosis.history import SearchStep
+from actuator_glue.diagnosis.measured.hum import Line
+from actuator_glue.diagnosis.measured.measurement import Measured
+from actuator_glue.diagnosis.model_selection import ModelSelection
+from actuator_glue.diagnosis.onset.onset import Appeared, Onset, dated
+from actuator_glue.diagnosis.preparation import Prepared
+from actuator_glue.diagnosis.regression import Surrogate
+from actuator_glue.diagnosis.score import Scorer
+from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.selection import Selection
+from actuator_glue.diagnosis.stages import Progress
+from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.inference.least_squares.data import Data
+
+
+@dataclass(frozen=True)
+class Conclusion:
+    """What the fitting part of the records says.
+
+    Attributes:
+        prepared: the records, fitting part and held-out part.
+        data: the fitting part without hum.
+        scorer: noise and blocks of the final structure.
+        line: hum.
+        found: effects with a mean response.
+        seen: measurement effects.
+        generic: the regression beside them.
+        decision: the verdict.
+        selection: what chose `found`, to go on from.
+        history: the steps that led here.
+        appeared: where all this is about the data since something appeared, what is known of that.
+    """
+
+    prepared: Prepared
+    data: Data
+    scorer: Scorer
+    line: Line | None
+    found: Selection
+    seen: tuple[Measured, ...]
+    generic: Surrogate
+    decision: Decision
+    selection: ModelSelection
+    history: tuple[SearchStep, ...]
+    appeared: Appeared | None = None
+
+    @property
+    def effort(self) -> Effort:
+        """What the search cost so far."""
+        return self.selection.search.effort
+
+    @cached_property
+    def onset(self) -> Onset | None:
+        """When the effects appeared that are found now; None for from the beginning."""
+        if self.appeared is None:
+            return None
+        return dated(self.appeared, self.decision.final, self.decision.noise)
+
+    def of(self, selection: ModelSelection, found: Selection) -> Conclusion:
+        """Return what another selection of effects says about the same records."""
+        other = concluded(self.prepared, selection, found, self.line)
+        return replace(other, appeared=self.appeared)
+
+    def complete(self, selection: ModelSelection, found: Selection | None) -> Conclusion | None:
+        """Return another answer about the same records, if there is one and it is complete."""
+        other = None if found is None else self.of(selection, found)
+        return None if other is None or other.decision.verdict == 'unexplained' else other
+
+
+def concluded(
+    prepared: Prepared, selection: ModelSelection, found: Selection, line: Line | None
+) -> Conclusion:
+    """Return what a selection of effects says, beside effects of the measurement.
+
+    Args:
+        prepared: the records.
+        selection: what chose.
+        found: what it chose.
+        line: hum that was taken out of the data before.
+    """
+    search, settings = selection.search, selection.settings
+    assert search.scorer is not None
+    data = search.data
+    seen = recorded.find(data, found, settings, line)
+    chosen = found.final if found.final.effects else found.singles[0]
+    generic = regression.compare(data, search.scorer, found.base, chosen)
+    decision = decide(found, seen, data, settings, generic)
+    return Conclusion(
+        prepared, data, search.scorer, line, found, seen, generic, decision, selection,
+        found.steps,
+    )  # fmt: skip
+
+
+def searched(
+    prepared: Prepared, search: Search, line: Line | None, settings: Thresholds, tell: Progress
+) -> Conclusion:
+    """Search for what the model lacks, one effect at a time, and say what that comes to.
+
+    Args:
+        prepared: the records.
+        search: refits structures to the fitting part.
+        line: hum that was taken out of the data before.
+        settings: thresholds.
+        tell: takes progress.
+    """
+    selection = ModelSelection(search, settings, tell)
+    named = selection.run()
+    if settings.use_force:
+        before = named.final
+        named, told = force_ranking.decided(search, named, settings)
+        if named.final.effects != before.effects:
+            step = SearchStep.to(named.final, 'the name that the force tells')
+            named = replace(named, steps=(*named.steps, step))
+        prepared = replace(prepared, notes=(*told, *prepared.notes))
+    return concluded(prepared, selection, named, line)

@@ -1,0 +1,115 @@
+"""A move: another answer that may take the place of the one so far."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+from actuator_glue.diagnosis.conclusion import Conclusion
+from actuator_glue.diagnosis.history import SearchStep
+from actuator_glue.diagnosis.model_selection import ModelSelection
+from actuator_glue.diagnosis.preparation import Prepared
+from actuator_glue.diagnosis.selection import Selection
+from actuator_glue.diagnosis.stages import Progress
+from actuator_glue.diagnosis.thresholds import Thresholds
+
+
+@dataclass(frozen=True)
+class Asking:
+    """What moves work with.
+
+    Attributes:
+        settings: thresholds.
+        tell: takes progress.
+        conclude: searches records, of which all samples that count are fixed, from the beginning.
+    """
+
+    settings: Thresholds
+    tell: Progress
+    conclude: Callable[[Prepared], Conclusion]
+
+
+@dataclass(frozen=True)
+class AnswerMove:
+    """A further search from an answer.
+
+    Attributes:
+        what: what it does, for people; empty where it tells its own steps.
+        when: whether it is asked for beside an answer.
+        make: returns another answer; None where the one so far stands.
+    """
+
+    what: str
+    when: Callable[[Conclusion], bool]
+    make: Callable[[Conclusion, Asking], Conclusion | None]
+
+
+Groups: TypeAlias = tuple[tuple[AnswerMove, ...], ...]
+
+
+def follow(result: Conclusion, groups: Groups, asking: Asking) -> Conclusion:
+    """Ask for one move after the other, of each group until one is taken.
+
+    Args:
+        result: the answer so far.
+        groups: moves, in the order in which they are asked for.
+        asking: what they work with.
+
+    Returns:
+        The last answer; each move that was taken is in its history. None is begun once the effort
+        is spent.
+    """
+    for group in groups:
+        for move in group:
+            if result.effort.over:
+                return result
+            other = move.make(result, asking) if move.when(result) else None
+            if other is not None:
+                result = after(result, other, move.what) if move.what else other
+                break
+    return result
+
+
+def after(before: Conclusion, result: Conclusion, what: str) -> Conclusion:
+    """Return an answer with the history of the one that it takes the place of."""
+    step = SearchStep.to(result.decision.final, what)
+    return replace(result, history=(*before.history, step))
+
+
+def always(result: Conclusion) -> bool:
+    """Whatever the answer is."""
+    return True
+
+
+def complete(result: Conclusion) -> bool:
+    """Whether effects explain all that matters."""
+    return result.decision.verdict == 'missing-effect'
+
+
+def unexplained(result: Conclusion) -> bool:
+    """Whether more is left than effects may leave."""
+    return result.decision.verdict == 'unexplained'
+
+
+def left(result: Conclusion) -> bool:
+    """Whether something material is left, of records that share all settings."""
+    material = result.decision.left >= result.found.material
+    return (unexplained(result) or material) and result.found.final.own is None
+
+
+def if_complete(
+    ask: Callable[[ModelSelection, Selection], Selection | None], *, apart: bool = False
+) -> Callable[[Conclusion, Asking], Conclusion | None]:
+    """Return a move to another selection, taken where that leaves nothing unexplained.
+
+    Args:
+        ask: returns the selection.
+        apart: whether it takes the noise anew, which stays as it is where the move is not taken.
+    """
+
+    def make(result: Conclusion, asking: Asking) -> Conclusion | None:
+        selection = result.selection.apart() if apart else result.selection
+        return result.complete(selection, ask(selection, result.found))
+
+    return make

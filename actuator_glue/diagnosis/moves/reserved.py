@@ -1,0 +1,50 @@
+"""Effects that are reserved for what all others leave."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from actuator_glue.diagnosis.candidates import mean_effects
+from actuator_glue.diagnosis.conclusion import Conclusion, searched
+from actuator_glue.diagnosis.moves.move import Asking
+from actuator_glue.diagnosis.score import Scorer
+from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.trial import Trial
+
+
+def with_reserved(first: Conclusion, asking: Asking) -> Conclusion | None:
+    """Search again with the effects that are reserved for what all others leave.
+
+    Where one of them alone, or beside what was found, is better beyond chance and by a material
+    error; and so must be the answer, with one of them in it or complete without: it may lead to
+    what the first search did not reach. A mode that rings on passes for hum: with it, hum is
+    asked for once more.
+    """
+    reserved, before, prepared = mean_effects(reserved=True), first.found.final, first.prepared
+    if not reserved:
+        return None
+    usual, cost = first.selection.search, math.log(len(reserved))
+    ways = [(usual.wider(reserved), first.line)]
+    if first.line is not None:
+        names = *usual.names, *reserved
+        ways.insert(0, (Search(prepared.fit, names, usual.each, effort=usual.effort), None))
+
+    def better(after: Trial, scorer: Scorer) -> bool:
+        known = replace(before, scores=scorer.block_scores(before.fit))
+        return first.selection.better(after, known, first.found.material, cost)
+
+    for search, line in ways:
+        search.scorer = first.scorer
+        search.base()
+        starts = [
+            search.trial(t.effects) for t in (first.found.base, before) if search.known(t.effects)
+        ]
+        if not any(better(t, first.scorer) for s in starts for t in search.additions(s, reserved)):
+            continue
+        second = searched(prepared, search, line, asking.settings, asking.tell)
+        found = second.found.final
+        told = set(found.effects) & set(reserved) or second.decision.verdict != 'unexplained'
+        if told and better(found, second.scorer):
+            return second
+    return None

@@ -1,0 +1,25 @@
+"""Effects that passed for noise beside an answer that seems complete.
+
+Structure is told from noise by its spectrum, and may pass for less than what an effect is found to
+take away: what removes that much is an addition like any other.
+"""
+
+from __future__ import annotations
+
+from actuator_glue.diagnosis import companions
+from actuator_glue.diagnosis.model_selection import ModelSelection
+from actuator_glue.diagnosis.selection import Selection
+
+
+def that_matter(selection: ModelSelection, found: Selection) -> Selection | None:
+    """Return a selection with further effects that turn out to matter, or None.
+
+    Args:
+        selection: the model selection that ended with `found`.
+        found: what leaves nothing material.
+    """
+    current = found.final
+    larger = companions.with_companions(selection, current, selection.material)
+    if not current.effects or larger is current:
+        return None
+    return selection.concluded(larger, selection.search.trial(()), found.singles)

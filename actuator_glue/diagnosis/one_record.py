@@ -1,0 +1,47 @@
+"""A structure one of whose effects acts in some records only."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from actuator_glue.model.effects import CATALOGUE
+from actuator_glue.model.exact import Initial
+from actuator_glue.model.parameters import Parameter
+from actuator_glue.model.structure import Structure
+from actuator_glue.records import Array, Record
+
+
+class OneRecord:
+    """A structure one of whose effects acts in some records only.
+
+    Args:
+        effects: all effects.
+        own: the effect that acts in `records` only.
+        records: these records.
+    """
+
+    def __init__(self, effects: tuple[str, ...], own: str, records: tuple[Record, ...]) -> None:
+        self._inner = Structure(effects)
+        self.own, self.records = own, records
+        self._off = [float(p.neutral or 0.0) for p in CATALOGUE[own].parameters]
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Those of the structure, in its order."""
+        return self._inner.parameters
+
+    def simulate(
+        self,
+        theta: Array,
+        record: Record,
+        *,
+        initial: Initial = 'rest',
+        origin: float = 0.0,
+        force: bool = False,
+    ) -> Array:
+        """Free-run sensor output [m] or force [N], the effect neutral in other records."""
+        table = np.array(np.atleast_2d(theta))
+        if not any(record is r for r in self.records):
+            table[:, self._inner.columns(self.own)] = self._off
+        out = self._inner.simulate(table, record, initial=initial, origin=origin, force=force)
+        return out.reshape(*np.shape(theta)[:-1], len(record))

@@ -1,0 +1,74 @@
+"""Moves on an answer are asked for in their order, and what was taken is told."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import two_sweeps
+
+from actuator_glue.diagnosis.effort import Effort
+from actuator_glue.diagnosis.history import SearchStep
+from actuator_glue.diagnosis.moves.move import AnswerMove, follow
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Stands for a conclusion: effects found, and what each parameter leaves."""
+
+    effects: tuple[str, ...]
+    effort: Effort = field(default_factory=Effort)
+    history: tuple[SearchStep, ...] = ()
+
+    @property
+    def decision(self) -> Any:
+        """A structure with a parameter for each effect beside four."""
+        fit = SimpleNamespace(theta=np.zeros(4 + len(self.effects)), rms=1e-5)
+        return SimpleNamespace(final=SimpleNamespace(effects=self.effects, fit=fit))
+
+
+def adding(name: str, *, when: bool = True, taken: bool = True) -> Any:
+    """A move that adds an effect."""
+
+    def make(result: Any, asking: Any) -> Any:
+        return replace(result, effects=(*result.effects, name)) if taken else None
+
+    return AnswerMove(f'add {name}', lambda result: when, make)
+
+
+def followed(*groups: tuple[Any, ...], effort: Effort | None = None) -> Any:
+    """Return what moves come to from nothing."""
+    start: Any = Answer((), effort or Effort(), (SearchStep('Eq. (2) alone', (), 4, 2e-5),))
+    asking: Any = None
+    return follow(start, groups, asking)
+
+
+def test_of_a_group_the_first_move_that_is_taken_ends_it() -> None:
+    told = followed((adding('a', taken=False), adding('b'), adding('c')), (adding('d'),))
+    assert told.effects == ('b', 'd')
+    assert [s.what for s in told.history] == ['Eq. (2) alone', 'add b', 'add d']
+    assert [s.parameters for s in told.history] == [4, 5, 6]
+
+
+def test_what_is_not_asked_for_is_not_taken() -> None:
+    told = followed((adding('a', when=False),), (adding('b', taken=False),))
+    assert told.effects == () and len(told.history) == 1
+
+
+def test_no_move_is_begun_once_the_effort_is_spent() -> None:
+    assert followed((adding('a'),), effort=Effort(0.0)).effects == ()
+
+
+def test_the_steps_of_a_search_lead_to_what_it_found() -> None:
+    """Play of 60 um: added to Eq. (2), which leaves more."""
+    effects = {'backlash': 6e-5}
+    names = ('backlash', 'delay', 'bias')
+    _, found = two_sweeps.selected(names, effects, stroke=2e-3, hertz=5.0, seconds=20.0)
+    steps = found.steps
+    assert [s.effects for s in steps] == [(), ('backlash',)]
+    assert [s.parameters for s in steps] == [4, 5]
+    assert steps[0].error > 1.3 * steps[1].error
+    assert steps[1].error == pytest.approx(found.final.fit.rms, rel=1e-3)
