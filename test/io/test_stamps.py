@@ -38,6 +38,10 @@ def table(path: Path, form: str, start: datetime.datetime = START, by: str = ','
         ('%Y-%m-%dT%H:%M:%S.MSZ', ',', DAY + 35_998),
         ('%Y-%m-%dT%H:%M:%S.MS+02:00', ',', DAY + 28_798),
         ('"%Y-%m-%d %H:%M:%S.MS"', ' ', DAY + 35_998),
+        ('%d.%m.%Y %H:%M:%S,MS', ';', DAY + 35_998),
+        ('%d-%b-%Y %H:%M:%S.MS', '\t', DAY + 35_998),
+        ('%d %b %Y %I:%M:%S.MS %p', ',', DAY + 35_998),
+        ('%I:%M:%S.MS %p', ';', 35_998),
         ('%H:%M:%S.MS', ' ', 35_998),
         ('%H:%M:%S,MS000', ';', 35_998),
     ],
@@ -66,7 +70,33 @@ def test_a_stamp_that_is_none_is_told_with_its_line(tmp_path: Path) -> None:
         read(table(tmp_path / 'a.csv', '%H:%M:%S.MS', night))
 
 
-def test_dates_whose_order_is_open_are_no_clock(tmp_path: Path) -> None:
-    """05/03 is March or May: such a column is no time of itself."""
-    with pytest.raises(InputError, match='Timestamp'):
-        read(table(tmp_path / 'a.csv', '%m/%d/%Y %H:%M:%S.MS'))
+@pytest.mark.parametrize(
+    'form',
+    [
+        '%m/%d/%Y %H:%M:%S.MS',
+        '%d/%m/%Y %I:%M:%S.MS %p',
+        '%d.%m.%y %H:%M:%S.MS',
+        '%m-%d-%Y %H:%M:%S.MS',
+    ],
+)
+def test_of_dates_whose_order_is_open_the_time_of_day_is_taken(tmp_path: Path, form: str) -> None:
+    """05/03 is March or May, which no step between samples minds; `map` asks for no rate."""
+    path = table(tmp_path / 'a.csv', form)
+    record = read(path)
+    assert (record.period, record.start_ns) == (5e-3, pytest.approx(35_998 * 10**9, abs=1000))
+    noon = START.replace(hour=12, minute=30)
+    at_noon = read(table(path, form, noon)).start_ns
+    assert at_noon == pytest.approx(45_058 * 10**9, abs=1000)
+    assert look(path).columns[0].unit == 's'
+    midnight = START.replace(hour=23, minute=59, second=59)
+    with pytest.raises(InputError, match='time goes back at sample 200'):
+        read(table(path, form, midnight))
+
+
+@pytest.mark.parametrize('odd', ['13:00:00.000 PM', '0:00:00 AM', '31.02.2024 10:00:00', 'noon'])
+def test_what_no_clock_shows_is_no_time(tmp_path: Path, odd: str) -> None:
+    """Hours beyond twelve in halves of a day, a day that no month has."""
+    path = table(tmp_path / 'a.csv', '%d.%m.%Y %H:%M:%S.MS')
+    path.write_text(path.read_text().replace('03.05.2024 09:59:58.750', odd))
+    with pytest.raises(InputError, match='time is NaN'):
+        read(path)

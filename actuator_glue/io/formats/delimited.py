@@ -30,9 +30,17 @@ _NUMBER = re.compile(
 )
 # Digits in groups of three, as thousands are written; a decimal fraction may look like it.
 _GROUPED = re.compile(r'[+-]?[1-9]\d{0,2}(?:[.,]\d{3})+', re.ASCII)
+_MONTHS = ('jan', 'feb', 'mar', 'apr', 'may', 'jun', 'jul', 'aug', 'sep', 'oct', 'nov', 'dec')
+# A date whose order is known: year first, dots behind the day, or a month by its name. Of any
+# other, such as 05/03/2024, only the time of day is taken.
 _STAMP = re.compile(
-    r'(?:(\d{4}[-/]\d\d[-/]\d\d)[T ])?(\d{1,2}:\d\d:\d\d)(?:[.,](\d+))?(Z|[+-]\d\d:\d\d)?',
-    re.ASCII,
+    r'(?:(?:(?P<year>\d{4})[-/](?P<month>\d\d)[-/](?P<day>\d\d)'
+    r'|(?P<day_2>\d{1,2})\.(?P<month_2>\d{1,2})\.(?P<year_2>\d{4})'
+    rf'|(?P<day_3>\d{{1,2}})[- ](?P<name>{"|".join(_MONTHS)})[- ](?P<year_3>\d{{4}})'
+    r'|\d{1,2}[-/.]\d{1,2}[-/.](?:\d{4}|\d\d))(?:T|,? ))?'
+    r'(?P<hour>\d{1,2})(?P<clock>:\d\d:\d\d)(?:[.,](?P<fraction>\d+))?'
+    r'(?: ?(?P<half>[ap])\.?m\.?)?(?P<zone>Z|[+-]\d\d:\d\d)?',
+    re.ASCII | re.IGNORECASE,
 )
 _WORD = re.compile(r'"((?:[^"]|"")*)"|(\S+)')
 _QUOTED_FIRST = re.compile(r'\s*"[^"]*"\s*[;,\s]\s*[^"\s]')
@@ -234,7 +242,7 @@ def is_number(entry: str) -> bool:
 
 
 def is_stamp(entry: str) -> bool:
-    """Return whether an entry is a date with a time, year first, or a time of day."""
+    """Return whether an entry is a time of day, with a date or without one."""
     return _STAMP.fullmatch(entry.strip()) is not None
 
 
@@ -243,14 +251,29 @@ def _seconds(entry: str) -> float:
     stamp = _STAMP.fullmatch(entry.strip())
     if stamp is None:
         return np.nan
-    day, clock, fraction, zone = stamp.groups()
+    year, month, day = (
+        next(filter(None, map(stamp.group, names)), None)
+        for names in (
+            ('year', 'year_2', 'year_3'),
+            ('month', 'month_2'),
+            ('day', 'day_2', 'day_3'),
+        )
+    )
+    if stamp['name']:
+        month = str(1 + _MONTHS.index(stamp['name'].lower()))
+    hour, half = int(stamp['hour']), (stamp['half'] or '').lower()
+    if half and not 1 <= hour <= 12:
+        return np.nan
+    if half:
+        hour = hour % 12 + (12 if half == 'p' else 0)
+    date = '1970-01-01' if year is None else f'{year}-{month or "":0>2}-{day or "":0>2}'
     try:
         whole = datetime.fromisoformat(
-            f'{(day or "1970-01-01").replace("/", "-")}T{clock:0>8}{zone or "+00:00"}'
+            f'{date}T{hour:02d}{stamp["clock"]}{(stamp["zone"] or "+00:00").upper()}'
         )
     except ValueError:  # 25:00:00
         return np.nan
-    return whole.timestamp() + float(f'0.{fraction or 0}')
+    return whole.timestamp() + float(f'0.{stamp["fraction"] or 0}')
 
 
 def fields_of(line: str, delimiter: str | None) -> list[str]:
