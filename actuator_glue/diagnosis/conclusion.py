@@ -8,7 +8,6 @@ from functools import cached_property
 from actuator_glue.diagnosis import force_ranking, recorded, regression
 from actuator_glue.diagnosis.completeness import Decision, decide
 from actuator_glue.diagnosis.effort import Effort
-from actuator_glue.diagnosis.history import SearchStep
 from actuator_glue.diagnosis.measured.hum import Line
 from actuator_glue.diagnosis.measured.measurement import Measured
 from actuator_glue.diagnosis.model_selection import ModelSelection
@@ -17,6 +16,7 @@ from actuator_glue.diagnosis.preparation import Prepared
 from actuator_glue.diagnosis.regression import Surrogate
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.search_step import SearchStep
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.stages import Progress
 from actuator_glue.diagnosis.thresholds import Thresholds

@@ -14,12 +14,12 @@ from actuator_glue.diagnosis.estimate import Estimate, Json
 from actuator_glue.diagnosis.finding import Candidate, Finding
 from actuator_glue.diagnosis.headline import headline
 from actuator_glue.diagnosis.held_out import COMPLETE, HeldOutError, Verdict
-from actuator_glue.diagnosis.history import SearchStep
 from actuator_glue.diagnosis.learned.term import LearnedTerm
 from actuator_glue.diagnosis.mixed_draws import shares
 from actuator_glue.diagnosis.next_experiment import Experiment
 from actuator_glue.diagnosis.onset.onset import Onset
 from actuator_glue.diagnosis.response import Response
+from actuator_glue.diagnosis.search_step import SearchStep
 from actuator_glue.diagnosis.table import Row
 from actuator_glue.diagnosis.wrong_setup import WrongSetup
 from actuator_glue.inference.at_bound import Pressed

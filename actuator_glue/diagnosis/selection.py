@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from actuator_glue.diagnosis.finding import Rival
-from actuator_glue.diagnosis.history import SearchStep
+from actuator_glue.diagnosis.search_step import SearchStep
 from actuator_glue.diagnosis.trial import Trial
 
 

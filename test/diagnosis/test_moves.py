@@ -11,8 +11,8 @@ import pytest
 import two_sweeps
 
 from actuator_glue.diagnosis.effort import Effort
-from actuator_glue.diagnosis.history import SearchStep
 from actuator_glue.diagnosis.moves.move import AnswerMove, follow
+from actuator_glue.diagnosis.search_step import SearchStep
 
 
 @dataclass(frozen=True)

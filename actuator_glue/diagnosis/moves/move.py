@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 from actuator_glue.diagnosis.conclusion import Conclusion
-from actuator_glue.diagnosis.history import SearchStep
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.preparation import Prepared
+from actuator_glue.diagnosis.search_step import SearchStep
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.stages import Progress
 from actuator_glue.diagnosis.thresholds import Thresholds
