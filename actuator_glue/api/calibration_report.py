@@ -113,6 +113,7 @@ def residuals(left: Sequence[Left]) -> html.Picture:
     return html.Picture.of(
         residual_figure(left),
         'What the best draw leaves of each record; grey is noise, which no model explains.',
+        residual_figure(left, narrow=True),
     )
 
 

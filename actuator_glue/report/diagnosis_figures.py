@@ -48,10 +48,10 @@ def _title(trace: Trace, width: float) -> str:
     return style.fit(source_name(trace.source), width, tail=tail)
 
 
-def _legend(figure: Figure, axes: Axes, scale: float = 1.0) -> None:
+def _legend(figure: Figure, axes: Axes, scale: float = 1.0, columns: int = 3) -> None:
     """Put the legend below the panels, where it covers nothing."""
     handles, names = axes.get_legend_handles_labels()
-    figure.legend(handles, names, loc='outside lower center', ncols=3, markerscale=scale)
+    figure.legend(handles, names, loc='outside lower center', ncols=columns, markerscale=scale)
 
 
 def _lines(trace: Trace, *columns: Array) -> Array:
@@ -64,15 +64,19 @@ def _lines(trace: Trace, *columns: Array) -> Array:
 
 
 @styled
-def residual_summary(found: DiagnosisData) -> Figure:
+def residual_summary(found: DiagnosisData, *, narrow: bool = False) -> Figure:
     """Residual where both models differ most, before and after, with the noise; rms errors.
 
-    Both of held-out data.
+    Both of held-out data; one below the other where it is `narrow`, for a phone.
     """
     trace = next(t for t in found.traces if t.held_out)
     part, error = _differing(trace, _SECONDS), found.error
-    figure = new_figure(2.9)
-    left, right = figure.subplots(1, 2, width_ratios=(2.6, 1.0))
+    if narrow:
+        figure, room = new_figure(4.6, style.NARROW), style.NARROW
+        left, right = figure.subplots(2, 1, height_ratios=(1.4, 1.0))
+    else:
+        figure, room = new_figure(2.9), 0.7 * style.WIDTH
+        left, right = figure.subplots(1, 2, width_ratios=(2.6, 1.0))
     floor = 2e6 * error.noise_floor
     left.axhspan(-floor, floor, color=NOISE, lw=0, label='noise (2 standard deviations)')
     for side, color in _sides(found):
@@ -80,7 +84,7 @@ def residual_summary(found: DiagnosisData) -> Figure:
         left.plot(trace.time[part], residual, color=color, lw=0.7, label=_text(found, side))
     left.set_xlabel('time [s]')
     left.set_ylabel('measured less model [um]')
-    left.set_title(_title(trace, 0.7 * style.WIDTH - 0.7))
+    left.set_title(_title(trace, room - 0.7))
     bars = [
         (_text(found, side), getattr(error, side), getattr(error, f'{side}_ci'), color)
         for side, color in _sides(found)
@@ -103,7 +107,7 @@ def residual_summary(found: DiagnosisData) -> Figure:
     right.margins(y=0.15)
     right.set_ylabel('rms error [um]')
     right.set_title('all held-out data')
-    _legend(figure, left)
+    _legend(figure, left, columns=2 if narrow else 3)
     return figure
 
 

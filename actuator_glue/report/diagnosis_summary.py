@@ -199,6 +199,7 @@ def first_page(found: DiagnosisData, hybrid: str = '', *, drawn: bool = True) ->
             residual_summary(found),
             'What the model leaves of held-out data, where both models differ most, and its rms '
             'error over all of them; grey is noise, which no model explains.',
+            residual_summary(found, narrow=True),
         )
     return FirstPage(
         (found.summary(), _meaning(found)),

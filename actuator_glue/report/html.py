@@ -47,16 +47,23 @@ class Table:
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """A figure with a caption; the image is rendered when the block is made."""
+    """A figure with a caption; the image is rendered when the block is made.
+
+    Attributes:
+        uri: the image.
+        caption: what it shows.
+        narrow: the same for a phone; empty where the one is moved to and fro there.
+    """
 
     uri: str
     caption: str
+    narrow: str = ''
     kind: str = field(default='picture', init=False)
 
     @classmethod
-    def of(cls, figure: Figure, caption: str) -> Picture:
-        """Render a matplotlib figure."""
-        return cls(data_uri(figure), caption)
+    def of(cls, figure: Figure, caption: str, narrow: Figure | None = None) -> Picture:
+        """Render a matplotlib figure, and one as wide as a phone that shows the same."""
+        return cls(data_uri(figure), caption, '' if narrow is None else data_uri(narrow))
 
 
 Block = Text | Note | Table | Picture

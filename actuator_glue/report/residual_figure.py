@@ -24,9 +24,10 @@ class Left(NamedTuple):
 
 
 @style.styled
-def residual_figure(records: Sequence[Left]) -> Figure:
-    """Draw each record's residual in um, grey where noise leaves it."""
-    figure = style.new_figure(0.9 + 1.5 * len(records))
+def residual_figure(records: Sequence[Left], *, narrow: bool = False) -> Figure:
+    """Draw each record's residual in um, grey where noise leaves it; `narrow` for a phone."""
+    width = style.NARROW if narrow else style.WIDTH
+    figure = style.new_figure(0.9 + 1.5 * len(records), width)
     panels = figure.subplots(len(records), 1, squeeze=False, sharey=True)[:, 0]
     for axes, of in zip(panels, records, strict=True):
         if of.noise is not None:
@@ -40,7 +41,7 @@ def residual_figure(records: Sequence[Left]) -> Figure:
             lw=0.6,
             label='measured less model',
         )
-        axes.set_title(style.fit(of.title, style.WIDTH - 0.7))
+        axes.set_title(style.fit(of.title, width - 0.7))
         axes.set_ylabel('residual [um]')
     panels[-1].set_xlabel('time [s]')
     handles, names = panels[0].get_legend_handles_labels()

@@ -26,6 +26,7 @@ R = TypeVar('R')
 
 STYLE_FILE = Path(__file__).with_name('actuator_glue.mplstyle')
 WIDTH = 7.2  # in, the text width of an A4 page
+NARROW = 4.2  # in, of a phone
 
 # Colour by role, the same in every figure (Okabe & Ito); print keeps them apart by lightness.
 COMMAND = '#777777'

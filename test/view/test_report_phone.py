@@ -11,7 +11,7 @@ from browser import PROGRAM, Browser
 import actuator_glue as ag
 
 WIDTH = 390
-# Page; boxes whose tables scroll; numbers of tables that stand on more than a line.
+# First picture; page; boxes whose tables scroll; numbers of tables that stand on more than a line.
 MEASURE = """(() => {
   const lines = (cell) => {
     const all = document.createRange();
@@ -19,7 +19,10 @@ MEASURE = """(() => {
     return new Set([...all.getClientRects()].map((r) => Math.round(r.top))).size;
   };
   const number = (cell) => /^-?[0-9.e+-]+$/.test(cell.textContent.trim());
+  const pictures = [...document.querySelectorAll('figure img')];
   return {
+    first: pictures[0].currentSrc.length, wide: pictures[0].getAttribute('src').length,
+    fits: pictures[0].getBoundingClientRect().width,
     page: document.documentElement.scrollWidth,
     boxes: [...document.querySelectorAll('.scroll')]
       .filter((box) => box.scrollWidth > box.clientWidth).map((box) => box.textContent),
@@ -60,5 +63,8 @@ def test_a_report_fits_a_phone(which: str, tmp_path: Path) -> None:
     found = asyncio.run(measured(result.report(tmp_path / 'report.html')))
     assert found['tables'] >= 4
     assert found['page'] <= WIDTH
+    # The first picture is one made for it.
+    assert found['fits'] <= WIDTH
+    assert found['first'] != found['wide']
     assert found['boxes'] == []
     assert found['broken'] == []
