@@ -7,7 +7,6 @@ has two parameters at least, so that only what has as many has rivals of two tha
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 
@@ -19,11 +18,6 @@ from actuator_glue.diagnosis.judge import Judge
 from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.trial import Trial
-
-
-def price(count: int) -> float:
-    """Nats that a pair pays for being one of many: pairs of `count` effects to each of them."""
-    return math.log(max(1.0, 0.5 * (count - 1)))
 
 
 def rivals(

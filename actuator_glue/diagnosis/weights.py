@@ -34,5 +34,10 @@ def price(structure: Structure, entries: Mapping[str, Effect], named: int) -> fl
     terms = sum(map(is_learned, structure.entries))
     forms = max(sum(map(is_learned, entries.values())), terms)
     names = len(structure.entries) - terms
-    choices = math.comb(max(named, names), names) * math.comb(forms, terms)
-    return len(structure.parameters) + math.log(choices)
+    chosen = choices(max(named, names), names) + choices(forms, terms)
+    return len(structure.parameters) + chosen
+
+
+def choices(count: int, taken: int) -> float:
+    """Return the logarithm of how many ways there are to take so many of `count` [nats]."""
+    return math.log(max(math.comb(count, taken), 1))

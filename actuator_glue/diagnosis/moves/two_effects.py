@@ -7,11 +7,11 @@ nor descriptions are worth adding, and told only where they explain all that is 
 
 from __future__ import annotations
 
-from actuator_glue.diagnosis import pairs
 from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.search import by_score
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.diagnosis.weights import choices
 
 
 def explained(selection: ModelSelection, found: Selection) -> Selection | None:
@@ -49,7 +49,8 @@ def _both(selection: ModelSelection, current: Trial) -> list[Trial]:
 
 def _is_worth(selection: ModelSelection, trial: Trial, current: Trial) -> bool:
     """Whether two effects explain the rest, and neither is idle beside the other."""
-    cost = pairs.price(len(selection.search.names))
+    count = len(selection.search.names)
+    cost = choices(count, 2) - choices(count, 1)  # of a single one the level has paid for
     if selection.left(trial) >= selection.material:
         return False
     if not selection.better(trial, current, selection.material, cost):
