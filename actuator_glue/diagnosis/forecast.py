@@ -3,9 +3,9 @@
 Under a random command what a wrong model leaves has the same spectrum at all times, but it follows
 from the motion, which the model knows. A ridge regression on generic features of the motion and
 on the motion's past (a finite impulse response for each stiffness, as long as a lightly damped
-mode rings) forecasts it, and no noise: nothing that was measured is among the features. The sizes
-that weights are expected to have are those of the largest marginal likelihood of other stretches, too
-(MacKay 1992; impulse responses that fade: Chen, Ohlsson & Ljung 2012).
+mode rings) forecasts it, and no noise: nothing that was measured is among the features. The
+sizes that weights are expected to have are those of the largest marginal likelihood of other
+stretches, too (MacKay 1992; impulse responses that fade: Chen, Ohlsson & Ljung 2012).
 """
 
 from __future__ import annotations
