@@ -82,8 +82,9 @@ def _proposed(series: Series) -> list[int]:
     signal = series.mean / np.maximum(np.maximum(steps, np.median(deviations, axis=0)), 1e-12)
     places: set[int] = set()
     for column in signal.T:
-        one = np.ascontiguousarray(column[:, None])
-        fitted = ruptures.Pelt(model='l2', min_size=_LEAST, jump=1).fit(one)
+        one = np.ascontiguousarray((column - column.mean())[:, None])
+        # Squared deviations from the mean of each stretch, as `Pelt(model='l2')` has them.
+        fitted = ruptures.KernelCPD(kernel='linear', min_size=_LEAST).fit(one)
         places |= set(fitted.predict(pen=2.0 * np.log(n))[:-1])
     return sorted(places)
 
@@ -101,7 +102,7 @@ def _likeliest(series: Series, proposed: list[int], taken: list[int]) -> ChangeP
     if not near:
         return None
     places = np.array(near)
-    factors = np.array([_log_factors(series, i, taken, places) for i in range(len(series.names))])
+    factors = np.array([_log_factors(series, i, taken, near) for i in range(len(series.names))])
     # Each parameter moves or not, with even odds.
     every = np.logaddexp(0.0, factors).sum(axis=0) - len(factors) * np.log(2.0)
     expected = A_YEAR * np.diff(series.times)[places - 1] / _YEAR
@@ -126,9 +127,8 @@ def _likeliest(series: Series, proposed: list[int], taken: list[int]) -> ChangeP
     )
 
 
-def _log_factors(series: Series, i: int, taken: list[int], places: Array) -> Array:
+def _log_factors(series: Series, i: int, taken: list[int], places: list[int]) -> Array:
     """Return the log Bayes factor of a jump of one parameter at each place (m,), over none."""
     y, s = series.mean[:, i], np.sqrt(series.covariance[:, i, i])
-    without = logsumexp(log_likelihoods(series.times, y, s, taken)[0])
-    with_one = logsumexp(log_likelihoods(series.times, y, s, taken, places), axis=1)
-    return np.asarray(with_one - without)
+    evidence = logsumexp(log_likelihoods(series.times, y, s, taken, places), axis=1)
+    return np.asarray(evidence[1:] - evidence[0])

@@ -10,7 +10,7 @@ level model (Durbin and Koopman 2012). q and tau are unknown: a grid holds their
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,7 +42,7 @@ class Grid:
 
 
 def log_likelihoods(
-    times: Array, y: Array, s: Array, jumps: Collection[int] = (), also: Array | None = None
+    times: Array, y: Array, s: Array, jumps: Collection[int] = (), also: Sequence[int] = ()
 ) -> Array:
     """Return the log likelihood of the days for each pair of the grid.
 
@@ -51,25 +51,27 @@ def log_likelihoods(
         y: estimates, (n,).
         s: their standard deviations, (n,).
         jumps: places before which the level jumps.
-        also: one more place for each of m hypotheses, (m,); None for one without.
+        also: one more place, for each of m hypotheses, ascending, (m,).
 
     Returns:
-        Shape (m, g), or (1, g).
+        Shape (1 + m, g): without one more place, and with each.
     """
     grid = Grid.usual()
-    places = np.array([-1]) if also is None else np.asarray(also)
-    shape = (len(places), len(grid.walk))
+    shape = (1 + len(also), len(grid.walk))
     m, p, total = np.zeros(shape), np.full(shape, DIFFUSE**2), np.zeros(shape)
+    begun = 1  # until its place a hypothesis is as the first row
     for t in range(len(y)):
         if t:
-            p = p + grid.walk**2 * (times[t] - times[t - 1])
-            p = p + JUMP**2 * ((places == t)[:, None] + (t in jumps))
-        f = p + grid.offset**2 + s[t] ** 2
-        v = y[t] - m
-        total -= 0.5 * (np.log(2.0 * np.pi * f) + v**2 / f)
-        gain = p / f
-        m = m + gain * v
-        p = p * (1.0 - gain)
+            p[:begun] += grid.walk**2 * (times[t] - times[t - 1]) + JUMP**2 * (t in jumps)
+        while begun <= len(also) and also[begun - 1] == t:
+            m[begun], p[begun], total[begun] = m[0], p[0] + JUMP**2, total[0]
+            begun += 1
+        f = p[:begun] + grid.offset**2 + s[t] ** 2
+        v = y[t] - m[:begun]
+        total[:begun] -= 0.5 * (np.log(2.0 * np.pi * f) + v**2 / f)
+        gain = p[:begun] / f
+        m[:begun] += gain * v
+        p[:begun] *= 1.0 - gain
     return total
 
 
