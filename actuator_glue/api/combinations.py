@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Unpack
@@ -11,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Unpack
 import numpy as np
 
 from actuator_glue.api import judgement, store
-from actuator_glue.api.calibration import calibrate
+from actuator_glue.api.calibration import Progress, calibrate
 from actuator_glue.api.calibration_options import CalibrationChanges, CalibrationOptions
 from actuator_glue.api.calibration_parts import Marginal, marginals_json
 from actuator_glue.api.calibration_result import Calibration
@@ -146,7 +145,7 @@ def combinations(
     records: Records,
     options: CalibrationOptions | None = None,
     *,
-    progress: Callable[[float], None] | None = None,
+    progress: Progress | bool | None = None,
     **changes: Unpack[CalibrationChanges],
 ) -> Combinations:
     """Return what records tell under one specimen whose stiffness is not known.
@@ -155,7 +154,7 @@ def combinations(
         records: one or several tests under the same specimen, or the files they are in; what they
             say of a stiffness is left aside.
         options: how to calibrate; see CalibrationOptions.
-        progress: called with the evaluations made so far.
+        progress: as `calibrate` takes it.
         changes: options by name.
 
     Raises:

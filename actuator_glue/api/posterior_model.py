@@ -206,9 +206,9 @@ class PosteriorModel(Result):
         Raises:
             InputError: no such draw, or effects that are no rational transfer function.
         """
-        import control
+        from actuator_glue.api.transfer import transfer_function
 
-        return control.ss2tf(self.state_space(stiffness, draw))
+        return transfer_function(self.drawn(), stiffness, draw)
 
     def save_mat(self, path: Path | str, stiffness: Sequence[float] | float | None = None) -> Path:
         """Write draws and model to a .mat file for MATLAB; return its path.

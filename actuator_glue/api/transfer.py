@@ -30,6 +30,25 @@ def chosen_draw(of: Drawn, draw: str | int) -> Array:
     raise InputError(f"draw {draw!r}: use 'mean', 'best', or a number below {len(draws)}")
 
 
+_DUST = 1e-9  # of the largest term of a polynomial at its own frequency: arithmetic, no term
+
+
+def transfer_function(of: Drawn, stiffness: float, draw: str | int) -> Any:
+    """Return x/u under a specimen stiffness [N/m] as `control.TransferFunction`.
+
+    Raises:
+        InputError: as `state_space`.
+    """
+    import control
+
+    found = control.ss2tf(state_space(of, stiffness, draw))
+    (num,), (den,) = found.num[0], found.den[0]
+    natural = abs(den[-1] / den[0]) ** (1.0 / (len(den) - 1))
+    sizes = np.abs(num) * natural ** np.arange(len(num) - 1, -1, -1)
+    num = np.where(sizes > _DUST * sizes.max(), num, 0.0)
+    return control.tf(num, den, inputs='command', outputs='displacement')
+
+
 def state_space(of: Drawn, stiffness: float, draw: str | int) -> Any:
     """Return x/u under a specimen stiffness [N/m] as `control.StateSpace`.
 

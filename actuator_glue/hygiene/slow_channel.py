@@ -86,7 +86,7 @@ def smooth(values: Array, known: Readings) -> Array:
 
 def lines(values: Array, known: Readings) -> Array:
     """Return a channel (n,) with straight lines between its readings."""
-    return np.interp(np.arange(len(values)), known.times, values[known.samples])
+    return np.asarray(np.interp(np.arange(len(values)), known.times, values[known.samples]))
 
 
 def _within(values: Array, known: Readings) -> Array:

@@ -197,6 +197,8 @@ def test_a_calibration_hands_out_its_transfer_function() -> None:
         expected = linear.frequency_response(theta, 250e3, w / (2.0 * np.pi))
         for made in (calibration.transfer_function, calibration.state_space):
             np.testing.assert_allclose(made(250e3, draw)(1j * w), expected, rtol=1e-9)
+    # No dust of the arithmetic among its terms.
+    assert [len(made) for made in calibration.transfer_function(0.0).num[0]] == [1]
     with pytest.raises(ag.InputError, match='draw'):
         calibration.transfer_function(250e3, 'median')
     with pytest.raises(ag.InputError, match='delay'):
