@@ -184,6 +184,12 @@ def test_no_width_makes_the_chart_grow(width: int, tmp_path: Path) -> None:
             curve = seen[top : top + high, left + 60 : left + wide - 16]
             assert (np.abs(curve - BLACK).max(axis=2) < 6).sum() > 300
             assert blue(curve) > 1000
+            # Numbers beside every curve: a scale has two at least.
+            told = await page.value(
+                "JSON.stringify(['motion', 'residual', 'error', 'force'].map((name) => "
+                'panels[name][1].chart.axes[1]._splits.length))'
+            )
+            assert min(json.loads(told)) >= 2, told
             legend = await page.value("document.getElementById('samples').innerText")
             for words in LEGENDS:
                 assert words in legend
