@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from actuator_glue.diagnosis.completeness import Decision
+from actuator_glue.diagnosis.agreement import Homogeneity
 from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.estimate import Estimate, Json
+from actuator_glue.diagnosis.fitting_verdict import Decision
 from actuator_glue.diagnosis.held_out import HeldOutError
-from actuator_glue.diagnosis.homogeneity import Homogeneity
 from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.next_experiment import Experiment
 from actuator_glue.diagnosis.posterior import RHAT

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.learned.forms import CAUSES
-from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.posterior import Draws
 from actuator_glue.diagnosis.ranking import removed, weights
 from actuator_glue.diagnosis.search import Search
@@ -29,7 +29,7 @@ _ALONE = 0.9  # weight among what was tried of a kind that is told from the othe
 
 
 def with_companions(
-    selection: ModelSelection, final: Trial, least: float | None = None, *, alone: bool = True
+    selection: BeamSearch, final: Trial, least: float | None = None, *, alone: bool = True
 ) -> Trial:
     """Add effects that are significant at the user's level but too small to be told.
 
@@ -87,7 +87,7 @@ def alike(search: Search, final: Trial, larger: Trial) -> list[tuple[Trial, floa
 
 
 def beside(
-    selection: ModelSelection, current: Trial, names: Sequence[str], least: float
+    selection: BeamSearch, current: Trial, names: Sequence[str], least: float
 ) -> list[Trial]:
     """Refit a structure with the effects that promise most; best out-of-sample score first.
 
@@ -154,7 +154,7 @@ def sentences(final: Trial, larger: Trial, held: Data, missed: bool) -> tuple[st
     return (said,)
 
 
-def hint(selection: ModelSelection, final: Trial, held: Data) -> tuple[str, ...]:
+def hint(selection: BeamSearch, final: Trial, held: Data) -> tuple[str, ...]:
     """Say what may explain the held-out part where the fitting records' answer does not.
 
     Args:

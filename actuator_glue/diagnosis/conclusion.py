@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from actuator_glue.diagnosis import force_ranking, recorded, regression
-from actuator_glue.diagnosis.completeness import Decision, decide
+from actuator_glue.diagnosis import force_ranking, regression
+from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.effort import Effort
+from actuator_glue.diagnosis.fitting_verdict import Decision, decide
+from actuator_glue.diagnosis.measured import at_recorded_rate
 from actuator_glue.diagnosis.measured.hum import Line
 from actuator_glue.diagnosis.measured.measurement import Measured
-from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.onset.onset import Appeared, Onset, dated
 from actuator_glue.diagnosis.preparation import Prepared
 from actuator_glue.diagnosis.regression import Surrogate
@@ -49,7 +50,7 @@ class Conclusion:
     seen: tuple[Measured, ...]
     generic: Surrogate
     decision: Decision
-    selection: ModelSelection
+    selection: BeamSearch
     history: tuple[SearchStep, ...]
     appeared: Appeared | None = None
 
@@ -65,19 +66,19 @@ class Conclusion:
             return None
         return dated(self.appeared, self.decision.final, self.decision.noise)
 
-    def of(self, selection: ModelSelection, found: Selection) -> Conclusion:
+    def of(self, selection: BeamSearch, found: Selection) -> Conclusion:
         """Return what another selection of effects says about the same records."""
         other = concluded(self.prepared, selection, found, self.line)
         return replace(other, appeared=self.appeared)
 
-    def complete(self, selection: ModelSelection, found: Selection | None) -> Conclusion | None:
+    def complete(self, selection: BeamSearch, found: Selection | None) -> Conclusion | None:
         """Return another answer about the same records, if there is one and it is complete."""
         other = None if found is None else self.of(selection, found)
         return None if other is None or other.decision.verdict == 'unexplained' else other
 
 
 def concluded(
-    prepared: Prepared, selection: ModelSelection, found: Selection, line: Line | None
+    prepared: Prepared, selection: BeamSearch, found: Selection, line: Line | None
 ) -> Conclusion:
     """Return what a selection of effects says, beside effects of the measurement.
 
@@ -90,7 +91,7 @@ def concluded(
     search, settings = selection.search, selection.settings
     assert search.scorer is not None
     data = search.data
-    seen = recorded.find(data, found, settings, line)
+    seen = at_recorded_rate.find(data, found, settings, line)
     chosen = found.final if found.final.effects else found.singles[0]
     generic = regression.compare(data, search.scorer, found.base, chosen)
     decision = decide(found, seen, data, settings, generic)
@@ -112,7 +113,7 @@ def searched(
         settings: thresholds.
         tell: takes progress.
     """
-    selection = ModelSelection(search, settings, tell)
+    selection = BeamSearch(search, settings, tell)
     named = selection.run()
     if settings.use_force:
         before = named.final

@@ -6,7 +6,7 @@ import numpy as np
 import scipy
 
 from actuator_glue.diagnosis.alarm import Alarm
-from actuator_glue.diagnosis.completeness import Decision
+from actuator_glue.diagnosis.fitting_verdict import Decision
 from actuator_glue.diagnosis.measured.measurement import Measured
 from actuator_glue.diagnosis.score import splits_of
 from actuator_glue.diagnosis.selection import Selection

@@ -12,16 +12,16 @@ from numpy.typing import NDArray
 
 from actuator_glue.diagnosis import (
     advice,
+    agreement,
     companions,
     discrepancy,
-    findings,
-    homogeneity,
+    held_out_reach,
     model_form,
     posterior,
-    reconciled,
     response,
     ridge,
     table,
+    told_effects,
     verdict,
     wrong_setup,
 )
@@ -33,6 +33,7 @@ from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.first_look import FirstLook
 from actuator_glue.diagnosis.force import check_forces
 from actuator_glue.diagnosis.held_out import COMPLETE
+from actuator_glue.diagnosis.held_out_look import Side, traces, verify
 from actuator_glue.diagnosis.learned import term as learned_term
 from actuator_glue.diagnosis.mixed_draws import MixedDraws, mixed
 from actuator_glue.diagnosis.next_experiment import Experiment, ranked
@@ -42,7 +43,6 @@ from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.diagnosis.stages import Progress, Stage
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
-from actuator_glue.diagnosis.verify import Side, traces, verify
 from actuator_glue.hygiene import rest
 from actuator_glue.hygiene.clean import rest_samples
 from actuator_glue.inference.at_bound import Pressed, pressed
@@ -107,7 +107,7 @@ def diagnose(
         result = conclude(ready, settings, each, tell, effort)
     prepared, data, scorer = result.prepared, result.data, result.scorer
     found, decision = result.found, result.decision
-    stretches = homogeneity.agreement(decision.final, scorer)
+    stretches = agreement.agreement(decision.final, scorer)
     rng = np.random.default_rng([seed, 1])
     size = max(found.material, decision.left)
     # One record's own setting is told from a common one by size alone: no common one beside it.
@@ -162,8 +162,10 @@ def diagnose(
     if not nowhere:
         mixture = mixed(mixture, final, others, lambda t: sample(t).points, rng)
     spread = mixture.points
-    error = reconciled.reached_by_both(error, found.material, scorer, prepared.held, before, after)
-    judged = verdict.conclude(decision.verdict, bool(decision.names), error, found.material)
+    error = held_out_reach.reached_by_both(
+        error, found.material, scorer, prepared.held, before, after
+    )
+    judged = verdict.of_both_parts(decision.verdict, bool(decision.names), error, found.material)
     if other is not None and any(map(learned_term.is_learned, final.structure.entries)):
         # A description of what another set-up explains with none describes the set-up.
         judged = 'unexplained' if judged in COMPLETE else judged
@@ -185,7 +187,7 @@ def diagnose(
     decision = replace(
         decision, certainty=verdict.certainty(decision.certainty, error, found.material)
     )
-    effects = findings.of(decision, found, estimates, stretches)
+    effects = told_effects.of(decision, found, estimates, stretches)
     judged = verdict.named(judged, effects)
     learned = learned_term.described(decision.final, data, estimates)
     used = None
@@ -201,7 +203,7 @@ def diagnose(
         verdict=judged,
         effects=effects,
         error=error,
-        candidates=findings.candidates(found, result.seen),
+        candidates=told_effects.candidates(found, result.seen),
         coverage=coverage,
         alarm=alarm_of(found, result.seen, decision, data, seed, settings.false_alarms, each),
         advice=(

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from actuator_glue.diagnosis import zero
+from actuator_glue.diagnosis import record_zero
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.inference.least_squares.fit import rms
@@ -175,7 +175,7 @@ def responses(search: Search, size: float) -> dict[str, Array]:
     sizes = {name: rms(response) for name, response in found.items()}
     out = {n: r * (size / sizes[n]) for n, r in found.items() if 0.0 < sizes[n] < 1.0}
     # Each record has a zero of its own, with a drift.
-    for i, (part, line) in enumerate(zero.lines(data)):
+    for i, (part, line) in enumerate(record_zero.lines(data)):
         for which, row in zip(('offset', 'drift'), line, strict=True):
             own = np.zeros(data.target.size)
             own[part] = size * row

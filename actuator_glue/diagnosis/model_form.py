@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from actuator_glue.diagnosis import homogeneity
+from actuator_glue.diagnosis import agreement
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.trial import Trial
@@ -28,7 +28,7 @@ def open_form(search: Search, final: Trial, left: float, space: Space, scorer: S
     between stretches, together. Structures are not compared with one that has an effect in one
     record only.
     """
-    stretches = homogeneity.between(final, scorer)
+    stretches = agreement.between(final, scorer)
     return stretches if final.own else np.hypot(stretches, spread(search, final, left, space))
 
 

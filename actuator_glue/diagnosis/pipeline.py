@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from actuator_glue.diagnosis import chance, cleaned
+from actuator_glue.diagnosis import final_impulses, undetermined_motion
 from actuator_glue.diagnosis.candidates import mean_effects
 from actuator_glue.diagnosis.conclusion import Conclusion, searched
 from actuator_glue.diagnosis.effort import Effort
@@ -64,11 +64,11 @@ def _within(
     begun = _begun(prepared, asking.settings, each, effort, fixed)
     first = _moved(*begun, asking)
     prepared, final = begun[0], first.found.final
-    clean = cleaned.without_impulses(prepared, final)
+    clean = final_impulses.without_impulses(prepared, final)
     if clean is prepared:
         return first
     taken = prepared.fit.target - clean.fit.target
-    if not cleaned.swayed(final.fit, first.scorer, taken):
+    if not final_impulses.swayed(final.fit, first.scorer, taken):
         return first
     return _moved(*_begun(clean, asking.settings, each, effort, fixed=True), asking)
 
@@ -81,7 +81,7 @@ def _begun(
     if line is not None:
         data = hum.without(prepared.fit, line)
         search = Search(data, mean_effects(), each, effort=effort)
-    return *chance.without(prepared, search, settings, fixed), line
+    return *undetermined_motion.without(prepared, search, settings, fixed), line
 
 
 def _moved(prepared: Prepared, search: Search, line: Line | None, asking: Asking) -> Conclusion:

@@ -13,8 +13,8 @@ import math
 
 import numpy as np
 
+from actuator_glue.diagnosis.held_out_reach import as_likely
 from actuator_glue.diagnosis.identifiable import Straight, coordinates
-from actuator_glue.diagnosis.reconciled import as_likely
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.inference.least_squares.free_run import Model
 from actuator_glue.inference.least_squares.space import Space

@@ -101,7 +101,7 @@ def excuse(error: HeldOutError, material: float) -> Excuse | None:
     return Excuse(None, error.least, how, 'with them')
 
 
-def conclude(verdict: Verdict, moved: bool, error: HeldOutError, material: float) -> Verdict:
+def of_both_parts(verdict: Verdict, moved: bool, error: HeldOutError, material: float) -> Verdict:
     """Return the verdict of both parts.
 
     Additions were chosen on the fitting part alone and stay in the model. Where they take nothing

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis.homogeneity import agreement, between
+from actuator_glue.diagnosis.agreement import agreement, between
 from actuator_glue.diagnosis.regression import Surrogate, compare
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.search import Search

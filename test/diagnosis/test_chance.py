@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis import chance
+from actuator_glue.diagnosis import undetermined_motion
 from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.global_search import Shares
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -35,8 +35,8 @@ def test_where_stick_and_slip_end_is_left_to_chance(rng_seed: int) -> None:
     rng = np.random.default_rng(rng_seed)
     theta = THETA * [1.0, 1.0, 1.0, 1.0, 1.0, 1.15, 1.0] * np.exp(0.05 * rng.standard_normal(7))
     data = Data.whole([sweep()])
-    (lost,) = chance.undetermined(data, STRIBECK, theta, 5e-7)
-    (coulomb,) = chance.undetermined(data, COULOMB, theta[:5], 2.5e-6)
+    (lost,) = undetermined_motion.undetermined(data, STRIBECK, theta, 5e-7)
+    (coulomb,) = undetermined_motion.undetermined(data, COULOMB, theta[:5], 2.5e-6)
     assert 0.3 < lost.mean() < 0.8
     assert not coulomb.any()
     near = theta * np.exp(1e-6 * rng.standard_normal((8, 7)))

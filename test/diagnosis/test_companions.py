@@ -8,7 +8,7 @@ import pytest
 import two_sweeps
 
 from actuator_glue.diagnosis import companions, discrepancy, mixed_draws, posterior
-from actuator_glue.diagnosis.model_selection import ModelSelection
+from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.moves.that_matter import that_matter
 from actuator_glue.diagnosis.posterior import Draws
 from actuator_glue.diagnosis.selection import Selection
@@ -22,13 +22,13 @@ NAMES = ('viscous-damping', 'specimen-gap', 'valve-deadband', 'bias', 'delay', '
 DAMPING, GAP = 5e4, 9e-5
 
 
-def selected(gap: float) -> tuple[ModelSelection, Selection]:
+def selected(gap: float) -> tuple[BeamSearch, Selection]:
     """Two sweeps with damping and perhaps a gap at the specimen; 10 um of noise."""
     effects = {'viscous-damping': DAMPING, 'specimen-gap': gap}
     return two_sweeps.selected(NAMES, effects, stroke=2e-3, hertz=10.0, seconds=40.0)
 
 
-def sampled(selection: ModelSelection, found: Selection, trial: Trial) -> Draws:
+def sampled(selection: BeamSearch, found: Selection, trial: Trial) -> Draws:
     """Normal approximation of a structure's posterior."""
     scorer = selection.search.scorer
     assert scorer is not None

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from actuator_glue.diagnosis import completeness
+from actuator_glue.diagnosis import fitting_verdict
 from actuator_glue.diagnosis.learned.forms import forms
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.model.effects import CATALOGUE, Effect, Scale
@@ -26,5 +26,5 @@ def test_names_beside_a_description_that_is_not_enough(
     final = SimpleNamespace(mean_square=11.0, structure=Structure(entries))
     found: Any = SimpleNamespace(base=SimpleNamespace(mean_square=20.0), final=final, noise=0.0)
     surrogate: Any = SimpleNamespace(error=1.0, structure_error=1.0)
-    told = completeness._certainty(found, 1.0, surrogate, Thresholds())
+    told = fitting_verdict._certainty(found, 1.0, surrogate, Thresholds())
     assert told == pytest.approx(expected)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from actuator_glue.diagnosis import findings
+from actuator_glue.diagnosis import told_effects
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.finding import Rival
 
@@ -16,11 +16,11 @@ def size(lower: float, upper: float, neutral: float | None) -> Estimate:
 def test_a_name_whose_size_may_be_nothing_is_not_sure(plausible: bool) -> None:
     """All names in its place keep their odds, and none of these has the rest."""
     rows = [Rival(n, 0.0, 0.0, 0.0, True, p, p) for n, p in (('delay', 0.9), ('sensor-lag', 0.1))]
-    told = findings._told('delay', rows, 0.95, plausible)
+    told = told_effects._told('delay', rows, 0.95, plausible)
     assert told[0].probability == pytest.approx(0.855 if plausible else 0.7)
     assert told[1].probability / told[0].probability == pytest.approx(1 / 9)
     # What was less sure stays as sure as it was.
-    assert findings._told('sensor-lag', rows, 0.95, plausible)[1].probability == 0.95 * 0.1
+    assert told_effects._told('sensor-lag', rows, 0.95, plausible)[1].probability == 0.95 * 0.1
 
 
 @pytest.mark.parametrize(
@@ -37,4 +37,4 @@ def test_a_name_whose_size_may_be_nothing_is_not_sure(plausible: bool) -> None:
 )
 def test_an_interval_without_the_neutral_value(sizes: list[Estimate], excluded: bool) -> None:
     """One of those that say how much there is must exclude it."""
-    assert findings._excludes_neutral(sizes) is excluded
+    assert told_effects._excludes_neutral(sizes) is excluded

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from actuator_glue.diagnosis import force_ranking
+from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.force import newtons_per_metre, with_forces
-from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.preparation import prepare
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
@@ -36,7 +36,7 @@ def swept(effect: str, sizes: list[float], seed: int) -> Data:
 def decided(data: Data, names: tuple[str, ...]) -> tuple[Selection, Selection, tuple[str, ...]]:
     """Return what the displacement says, and what both say, with the notes."""
     search = Search(data, names)
-    found = ModelSelection(search, SETTINGS, lambda stage, share: None).run()
+    found = BeamSearch(search, SETTINGS, lambda stage, share: None).run()
     return found, *force_ranking.decided(search, found, SETTINGS)
 
 

@@ -7,7 +7,7 @@ import pytest
 from scipy import signal
 
 from actuator_glue.diagnosis import forecast
-from actuator_glue.diagnosis.model_selection import ModelSelection
+from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -21,7 +21,7 @@ THETA = [133.65, 1.1005e9, 2.4927e5, 1.0]
 
 def selected(
     effects: tuple[str, ...], sizes: list[float], rng: np.random.Generator, fading: float = 0.0
-) -> ModelSelection:
+) -> BeamSearch:
     """Eq. (2) fitted to two random commands of 30 s, 0.1 to 9 Hz, that may fade (1/s)."""
     n, records = int(30 * RATE), []
     for _ in range(2):
@@ -33,7 +33,7 @@ def selected(
         y = Structure(effects).simulate([*THETA, *sizes], still).reshape(-1)
         records.append(replace(still, measured=y + NOISE * rng.standard_normal(n)))
     search = Search(Data.whole(records), ('delay',))
-    found = ModelSelection(search, Thresholds(), lambda stage, share: None)
+    found = BeamSearch(search, Thresholds(), lambda stage, share: None)
     found.renoise()
     return found
 

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.candidates import mean_effects
 from actuator_glue.diagnosis.diagnose import diagnose
-from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.inference.least_squares.data import Data
@@ -35,7 +35,7 @@ def test_a_mode_has_its_name(effect: str, sizes: list[float], rng_seed: int) -> 
     noise = NOISE * np.random.default_rng(rng_seed).standard_normal(len(T))
     data = Data.whole([replace(still, measured=moved + noise)])
     names = 'frame-mode', 'payload-inertia', 'delay', 'valve-lag', 'backlash'
-    found = ModelSelection(Search(data, names), Thresholds(), lambda stage, share: None).run()
+    found = BeamSearch(Search(data, names), Thresholds(), lambda stage, share: None).run()
     assert found.final.effects == (effect,)
     assert found.final.fit.rms < 1.1 * NOISE
     assert [r.name for r in found.rivals[effect] if r.tied and len(r.effects) == 1] == [effect]

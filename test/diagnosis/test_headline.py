@@ -15,7 +15,7 @@ from actuator_glue.diagnosis.finding import Finding, Rival
 from actuator_glue.diagnosis.headline import headline
 from actuator_glue.diagnosis.held_out import HeldOutError, Verdict
 from actuator_glue.diagnosis.result import DiagnosisData
-from actuator_glue.diagnosis.verdict import against, certainty, conclude, misses, named
+from actuator_glue.diagnosis.verdict import against, certainty, misses, named, of_both_parts
 from actuator_glue.diagnosis.wrong_setup import WrongSetup
 from actuator_glue.model.effects import CATALOGUE
 
@@ -41,7 +41,7 @@ def diagnosis(
     interval = ((1.0 - scatter) * after, (1.0 + scatter) * after)
     error = HeldOutError(before, (0, 1), after, interval, noise, removed, about, before)
     alarm = Alarm(verdict != 'none', 1e-5, 5e-6, noise, 0.01)
-    judged = conclude(verdict, any(e.noise is None for e in effects), error, alarm.threshold)
+    judged = of_both_parts(verdict, any(e.noise is None for e in effects), error, alarm.threshold)
     return module.Diagnosis(
         judged,
         effects,
@@ -202,7 +202,7 @@ def test_what_the_parameters_leave_open_contradicts_nothing() -> None:
     error = replace(error, reached=11e-6)
     assert not misses(error, 5e-6)
     assert '11.0 um with parameters as likely' in contradicted(error, 5e-6)[0]
-    verdict = conclude('none', False, error, 5e-6)
+    verdict = of_both_parts('none', False, error, 5e-6)
     said = headline(replace(diagnosis('none', 13e-6, 13e-6), error=error, verdict=verdict))
     assert said == (
         'the model is enough: held-out error 11.0 um with parameters as likely as the best '
@@ -221,7 +221,7 @@ def test_a_record_with_a_zero_of_its_own_contradicts_nothing() -> None:
     assert said.startswith('a.csv: 13.0 um are left, 10.0 um without')
     error = replace(error, after_without_zero=10.5e-6)
     assert not misses(error, 5e-6)
-    verdict = conclude('none', False, error, 5e-6)
+    verdict = of_both_parts('none', False, error, 5e-6)
     said = headline(replace(diagnosis('none', 13e-6, 13e-6), error=error, verdict=verdict))
     assert said == (
         "the model is enough: held-out error 10.5 um without each record's own offset and drift "
@@ -269,7 +269,7 @@ def test_what_likely_parameters_leave_bears_additions_out(
     """
     asked = diagnosis('missing-effect', 80e-6, 90e-6, finding('backlash'))
     error = replace(asked.error, reached=reached, reached_before=without)
-    assert conclude('missing-effect', True, error, asked.alarm.threshold) == verdict
+    assert of_both_parts('missing-effect', True, error, asked.alarm.threshold) == verdict
     told = replace(asked, error=error, verdict=verdict)
     sure = certainty(0.95, error, asked.alarm.threshold)
     assert sure == pytest.approx(share)

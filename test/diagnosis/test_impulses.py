@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis import cleaned
+from actuator_glue.diagnosis import final_impulses
 from actuator_glue.diagnosis.preparation import prepare
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.hygiene import impulses
@@ -224,7 +224,7 @@ def test_what_an_effect_makes_is_not_left_out_of_its_size(rng_seed: int) -> None
         shown += any(i.count for i in prepared.impulses)
         found = fit(prepared.fit, model, true)
         trial = Trial(model, 'viscous-damping', found, np.zeros(1))
-        clean = cleaned.without_impulses(prepared, trial)
+        clean = final_impulses.without_impulses(prepared, trial)
         assert not any(i.count for i in clean.impulses)
         for record, mended in zip(records, clean.fit.records, strict=True):
             np.testing.assert_allclose(mended.measured, record.measured, rtol=0.0, atol=1e-15)

@@ -5,10 +5,10 @@ import pytest
 from scipy import signal
 from smooth_machines import piston
 
+from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.learned.forms import forms
 from actuator_glue.diagnosis.learned.term import described
-from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.moves.describe import _plainer
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.search import Search
@@ -106,7 +106,7 @@ def test_lost_motion_has_one_size(rng_seed: int) -> None:
     """A share of the reading that has play is one, and must be worth its parameter."""
     rng = np.random.default_rng(rng_seed)
     search, _ = searched(sweeps(7, 60e-6, PLANTS[0], rng))
-    selection = ModelSelection(search, Thresholds(), lambda *_: None)
+    selection = BeamSearch(search, Thresholds(), lambda *_: None)
     selection.renoise()
     (share,) = search.additions(search.trial(()), ['learned-feedback-hysteresis'])
     assert _plainer(selection, share).effects == ('learned-feedback-play',)

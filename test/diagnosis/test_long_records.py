@@ -6,8 +6,8 @@ import pytest
 from test_diagnose import make
 
 from actuator_glue.diagnosis import advice, companions, posterior
+from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.diagnose import diagnose
-from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference import importance
 
@@ -37,7 +37,7 @@ def test_chains_of_a_long_record_are_cut(monkeypatch: pytest.MonkeyPatch) -> Non
         monkeypatch.setattr(module, 'RHAT', 0.9)
     monkeypatch.setattr(importance, 'sample', lambda *args: None)
 
-    def larger(selection: ModelSelection, final: Trial, least: float | None = None) -> Trial:
+    def larger(selection: BeamSearch, final: Trial, least: float | None = None) -> Trial:
         return final if least else selection.search.additions(final, ['delay'])[0]
 
     monkeypatch.setattr(companions, 'with_companions', larger)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis.model_selection import ModelSelection
+from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -29,7 +29,7 @@ def selected(
         measured += 1e-5 * rng.standard_normal(len(command))
         records.append(Record(command, measured, 1 / RATE, stiffness=k))
     search = Search(Data.whole(records), NAMES)
-    return ModelSelection(search, Thresholds(), lambda stage, share: None).run()
+    return BeamSearch(search, Thresholds(), lambda stage, share: None).run()
 
 
 def test_damping_and_a_delay_are_as_likely_as_the_payload_that_does_the_same(

@@ -80,7 +80,7 @@ def test_held_out_records_that_contradict_lower_the_certainty() -> None:
     assert verdict.certainty(0.95, good, 5e-6) == 0.95
     # A verdict that says the held-out part does not ask for the name gives it no probability.
     nothing = replace(error, before=10e-6, after=10e-6, removable_removed=0.0)
-    assert verdict.conclude('missing-effect', True, nothing, 5e-6) == 'undecided'
+    assert verdict.of_both_parts('missing-effect', True, nothing, 5e-6) == 'undecided'
     assert verdict.certainty(0.95, nothing, 5e-6) == 0.0
 
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis import discrepancy, posterior, reconciled
+from actuator_glue.diagnosis import discrepancy, held_out_reach, posterior
+from actuator_glue.diagnosis.held_out_look import Side
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.search import Search
-from actuator_glue.diagnosis.verify import Side
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
@@ -46,7 +46,7 @@ def test_what_one_stiffness_leaves_open_is_no_contradiction(gain: float, rng_see
     ).points
     held = Data.whole([record(rng, 0.0, gain)])
     alone = held.target - held.simulate(PLAIN, base.theta)[0]
-    left = reconciled.reached(scorer, held, Side(PLAIN, base.theta, draws))
+    left = held_out_reach.reached(scorer, held, Side(PLAIN, base.theta, draws))
     if gain == 1.0:
         assert left is not None and left < NOISE * (1.0 + 3.0 / np.sqrt(2.0 * alone.size))
     else:

@@ -3,7 +3,7 @@
 import pytest
 import two_sweeps
 
-from actuator_glue.diagnosis.model_selection import ModelSelection
+from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.moves import two_effects
 from actuator_glue.diagnosis.ranking import removed
 from actuator_glue.diagnosis.selection import Selection
@@ -13,7 +13,7 @@ NAMES = ('delay', 'supply-droop', 'viscous-damping', 'gain-drift', 'bias')
 DELAY, DROOP = 8e-3, 6.0  # together some 8 um, each alone less than 3
 
 
-def selected(delay: float, droop: float) -> tuple[ModelSelection, Selection]:
+def selected(delay: float, droop: float) -> tuple[BeamSearch, Selection]:
     """Two sweeps with both effects; 10 um of noise."""
     effects = {'delay': delay, 'supply-droop': droop}
     return two_sweeps.selected(NAMES, effects, stroke=2.2e-3, hertz=8.0, seconds=30.0)

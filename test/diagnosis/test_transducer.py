@@ -5,8 +5,8 @@ import pytest
 from scipy.interpolate import CubicSpline
 from smooth_machines import piston
 
+from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.diagnose import diagnose
-from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.moves.feedback import in_the_loop
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
@@ -52,7 +52,7 @@ def selected(half: float, inside: bool, rng: np.random.Generator) -> Selection:
     departure = (_FEEDBACK_PLAY, half) if inside else (0, 0.0)
     records = sweeps(rng.choice(PLANTS), departure, rng, half)
     search = Search(Data.whole(records), NAMES)
-    selection = ModelSelection(search, Thresholds(), lambda *_: None)
+    selection = BeamSearch(search, Thresholds(), lambda *_: None)
     found = selection.run()
     return in_the_loop(selection, found) or found
 

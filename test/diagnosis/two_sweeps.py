@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 
 import numpy as np
 
-from actuator_glue.diagnosis.model_selection import ModelSelection
+from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -30,7 +30,7 @@ def selected(
     stroke: float,
     hertz: float,
     seconds: float,
-) -> tuple[ModelSelection, Selection]:
+) -> tuple[BeamSearch, Selection]:
     """Sweeps with two specimens; `names` are tried, all parameters of an effect are its size."""
     u = sweep(stroke, hertz, seconds)
     return selected_of(names, motions(effects, THETA, u, (100e3, 400e3)))
@@ -53,12 +53,12 @@ def selected_of(
     names: tuple[str, ...],
     tests: Iterable[tuple[float, Array, Array]],
     seed: int | None = None,
-) -> tuple[ModelSelection, Selection]:
+) -> tuple[BeamSearch, Selection]:
     """What `names` say of stiffness, command and displacement of each test, noise added."""
     rng = np.random.default_rng(seed)
     records = [
         Record(u, y + NOISE * rng.standard_normal(len(y)), 1 / RATE, stiffness=k)
         for k, u, y in tests
     ]
-    selection = ModelSelection(Search(Data.whole(records), names), Thresholds(), lambda s, d: None)
+    selection = BeamSearch(Search(Data.whole(records), names), Thresholds(), lambda s, d: None)
     return selection, selection.run()

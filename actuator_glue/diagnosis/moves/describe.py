@@ -13,19 +13,19 @@ import math
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from actuator_glue.diagnosis import learned_first
+from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.conclusion import Conclusion
 from actuator_glue.diagnosis.learned.forms import forms
 from actuator_glue.diagnosis.learned.friction import DRY, FALLING, SHAPES
 from actuator_glue.diagnosis.learned.term import is_learned
-from actuator_glue.diagnosis.model_selection import ModelSelection
+from actuator_glue.diagnosis.moves import names_beside_term
 from actuator_glue.diagnosis.moves.move import Asking
 from actuator_glue.diagnosis.ranking import MUCH, decisive, least_removed, removed
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
 
-Way = Callable[[ModelSelection, Selection], Selection | None]
+Way = Callable[[BeamSearch, Selection], Selection | None]
 _LONG = 100_000  # samples
 _MOST = 2  # learned terms
 _REFITS = 4  # per structure and turn
@@ -71,9 +71,7 @@ def ways(found: Selection) -> list[Way]:
     return [instead, reshaped, partial(learned, complete=True)]
 
 
-def learned(
-    selection: ModelSelection, found: Selection, complete: bool = False
-) -> Selection | None:
+def learned(selection: BeamSearch, found: Selection, complete: bool = False) -> Selection | None:
     """Add learned terms to a selection.
 
     Args:
@@ -103,10 +101,10 @@ def learned(
     if best is found.final:
         return None
     singles = selection.rescored(found.singles)
-    return selection.concluded(best, search.trial(()), singles)
+    return selection.checked(best, search.trial(()), singles)
 
 
-def instead(selection: ModelSelection, found: Selection) -> Selection | None:
+def instead(selection: BeamSearch, found: Selection) -> Selection | None:
     """Return one term in place of all effects, where it is better for its parameters.
 
     Lost motion of the command moves the piston nearly as play and a lag of the transducer do: two
@@ -134,10 +132,10 @@ def instead(selection: ModelSelection, found: Selection) -> Selection | None:
             return None
     if _gain(search, best, found.final) <= least:
         return None
-    return selection.concluded(_plainer(selection, best), base, found.singles)
+    return selection.checked(_plainer(selection, best), base, found.singles)
 
 
-def reshaped(selection: ModelSelection, found: Selection) -> Selection | None:
+def reshaped(selection: BeamSearch, found: Selection) -> Selection | None:
     """Return an answer with another shape of its cause, if the records show that.
 
     Friction that is reached over 1 mm/s leaves less than what matters as friction that is there
@@ -172,10 +170,10 @@ def reshaped(selection: ModelSelection, found: Selection) -> Selection | None:
             best = better
     if best is named:
         return None
-    return selection.concluded(best, search.trial(()), found.singles)
+    return selection.checked(best, search.trial(()), found.singles)
 
 
-def as_good_and_plainer(selection: ModelSelection, found: Selection, named: Selection) -> bool:
+def as_good_and_plainer(selection: BeamSearch, found: Selection, named: Selection) -> bool:
     """Whether a description explains all that is left, as well as names do with more parameters.
 
     A name that fits only with what no record shows by itself, as a fault that the controller
@@ -210,7 +208,7 @@ def _gain(search: Search, best: Trial, other: Trial) -> float:
 
 
 def _additions(
-    selection: ModelSelection,
+    selection: BeamSearch,
     starts: Sequence[Trial],
     best: Trial,
     names: Sequence[str],
@@ -228,7 +226,7 @@ def _additions(
                 # more than all of them is where to begin.
                 whole = selection.left(trial) < selection.material
                 if not whole and _gain(search, trial, best) > cost:
-                    begun = learned_first.with_names(selection, trial)
+                    begun = names_beside_term.with_names(selection, trial)
                     if begun is not None and selection.better(begun, best, least, cost):
                         worth.append(begun)
                 if not whole or not selection.better(trial, start, least, cost):
@@ -241,7 +239,7 @@ def _additions(
     return next((t for t in worth if not _displaces(selection, t, best)), None)
 
 
-def _plainer(selection: ModelSelection, trial: Trial) -> Trial:
+def _plainer(selection: BeamSearch, trial: Trial) -> Trial:
     """Put the form that the term holds in its place, where it is not worth more than that."""
     search, holds = selection.search, selection.search.entries[trial.added].holds
     if holds is None or holds[0] in trial.effects:
@@ -250,7 +248,7 @@ def _plainer(selection: ModelSelection, trial: Trial) -> Trial:
     return trial if selection.better(trial, plain, selection.material) else plain
 
 
-def _displaces(selection: ModelSelection, trial: Trial, best: Trial) -> bool:
+def _displaces(selection: BeamSearch, trial: Trial, best: Trial) -> bool:
     """Whether a term would only take the place of names that explain nearly the same.
 
     Beside the term they are not worth their parameters, though something remains: a smooth form

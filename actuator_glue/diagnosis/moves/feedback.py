@@ -9,9 +9,9 @@ from __future__ import annotations
 
 import math
 
+from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.candidates import FAULTS, FEEDBACK
 from actuator_glue.diagnosis.conclusion import Conclusion
-from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.moves import describe
 from actuator_glue.diagnosis.moves.move import Asking
 from actuator_glue.diagnosis.selection import Selection
@@ -41,7 +41,7 @@ def _described(result: Conclusion, inside: Selection) -> Conclusion | None:
     return result.complete(selection, found)
 
 
-def in_the_loop(selection: ModelSelection, found: Selection) -> Selection | None:
+def in_the_loop(selection: BeamSearch, found: Selection) -> Selection | None:
     """Put a fault of the transducer inside the controller's loop.
 
     Asked for where structure remains, and where more parameters than its own may stand for it.
@@ -82,4 +82,4 @@ def in_the_loop(selection: ModelSelection, found: Selection) -> Selection | None
             break
         best = worth[0]
     singles = selection.rescored(found.singles)
-    return selection.concluded(best, search.trial(()), singles)
+    return selection.checked(best, search.trial(()), singles)

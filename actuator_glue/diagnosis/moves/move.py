@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
+from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.conclusion import Conclusion
-from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.preparation import Prepared
 from actuator_glue.diagnosis.search_step import SearchStep
 from actuator_glue.diagnosis.selection import Selection
@@ -99,7 +99,7 @@ def left(result: Conclusion) -> bool:
 
 
 def if_complete(
-    ask: Callable[[ModelSelection, Selection], Selection | None], *, apart: bool = False
+    ask: Callable[[BeamSearch, Selection], Selection | None], *, apart: bool = False
 ) -> Callable[[Conclusion, Asking], Conclusion | None]:
     """Return a move to another selection, taken where that leaves nothing unexplained.
 

@@ -1,6 +1,6 @@
 """All moves, in the order in which they are asked for.
 
-A search that adds one effect at a time ends with an answer (model_selection.py). What it cannot
+A search that adds one effect at a time ends with an answer (beam_search.py). What it cannot
 reach by that is asked for here: another scope, another form, other names for all of it. Of a group
 the first move that is taken ends it.
 """

@@ -7,11 +7,11 @@ take away: what removes that much is an addition like any other.
 from __future__ import annotations
 
 from actuator_glue.diagnosis import companions
-from actuator_glue.diagnosis.model_selection import ModelSelection
+from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.selection import Selection
 
 
-def that_matter(selection: ModelSelection, found: Selection) -> Selection | None:
+def that_matter(selection: BeamSearch, found: Selection) -> Selection | None:
     """Return a selection with further effects that turn out to matter, or None.
 
     Args:
@@ -22,4 +22,4 @@ def that_matter(selection: ModelSelection, found: Selection) -> Selection | None
     larger = companions.with_companions(selection, current, selection.material)
     if not current.effects or larger is current:
         return None
-    return selection.concluded(larger, selection.search.trial(()), found.singles)
+    return selection.checked(larger, selection.search.trial(()), found.singles)

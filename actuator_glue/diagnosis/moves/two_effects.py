@@ -7,14 +7,14 @@ nor descriptions are worth adding, and told only where they explain all that is 
 
 from __future__ import annotations
 
-from actuator_glue.diagnosis.model_selection import ModelSelection
+from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.search import by_score
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.diagnosis.weights import choices
 
 
-def explained(selection: ModelSelection, found: Selection) -> Selection | None:
+def explained(selection: BeamSearch, found: Selection) -> Selection | None:
     """Add two effects at once to a selection.
 
     Args:
@@ -32,11 +32,11 @@ def explained(selection: ModelSelection, found: Selection) -> Selection | None:
     best = min(worth, key=by_score)
     selection.renoise(best)
     singles = selection.rescored(found.singles)
-    chosen = selection.concluded(search.trial(best.effects, best.added), search.trial(()), singles)
+    chosen = selection.checked(search.trial(best.effects, best.added), search.trial(()), singles)
     return chosen if chosen.left < chosen.material else None
 
 
-def _both(selection: ModelSelection, current: Trial) -> list[Trial]:
+def _both(selection: BeamSearch, current: Trial) -> list[Trial]:
     """Refit with two more: the best alone, each with what promises most beside it."""
     search = selection.search
 
@@ -47,7 +47,7 @@ def _both(selection: ModelSelection, current: Trial) -> list[Trial]:
     return [pair for first in firsts for pair in search.additions(first, other(first))]
 
 
-def _is_worth(selection: ModelSelection, trial: Trial, current: Trial) -> bool:
+def _is_worth(selection: BeamSearch, trial: Trial, current: Trial) -> bool:
     """Whether two effects explain the rest, and neither is idle beside the other."""
     count = len(selection.search.names)
     cost = choices(count, 2) - choices(count, 1)  # of a single one the level has paid for

@@ -9,13 +9,13 @@ many parameters and more evidence. Names of more than one parameter have pairs a
 
 from __future__ import annotations
 
+from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.companions import SEEN, beside
-from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
 
 
-def exchanged(selection: ModelSelection, found: Selection) -> Selection | None:
+def exchanged(selection: BeamSearch, found: Selection) -> Selection | None:
     """Return a selection with two effects in place of one, or None.
 
     Args:
@@ -31,10 +31,10 @@ def exchanged(selection: ModelSelection, found: Selection) -> Selection | None:
             best = _better(selection, with_more, name, best)
     if best is with_more:
         return None
-    return selection.concluded(best, selection.search.trial(()), found.singles)
+    return selection.checked(best, selection.search.trial(()), found.singles)
 
 
-def _with_more(selection: ModelSelection, final: Trial) -> Trial | None:
+def _with_more(selection: BeamSearch, final: Trial) -> Trial | None:
     """Return the structure with its best significant but immaterial effect added, if any."""
     if final.own is not None or not final.effects:
         return None
@@ -43,7 +43,7 @@ def _with_more(selection: ModelSelection, final: Trial) -> Trial | None:
     return next((t for t in trials if selection.better(t, final, seen)), None)
 
 
-def _better(selection: ModelSelection, with_more: Trial, name: str, best: Trial) -> Trial:
+def _better(selection: BeamSearch, with_more: Trial, name: str, best: Trial) -> Trial:
     """Return a structure with another name in the place of one, where that has more weight.
 
     Args:

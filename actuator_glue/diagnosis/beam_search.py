@@ -23,14 +23,14 @@ _SWAPS = 4
 _OPEN, _OPEN_TRIED = 2, 3
 
 
-class ModelSelection(Judge):
+class BeamSearch(Judge):
     """Beam search over effect sets on one data set."""
 
     def __init__(self, search: Search, settings: Thresholds, progress: Progress) -> None:
         super().__init__(search, settings)
         self.progress = progress
 
-    def apart(self) -> ModelSelection:
+    def apart(self) -> BeamSearch:
         """Return a selection to go on with: what it adds and its noise are its own."""
         other = copy(self)
         other.search = replace(self.search.wider(()), entries=dict(self.search.entries))
@@ -98,7 +98,7 @@ class ModelSelection(Judge):
                 self.renoise(self._nearest(ranked))
                 ranked = self.rescored(ranked)
             current = self.search.trial(current.effects, current.added)
-        found = self.concluded(current, base, singles)
+        found = self.checked(current, base, singles)
         if set(found.final.effects) != set(current.effects):
             steps.append(
                 SearchStep.to(found.final, 'each held against its absence and its rivals')
@@ -134,7 +134,7 @@ class ModelSelection(Judge):
         assert scorer is not None
         return min(trials, key=lambda t: scorer.left_out_error(t.fit))
 
-    def concluded(self, current: Trial, base: Trial, singles: Sequence[Trial]) -> Selection:
+    def checked(self, current: Trial, base: Trial, singles: Sequence[Trial]) -> Selection:
         """Compare each member with its absence and its rivals, and note its evidence."""
         current = self.pruned(current)
         for name in current.effects:

@@ -8,10 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from actuator_glue.diagnosis.completeness import Decision
+from actuator_glue.diagnosis.agreement import Homogeneity
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.finding import Candidate, Finding, Rival
-from actuator_glue.diagnosis.homogeneity import Homogeneity
+from actuator_glue.diagnosis.fitting_verdict import Decision
 from actuator_glue.diagnosis.learned import term as learned_term
 from actuator_glue.diagnosis.learned.forms import CAUSES
 from actuator_glue.diagnosis.measured.measurement import Measured

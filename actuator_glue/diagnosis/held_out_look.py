@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from actuator_glue.diagnosis import zero
+from actuator_glue.diagnosis import record_zero
 from actuator_glue.diagnosis.held_out import HeldOutError
 from actuator_glue.diagnosis.measured import hum
 from actuator_glue.diagnosis.measured.hum import Line
 from actuator_glue.diagnosis.result import Trace
 from actuator_glue.diagnosis.score import BLOCK, pooled, splits_of
-from actuator_glue.diagnosis.spread import spread
+from actuator_glue.diagnosis.simulation_spread import spread
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import rms
 from actuator_glue.inference.least_squares.free_run import Model
@@ -190,7 +190,7 @@ def verify(
     count = len(after.theta) - len(before.theta)
     pair = fit.target - curves['before'][0], errors['before']
     sham = _sham(fit, held, before, pair, (count, tried), seed)
-    without_zero = zero.without(held, errors['after'])
+    without_zero = record_zero.without(held, errors['after'])
     per_record = tuple(
         (record.source or f'record {i + 1}', rms(b), rms(a))
         for i, (record, b, a) in enumerate(

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from actuator_glue.diagnosis.model_selection import ModelSelection
+from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.trial import Trial
 
 
-def with_names(selection: ModelSelection, term: Trial) -> Trial | None:
+def with_names(selection: BeamSearch, term: Trial) -> Trial | None:
     """Add effects to a structure with a learned term while each is worth it.
 
     Args:

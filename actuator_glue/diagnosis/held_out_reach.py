@@ -14,10 +14,10 @@ import numpy as np
 import scipy
 
 from actuator_glue.diagnosis.held_out import HeldOutError
+from actuator_glue.diagnosis.held_out_look import Side
 from actuator_glue.diagnosis.ranking import standard_error
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.verdict import misses, takes_nothing
-from actuator_glue.diagnosis.verify import Side
 from actuator_glue.inference.least_squares.data import LANES, Data
 from actuator_glue.inference.least_squares.fit import fit, rms
 from actuator_glue.inference.least_squares.free_run import Model

@@ -7,8 +7,8 @@ import pytest
 from scipy import signal
 from trials import ENTRIES, THETA, trial
 
+from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.candidates import mean_effects
-from actuator_glue.diagnosis.model_selection import ModelSelection
 from actuator_glue.diagnosis.moves import describe
 from actuator_glue.diagnosis.score import Scorer, pooled, splits_of
 from actuator_glue.diagnosis.search import Search
@@ -40,9 +40,9 @@ def stationary(
     return Data.whole(records)
 
 
-def selection(data: Data) -> ModelSelection:
+def selection(data: Data) -> BeamSearch:
     """The first step of a selection: Eq. (2) fitted, noise taken from what it leaves."""
-    found = ModelSelection(Search(data, mean_effects()), Thresholds(), lambda stage, share: None)
+    found = BeamSearch(Search(data, mean_effects()), Thresholds(), lambda stage, share: None)
     found.renoise()
     return found
 
