@@ -126,17 +126,17 @@ def test_the_model_changes_live_and_the_replay_repeats_it(start, probe, tmp_path
 
 
 def test_a_file_is_streamed_and_replayed_faster_than_real_time(start, probe, tmp_path):
-    """lab_bridge, then the replay node on the bag: the same samples twice."""
+    """lab_bridge, then the replay node on the bag: the same samples twice, and what they are."""
     rng = np.random.default_rng(0)
     time = np.arange(1200) / RATE
     command = np.sin(2 * np.pi * 1.5 * time)
     rows = np.column_stack([time, command, 0.9 * command + 0.01 * rng.standard_normal(1200)])
     file = tmp_path / 'test.csv'
-    np.savetxt(file, rows, delimiter=',', header='time_s,command_mm,measured_mm', comments='')
+    np.savetxt(file, rows, delimiter=',', header='time_s,command_deg,measured_deg', comments='')
     bags = tmp_path / 'first', tmp_path / 'second'
     recorder = start('recorder', bag=str(bags[0]))
     bridge = start(
-        'lab_bridge', file=str(file), specimen_stiffness=1e5, speed=5.0, wait_for=1, preview=1.0
+        'lab_bridge', file=str(file), specimen_stiffness=0.0, speed=5.0, wait_for=1, preview=1.0
     )
     assert bridge.wait(40) == 0, bridge.text
     assert recorder.end() == 0
@@ -151,7 +151,8 @@ def test_a_file_is_streamed_and_replayed_faster_than_real_time(start, probe, tmp
         assert np.array_equal(one.measured, other.measured)
         assert one.header.stamp == other.header.stamp
     (setup,) = [m for _, m in decoded(bags[1], ('TestSetup',))]
-    assert setup.specimen_stiffness == 1e5 and setup.rate == pytest.approx(RATE)
+    assert (setup.specimen_stiffness, setup.motion) == (0.0, 'deg')
+    assert setup.rate == pytest.approx(RATE)
 
 
 @pytest.mark.slow
