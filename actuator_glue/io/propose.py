@@ -12,7 +12,7 @@ from actuator_glue.even_times import uneven
 from actuator_glue.io.look import ColumnLook, FileLook
 from actuator_glue.io.units import OF_NO_LENGTH, ROLES
 from actuator_glue.motion import MOTIONS
-from actuator_glue.records import SLOWEST_RATE, Array
+from actuator_glue.records import FASTEST_RATE, SLOWEST_RATE, Array
 from actuator_glue.velocity_command import is_velocity
 
 # Words of the field for each role, in the languages of controllers; whole words or parts.
@@ -34,6 +34,9 @@ _NO_LENGTH = re.compile(
 _SAMPLES = 200_000  # of a channel that are compared
 _ALIKE = 0.8  # correlation above which one displacement follows another
 _LATEST = 0.25  # s; no actuator follows later
+_DAY = 86_400.0  # s
+# Days since 1900, and since year 0, in this century.
+_DAYS = ((36_500.0, 73_100.0), (730_400.0, 767_100.0))
 _PAIRS = 100  # of columns that are looked at for a command of velocity
 
 
@@ -162,11 +165,20 @@ def _clock(columns: list[ColumnLook]) -> Guess | None:
 def _rate(found: FileLook, rest: list[ColumnLook], clock: Guess | None) -> float | None:
     """Return samples per second: by the clock, by stamps, or as the file states."""
     if clock is not None and clock.column.steps is not None:
-        return 1.0 / (float(clock.column.steps.mean()) * ROLES['time'][clock.unit])
+        step = float(clock.column.steps.mean()) * clock.scale
+        return 1.0 / (step * ROLES['time'][clock.unit])
     if found.period is not None:
         return 1.0 / found.period
     rates = [c.rate for c in rest if c.times is not None and c.rate is not None]
     return max(rates, default=None)
+
+
+def _counts_days(column: ColumnLook) -> bool:
+    """Whether a clock counts days since 1900 or year 0: as seconds no recorder is as fast."""
+    if column.steps is None or column.unit not in ('', 'd', 'day', 'days'):
+        return False
+    first, step = float(column.values[0]), float(column.steps.mean())
+    return any(a < first < b for a, b in _DAYS) and step < 1.0 / FASTEST_RATE < step * _DAY
 
 
 def _guess(column: ColumnLook, role: str, reasons: tuple[str, ...]) -> Guess:
@@ -177,6 +189,9 @@ def _guess(column: ColumnLook, role: str, reasons: tuple[str, ...]) -> Guess:
     if role == 'time' and column.steps is not None:
         pace = float(column.steps.mean()) * SLOWEST_RATE
         likeliest = next((u for u in ('s', 'ms', 'us') if pace * ROLES['time'][u] <= 1.0), 'ns')
+    if role == 'time' and _counts_days(column):
+        days = 'unit: days, as spreadsheets and MATLAB count them'
+        return Guess(column, 's', reasons, (days,), scale=_DAY)
     if not column.unit:
         said = 'the file states none, and a scale may be needed'
     else:

@@ -81,6 +81,21 @@ def test_names_units_and_times_are_used(tmp_path: Path) -> None:
     assert ranges['Istwert'] == pytest.approx((measured.min(), measured.max()), abs=1e-6)
 
 
+@pytest.mark.parametrize('first', [45_415.0, 739_375.25])
+def test_days_are_proposed_as_such(tmp_path: Path, first: float) -> None:
+    """A spreadsheet counts them since 1900, MATLAB since year 0; never a rate in place of them."""
+    command, measured, _ = channels()
+    rows = zip(first + TIME / 86_400.0, command, measured, strict=True)
+    text = '\n'.join(f'{t:.12f},{u:.6f},{x:.6f}' for t, u, x in rows)
+    (tmp_path / 'days.csv').write_text(f'time,command_mm,measured_mm\n{text}\n')
+    found = looked(tmp_path, tmp_path / 'days.csv', '--out', str(tmp_path / 'map.yaml'))
+    assert found['channels']['time']['scale'] == 86_400.0
+    described = parse_channel_map(yaml.safe_load((tmp_path / 'map.yaml').read_text()), 'map')
+    (record,) = load_records(tmp_path / 'days.csv', channels=described)
+    assert record.rate == pytest.approx(RATE, rel=1e-5)
+    np.testing.assert_allclose(record.command, 1e-3 * np.round(command, 6), atol=1e-12)
+
+
 def test_a_turned_channel_and_a_matrix(tmp_path: Path) -> None:
     """A measurement of opposite sign gets a scale of -1 and a word; columns of a .mat."""
     command, measured, _ = channels()
