@@ -107,6 +107,18 @@ def test_what_it_is_told_and_kept(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert '`calibrate --stiffness unknown` tells what holds' in capsys.readouterr().err
 
 
+def test_structure_is_told_with_what_can_be_done_without_a_stiffness() -> None:
+    """`diagnose` needs the stiffness: nobody is sent there without one."""
+    command = ag.Command(rate=200.0, duration=10.0)
+    record = ag.simulate(
+        command, stiffness=250e3, effects={'backlash': {'backlash': 2e-4}}, seed=3
+    )
+    found = ag.combinations(record, evaluations=8000)
+    (first, *_) = found.problems
+    assert first.endswith('with the stiffness, `actuator-glue diagnose` tells what is missing')
+    assert 'on the same records' not in ' '.join(found.problems)
+
+
 def test_what_needs_a_stiffness_is_refused(tmp_path: Path) -> None:
     """A mass, the force as evidence, records of which one has a stiffness."""
     record = simulated(250e3)

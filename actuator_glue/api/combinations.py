@@ -19,6 +19,7 @@ from actuator_glue.api.given import Records, records_given
 from actuator_glue.api.matlab import Exported, TransferFunction, write_mat
 from actuator_glue.api.options import chosen, takes
 from actuator_glue.api.result import Result
+from actuator_glue.diagnosis.residual_structure import DIAGNOSE
 from actuator_glue.errors import InputError
 from actuator_glue.hygiene.checks import pull
 from actuator_glue.hygiene.unlike_rest import unlike_rest
@@ -37,6 +38,7 @@ if TYPE_CHECKING:
 # A stiffness that stands for the one nobody knows [N/m]: whatever that is, some parameters inside
 # the box of Table 3 move as the actuator does. Nothing that is told depends on it.
 _STAND_IN = 250e3
+_DIAGNOSE = 'with the stiffness, `actuator-glue diagnose` tells what is missing'
 COST = (
     'the specimen stiffness is not known: alpha_1_beta_0, alpha_2 and alpha_3 cannot be told apart'
     ' from it. What is told holds for this specimen alone: it predicts no other stiffness, no '
@@ -193,11 +195,12 @@ def combinations(
     left = found.structure
     unlike = () if left is None else unlike_rest(given, left.noise_m)
     found_pull, told_pull = _pushed(given)
+    problems = judgement.problems((), known, found.error, None, found.structure, unlike)
     return Combinations(
         combinations=known,
         draws=draws,
         error=found.error,
-        problems=tuple(judgement.problems((), known, found.error, None, found.structure, unlike)),
+        problems=tuple(line.replace(DIAGNOSE, _DIAGNOSE) for line in problems),
         notes=(COST, *told_pull, *(line for line in found.notes if line not in told)),
         converged=converged,
         effects=found.effects,

@@ -234,6 +234,12 @@ def sizes(effects: Effects = (), theta: ArrayLike | None = None) -> tuple[Struct
         InputError: unknown effect or parameter, or a value outside the catalogue's bounds.
     """
     asked = dict(effects) if isinstance(effects, Mapping) else {name: {} for name in effects}
+    for name, given in asked.items():
+        if not isinstance(given, Mapping):
+            raise InputError(
+                f'effect {name}: sizes are given by parameter, as in '
+                f'effects={{{name!r}: {{PARAMETER: VALUE}}}}, not as {given!r:.60}'
+            )
     structure = Structure(tuple(asked))
     base = TABLE_2 if theta is None else np.asarray(theta, dtype=np.float64)
     if base.shape != (4,):

@@ -16,7 +16,7 @@ from actuator_glue.hybrid.stability import tracking
 from actuator_glue.hygiene.clean import clean, common_initial, initial_state
 from actuator_glue.hygiene.despike import despiked
 from actuator_glue.inference.least_squares.data import LANES, SETTLE, chunks
-from actuator_glue.model.effects import scale
+from actuator_glue.model.effects import Scale, scale
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.online.job import WindowResult
@@ -99,7 +99,7 @@ def records_tracking(
 
     Numbers of one record are those of one set of samples: at the rate it was sampled with, without
     impulses, and without what lets a state that is not known be forgotten. Delay and amplitude of
-    a model that is not linear are those of sines as large as the test had them.
+    a model that is not linear are those of sines as large as the tests had them.
 
     Args:
         draws: shape (m, p), SI units.
@@ -108,12 +108,14 @@ def records_tracking(
         records: the tests, as `ready` returns them.
     """
     out = []
+    sizes = scale(records, draws[:, :4].mean(axis=0))
     for record in records:
         initial = initial_state(record)
         settle = 0 if initial == 'rest' else round(SETTLE / record.period)
         settle = min(settle, len(record) // 2)
         of = record_tracking(draws, names, structure, record, initial, settle)
-        out.append(replace(of, predicted=_sines(draws, names, structure, record) | of.predicted))
+        k = record.known_stiffness()
+        out.append(replace(of, predicted=_sines(draws, names, structure, sizes, k) | of.predicted))
     return tuple(out)
 
 
@@ -175,17 +177,19 @@ def _some(draws: Array, names: Sequence[str], structure: Structure, most: int) -
 
 
 def _sines(
-    draws: Array, names: Sequence[str], structure: Structure, record: Record
+    draws: Array, names: Sequence[str], structure: Structure, sizes: Scale, stiffness: float
 ) -> dict[str, Spread]:
-    """Return delay and amplitude of a model that is not linear, of sines as large as a test's."""
+    """Return delay and amplitude of a model that is not linear, of sines as large as the tests'.
+
+    Those of a diagnosis are as large.
+    """
     if structure.linear:
         return {}
     table = _some(draws, names, structure, _ANSWERS)
-    sizes = scale([record], table[:, :4].mean(axis=0))
     out = {}
     for hertz in FREQUENCIES:
         size = amplitude_of(sizes, hertz)
-        answer = harmonic(structure, table, size, hertz, record.known_stiffness())
+        answer = harmonic(structure, table, size, hertz, stiffness)
         answer = answer[np.isfinite(answer)]
         if len(answer):
             lag = -np.angle(answer)

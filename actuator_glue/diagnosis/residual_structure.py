@@ -34,6 +34,8 @@ _SHORT = 5.0  # s, below which few windows tell structure from noise: twice as m
 _FEWEST = 200  # samples of a record that has a spectrogram
 _OTHER: dict[Hold, Hold] = {'zoh': 'linear', 'linear': 'zoh'}
 _RUNS: dict[Hold, str] = {'linear': 'straight from sample to sample', 'zoh': 'held'}
+# What is done about structure.
+DIAGNOSE = 'run `actuator-glue diagnose` on the same records'
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,7 +96,7 @@ class ResidualStructure(JsonObject):
         """Return why the intervals do not hold, and what to do; None where they do."""
         if self.intervals_hold:
             return None
-        run = 'run `actuator-glue diagnose` on the same records'
+        run = DIAGNOSE
         if self.setup is not None:
             told = f'{self.amounts()}: intervals do not hold; {self.setup.sentence()}, or {run}'
         elif self.other_fits:

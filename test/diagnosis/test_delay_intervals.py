@@ -67,7 +67,7 @@ def hits_of_a_calibration(rng: np.random.Generator, *effects: str) -> list[bool]
     for record, tracked in zip(records, found.tracking, strict=True):
         k = record.known_stiffness()
         delay = tracked.predicted['delay_at_5_hz_s']
-        size = response.amplitude_of(scale([record], theta), HERTZ)
+        size = response.amplitude_of(scale(records, theta), HERTZ)
         truth = delay_of_a_sine(structure, theta, k, size) if effects else delay_of_eq_2(theta, k)
         hits.append(delay.lower <= truth <= delay.upper)
     return hits
@@ -110,15 +110,16 @@ def test_the_delay_of_play_is_that_of_sines_as_large_as_the_test() -> None:
     """Of a calibration with effects as of a diagnosis, within a hundredth of a millisecond."""
     structure, theta = Structure(('backlash',)), np.append(TABLE_2, 8e-5)
     names = tuple(p.name for p in structure.parameters)
-    for record in sweeps(structure, theta, np.random.default_rng(3), 10.0):
+    records = sweeps(structure, theta, np.random.default_rng(3), 10.0)
+    several = records_tracking(np.tile(theta, (40, 1)), names, structure, records)
+    for record, tracked in zip(records, several, strict=True):
         k = record.known_stiffness()
-        (tracked,) = records_tracking(np.tile(theta, (40, 1)), names, structure, [record])
-        size = response.amplitude_of(scale([record], theta), HERTZ)
+        size = response.amplitude_of(scale(records, theta), HERTZ)
         truth = delay_of_a_sine(structure, theta, k, size)
         told = tracked.predicted['delay_at_5_hz_s']
         assert told.median == pytest.approx(truth, abs=1e-5)
         assert abs(truth - delay_of_eq_2(TABLE_2, k)) > 3e-4
-        of = response.of(structure, theta, theta[None], scale([record], theta), k)
+        of = response.of(structure, theta, theta[None], scale(records, theta), k)
         (sine,) = (s for s in of.sines if s.frequency == HERTZ)
         assert sine.delay == pytest.approx(told.median, abs=1e-9)
 
