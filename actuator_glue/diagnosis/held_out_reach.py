@@ -1,8 +1,8 @@
 """Whether parameters that the fitting part does not exclude explain the held-out part, too.
 
-Along a ridge of hundreds of per cent nothing is linear (simulation_spread.py goes by first order): a machine
-tried under one stiffness only is another one, to first order, under the next. So both parts are
-refitted together, and it is asked what that costs in the fitting part.
+Along a ridge of hundreds of per cent nothing is linear (simulation_spread.py goes by first order):
+a machine tried under one stiffness only is another one, to first order, under the next. So both
+parts are refitted together, and it is asked what that costs in the fitting part.
 """
 
 from __future__ import annotations
