@@ -60,6 +60,7 @@ def bode(responses: Sequence[Bode]) -> Figure:
                 )
         column[0].set_title(style.fit(of.title, style.WIDTH / count - 0.5))
         column[-1].set_xlabel('frequency [Hz]')
+        style.decades(column[-1].xaxis)
         low, high = of.frequency[[0, -1]]
         if high > low:
             column[-1].set_xlim(low, high)

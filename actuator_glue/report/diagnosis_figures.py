@@ -153,6 +153,8 @@ def residuals_in_frequency(found: DiagnosisData) -> Figure:
             axes.loglog(f, 1e6 * density, color=color, lw=0.8, label=_text(found, side))
         axes.set_title(_title(trace, style.WIDTH / columns - 0.5))
         axes.set_xlabel('frequency [Hz]')
+        style.decades(axes.xaxis)
+        style.decades(axes.yaxis)
     for axes in panels[::columns]:
         axes.set_ylabel(r'residual [um/$\sqrt{\mathrm{Hz}}$]')
     _legend(figure, panels[0])

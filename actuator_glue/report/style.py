@@ -13,9 +13,11 @@ from typing import ParamSpec, TypeVar
 
 import matplotlib.style
 import numpy as np
+from matplotlib.axis import Axis
 from matplotlib.backend_bases import RendererBase
 from matplotlib.figure import Figure
 from matplotlib.text import Text
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import ArrayLike
 
 from actuator_glue.errors import printable
@@ -83,6 +85,13 @@ def fit(text: str, width: float, *, tail: str = '', size: float = 9.0) -> str:
     if len(text) > room:
         text = f'{text[: room - 3 - room // 3]}...{text[-(room // 3) :]}'
     return text.replace('$', r'\$') + tail  # a name is no formula
+
+
+def decades(axis: Axis) -> None:
+    """Number a logarithmic axis as people read it: 1, 2, 5, 10, no powers of ten."""
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=12))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f'{value:g}'))
+    axis.set_minor_formatter(NullFormatter())
 
 
 def styled(draw: Callable[P, R]) -> Callable[P, R]:

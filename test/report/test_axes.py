@@ -108,6 +108,18 @@ def test_axes_have_names_and_units(name: str) -> None:
     assert nameless(figure) == []
 
 
+def test_frequencies_are_numbered_as_people_read_them() -> None:
+    """1, 2, 5, 10 Hz: no powers of ten, and two numbers at least."""
+    figure = PICTURES['bode']()
+    figure.canvas.draw()
+    low, high = figure.axes[-1].get_xlim()
+    texts = [tick.get_text() for tick in figure.axes[-1].get_xticklabels()]
+    inside = [text for text in texts if low <= float(text) <= high]
+    assert len(inside) >= 2
+    leading = {f'{float(text):e}'[0] for text in texts}
+    assert leading <= {'1', '2', '5'}
+
+
 @pytest.mark.parametrize('name', ['bode', 'prediction', 'bands'])
 def test_what_was_measured_is_seen(name: str) -> None:
     """Black, and above every band."""
