@@ -25,6 +25,9 @@ JUMP = 0.3
 # no machine does.
 _WALKS = np.geomspace(1e-5, 0.03, 12)
 _OFFSETS = np.geomspace(1e-4, 0.5, 20)
+# Values of each in a finer grid, and logarithm of what does not count beside the likeliest pair.
+_FINE = 24
+_NEGLIGIBLE = 7.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -37,12 +40,38 @@ class Grid:
     @classmethod
     def usual(cls) -> Grid:
         """Return the grid that every parameter has."""
-        walk, offset = np.meshgrid(_WALKS, _OFFSETS, indexing='ij')
+        return cls.of(_WALKS, _OFFSETS)
+
+    @classmethod
+    def of(cls, walks: Array, offsets: Array) -> Grid:
+        """Return every pair of some walks and offsets."""
+        walk, offset = np.meshgrid(walks, offsets, indexing='ij')
         return cls(walk.ravel(), offset.ravel())
+
+    def around(self, log_likelihood: Array) -> Grid:
+        """Return a finer grid of where the posterior is: many days tell more than this one holds.
+
+        Args:
+            log_likelihood: of each pair, (g,).
+        """
+        there = log_likelihood > log_likelihood.max() - _NEGLIGIBLE
+        finer = []
+        for all_values, values in ((_WALKS, self.walk), (_OFFSETS, self.offset)):
+            # A step beyond what counts on either side, within the prior.
+            step = all_values[1] / all_values[0]
+            low = max(values[there].min() / step, all_values[0])
+            high = min(values[there].max() * step, all_values[-1])
+            finer.append(np.geomspace(low, high, _FINE))
+        return Grid.of(*finer)
 
 
 def log_likelihoods(
-    times: Array, y: Array, s: Array, jumps: Collection[int] = (), also: Sequence[int] = ()
+    times: Array,
+    y: Array,
+    s: Array,
+    jumps: Collection[int] = (),
+    also: Sequence[int] = (),
+    grid: Grid | None = None,
 ) -> Array:
     """Return the log likelihood of the days for each pair of the grid.
 
@@ -52,11 +81,12 @@ def log_likelihoods(
         s: their standard deviations, (n,).
         jumps: places before which the level jumps.
         also: one more place, for each of m hypotheses, ascending, (m,).
+        grid: of walks and offsets; None for the usual one.
 
     Returns:
         Shape (1 + m, g): without one more place, and with each.
     """
-    grid = Grid.usual()
+    grid = grid or Grid.usual()
     shape = (1 + len(also), len(grid.walk))
     m, p, total = np.zeros(shape), np.full(shape, DIFFUSE**2), np.zeros(shape)
     begun = 1  # until its place a hypothesis is as the first row
@@ -76,11 +106,27 @@ def log_likelihoods(
 
 
 def hyper_draws(
-    log_likelihood: Array, count: int, rng: np.random.Generator
+    times: Array,
+    y: Array,
+    s: Array,
+    jumps: Collection[int],
+    count: int,
+    rng: np.random.Generator,
 ) -> tuple[Array, Array]:
-    """Return draws (count,) of walk and offset from their posterior over the grid, (g,)."""
-    grid = Grid.usual()
-    weights = np.exp(log_likelihood - log_likelihood.max())
+    """Return draws (count,) of walk and offset from their posterior.
+
+    Args:
+        times: days, (n,).
+        y: estimates, (n,).
+        s: their standard deviations, (n,).
+        jumps: places before which the level jumps.
+        count: how many.
+        rng: random numbers.
+    """
+    coarse = log_likelihoods(times, y, s, jumps)[0]
+    grid = Grid.usual().around(coarse)
+    likelihood = log_likelihoods(times, y, s, jumps, grid=grid)[0]
+    weights = np.exp(likelihood - likelihood.max())
     # Strata: as many draws of each pair as its weight says, but for one.
     at = (np.arange(count) + rng.random(count)) / count
     rows = np.searchsorted(np.cumsum(weights) / weights.sum(), at).clip(max=len(weights) - 1)

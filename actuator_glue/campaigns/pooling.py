@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from actuator_glue.campaigns.change_points import ChangePoint
-from actuator_glue.campaigns.day_model import DIFFUSE, JUMP, hyper_draws, log_likelihoods
+from actuator_glue.campaigns.day_model import DIFFUSE, JUMP, hyper_draws
 from actuator_glue.campaigns.series import Series
 from actuator_glue.records import Array
 
@@ -72,9 +72,10 @@ def pooled(
     jumps = {c.place for c in changes}
     hyper = [
         hyper_draws(
-            log_likelihoods(
-                series.times, series.mean[:, i], np.sqrt(series.covariance[:, i, i]), jumps
-            )[0],
+            series.times,
+            series.mean[:, i],
+            np.sqrt(series.covariance[:, i, i]),
+            jumps,
             _HYPER,
             rng,
         )
