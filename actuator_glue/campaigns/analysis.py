@@ -136,6 +136,8 @@ def _told(found: Diagnosis) -> Row:
         'error_before_m': found.error.before,
         'error_after_m': found.error.after,
         'noise_m': found.alarm.noise,
+        # Those of the calibration are answered.
+        'problems': '' if found.complete else found.summary(),
     }
     row |= _quantiles(found.posterior, found.names)
     row['pooling'] = pooling(found.posterior, found.names)

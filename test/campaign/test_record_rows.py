@@ -56,6 +56,26 @@ def test_a_row_says_what_the_calibration_says(folder: Path, tmp_path: Path) -> N
 
 
 @pytest.mark.slow
+def test_a_row_says_what_the_diagnosis_says(tmp_path: Path) -> None:
+    """Its effect, sizes and report, and no problem of the calibration that asked for it."""
+    for name, k in (('free', 0.0), ('clamped', 250e3)):
+        test = ag.simulate(
+            ag.Command(rate=200.0, duration=15.0),
+            stiffness=k,
+            effects={'backlash': {'backlash': 6e-5}},
+            seed=(2, int(k)),
+        )
+        write(tmp_path / f'north_20260301T090000_{name}.csv', test)
+    asked = {**RECIPE, 'diagnose': 'structure', 'partition': None, 'draws': False}
+    (task,) = tasks_of([tmp_path], parse_recipe(asked, tmp_path))
+    row = analysed(task, tmp_path, 'k')
+    assert (row['verdict'], row['effects'], row['problems']) == ('missing-effect', 'backlash', '')
+    assert row['backlash_lower'] <= 6e-5 <= row['backlash_upper']
+    assert row['error_after_m'] < 0.6 * row['error_before_m']
+    assert 'backlash' in (tmp_path / row['report']).read_text('utf-8')
+
+
+@pytest.mark.slow
 def test_a_delay_that_was_named_is_in_the_margin(folder: Path) -> None:
     """4 ms of it cost 4 ms of the margin; play, which no linear loop has, costs nothing."""
     (task,) = tasks_of([folder], parse_recipe(RECIPE, folder))
