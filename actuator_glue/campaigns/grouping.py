@@ -119,7 +119,7 @@ def files_below(given: Sequence[Path | str], rules: Sequence[FileRule]) -> Itera
             whole = str(path.resolve())
             if whole not in seen:
                 seen.add(whole)
-                yield _read_as(path, path.relative_to(root).as_posix(), rules)
+                yield _read_as(whole, path.relative_to(root).as_posix(), rules)
         if empty:
             raise InputError(
                 f'{one}: no record in this folder; known are {", ".join(formats())}, bags, and '
@@ -147,13 +147,13 @@ def _matches(name: str, pattern: str) -> bool:
     return fnmatch(name, pattern) or fnmatch(name.rpartition('/')[2], pattern)
 
 
-def _read_as(path: Path, name: str, rules: Sequence[FileRule]) -> Member:
+def _read_as(path: str, name: str, rules: Sequence[FileRule]) -> Member:
     said: dict[str, Any] = {}
     for rule in rules:
         if _matches(name, rule.match):
             entries = {f.name: getattr(rule, f.name) for f in fields(rule) if f.name != 'match'}
             said |= {n: v for n, v in entries.items() if v is not None}
-    return Member(path=str(path.resolve()), name=name, **said)
+    return Member(path=path, name=name, **said)
 
 
 def tasks_of(given: Sequence[Path | str], recipe: Recipe) -> list[Task]:

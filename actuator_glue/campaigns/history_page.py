@@ -108,7 +108,8 @@ def _changed(found: ActuatorHistory) -> list[Block]:
         blocks.append(Text('No sudden change is as likely as not.'))
     drift = _drift(found)
     if drift:
-        blocks.append(Text(f'Slowly since the last change: {drift}.'))
+        last = ' since the last change' if found.changes else ''
+        blocks.append(Text(f'Slowly{last}: {drift}.'))
     if found.effects:
         blocks.append(_effects(found.effects))
     return blocks
