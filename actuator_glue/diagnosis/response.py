@@ -19,8 +19,10 @@ from actuator_glue.records import Array, Record
 FREQUENCIES = (1.0, 2.0, 5.0, 10.0)  # Hz
 _HIGHEST = 60.0  # Hz
 _GRID = 16
-_RATE = 50.0  # samples per period, at least
-_SLOWEST = 256.0  # samples per second, at least
+# Samples per period and per second, at least: with a quarter of these the steps of a simulation
+# with play are 2 us of delay, a third of what long records leave open.
+_RATE = 100.0
+_SLOWEST = 1024.0
 _SETTLE = 2.0  # s
 _PERIODS = 3
 _HALF_POWER = 1.0 / math.sqrt(2.0)
