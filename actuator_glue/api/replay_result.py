@@ -10,6 +10,7 @@ from actuator_glue.api.frame import frame
 from actuator_glue.api.replay_data import ReplayData
 from actuator_glue.api.result import Result
 from actuator_glue.model.effects import CATALOGUE
+from actuator_glue.motion import METRES, speaking
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,9 +24,13 @@ class Replay(Result, ReplayData):
     """All windows of a stream, and whether they are what was published live.
 
     Its numbers are those of `ReplayData`: `windows`, `identical`, `compared`, ...
+
+    Attributes:
+        motion: what the samples are: 'm', or 'deg', 'counts' and so on, see `Record`.
     """
 
     schema: ClassVar[str] = 'actuator_glue.replay/1'
+    motion: str = METRES
 
     @property
     def model_effects(self) -> tuple[str, ...]:
@@ -73,7 +78,8 @@ class Replay(Result, ReplayData):
         """Return a figure of every parameter against time, with two standard deviations."""
         from actuator_glue.api.replay_report import parameters_figure
 
-        return parameters_figure(self)
+        with speaking(self.motion):
+            return parameters_figure(self)
 
     def brief(self) -> list[html.Block]:
         """Return the summary, the windows, what differs and what limits the answer."""

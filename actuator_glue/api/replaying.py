@@ -29,6 +29,7 @@ from actuator_glue.inference.moments import Moments
 from actuator_glue.io.bag_reader import decoded, is_bag, summarise
 from actuator_glue.io.bag_records import check_order
 from actuator_glue.io.bag_samples import topics_of_actuator
+from actuator_glue.motion import METRES
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.playback import Item, items, stream
 from actuator_glue.online.playback import replay as run
@@ -36,6 +37,7 @@ from actuator_glue.online.replay_comparison import Published, ReplayComparison, 
 from actuator_glue.online.settings import AUTOMATIC, EstimatorSettings
 from actuator_glue.online.stream import Rejected, structure_name
 from actuator_glue.sample_block import Block, check_block
+from actuator_glue.setups import StreamSetup
 from actuator_glue.workers.reports import Reports
 
 INPUTS = ('SampleBlock', 'TestSetup')
@@ -108,6 +110,7 @@ class _Run:
     effects: tuple[str, ...] = ()
     data_seconds: float = 0.0
     tracking: bool = False
+    motion: str = METRES
     # Running indices of the first sample of each stretch without a gap, and of the one after it.
     stretches: list[tuple[int, int]] = field(default_factory=list)
 
@@ -178,6 +181,7 @@ def replay(
         data_seconds=under_way.data_seconds,
         seconds=time.perf_counter() - started,
         notes=tuple(under_way.notes),
+        motion=under_way.motion,
     )
 
 
@@ -233,6 +237,8 @@ def _estimate(out: _Run, settings: EstimatorSettings, done: Progress) -> ReplayC
         for place, item in enumerate(out.items):
             if isinstance(item, Block):
                 out.took(item)
+            elif isinstance(item, StreamSetup):
+                out.motion = item.motion
             done(place / out.total if out.total else 0.0)
             yield item
 

@@ -123,6 +123,8 @@ def _bag(path: str, args: argparse.Namespace) -> dict[str, Any]:
 def _show(record: Record, args: argparse.Namespace) -> None:
     k = record.stiffness
     stiffness = 'specimen stiffness not known' if k is None else f'stiffness {k / 1e3:.6g} kN/m'
+    if k is not None and record.motion != METRES:
+        stiffness = 'no specimen'  # nothing else has a stiffness in N/m
     say(
         f'record {record.source}: {len(record)} samples at {record.rate:.6g} Hz, '
         f'{record.duration:.6g} s; {record.actuator}, {stiffness}, hold {record.hold}',

@@ -59,6 +59,7 @@ def run(args: argparse.Namespace) -> int:
     """
     from actuator_glue.api.replaying import replay
     from actuator_glue.io.bag_reader import is_bag
+    from actuator_glue.motion import speak
 
     source = args.bag
     if not is_bag(args.bag) or args.stiffness is not None or args.hold is not None:
@@ -73,6 +74,7 @@ def run(args: argparse.Namespace) -> int:
             progress=done,
             **settings,
         )
+    speak(found.motion)
     write_json(found.to_json(), args.json)
     from actuator_glue.api.replay_report import (
         IF_TRUE,

@@ -114,6 +114,20 @@ def test_windows_of_a_stream_move_as_it_does() -> None:
     assert {kept.motion for kept in collector.records()} == {'deg'}
 
 
+def test_a_replay_speaks_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of a bag as of records; the bag is shown without a stiffness in newtons over volts."""
+    test = ag.simulate(ag.Command(rate=RATE, duration=8.0), stiffness=0.0, seed=3)
+    with BagWriter(tmp_path / 'bag') as bag:
+        write_record(bag, replace(test, motion='V'))
+    assert main(['info', str(tmp_path / 'bag')]) == 0
+    assert ', no specimen, hold zoh' in capsys.readouterr().out
+    assert main(['replay', str(tmp_path / 'bag'), '--hop', '3']) == 0
+    assert 'rms [mV]' in capsys.readouterr().out
+    found = ag.replay(replace(test, motion='V'), hop=3.0)
+    assert found.motion == ag.Replay.load(found.save(tmp_path / 'r.npz')).motion == 'V'
+    assert 'rms [mV]' in repr(found) and 'um' not in repr(found)
+
+
 def test_commands_speak_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Ranges, limits and refusals; the next command is in metres again."""
     write(tmp_path / 'a.csv', record('counts', force=np.ones(COUNT)))
