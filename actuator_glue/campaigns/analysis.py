@@ -11,7 +11,6 @@ import numpy as np
 from actuator_glue.campaigns.grouping import Task
 from actuator_glue.errors import InputError
 from actuator_glue.io.calendar_time import calendar_time
-from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.parameters import NAMES
 from actuator_glue.records import Array, Record, source_name
 
@@ -205,6 +204,7 @@ def judged(
     from actuator_glue.api.calibration import calibrate
     from actuator_glue.api.rths import rths
     from actuator_glue.io.partition import parse_partition
+    from actuator_glue.model.effects import CATALOGUE
 
     linear = [n for n in named if n in CATALOGUE and CATALOGUE[n].linear]
     if set(linear) - set(found.effects):

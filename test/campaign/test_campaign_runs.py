@@ -159,6 +159,13 @@ print('rows', len(found.table), set(found.table['failure']))
     assert done.stdout.splitlines() == ['begins', "rows 12 {''}"]
 
 
+def test_schedulers_and_workers_load_no_compiler() -> None:
+    """50 MB each that only the process beside a worker needs."""
+    code = 'import sys, actuator_glue.campaigns.worker_task; print("llvmlite" in sys.modules)'
+    told = subprocess.run([sys.executable, '-c', code], capture_output=True, text=True, check=True)
+    assert told.stdout.strip() == 'False'
+
+
 @pytest.fixture(scope='module')
 def here() -> Iterator[str]:
     """Address of a scheduler and two workers in this process: they start in a moment."""
