@@ -166,7 +166,7 @@ def read_records(
         for i, segment in enumerate(long_enough, start=1)
     ]
     if not records:
-        raise InputError(_nothing(path))
+        raise InputError(without_samples(path))
     return records
 
 
@@ -181,7 +181,8 @@ def _source(path: Path | str, topic: str, topics: int, number: int, records: int
     return f'{name} (record {number} of {records})' if records > 1 else name
 
 
-def _nothing(path: Path | str) -> str:
+def without_samples(path: Path | str) -> str:
+    """Return what a bag without samples of ours holds, and how it is read."""
     held = [f'{t.name} ({t.type}, {t.count})' for t in summarise(path).topics.values()]
     return (
         f'{path}: no two samples of {SAMPLE_BLOCK} in this bag; it holds '

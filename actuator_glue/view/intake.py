@@ -21,6 +21,7 @@ from actuator_glue.io.bag_reader import (
     refuse,
     summarise,
 )
+from actuator_glue.io.bag_records import without_samples
 from actuator_glue.io.bag_samples import topics_of_actuator
 from actuator_glue.io.messages import deserialize, full_name
 from actuator_glue.motion import METRES
@@ -230,6 +231,11 @@ def read_bag(path: Path | str, namespace: str | None = None, *, note: Note = ref
     timeline, places = _timeline(
         as_published(messages(path, types={full_name('SampleBlock')}, topics=topics, note=note))
     )
+    if not timeline.samples:
+        raise InputError(
+            f'{without_samples(path)}, and `actuator-glue convert {path} OUT --channels MAP.yaml` '
+            'makes a bag that is shown'
+        )
     if not 0 < timeline.capacity <= MOST_SAMPLES:
         raise InputError(
             f'{path}: {timeline.samples} samples; a page shows 1 to {MOST_SAMPLES} with the '

@@ -425,6 +425,18 @@ def test_a_bag_of_several_actuators_and_a_damaged_one(tmp_path: Path) -> None:
     assert told
 
 
+def test_a_bag_of_other_topics_is_told_how_it_can_be_shown(tmp_path: Path) -> None:
+    """What it holds, and the two commands that make it one of ours."""
+    from actuator_glue.io.bag_writer import BagWriter
+    from actuator_glue.io.messages import message
+
+    with BagWriter(tmp_path / 'bag') as bag:
+        bag.add_topic('/command', 'std_msgs/msg/Float64')
+        bag.write('/command', message('std_msgs/msg/Float64', data=1.0), 1)
+    with pytest.raises(InputError, match=r'/command .*`actuator-glue map .*convert .* --channels'):
+        read_bag(tmp_path / 'bag')
+
+
 def test_who_is_let_in() -> None:
     """Another name, another origin, no origin at the socket, other paths, absurd requests."""
 
