@@ -14,7 +14,7 @@ from actuator_glue_msgs.msg import Candidate, Effect, ModelProposal
 from actuator_glue_msgs.srv import SetModel
 
 from actuator_glue.api.diagnosis import Diagnosis, diagnose
-from actuator_glue.api.live import concluded, given
+from actuator_glue.api.live import EFFORT, concluded, given
 from actuator_glue.diagnosis.finding import Finding
 from actuator_glue.errors import InputError
 from actuator_glue.inference.carried import Carried, Drift
@@ -126,6 +126,7 @@ def work(request: Request, tell: Tell) -> Outcome:
             holdout,
             seed=request.seed,
             jobs=1,
+            effort=1.0 if request.paths else EFFORT,
             prior=given(request.known),
             progress=lambda stage, fraction: tell((stage, fraction)),
         )

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from actuator_glue.api.diagnosis import diagnose
-from actuator_glue.api.live import concluded, given
+from actuator_glue.api.live import EFFORT, concluded, given
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.online import live_diagnosis as live
@@ -158,7 +158,7 @@ class _Loop:
         records = self.collector.records()
         known = given(self._memory.before(records[0].start_ns))
         began = time.process_time()
-        found = diagnose(records, seed=self._seed, jobs=1, prior=known)
+        found = diagnose(records, seed=self._seed, jobs=1, effort=EFFORT, prior=known)
         self.out.looks.append(time.process_time() - began)
         self.out.said.append((self._now, found.summary()))
         return concluded(found, records)
