@@ -13,6 +13,7 @@ from actuator_glue.io.formats.delimited import (
     is_number,
     is_stamp,
     read_head,
+    uncommented,
 )
 from actuator_glue.io.signature import open_text
 from actuator_glue.io.units import units_line
@@ -96,7 +97,7 @@ def _blocks(path: Path, like: _Rows) -> tuple[list[SampleRows], bool]:
                 found.append(SampleRows(first, rows))
                 rows, follows, above = 0, True, []
             empty = 0
-            above = [*above[-1:], entries]
+            above = [*above[-1:], fields_of(uncommented(line.rstrip('\r\n')), like.delimiter)]
     if rows:
         found.append(SampleRows(first, rows))
     return found, follows

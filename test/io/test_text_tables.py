@@ -248,3 +248,25 @@ def test_a_pipe_is_refused_before_it_is_read(tmp_path: Path) -> None:
         for use in (load_records, look, read_channel_map):
             with pytest.raises(InputError, match='pipe or a device'):
                 use(path)
+
+
+@pytest.mark.parametrize('mark', ['#', '%', '%%', '# '])
+@pytest.mark.parametrize('by', [',', '\t', ' ', ';'])
+@pytest.mark.parametrize('units', [True, False])
+def test_names_and_units_in_comments(tmp_path: Path, mark: str, by: str, units: bool) -> None:
+    """As numpy and MATLAB write them, with remarks above; read as they are, and by `map`."""
+    names = [n.partition('_')[0] for n in NAMES] if units else list(NAMES)
+    lines = [f'{mark} a test of Monday', f'{mark} {by.join(names)}']
+    lines += [f'{mark} {by.join(["s", "mm", "mm", "N"])}'] if units else []
+    text = '\n'.join([*lines, *map(by.join, ROWS)]) + '\n'
+    (tmp_path / 'a.txt').write_text(text)
+    check(tmp_path / 'a.txt')
+    assert [column.unit for column in look(tmp_path / 'a.txt').columns] == ['s', 'mm', 'mm', 'N']
+
+
+def test_units_of_no_column_are_nobodys(tmp_path: Path) -> None:
+    """More of them than columns: which is whose is not told, and they are asked for."""
+    lines = ['time,command,measured,force', 's,%,mm,mm,N', *map(','.join, ROWS)]
+    (tmp_path / 'a.txt').write_text('\n'.join(lines) + '\n')
+    with pytest.raises(InputError, match='has no unit'):
+        read(tmp_path / 'a.txt')

@@ -45,6 +45,8 @@ _STAMP = re.compile(
 _WORD = re.compile(r'"((?:[^"]|"")*)"|(\S+)')
 _QUOTED_FIRST = re.compile(r'\s*"[^"]*"\s*[;,\s]\s*[^"\s]')
 _SPREADSHEET = re.compile(r'"?sep=(.)"?', re.IGNORECASE)  # a first line that says the delimiter
+# What begins a comment: `#` as numpy writes it, `%` as MATLAB does.
+_COMMENT = re.compile(r'\s*(?:#[#\s]*|%+\s+)')
 # Names of columns that go up by themselves: a running number below one may be its own.
 _GOES_UP = re.compile(
     r'time|zeit|sample|index|count|number|row|step|^(nr|no|id|t|i|n|#)\b', re.IGNORECASE
@@ -97,7 +99,7 @@ def read_head(
     Args:
         path: the file.
         header_lines: lines before the first sample, the last naming the columns; None where
-            `#` lines and one line of names are all there is.
+            comments (`#`, `%`) and one line of names are all there is.
         delimiter: text between columns, found by itself where None.
         decimal: decimal sign, found by itself where None.
 
@@ -109,19 +111,20 @@ def read_head(
     if not any(line.strip() for line in top):
         raise InputError(f'{path}: the file is empty')
     notes: dict[str, str] = {}
+    units: list[str] = []
     if header_lines is None:
         if (said := _SPREADSHEET.fullmatch(top[0].strip())) is not None:
             delimiter = delimiter or said[1]
         header_lines, line, notes = _find_names(path, top, int(said is not None))
+        line, units = _commented_units(line)
     elif len(top) < header_lines:
         raise InputError(f'{path}: {len(top)} lines, but {header_lines} header lines expected')
     else:
-        line = top[header_lines - 1].removeprefix('# ') if header_lines else ''
-    units: list[str] = []
-    if line and len(top) > header_lines:
-        below = top[header_lines]
+        line = uncommented(top[header_lines - 1]) if header_lines else ''
+    if line and not units and len(top) > header_lines:
+        below = uncommented(top[header_lines])
         units = units_line(fields_of(below, delimiter or _best_delimiter(line, below)))
-    header_lines += bool(units)
+        header_lines += bool(units)
     rows = [text for text in top[header_lines:] if text.strip(_NOTHING)] or [line]
     if delimiter is None:
         delimiter = _best_delimiter(line, rows[0])
@@ -135,6 +138,8 @@ def read_head(
     least = _least_width(aligned, table, width)
     if aligned and not aligned[0] and len(units) == width - 1:
         units = ['', *units]
+    if any(units[width:]):  # of which column each is nobody knows
+        units = []
     units = [*units, *[''] * (width - len(units))][:width]
     sign = decimal or _decimal([entry for row in table for entry in row])
     stamps = frozenset(at for at, entry in enumerate(table[0]) if is_stamp(entry))
@@ -144,17 +149,21 @@ def read_head(
 
 
 def _find_names(path: Path, top: list[str], first: int) -> tuple[int, str, dict[str, str]]:
-    """Return the lines before samples or a line of units, the line of names, and the notes."""
+    """Return the lines before samples or a line of units, the line of names, and the notes.
+
+    Of names in comments the line before the last one is told, too: the last may be units.
+    """
     notes: dict[str, str] = {}
-    line, at = '', first
-    while at < len(top) and top[at].lstrip().startswith('#'):
-        comment = top[at].lstrip('# ')
+    comments, at = [''], first
+    while at < len(top) and _COMMENT.match(top[at]):
+        comment = uncommented(top[at])
         name, sign, value = comment.partition('=')
         if sign:
             notes[name.strip()] = value.strip()
         else:
-            line = comment
+            comments.append(comment)
         at += 1
+    line = '\n'.join(comments[-2:])
     if at == len(top):
         return at, line, notes
     entries = fields_of(top[at], _best_delimiter('', top[at]))
@@ -167,6 +176,22 @@ def _find_names(path: Path, top: list[str], first: int) -> tuple[int, str, dict[
         )
     # Numbers are no names but the first sample; numpy.savetxt puts names behind a `#`.
     return at, line, notes
+
+
+def _commented_units(line: str) -> tuple[str, list[str]]:
+    """Return the line of names, and the units that a comment below it holds."""
+    above, _, last = line.rpartition('\n')
+    delimiter = next((d for d in DELIMITERS if d in last), None)
+    units = units_line(fields_of(last, delimiter))
+    if units and len(fields_of(above, delimiter)) == len(units):
+        return above, units
+    return last, []
+
+
+def uncommented(line: str) -> str:
+    """Return a line without what makes it a comment."""
+    mark = _COMMENT.match(line)
+    return line if mark is None else line[mark.end() :]
 
 
 def _best_delimiter(names: str, row: str) -> str | None:
