@@ -13,6 +13,9 @@ from actuator_glue.api.pooled_prior import PooledPrior
 from actuator_glue.campaigns.actuator_history import ActuatorHistory, history
 from actuator_glue.campaigns.comparison import compare
 from actuator_glue.campaigns.day_model import hyper_draws
+from actuator_glue.campaigns.pooling import pooled
+from actuator_glue.campaigns.rows import read_results
+from actuator_glue.campaigns.series import series_of
 from actuator_glue.cli.main import main
 
 REPAIR = (36, (0.12, -0.10, 0.0, 0.0))
@@ -76,10 +79,8 @@ def test_pooled_intervals_and_the_next_test_hold_the_truth(tmp_path: Path) -> No
     for seed in range(10):
         folder = tmp_path / str(seed)
         truth = write_table(folder, seed=100 + seed, days=60)
-        series = history(folder, 'north').series
+        series = series_of(read_results(folder), 'north')
         logs = np.array(truth.logs)
-        from actuator_glue.campaigns.pooling import pooled
-
         together = pooled(series)
         days.append(np.abs(together.mean - logs) < 1.96 * together.stddev)
         for cut in np.linspace(24, 59, tests // 5).astype(int):
