@@ -163,20 +163,33 @@ class _CampaignRun:
             if left:
                 count = None if workers is None else min(workers, len(left))
                 with connected(scheduler, count) as client:
-                    self._compute(client, left, keys, told)
+                    suspects = self._compute(client, left, keys, told)
+                    # Whatever ended their workers was one of those there: now each is by itself.
+                    self._compute(client, suspects, keys, told, alone=True)
             table = self.rows.gather(keys)
         return CampaignResult(self.rows.folder, told.now, table)
 
     def _compute(
-        self, client: Any, tasks: list[Task], keys: dict[str, str], told: ProgressFile
-    ) -> None:
+        self,
+        client: Any,
+        tasks: list[Task],
+        keys: dict[str, str],
+        told: ProgressFile,
+        alone: bool = False,
+    ) -> list[Task]:
+        """Have tasks computed, many at a time or each alone; return those that no worker outlived.
+
+        Alone, such a task has a row that says so.
+        """
+        suspects: list[Task] = []
         ended: SimpleQueue[Any] = SimpleQueue()
         flying: dict[Any, Task] = {}
         name = f'campaign-{os.urandom(6).hex()}'
         room, counted, following = 0, -math.inf, 0
         while following < len(tasks) or flying:
             if time.monotonic() - counted > _RECOUNT:
-                room, counted = _AHEAD * max(sum(client.nthreads().values()), 1), time.monotonic()
+                threads = max(sum(client.nthreads().values()), 1)
+                room, counted = 1 if alone else _AHEAD * threads, time.monotonic()
             if following < len(tasks) and len(flying) <= room // 2:
                 new = tasks[following : following + room - len(flying)]
                 futures = client.map(
@@ -199,18 +212,27 @@ class _CampaignRun:
             answers = self._answers(client, done)
             for key, future in done.items():
                 task = flying.pop(key)
-                row, bad, computed = answers.get(key) or self._lost(future, task)
+                answer = answers.get(key)
+                if answer is None:
+                    self._check(future)
+                    if not alone:
+                        suspects.append(task)
+                        future.release()
+                        continue
+                    answer = self._lost(task)
                 future.release()
+                row, bad, computed = answer
                 keys[task.group] = row
                 told.add(computed=computed, failed=bad)
+        return suspects
 
     def _answers(self, client: Any, done: dict[Any, Any]) -> dict[Any, tuple[str, bool, bool]]:
         """Return what `carry_out` said of the tasks that it did."""
         finished = {key: f for key, f in done.items() if f.status == 'finished'}
         return client.gather(finished, errors='skip') if finished else {}
 
-    def _lost(self, future: Any, task: Task) -> tuple[str, bool, bool]:
-        """Return a row of its own for a task that no worker outlived.
+    def _check(self, future: Any) -> None:
+        """See that a task has no result because no worker outlived it.
 
         Raises:
             InputError: the scheduler has gone, or a worker cannot write to the folder.
@@ -226,6 +248,9 @@ class _CampaignRun:
                 f'a worker cannot do its part ({type(error).__name__}: {error}); it needs this '
                 f'version of actuator_glue, and {self.rows.folder} under the same path'
             ) from error
+
+    def _lost(self, task: Task) -> tuple[str, bool, bool]:
+        """Return what `carry_out` would say, a row written in its place."""
         hashes = content(task)
         key = key_of(task, hashes)
         found = {'failure': 'every worker that was given it ended'}

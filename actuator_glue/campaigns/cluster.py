@@ -109,6 +109,8 @@ def _serve(workers: int) -> None:
         env=dict.fromkeys(THREADS, '1'),
         silence_logs='CRITICAL',
     ) as cluster:
+        # A worker that ends as it starts is not started anew by its nanny.
+        cluster.adapt(minimum=workers, maximum=workers)
         sys.stdout.write(f'{cluster.scheduler_address}\n')
         sys.stdout.flush()
         threading.Thread(target=_keep_forgetting, args=[ended], daemon=True).start()

@@ -130,6 +130,17 @@ def test_a_killed_worker_and_a_killed_client_cost_no_row(
 
 
 @pytest.mark.slow
+@pytest.mark.timeout(300)
+def test_a_record_that_kills_workers_costs_itself_alone(records: Path, tmp_path: Path) -> None:
+    """Those beside it are not blamed, and workers that end as they start are replaced."""
+    (records / 'north' / 'broken.csv').write_text('parent')
+    found = ag.campaign(records, tmp_path / 'out', workers=1, analysis=ANALYSIS)
+    assert len(found.table) == 13
+    failed = dict(zip(found.failures['group'], found.failures['failure'], strict=True))
+    assert failed == {'north/broken.csv': 'every worker that was given it ended'}
+
+
+@pytest.mark.slow
 def test_one_and_two_workers_make_the_same_rows(records: Path, tmp_path: Path) -> None:
     """To the bit, what the record that crashes leaves included."""
     (records / 'north' / 'broken.csv').write_text('crash')
