@@ -10,7 +10,7 @@ import numpy as np
 from actuator_glue.diagnosis.onset.moments import Moment
 from actuator_glue.diagnosis.wrong_setup import WrongSetup
 from actuator_glue.errors import InputError
-from actuator_glue.hygiene import despike
+from actuator_glue.hygiene import despike, slow_channel
 from actuator_glue.hygiene.checks import where
 from actuator_glue.hygiene.clean import clean, initial_state
 from actuator_glue.hygiene.impulses import NONE, Impulses
@@ -108,13 +108,16 @@ def prepare(
     every, notes = clean(records, holdout)
     initials = tuple(initial_state(r) for r in every)
     recorded, every = tuple(every), []
-    for i, record in enumerate(recorded):
+    for i, (given, record) in enumerate(zip((*records, *holdout), recorded, strict=True)):
         count = decimate.factor(record)
+        why = f'what moves in it needs (motion up to {decimate.motion_bandwidth(record):.3g} Hz)'
+        if (known := slow_channel.readings(given.measured)) is not None:
+            least, count = count, decimate.factor_of_readings(record, known.every)
+            why = 'its measured channel gives' if count > least else why
         every.append(decimate.decimated(record, count))
         if count > 1:
             notes.append(
-                f'{where(record, i + 1)}: {record.rate:g} Hz are more than what moves in it needs '
-                f'(motion up to {decimate.motion_bandwidth(record):.3g} Hz): means over '
+                f'{where(record, i + 1)}: {record.rate:g} Hz are more than {why}: means over '
                 f'{count} samples are fitted, at {every[-1].rate:.4g} Hz; errors and noise are '
                 'theirs'
             )

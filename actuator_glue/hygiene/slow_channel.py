@@ -24,9 +24,10 @@ from actuator_glue.model.exact import Initial
 from actuator_glue.records import Array, Record
 
 _FEWEST = 50  # changes that tell a rate
-_FASTEST, _SLOWEST = 1.5, 500.0  # samples from one reading to the next
+# Samples from one reading to the next; where it were fewer, any change would come when it is due.
+_FASTEST, _SLOWEST = 1.9, 500.0
 _REGULAR = 0.98  # of the changes come when they are due
-_DUE = 0.75  # samples beside their time: it is somewhere within one
+_DUE = 0.6  # samples beside their time: it is somewhere within one
 _BETTER = 0.98  # of the error that steps leave: what leaves more is no better
 
 
@@ -69,7 +70,8 @@ def readings(values: Array) -> Readings | None:
     if in_step:
         every, first = float(whole), float(np.bincount(at % whole).argmax())
         count = np.rint((at - first) / every)
-    numbers = np.arange(math.ceil(-first / every), math.floor((len(values) - 1 - first) / every))
+    last = math.floor((len(values) - 1 - first) / every)
+    numbers = np.arange(math.ceil(-first / every), last + 1)
     samples = np.rint(first + every * numbers).astype(np.intp)
     # Where it changed tells better than the mean rate when the reading was there.
     known = (count >= numbers[0]) & (count <= numbers[-1])
@@ -106,7 +108,7 @@ def measured_filled(records: Sequence[Record]) -> tuple[list[Record], list[str]]
                 f'{where(record, i + 1)}: the measured displacement {_told(record, known)}; a '
                 'cubic runs between its changes'
             )
-            record = replace(record, measured=smooth(record.measured, known))
+            record = _between(replace(record, measured=smooth(record.measured, known)), known)
         if record.force is not None and (known := readings(record.force)) is not None:
             record = replace(record, force=smooth(record.force, known))
         out.append(record)
@@ -144,7 +146,7 @@ def command_filled(
         told = f'{where(record, i + 1)}: the command {_told(record, known)}; '
         errors = f'{1e6 * left[best]:.1f} um of error for {1e6 * steps:.1f} um'
         if left[best] < _BETTER * steps:
-            out[i] = others[best]
+            out[i] = _between(others[best], known)
             told += (
                 f'with {best} in place of its steps Eq. (2) leaves {errors}, and so it is taken: '
                 'record the command that the controller puts out, at its own rate'
@@ -156,6 +158,11 @@ def command_filled(
             )
         notes.append(told)
     return out, notes
+
+
+def _between(record: Record, known: Readings) -> Record:
+    """Return a record from the first reading to the last one: beyond them nothing is known."""
+    return record.slice(math.ceil(known.times[0]), math.floor(known.times[-1]) + 1)
 
 
 def _told(record: Record, known: Readings) -> str:

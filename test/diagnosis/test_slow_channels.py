@@ -57,12 +57,29 @@ def test_readings_are_found_where_they_are(every: float, first: float) -> None:
     assert every % 1.0 or np.abs(inside).max() < 1e-12
 
 
-@pytest.mark.parametrize('grid', [0.0, 2e-5, 5e-4])
-def test_coarse_channels_are_not_slow(grid: float) -> None:
-    """A converter's step repeats readings at no regular times; noise never."""
-    y = machine().measured
-    assert slow_channel.readings(np.round(y / grid) * grid if grid else y) is None
-    assert slow_channel.readings(np.zeros(1000)) is None
+def test_nothing_is_made_up_beyond_the_readings() -> None:
+    """A fast motion to the last sample: what is filled is within a micrometre of it everywhere."""
+    record = machine(top=3.0)
+    silent = replace(record, measured=Structure(()).simulate(THETA, record))
+    stepped = replace(silent, measured=held(silent.measured, 20.0, 7.0))
+    (filled,), _ = slow_channel.measured_filled([stepped])
+    assert len(record) - 20 < len(filled) <= len(record) - 7
+    offset = round((filled.start_ns - record.start_ns) * 1e-9 * RATE)
+    truth = silent.measured[offset : offset + len(filled)]
+    assert offset == 7
+    assert np.abs(filled.measured - truth).max() < 3e-6
+
+
+@pytest.mark.parametrize('grid', np.geomspace(2e-6, 1e-3, 12))
+@pytest.mark.parametrize('rate', [250.0, 1000.0, 2000.0, 10_000.0])
+def test_coarse_channels_are_not_slow(grid: float, rate: float) -> None:
+    """A converter's step repeats readings at no regular times; noise never repeats one."""
+    t = np.arange(int(20 * rate)) / rate
+    y = 2e-3 * np.sin(np.pi * 0.4 * t**2)
+    y += NOISE * np.random.default_rng(7).standard_normal(len(t))
+    assert slow_channel.readings(grid * np.round(y / grid)) is None
+    assert slow_channel.readings(y) is None
+    assert slow_channel.readings(np.zeros(len(t))) is None
 
 
 @pytest.mark.parametrize('every', [2.0, 5.0, 1000.0 / 77.0, 20.0])
@@ -100,6 +117,17 @@ def test_a_command_that_is_held_stays_held() -> None:
     assert found(record)[0][0] == pytest.approx(THETA[0], rel=0.03)
 
 
+@pytest.mark.parametrize(('every', 'rate'), [(10.0, 125.0), (20.0, 50.0), (2.0, 1000 / 3)])
+def test_readings_are_fitted_at_no_more_than_their_rate(every: float, rate: float) -> None:
+    """Between them is nothing new: noise drawn out over many samples left sizes open."""
+    record = machine(top=4.0)
+    ready = prepare([replace(record, measured=held(record.measured, every))], [])
+    (fitted,) = ready.fit.records
+    assert fitted.rate == pytest.approx(rate)
+    assert any('measured channel gives: means' in note for note in ready.notes) == (rate < 300.0)
+
+
+@pytest.mark.slow
 def test_a_calibration_is_told_too() -> None:
     """The same record, the same answer, in seconds."""
     record = machine()
@@ -123,3 +151,18 @@ def test_a_diagnosis_of_held_channels_finds_nothing_that_is_not_there() -> None:
     answer = ag.diagnose(stepped, jobs=1)
     assert answer.verdict == 'none'
     assert answer.seconds < 60.0
+
+
+@pytest.mark.slow
+def test_play_is_found_with_its_size_in_channels_that_are_held() -> None:
+    """A command of 50 Hz and readings of 100 Hz in a log of 1 kHz: it was 26 to 976 um."""
+    command, records = ag.Command(rate=RATE, duration=20.0, high=6.0), []
+    for k, seed in ((0.0, 1), (250e3, 2)):
+        made = ag.simulate(command, stiffness=k, seed=seed, effects=['backlash'], hold='linear')
+        stepped = replace(made, command=held(made.command, 20.0), hold='zoh', force=None)
+        records.append(replace(stepped, measured=held(made.measured, 10.0)))
+    answer = ag.diagnose(records, jobs=2)
+    (found,) = answer.effects
+    size = found.parameters['backlash']
+    assert found.name == 'backlash'
+    assert size.lower < 41.4e-6 < size.upper < 1.05 * size.lower

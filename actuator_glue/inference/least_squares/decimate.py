@@ -19,6 +19,7 @@ from actuator_glue.records import Array, Record
 # Samples per period of the fastest that command or actuator show: the straight line between two
 # is then off by less than 1e-4 after its correction.
 _PER_PERIOD = 12.0
+_LEAST_PER_PERIOD = 8.0  # where a channel has no more readings
 # Hz that stay in sight whatever moves: hum with its first overtone, and the dynamics of valves and
 # conditioners in the catalogue.
 _SEEN = 150.0
@@ -92,8 +93,26 @@ def factor(record: Record) -> int:
     """Return by what factor a record may be decimated; large ones are multiples of four."""
     if record.rate < 4.0 * _SEEN:  # whatever moves
         return 1
-    count = max(1, int(record.rate / needed_rate(record) + 1e-9))
-    return count if count <= _WHOLE else count - count % 4
+    return _handy(int(record.rate / needed_rate(record) + 1e-9))
+
+
+def factor_of_readings(record: Record, every: float) -> int:
+    """Return by what factor a record is decimated that has a reading in some samples only.
+
+    What runs between readings says nothing of its own, and noise that was drawn out over many
+    samples is none that a likelihood knows. The motion keeps some samples a period.
+
+    Args:
+        record: what is measured in it filled between its readings.
+        every: samples from one reading to the next.
+    """
+    room = record.rate / (_LEAST_PER_PERIOD * motion_bandwidth(record))
+    return max(factor(record), _handy(int(min(every, room) + 1e-9)))
+
+
+def _handy(count: int) -> int:
+    """Return a factor of decimation that is one at least, and divides well."""
+    return max(count, 1) if count <= _WHOLE else count - count % 4
 
 
 def window(count: int) -> Array:
