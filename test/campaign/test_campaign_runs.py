@@ -207,6 +207,9 @@ def test_only_what_changed_is_made_again(here: str, records: Path, tmp_path: Pat
     assert (first.known, first.computed, first.failed) == (0, 13, 1)
     assert (told[0].done, told[-1].state) == (0, 'finished')
     assert read_progress(tmp_path / 'out') == told[-1]
+    provenance = json.loads((tmp_path / 'out' / 'campaign.json').read_text('utf-8'))
+    assert provenance['version'] == f'actuator_glue {ag.__version__}'
+    assert (provenance['groups'], provenance['recipe']['diagnose']) == (13, 'structure')
     table = read_results(tmp_path / 'out')
     failure = table.loc[table['failure'] != '', 'failure'].item()
     assert failure == 'its process was ended by signal 11 SIGSEGV'
