@@ -249,7 +249,7 @@ def test_effects_are_read_from_and_written_to_any_path(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize('given', [[2e-4], 2e-4, 'large'])
-def test_sizes_of_effects_are_given_by_parameter(given: object) -> None:
+def test_sizes_of_effects_are_given_by_parameter(given: Any) -> None:
     """Anything else is refused with the form that is meant."""
     with pytest.raises(api.InputError, match=r"effects=\{'backlash': \{PARAMETER: VALUE\}\}"):
-        api.simulate(api.Command(rate=100.0, duration=2.0), effects={'backlash': given})  # type: ignore[dict-item]
+        api.simulate(api.Command(rate=100.0, duration=2.0), effects={'backlash': given})
