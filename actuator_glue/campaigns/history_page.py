@@ -77,7 +77,12 @@ def lead(found: ActuatorHistory) -> str:
         told += 'Nothing points to a repair or a sudden fault. '
     now = [e.name for e in found.effects if e.there]
     told += f'Now there: {", ".join(now)}.' if now else 'No effect beyond the model is there now.'
-    return told
+    gone = [
+        f'{e.name} (last on {e.spells[-1].end}, {len(e.spells)} time{"s" * (len(e.spells) > 1)})'
+        for e in found.effects
+        if not e.there
+    ]
+    return told + (f' Came and went: {", ".join(gone)}.' if gone else '')
 
 
 def _changed(found: ActuatorHistory) -> list[Block]:

@@ -13,6 +13,7 @@ from actuator_glue.api.pooled_prior import PooledPrior
 from actuator_glue.campaigns.actuator_history import ActuatorHistory, history
 from actuator_glue.campaigns.comparison import compare
 from actuator_glue.campaigns.day_model import hyper_draws
+from actuator_glue.campaigns.history_page import lead
 from actuator_glue.campaigns.pooling import pooled
 from actuator_glue.campaigns.rows import read_results
 from actuator_glue.campaigns.series import series_of
@@ -67,6 +68,17 @@ def test_an_effect_that_stays_is_expected(found: ActuatorHistory) -> None:
     assert effect.there
     assert effect.sizes[0][:3] == ('backlash', 'm', pytest.approx(40e-6))
     assert effect.sizes[0][3] == pytest.approx(38e-6, abs=0.1e-6)
+
+
+def test_an_effect_that_went_is_told(tmp_path: Path) -> None:
+    """In the first lines of the page, with its last day."""
+    there = [10 <= i < 16 or i == 20 for i in range(40)]
+    named = ['backlash' if t else '' for t in there]
+    write_table(tmp_path, seed=4, days=40, effects=named)
+    gone = history(tmp_path, 'north')
+    assert lead(gone).endswith(
+        f'is there now. Came and went: backlash (last on {gone.series.days[20]}, 2 times).'
+    )
 
 
 def test_pooled_intervals_and_the_next_test_hold_the_truth(tmp_path: Path) -> None:
