@@ -94,7 +94,9 @@ def test_what_it_is_told_and_kept(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert re.search(rf'after: the best draw +{rms} *\n', said.out)
     (following,) = re.findall(r'Next: (.*)', said.out)
     assert re.fullmatch(
-        rf'actuator-glue calibrate {tmp_path}/a.csv --stiffness 2[45]\d000', following
+        rf'actuator-glue calibrate {tmp_path}/a.csv --stiffness 2[45]\d000'
+        r' --evaluations 16000 --seed 2',
+        following,
     )
     for name, p in kept.combinations.items():
         low, high = np.quantile(

@@ -91,8 +91,8 @@ def _cluster(workers: int) -> Iterator[str]:
 
 def _serve(workers: int) -> None:
     """Have workers on this machine until standard input ends; the address is told first."""
-    import dask
     from distributed import LocalCluster
+    from distributed.utils import dask
 
     dask.config.set(SETTINGS)
     # A record's memory and threads are held to by the process it is computed in.
@@ -125,7 +125,7 @@ def _keep_forgetting(ended: threading.Event) -> None:
 
 def forget_names() -> None:
     """Have dask forget the names of tasks that have ended: it keeps 100 000, in each process."""
-    from dask.utils import key_split
+    from distributed.utils import key_split
 
     key_split.cache_clear()
 
