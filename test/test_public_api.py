@@ -101,7 +101,7 @@ def test_a_calibration_is_shown(posterior: ag.Calibration, tmp_path: Path) -> No
     assert posterior.plot_bands(posterior.records[0]).axes
     assert 'beta_1' in posterior._repr_html_()
     page = posterior.report(tmp_path / 'report.html').read_text()
-    assert 'Posterior moments' in page and page.count('<img') == 3
+    assert 'Posterior moments' in page and page.count('<figure') == 3
     data = posterior.inference_data
     assert data.posterior['beta_1'].attrs['unit'] == '1/s'
     assert data.posterior['beta_1'].attrs['upper'] == 400.0
@@ -164,7 +164,7 @@ def test_a_replay_is_kept_and_shown(record: ag.Record, tmp_path: Path) -> None:
     ag.effects.unregister('bent')
     assert again.windows == found.windows
     page = dataclasses.replace(again, effects=()).report(tmp_path / 'replay.html').read_text()
-    assert page.count('<img') == 1
+    assert page.count('<figure') == 1
     assert f'>{found.windows[-1].end_s:.2f}</td>' in page
 
 
