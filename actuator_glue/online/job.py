@@ -154,9 +154,12 @@ def fit(job: Job, expired: Expired | None = None) -> WindowFit:
         sampled = _fit(jobs[i], None if expired is None else partial(_spent, expired, share))
         if i == 0 and sampled.failure:
             return sampled
-        found[i] = (
-            sampled if i == 0 or _warm(sampled) else replace(sampled, frozen=found[i].frozen)
-        )
+        if i > 0:
+            # Whose turn it was not has had what was left over, and no claim to more.
+            sampled = replace(sampled, starved=sampled.starved and i == due)
+            if not _warm(sampled):
+                sampled = replace(sampled, frozen=found[i].frozen)
+        found[i] = sampled
     leading, *rivals = found
     if not rivals:
         return leading
