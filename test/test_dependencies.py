@@ -43,6 +43,7 @@ LIBRARIES = {
     'hypothesis': Names('hypothesis', 'python3-hypothesis'),
     'jinja2': Names('jinja2', 'python3-jinja2'),
     'llvmlite': Names('llvmlite', None),
+    'lvm_read': Names('lvm-read', None),
     'lz4': Names('lz4', None),
     'markupsafe': Names('markupsafe', None),
     'matio': Names('mat-io', None),

@@ -104,14 +104,8 @@ def text_encoding(path: Path) -> str:
     start = refuse_foreign(path, 'text')
     if start.startswith(b'MATLAB '):
         raise InputError(f'{path}: this is a MATLAB file; give it a name ending in .mat')
-    for mark, encoding in _MARKS:
-        if start.startswith(mark):
-            return encoding
-    # Western text in UTF-16 without a mark has a zero in every second byte.
-    for zeros, encoding in ((1, 'utf-16-le'), (0, 'utf-16-be')):
-        high, low = start[zeros::2], start[1 - zeros :: 2]
-        if high and high.count(0) > 0.9 * len(high) and 0 not in low:
-            return encoding
+    if encoding := _wide(start):
+        return encoding
     if not _CONTROL.isdisjoint(start):
         raise InputError(
             f'{path}: this is binary data of a format that is not known, not text; {_TABLE}'
@@ -121,6 +115,27 @@ def text_encoding(path: Path) -> str:
     except UnicodeDecodeError:
         return 'cp1252'  # of which a few bytes are no character: those are told where they are
     return 'utf-8-sig'
+
+
+def unmarked(start: bytes) -> bytes:
+    """Return the first bytes of a text as UTF-8 has them, without a mark of its coding."""
+    encoding = _wide(start)
+    if encoding:
+        start = start.decode(encoding, 'ignore').encode()
+    return start.removeprefix(codecs.BOM_UTF8)
+
+
+def _wide(start: bytes) -> str:
+    """Return the coding of a text whose characters are of two bytes or four; else nothing."""
+    for mark, encoding in _MARKS:
+        if start.startswith(mark):
+            return encoding
+    # Western text in UTF-16 without a mark has a zero in every second byte.
+    for zeros, encoding in ((1, 'utf-16-le'), (0, 'utf-16-be')):
+        high, low = start[zeros::2], start[1 - zeros :: 2]
+        if high and high.count(0) > 0.9 * len(high) and 0 not in low:
+            return encoding
+    return ''
 
 
 def open_text(path: Path, errors: Literal['strict', 'replace'] = 'strict') -> TextIO:

@@ -92,6 +92,22 @@ def test_every_form_is_read(
     assert [column.unit for column in found.columns][-2:] == ['mm', 'um']
 
 
+@pytest.mark.parametrize('coding', ['cp1252', 'utf-8', 'utf-8-sig', 'utf-16', 'utf-16-le'])
+def test_however_the_text_is_coded(tmp_path: Path, coding: str) -> None:
+    """Known by its first bytes behind a mark of the coding, too; the unit is its own."""
+    path = labview(tmp_path / 'a.lvm', channels={'Y_Unit_Label': ('mm', 'µm')})
+    path.write_text(path.read_text('cp1252'), encoding=coding)
+    check(path)
+    check(path.rename(tmp_path / 'a.txt'))
+
+
+def test_units_stand_above_their_columns(tmp_path: Path) -> None:
+    """A channel without a unit moves that of no other one, with a column of times for each."""
+    for unit in (('', 'um'), ('mm', '')):
+        path = labview(tmp_path / 'a.lvm', x='Multi', channels={'Y_Unit_Label': unit})
+        assert [column.unit for column in look(path).columns][1:] == [*unit]
+
+
 def test_where_time_begins(tmp_path: Path) -> None:
     """`X0` is later than the date; absolute times count from 1904; without a date from 0."""
     check(labview(tmp_path / 'a.lvm', channels={'X0': ('0.5', '0.5')}), START + 500_000_000)

@@ -17,7 +17,7 @@ from typing import Any
 from actuator_glue import optional_library
 from actuator_glue.errors import InputError
 from actuator_glue.io.channel_map import ChannelMap
-from actuator_glue.io.signature import beginning
+from actuator_glue.io.signature import beginning, unmarked
 from actuator_glue.records import Array
 
 # Bytes of numbers that one file may hold: a day and a half at 1 kHz with two channels.
@@ -105,7 +105,11 @@ def format_of(path: Path) -> Format:
     named = formats().get(path.suffix.lower())
     start = beginning(path) if path.is_file() else b''
     # What begins as another does is that, whatever it is called; a .mat may be an HDF5 file.
-    found = [f for f in _formats() if f.begins and start.startswith(f.begins)]
+    found = [
+        f
+        for f in _formats()
+        if f.begins and (unmarked(start) if f.text else start).startswith(f.begins)
+    ]
     if named is not None and named.text and named not in found:
         named = None
     return next((f for f in found if f is not named), None) or named or formats()['.csv']

@@ -31,6 +31,8 @@ _LONGEST = 1000  # lines of both headings
 # What begins a heading below the rows of another: of an appended file, of a segment.
 _BEGINS = ('LabVIEW Measurement', 'Channels', _SPECIAL[0])
 _TIMES, _COMMENT = 'X_Value', 'Comment'
+# Lines of a heading with an entry for each channel.
+_EACH = ('Samples', 'Date', 'Time', 'Y_Unit_Label', 'X_Dimension', 'X0', 'Delta_X')
 # Seconds from LabVIEW's time zero, 1904, to that of Unix: absolute times count from the former.
 _EPOCH = 2_082_844_800
 
@@ -63,7 +65,7 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
     shown = [at for at in range(least) if names[at] != _TIMES]
     if not shown:
         raise InputError(f'{path}: no channel in {_NAME}')
-    units = [_of_channels(segment, 'Y_Unit_Label', len(shown)) for segment in said.segments]
+    units = [_of_channels(segment, 'Y_Unit_Label', shown) for segment in said.segments]
     if any(s.names != names or u != units[0] for s, u in zip(said.segments, units, strict=True)):
         raise InputError(
             f'{path}: several measurements of different channels in one file; save each as a '
@@ -241,12 +243,22 @@ def _heading(path: Path) -> _Heading:
     return _Heading(file, delimiter, segments)
 
 
-def _of_channels(said: _HeadedRows, name: str, count: int) -> list[str]:
-    """Return what a heading says of each channel."""
+def _of_channels(said: _HeadedRows, name: str, shown: list[int]) -> list[str]:
+    """Return what a heading says of each channel, in the columns `shown`.
+
+    An entry stands above its column; where channels have columns of times some writers leave none
+    empty for these, which is seen where any line of the heading has an entry above one.
+    """
+    above = {at - 1 for at in shown}
+    beside = any(
+        entry
+        for line in _EACH
+        for at, entry in enumerate(said.channels.get(line, []))
+        if at not in above
+    )
     entries = said.channels.get(name, [])
-    filled = [entry for entry in entries if entry]
-    # Where each channel has a column of times there are empty entries between.
-    return filled if len(filled) == count else [*entries, *[''] * count][:count]
+    places = range(len(shown)) if beside else sorted(above)
+    return [entries[at] if at < len(entries) else '' for at in places]
 
 
 def _common(path: Path, said: _HeadedRows, name: str, shown: list[int]) -> str:
@@ -255,7 +267,7 @@ def _common(path: Path, said: _HeadedRows, name: str, shown: list[int]) -> str:
     Raises:
         InputError: not the same of all.
     """
-    found = set(_of_channels(said, name, len(shown))) - {''}
+    found = set(_of_channels(said, name, shown)) - {''}
     if len(found) > 1:
         raise InputError(
             f'{path}: {name} differs between channels ({", ".join(sorted(found))}); save those of '
