@@ -15,6 +15,8 @@ from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 
 RATE, NOISE, STIFFNESS = 200.0, 1e-5, 250e3
+# So large that the hardest specimen of the catalogue is clear, too [m].
+PEAK = 3e-3
 # Single effects, and pairs that do not stand for each other.
 EFFECTS = (
     'backlash',
@@ -33,6 +35,8 @@ EFFECTS = (
 PAIRS = (('backlash', 'gain-drift'), ('coulomb-friction', 'flow-asymmetry'))
 KNOWN = 0.01  # relative standard deviation of what a calibration knows
 START_NS = 10**18
+# Sizes that are tried, in times of what is typical; how far from neutral to a bound they may go.
+_TIMES, _INSIDE = np.geomspace(0.05, 200.0, 24), 0.8
 
 
 @dataclass(frozen=True)
@@ -81,7 +85,7 @@ def streamed(case: Case) -> Streamed:
     theta = np.array([134.0, 1.1e9, 2.5e5, 0.5])
     theta *= np.exp([0.1, 0.1, 0.1, 0.3] * rng.standard_normal(4))
     command = commands.noise(RATE, case.seconds, 0.2, 8.0, seed=case.seed)
-    command *= 2e-3 / np.abs(command).max()
+    command *= PEAK / np.abs(command).max()
     rest = Record(command, command, 1.0 / RATE, STIFFNESS, start_ns=START_NS)
     plain = linear.simulate(theta, command, stiffness=STIFFNESS, period=1.0 / RATE)
     clean, found = plain, {}
@@ -106,24 +110,45 @@ def streamed(case: Case) -> Streamed:
 
 
 def _sized(case: Case, theta: Array, rest: Record) -> tuple[Structure, Array]:
-    """Return effects of a size of which a refitted Eq. (2) leaves the ratio wanted."""
+    """Return effects of the smallest size of which a refitted Eq. (2) leaves the ratio wanted.
+
+    Raises:
+        ValueError: none inside the bounds does.
+    """
     structure, typical = sizes(case.effects, theta)
-    neutral = structure.neutral(theta)
-    lower = np.array([p.lower for p in structure.parameters])
-    upper = np.array([p.upper for p in structure.parameters])
+    neutral, wanted = structure.neutral(theta), case.ratio * NOISE
+    bounds = np.array([(p.lower, p.upper) for p in structure.parameters]).T
+    # A truth at a bound is none that an interval may be asked to hold.
+    lower, upper = neutral + _INSIDE * (bounds - neutral)
+    # What limits a motion is neutral where nothing reaches it: half as much is twice the effect.
+    limits = (typical > 0.0) & (typical < neutral)
+    lower[limits] = bounds[0, limits] / _INSIDE
 
-    def scaled(share: float) -> Array:
-        return np.clip(neutral + share * (typical - neutral), lower, upper)
+    def scaled(times: float) -> Array:
+        found = neutral + times * (typical - neutral)
+        most = 1.0 / neutral[limits]
+        share = np.maximum(times, 0.0)
+        found[limits] = 1.0 / (most + share * (1.0 / typical[limits] - most))
+        return np.clip(found, lower, upper)
 
-    low, high = np.log(1e-3), np.log(30.0)
-    for _ in range(12):
-        middle = 0.5 * (low + high)
-        left = _left(structure.simulate(scaled(np.exp(middle)), rest), theta, rest)
-        low, high = (middle, high) if left < case.ratio * NOISE else (low, middle)
-    return structure, scaled(np.exp(0.5 * (low + high)))
+    def leaves(times: float) -> float:
+        return left(structure.simulate(scaled(times), rest), theta, rest)
+
+    # Some have a direction that leaves less than is wanted, wherever it ends.
+    for direction in (1.0, -1.0):
+        low = 0.0
+        for high in _TIMES:
+            if leaves(direction * high) >= wanted:
+                for _ in range(10):
+                    middle = 0.5 * (low + high)
+                    small = leaves(direction * middle) < wanted
+                    low, high = (middle, high) if small else (low, middle)
+                return structure, scaled(direction * high)
+            low = high
+    raise ValueError(f'{case}: no size inside the bounds leaves so much')
 
 
-def _left(clean: Array, theta: Array, part: Record) -> float:
+def left(clean: Array, theta: Array, part: Record) -> float:
     """Return the rms that a refitted Eq. (2) leaves of a response [m]."""
 
     def error(logs: Array) -> Array:

@@ -7,7 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from benchmarks.live.cases import Case, all_cases, streamed
+from actuator_glue.model.structure import Structure
+from benchmarks.live.cases import NOISE, Case, all_cases, left, streamed
 from benchmarks.live.score import made_worse
 from benchmarks.live.table import page
 
@@ -71,6 +72,17 @@ def test_a_fair_part_of_300_streams_has_healthy_ones_pairs_and_both_sizes():
 def test_a_drifting_gain_stays_a_gain_to_the_end_of_the_stream():
     given = streamed(Case(('gain-drift',), 2.0, seconds=120.0, seed=3))
     assert abs(given.sizes['gain_drift']) * 120.0 < 0.5
+
+
+@pytest.mark.parametrize('name', ['specimen-hardening', 'flow-saturation', 'specimen-gap'])
+def test_a_hidden_effect_has_the_size_that_is_told_and_lies_inside_its_bounds(name):
+    """Half of the saturated valves had their velocity at its lower bound, and another size."""
+    given = streamed(Case((name,), 4.0, seconds=20.0, seed=12))
+    structure = Structure((name,))
+    (parameter,), (size,) = structure.parameters[4:], given.sizes.values()
+    assert parameter.lower < size < parameter.upper
+    response = structure.simulate(np.append(given.theta, size), given.record)
+    assert left(response, given.theta, given.record) / NOISE == pytest.approx(4.0, rel=0.02)
 
 
 @pytest.mark.parametrize(
