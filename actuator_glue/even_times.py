@@ -92,7 +92,7 @@ def uniform_period(time: Array, where: str) -> float:
 def near_rate(time: Array) -> str:
     """Return a round number of samples per second near the mean one of times [Hz]."""
     rate = (len(time) - 1) / float(time[-1] - time[0])
-    return f'{rate:.2g}' if rate < 100.0 else f'{round(rate, -1):.0f}'
+    return f'{rate:.2g}' if rate < 99.5 else f'{round(rate, -1):.0f}'
 
 
 def uneven(steps: Array) -> bool:
@@ -113,7 +113,7 @@ def span(steps: Array) -> str:
         steps: differences of ascending times, shape (n,) [s].
     """
     ends = [1e3 * float(end) for end in (steps.min(), steps.max())]
-    return ' to '.join(f'{end:.2g}' if end < 100.0 else f'{end:.0f}' for end in ends) + ' ms'
+    return ' to '.join(f'{end:.2g}' if end < 99.5 else f'{end:.0f}' for end in ends) + ' ms'
 
 
 def rounding(time: Array) -> float:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from actuator_glue.io.look import ColumnLook, FileLook
     from actuator_glue.io.propose import Guess, ProposedMap
 
+_JOIN = '`convert COMMAND_FILE RESPONSE_FILE OUT --join time` (or `correlation`) joins both'
 _SHOWN = 8  # blocks of samples of a file that are told
 
 EXAMPLES = (
@@ -147,8 +148,13 @@ def _missing(found: FileLook, proposal: ProposedMap) -> str:
         return (
             'no command in this file: no displacement is called so (command, target, set point, '
             f'demand, reference, soll), and none is followed by another{instead}. A displacement '
-            'command is needed: record it, or name its column in a channel map written by hand '
-            '(docs/howto_your_data.md)'
+            f'command is needed: record it; where another file of the test has it, {_JOIN}; or '
+            'name its column in a channel map written by hand (docs/howto_your_data.md)'
+        )
+    if 'command' in proposal.channels:
+        return (
+            'no measured displacement could be told from these columns; where another file of the '
+            f'test has it, {_JOIN}; else write the channel map by hand (docs/howto_your_data.md)'
         )
     return (
         f'no {" and no ".join(names)} could be told from these columns; write the channel map by '

@@ -209,10 +209,13 @@ def choose(
         found[role] = (position, of_file(role, written[role], place))
     for role in needed:
         if role not in found:
+            # One of both moves here: the other may be in a file of its own.
+            half = len({'command', 'measured'} & set(found)) == 1 and role in _MOVING
+            join = ', or join it with the file that has it (`convert --join`)' if half else ''
             raise InputError(
                 f'{where}: no column for {role}; the columns are '
                 f'{", ".join(n.strip() for n in names)}. Name them as in {EXAMPLE}, or describe '
-                'the file with --channels MAP.yaml, which `actuator-glue map` proposes'
+                f'the file with --channels MAP.yaml, which `actuator-glue map` proposes{join}'
             )
     if not {'command', 'measured'} <= set(found):  # a part of a test
         return found, MOTIONS.get(''.join(written.get(r, '') for r in _MOVING), (METRES, 1.0))[0]

@@ -88,6 +88,30 @@ def test_by_correlation_the_clocks_need_not_agree(
     assert np.abs(record.command - test.command[shared]).max() < lost
 
 
+@pytest.mark.parametrize('stiffness', [0.0, 100e3, 250e3])
+@pytest.mark.parametrize('rates', [(100.0, 256.0), (500.0, 100.0), (256.0, 1000.0)])
+@pytest.mark.parametrize('kind', ['sweep', 'earthquake'])
+def test_a_slow_test_tells_its_clocks_no_closer_than_it_says(
+    tmp_path: Path, kind: str, rates: tuple[float, float], stiffness: float
+) -> None:
+    """Up to 3 Hz the valve's pole is hardly seen: it was taken for 9 ms of the clocks."""
+    shape = ag.Command(kind, rate=1000.0, duration=20.0, high=3.0)
+    test = ag.simulate(shape, stiffness=stiffness, seed=6)
+    command_at = np.arange(0.0, 19.9, 1.0 / rates[0])
+    response_at = np.arange(1.3, 19.0, 1.0 / rates[1])
+    command = np.interp(command_at, test.time, test.command)
+    measured = np.interp(response_at, test.time, test.measured)
+    told: list[str] = []
+    paths = (
+        table(tmp_path / 'c.csv', command_at, command=command),
+        table(tmp_path / 'r.csv', response_at + 31.7, measured=measured),
+    )
+    ag.join(*paths, by='correlation', warn=told.append)
+    found, deviation = begins(told)
+    assert abs(found - 1.3) < 2.5 * deviation
+    assert deviation < (6e-3 if kind == 'sweep' else 10e-3)
+
+
 def test_what_both_files_hold_tells_the_clocks_apart(tmp_path: Path) -> None:
     """By the same channel in both, and a delay in the loop stays what it is."""
     test = ag.simulate(
@@ -154,3 +178,16 @@ def test_the_command_line_joins(tmp_path: Path, capsys: pytest.CaptureFixture[st
     assert (record.stiffness, record.hold) == (0.0, 'linear')
     assert main(['convert', command, out, '--join', 'time', '--force']) == 2
     assert '--join takes two files' in capsys.readouterr().err
+
+
+def test_one_file_of_two_is_told_how_it_can_be_joined(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """By `map`, and by what reads it; a file without either channel is not."""
+    for path in files(tmp_path):
+        main(['map', str(path)])
+        assert '`convert COMMAND_FILE RESPONSE_FILE OUT --join time`' in capsys.readouterr().err
+        with pytest.raises(InputError, match='join it with the file that has it'):
+            ag.load(path)
+    with pytest.raises(InputError, match=r'proposes$'):
+        ag.load(table(tmp_path / 'n.csv', SWEEP.time, other=SWEEP.command))
