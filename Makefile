@@ -14,7 +14,7 @@ ROS := . install/setup.bash &&
 .DEFAULT_GOAL := help
 SAFETY_STAMP := .venv/safety
 
-.PHONY: help setup demo follow test coverage test-slow lint bench soak fuzz audit reproduce study-rths tables scores docs news clean
+.PHONY: help setup demo screenshots follow test coverage test-slow lint bench soak fuzz audit reproduce study-rths tables scores docs news clean
 
 help: ## show this list
 	@grep -hE '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /  make \1\t/' | expand -t 20
@@ -38,6 +38,10 @@ demo: $(ROS_STAMP) ## 90 s of real nodes, three minutes in all; results in out/d
 	@$(ROS) $(BIN)/python -m examples.demonstration --force --out out/demo \
 		$(if $(DATA),--data '$(DATA)') $(if $(CHANNELS),--channels '$(CHANNELS)') \
 		$(if $(STIFFNESS),--stiffness '$(STIFFNESS)') $(DEMO_ARGS)
+
+# make screenshots REV=COMMIT photographs another commit beside this one.
+screenshots: $(VENV_STAMP) ## report and live page on phone, tablet and desk, in Chromium; out/screenshots
+	@$(BIN)/python scripts/screenshots.py $(if $(REV),--rev '$(REV)')
 
 follow: ## the tutorial, word for word, in an empty container (root, ten minutes)
 	@scripts/follow_tutorial.sh

@@ -115,9 +115,14 @@ class Browser:
             await asyncio.sleep(0.1)
         raise AssertionError(f'never came true: {expression}; {self.faults}')
 
-    async def picture(self) -> Image.Image:
-        """Return what is seen."""
-        found = await self.call('Page.captureScreenshot', format='png')
+    async def picture(self, height: float | None = None) -> Image.Image:
+        """Return what is seen, or that much of the page from its beginning [px]."""
+        clip = {}
+        if height is not None:
+            width = await self.value('innerWidth')
+            area = {'x': 0, 'y': 0, 'width': width, 'height': height, 'scale': 1}
+            clip = {'captureBeyondViewport': True, 'clip': area}
+        found = await self.call('Page.captureScreenshot', format='png', **clip)
         return Image.open(io.BytesIO(base64.b64decode(found['data']))).convert('RGB')
 
     async def _read(self) -> None:
