@@ -167,25 +167,27 @@ class DiagnoserNode(WorkingNode):
         self.loop, actions = live.step(self.loop, given)
         for action in actions:
             if isinstance(action, live.Look):
-                self._look(action.reason)
+                self._look(action)
             elif isinstance(action, live.Carry):
                 self._carry(action.proposal)
             else:
                 self.complain(action.kind, action.message)
 
-    def _look(self, reason: str) -> None:
-        values, records = self.parameters.values(), self.collector.records()
+    def _look(self, wanted: live.Look) -> None:
+        values = self.parameters.values()
+        records, known = live.looked_at(self.collector, self.memory, wanted.since)
         if not records:
             self._take(live.Concluded())
             return
-        self.get_logger().info(f'diagnosing {self.collector.received:.0f} s: {reason}')
+        seconds = sum(record.duration for record in records)
+        self.get_logger().info(f'diagnosing {seconds:.0f} s: {wanted.reason}')
         self._start(
             diagnoser_worker.Request(
                 records=tuple(records),
-                known=self.memory.before(records[0].start_ns),
+                known=known,
                 seed=values['seed'],
                 apply=values['apply'],
-                reason=reason,
+                reason=wanted.reason,
             )
         )
 

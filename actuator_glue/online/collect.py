@@ -59,14 +59,16 @@ class Collector:
         self._kept.clear()
         self._pieces = 0
 
-    def records(self, shortest: float = 5.0) -> list[Record]:
+    def records(self, shortest: float = 5.0, since: float = 0.0) -> list[Record]:
         """Return what is kept, oldest first.
 
         Args:
             shortest: stretches shorter than this are left out [s].
+            since: so much of what has been received is left out, too [s].
         """
         stretches: dict[int, list[Record]] = {}
-        for window in self._kept:
+        wanted = max(0, self._pieces - round(since / PIECE))
+        for window in list(self._kept)[max(0, len(self._kept) - wanted) :]:
             stretches.setdefault(window.segment, []).append(window.record)
         joined = [_join(parts) for parts in stretches.values()]
         return [r for r in joined if r.duration >= shortest - 1e-9]

@@ -2,7 +2,9 @@
 
 A diagnosis is due when coverage breaks, when the estimator's prior is contradicted, and, while
 names are tied or structure remains, each time that twice as much has been received; while an
-alarm stands, each time that twice as much has been received since it began. What it says replaces
+alarm stands, each time that twice as much has been received since it began. It is of all data, or,
+of a machine that was sound until it changed, of those since: what the estimator learned before is
+its prior, and stands for the others. What it says replaces
 what was added before: an addition that later data contradict is taken out, one that they do not
 support any more is carried beside Eq. (2) until forecasts tell.
 """
@@ -18,9 +20,11 @@ import numpy as np
 
 from actuator_glue.inference.carried import Carried, Drift
 from actuator_glue.inference.choice import choose_model
+from actuator_glue.online.collect import Collector
 from actuator_glue.online.knowledge import Known
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.structures import Proposal, Proposed
+from actuator_glue.records import Record
 
 # The likeliest structure is proposed again where it has less weight than this by now.
 _DOUBTED = 0.5
@@ -134,9 +138,15 @@ Input: TypeAlias = Received | Judged | Carries | Estimated | Began | Asked | Con
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """Diagnose what has been received, for a reason."""
+    """Diagnose what has been received, for a reason.
+
+    Attributes:
+        reason: why, for people.
+        since: data before those that it is of [s]; what they say is known (`looked_at`).
+    """
 
     reason: str
+    since: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -171,6 +181,9 @@ class LiveState:
         settings: when to diagnose.
         seconds: data received since the stream began [s].
         coverages: of the last bands.
+        judged: data there were when each of them was judged [s].
+        origin: data before those that looks are of [s]: until a sudden change of a machine that
+            nothing was added to.
         broken: their mean is below the limit.
         contradicted: the alarm of the check of the prior stands.
         since: window that the structures are carried from.
@@ -187,6 +200,8 @@ class LiveState:
     settings: LiveSettings
     seconds: float = 0.0
     coverages: tuple[float, ...] = ()
+    judged: tuple[float, ...] = ()
+    origin: float = 0.0
     broken: bool = False
     contradicted: bool = False
     since: int = 0
@@ -250,14 +265,18 @@ def step(state: LiveState, given: Input) -> tuple[LiveState, tuple[Action, ...]]
     if not reason:
         return state, told
     state = replace(state, running=True, looked=state.seconds, reason='')
-    return state, (*told, Look(reason))
+    return state, (*told, Look(reason, state.origin))
 
 
 def _judged(state: LiveState, given: Judged) -> tuple[LiveState, tuple[Action, ...]]:
     if given.number < state.since:
         return state, ()
     most = _LASTING * state.settings.coverage_windows
-    state = replace(state, coverages=(*state.coverages, given.coverage)[-most:])
+    state = replace(
+        state,
+        coverages=(*state.coverages, given.coverage)[-most:],
+        judged=(*state.judged, state.seconds)[-most:],
+    )
     broken = state.coverage < state.settings.coverage_limit or state.lasting
     sound = state.sound or state.coverage >= state.settings.coverage_limit
     if math.isnan(state.coverage) or broken == state.broken:
@@ -266,12 +285,22 @@ def _judged(state: LiveState, given: Judged) -> tuple[LiveState, tuple[Action, .
         return replace(state, broken=False, sound=True), ()
     sudden = state.sound and not state.lasting
     state = replace(state, ready=state.seconds + _CHANGED * sudden)
+    if sudden and not (state.weights and state.weights[0][0]):
+        state = replace(state, origin=_changed(state), left_open=False)
     covers = float(np.mean(state.coverages)) if state.lasting else state.coverage
     what = (
         f'the band of parameters and sensor noise covers {covers:.0%} of the samples: '
         'the model lacks something'
     )
     return replace(state, broken=True, reason=what), (Say('coverage', what),)
+
+
+def _changed(state: LiveState) -> float:
+    """Return how much data there were when the last band before the bad ones was judged [s]."""
+    count = state.settings.coverage_windows
+    lately = list(zip(state.coverages, state.judged, strict=True))[-count - 1 :]
+    bad = [i for i, (coverage, _) in enumerate(lately) if coverage < state.settings.coverage_limit]
+    return lately[bad[0] - 1][1] if bad and bad[0] > 0 else state.origin
 
 
 def _estimated(state: LiveState, given: Estimated) -> tuple[LiveState, tuple[Action, ...]]:
@@ -293,7 +322,7 @@ def _received(state: LiveState, seconds: float) -> LiveState:
 
 def _began(state: LiveState) -> LiveState:
     """Let go of bands, which are of windows before."""
-    return replace(state, coverages=(), broken=False, sound=False, alarm=math.nan)
+    return replace(state, coverages=(), judged=(), broken=False, sound=False, alarm=math.nan)
 
 
 def _timed(state: LiveState) -> LiveState:
@@ -341,7 +370,7 @@ def _due(state: LiveState) -> str:
     paused = seconds < state.looked + settings.pause
     if state.reason and not paused and seconds >= state.ready:
         return state.reason
-    if seconds >= 2.0 * state.looked:
+    if seconds - state.origin >= 2.0 * (state.looked - state.origin):
         if state.left_open:
             return 'names are tied or structure remains, and there are twice as many data'
         if state.weights and state.weights[0][0]:
@@ -402,6 +431,10 @@ class Memory:
         while first_ns is not None and len(self._known) > 1 and self._known[1].last_ns < first_ns:
             self._known.popleft()
 
+    def learned_before(self, first_ns: int) -> bool:
+        """Whether a posterior is known whose samples ended before a time [ns]."""
+        return any(one.last_ns < first_ns for one in self._known)
+
     def before(self, first_ns: int) -> tuple[Carried, Drift, float] | None:
         """Return what was known before records that begin at a time [ns].
 
@@ -422,3 +455,17 @@ class Memory:
         since = 0 if self._began_ns is None else max(first_ns - self._began_ns, 0)
         age = self.settings.prior_age + since * 1e-9
         return self._carried.drifted(drift, age), drift, age
+
+
+def looked_at(
+    collector: Collector, memory: Memory, since: float
+) -> tuple[list[Record], tuple[Carried, Drift, float] | None]:
+    """Return what a look is of, and what was known before, as `Memory.before`.
+
+    That is what has come since so many seconds of data where a posterior stands for those before;
+    else all that is kept.
+    """
+    recent = collector.records(since=since)
+    if not recent or not memory.learned_before(recent[0].start_ns):
+        recent = collector.records()
+    return recent, memory.before(recent[0].start_ns) if recent else None

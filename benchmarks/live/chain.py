@@ -26,8 +26,6 @@ from actuator_glue.setups import StreamSetup
 SETTINGS = EstimatorSettings(prior='sequential', evaluations=4000, start_evaluations=16_000)
 KEPT = 180.0  # s
 BLOCK = 0.5  # s
-# What a diagnosis is taken to last on a core of its own [s]; the bench's own may be shared.
-TAKES = 8.0
 
 
 @dataclass
@@ -64,7 +62,8 @@ def chain(
 ) -> Chain:
     """Run a stream through estimator and diagnosis.
 
-    Windows have all the time that they want; while a diagnosis computes the stream goes on.
+    Windows have all the time that they want; while a diagnosis computes the stream goes on, for as
+    long as that took of a processor.
 
     Args:
         record: what is streamed.
@@ -138,8 +137,8 @@ class _Loop:
         for action in actions:
             if isinstance(action, live.Look):
                 out.said.append((now, f'looks: {action.reason}'))
-                found = self._look()
-                self._waiting.append((now + TAKES, found))
+                found = self._look(action.since)
+                self._waiting.append((now + out.looks[-1], found))
             elif isinstance(action, live.Carry):
                 self.estimator.set_model(action.proposal)
                 carried = tuple(one.model.effects for one in action.proposal.structures)
@@ -154,11 +153,10 @@ class _Loop:
                     out.broke = now
                 out.said.append((now, action.message))
 
-    def _look(self) -> live.Concluded:
-        records = self.collector.records()
-        known = given(self._memory.before(records[0].start_ns))
+    def _look(self, since: float) -> live.Concluded:
+        records, known = live.looked_at(self.collector, self._memory, since)
         began = time.process_time()
-        found = diagnose(records, seed=self._seed, jobs=1, effort=EFFORT, prior=known)
+        found = diagnose(records, seed=self._seed, jobs=1, effort=EFFORT, prior=given(known))
         self.out.looks.append(time.process_time() - began)
         self.out.said.append((self._now, found.summary()))
         return concluded(found, records)

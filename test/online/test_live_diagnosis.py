@@ -13,10 +13,13 @@ from actuator_glue.inference.choice import choose_model
 from actuator_glue.model.parameters import NAMES
 from actuator_glue.model.structure import Structure
 from actuator_glue.online import live_diagnosis as live
+from actuator_glue.online.collect import Collector
 from actuator_glue.online.knowledge import Known
+from actuator_glue.online.playback import stream
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.structures import Proposal
 from actuator_glue.records import Record
+from actuator_glue.setups import StreamSetup
 
 SETTINGS = live.LiveSettings(apply=True, coverage_windows=3, minimum=20.0, pause=10.0)
 PLAY = frozenset({'backlash'})
@@ -232,6 +235,53 @@ def test_what_begins_in_mid_stream_is_waited_for_and_looked_at_again_soon():
     # Two good bands and a bad one tell it; 5 s of it are waited for.
     assert asked == [50.0, 60.0]
     assert state.alarm == 45.0
+
+
+def changed(state, weights=()):
+    """What a stream does that was sound and changes at 45 s of it."""
+    _, state = watched(state, 44.0, lambda now: 0.95)
+    state, _ = run(state, live.Estimated(False, weights))
+    actions = []
+    while not looks(actions):
+        now = state.seconds + 1.0
+        bands = live.Judged(0.95 if now < 45.0 else 0.3)
+        state, actions = run(state, live.Received(now), bands)
+    return state, next(action for action in actions if isinstance(action, live.Look))
+
+
+def test_a_sound_machine_that_changes_is_looked_at_from_its_last_good_band_on():
+    state, look = changed(live.init(SETTINGS))
+    assert (look.since, state.seconds) == (44.0, 50.0)
+    # What was found in 6 s of it is looked at again in 12 s, not in 100 s.
+    state, _ = run(state, live.Concluded(proposal('backlash')))
+    carried = live.Estimated(False, ((PLAY, 1.0),))
+    state, actions = run(state, carried, live.Received(55.5))
+    assert looks(actions) == []
+    state, actions = run(state, live.Received(60.0))
+    assert [action.since for action in actions] == [44.0]
+
+
+def test_what_changes_beside_an_addition_is_looked_at_from_the_beginning():
+    """The addition may be what was wrong, and what was learned with it."""
+    _, look = changed(live.init(SETTINGS), ((PLAY, 1.0),))
+    assert look.since == 0.0
+
+
+def test_what_a_look_is_of_begins_where_the_estimator_knows_what_was_before():
+    command = 1e-3 * np.sin(np.linspace(0.0, 300.0, 6000))
+    collector, memory = Collector(180.0), live.Memory()
+    for item in stream(Record(command, command, 0.01, 250e3, start_ns=10**18), 50):
+        collector.setup(item) if isinstance(item, StreamSetup) else collector.push(item)
+    assert collector.received == 60.0
+    start = collector.first_ns
+    (record,), prior = live.looked_at(collector, memory, 45.0)
+    assert record.duration == 60.0 and prior is None
+    memory.setup(EstimatorSettings(prior='sequential'), None)
+    memory.learn(replace(known(0.0), middle_ns=start, last_ns=start + 44_000_000_000), start)
+    (record,), (_, _, age) = live.looked_at(collector, memory, 45.0)
+    assert record.duration == 15.0 and record.start_ns == start + 45_000_000_000
+    assert age == 45.0
+    assert live.looked_at(Collector(9.0), memory, 0.0) == ([], None)
 
 
 def test_an_addition_that_a_look_does_not_support_is_carried_beside_eq_2():
