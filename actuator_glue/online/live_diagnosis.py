@@ -283,11 +283,13 @@ def _judged(state: LiveState, given: Judged) -> tuple[LiveState, tuple[Action, .
         return replace(state, sound=sound), ()
     if not broken:
         return replace(state, broken=False, sound=True), ()
-    sudden = state.sound and not state.lasting
+    # Few bands that are bad enough bring the mean of many down, too.
+    low = state.coverage < state.settings.coverage_limit
+    sudden = state.sound and low
     state = replace(state, ready=state.seconds + _CHANGED * sudden)
     if sudden and not (state.weights and state.weights[0][0]):
         state = replace(state, origin=_changed(state), left_open=False)
-    covers = float(np.mean(state.coverages)) if state.lasting else state.coverage
+    covers = state.coverage if low else float(np.mean(state.coverages))
     what = (
         f'the band of parameters and sensor noise covers {covers:.0%} of the samples: '
         'the model lacks something'

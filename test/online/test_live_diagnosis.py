@@ -237,20 +237,22 @@ def test_what_begins_in_mid_stream_is_waited_for_and_looked_at_again_soon():
     assert state.alarm == 45.0
 
 
-def changed(state, weights=()):
+def changed(state, weights=(), coverage=0.3):
     """What a stream does that was sound and changes at 45 s of it."""
     _, state = watched(state, 44.0, lambda now: 0.95)
     state, _ = run(state, live.Estimated(False, weights))
     actions = []
     while not looks(actions):
         now = state.seconds + 1.0
-        bands = live.Judged(0.95 if now < 45.0 else 0.3)
+        bands = live.Judged(0.95 if now < 45.0 else coverage)
         state, actions = run(state, live.Received(now), bands)
     return state, next(action for action in actions if isinstance(action, live.Look))
 
 
-def test_a_sound_machine_that_changes_is_looked_at_from_its_last_good_band_on():
-    state, look = changed(live.init(SETTINGS))
+@pytest.mark.parametrize('coverage', [0.3, 0.0])
+def test_a_sound_machine_that_changes_is_looked_at_from_its_last_good_band_on(coverage):
+    """Bands that cover nothing bring the mean of many down at once: no lasting change, either."""
+    state, look = changed(live.init(SETTINGS), coverage=coverage)
     assert (look.since, state.seconds) == (44.0, 50.0)
     # What was found in 6 s of it is looked at again in 12 s, not in 100 s.
     state, _ = run(state, live.Concluded(proposal('backlash')))
