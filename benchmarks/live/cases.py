@@ -91,7 +91,7 @@ def streamed(case: Case) -> Streamed:
     clean, found = plain, {}
     if case.effects:
         structure, values = _sized(case, theta, rest)
-        clean = structure.simulate(values, rest)
+        clean = structure.simulate(_from_onset(structure, values, case.onset), rest)
         found = dict(zip(structure.names[4:], values[4:].tolist(), strict=True))
     if case.drift:
         # A slow change is a sequence of steady states.
@@ -107,6 +107,16 @@ def streamed(case: Case) -> Streamed:
         middle = theta * np.exp(KNOWN * rng.standard_normal(4))
         carried = Carried(NAMES, middle * np.exp(KNOWN * rng.standard_normal((400, 4))))
     return Streamed(replace(rest, measured=measured), theta, found, carried)
+
+
+def _from_onset(structure: Structure, values: Array, onset: float) -> Array:
+    """Return parameters (p,) with which a gain that drifts is what it was when it begins to."""
+    if 'gain_drift' not in structure.names:
+        return values
+    out, rate = values.copy(), structure.names.index('gain_drift')
+    out[1] *= 1.0 - values[rate] * onset
+    out[rate] /= 1.0 - values[rate] * onset
+    return out
 
 
 def _sized(case: Case, theta: Array, rest: Record) -> tuple[Structure, Array]:

@@ -44,7 +44,7 @@ def scored(case: Case, given: Streamed, ran: Chain) -> dict[str, Any]:
         # A model that has the drift itself has the gain at the window's beginning.
         own = 'gain-drift' in result.model.effects
         at = end - (1.0 if own else 0.5) * len(result.window.record) / RATE
-        theta[1] *= 1.0 + rate * at
+        theta[1] *= 1.0 + rate * (at - case.onset)
         mean, sd = result.moments.mean[:4], result.moments.stddev[:4]
         known = ~np.array(result.prior_dominated[:4])
         inside += (np.abs(mean - theta) <= 1.96 * sd)[known].tolist()

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from actuator_glue.model.structure import Structure
-from benchmarks.live.cases import NOISE, Case, all_cases, left, streamed
+from benchmarks.live.cases import NOISE, RATE, Case, all_cases, left, streamed
 from benchmarks.live.score import made_worse
 from benchmarks.live.table import page
 
@@ -72,6 +72,18 @@ def test_a_fair_part_of_300_streams_has_healthy_ones_pairs_and_both_sizes():
 def test_a_drifting_gain_stays_a_gain_to_the_end_of_the_stream():
     given = streamed(Case(('gain-drift',), 2.0, seconds=120.0, seed=3))
     assert abs(given.sizes['gain_drift']) * 120.0 < 0.5
+
+
+def test_a_drift_that_begins_in_mid_stream_begins_with_no_leap():
+    """Its gain was that of 45 s of drift at once: a second fault that nobody had hidden."""
+    case = Case(('gain-drift',), 4.0, onset=45.0, seconds=90.0, seed=3)
+    given, plain = streamed(case), streamed(replace(case, effects=()))
+    error = given.record.measured - plain.record.measured
+
+    def rms(start):
+        return np.std(error[round(start * RATE) : round((start + 2.0) * RATE)])
+
+    assert rms(43.0) == 0.0 and rms(45.0) < 0.1 * rms(88.0)
 
 
 @pytest.mark.parametrize('name', ['specimen-hardening', 'flow-saturation', 'specimen-gap'])
