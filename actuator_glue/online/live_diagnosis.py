@@ -372,10 +372,11 @@ def _due(state: LiveState) -> str:
     paused = seconds < state.looked + settings.pause
     if state.reason and not paused and seconds >= state.ready:
         return state.reason
-    if seconds - state.origin >= 2.0 * (state.looked - state.origin):
+    data, seen = seconds - state.origin, state.looked - state.origin
+    if data >= 2.0 * seen and not paused:
         if state.left_open:
             return 'names are tied or structure remains, and there are twice as many data'
-        if state.weights and state.weights[0][0]:
+        if state.weights and state.weights[0][0] and data >= 2.0 * settings.minimum:
             # What grows with time is small at first, and windows follow a slow change.
             return 'there are twice as many data as what was added was found in'
     # Before the first one there is nothing to look at again.

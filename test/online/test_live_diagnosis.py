@@ -254,13 +254,15 @@ def test_a_sound_machine_that_changes_is_looked_at_from_its_last_good_band_on(co
     """Bands that cover nothing bring the mean of many down at once: no lasting change, either."""
     state, look = changed(live.init(SETTINGS), coverage=coverage)
     assert (look.since, state.seconds) == (44.0, 50.0)
-    # What was found in 6 s of it is looked at again in 12 s, not in 100 s.
-    state, _ = run(state, live.Concluded(proposal('backlash')))
+    # What was found in 6 s of it is looked at again in 12 s where it is open, and in twice the
+    # minimum where it is not: not in 100 s.
     carried = live.Estimated(False, ((PLAY, 1.0),))
-    state, actions = run(state, carried, live.Received(55.5))
-    assert looks(actions) == []
-    state, actions = run(state, live.Received(60.0))
-    assert [action.since for action in actions] == [44.0]
+    for left_open, again in ((True, 60.0), (False, 84.0)):
+        found, _ = run(state, live.Concluded(proposal('backlash'), left_open=left_open))
+        found, actions = run(found, carried, live.Received(again - 0.5))
+        assert looks(actions) == []
+        _, actions = run(found, live.Received(again))
+        assert [action.since for action in actions] == [44.0]
 
 
 def test_what_changes_beside_an_addition_is_looked_at_from_the_beginning():
