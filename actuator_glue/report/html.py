@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from actuator_glue import __version__
 from actuator_glue.errors import InputError
 from actuator_glue.motion import spoken
-from actuator_glue.report.style import data_uri
+from actuator_glue.report.style import data_uri, narrowed
 
 TEMPLATES = Path(__file__).with_name('templates')
 
@@ -52,7 +52,7 @@ class Picture:
     Attributes:
         uri: the image.
         caption: what it shows.
-        narrow: the same for a phone; empty where the one is moved to and fro there.
+        narrow: the same for a phone; empty where the one is shown smaller there.
     """
 
     uri: str
@@ -62,8 +62,14 @@ class Picture:
 
     @classmethod
     def of(cls, figure: Figure, caption: str, narrow: Figure | None = None) -> Picture:
-        """Render a matplotlib figure, and one as wide as a phone that shows the same."""
-        return cls(data_uri(figure), caption, '' if narrow is None else data_uri(narrow))
+        """Render a matplotlib figure, and one as wide as a phone that shows the same.
+
+        Where none is given for a phone the figure itself is laid out anew, if it can be.
+        """
+        wide = data_uri(figure)
+        if narrow is None and narrowed(figure):
+            narrow = figure
+        return cls(wide, caption, '' if narrow is None else data_uri(narrow))
 
 
 Block = Text | Note | Table | Picture

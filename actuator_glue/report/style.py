@@ -139,6 +139,46 @@ def new_figure(height: float, width: float = WIDTH, *, motion: str | None = None
     return figure
 
 
+@styled
+def narrowed(figure: Figure) -> bool:
+    """Lay a figure out anew, as wide as a phone, its panels one below the other.
+
+    They follow each other row by row; column by column where only the first row has titles.
+    Returns whether that was done: neither a matrix nor panels over several columns are a list.
+    """
+    panels = {a: spec for a in figure.axes if a.get_visible() and (spec := a.get_subplotspec())}
+    grids = {spec.get_gridspec() for spec in panels.values()}
+    if len(grids) != 1 or any(len(spec.colspan) > 1 for spec in panels.values()):
+        return False
+    rows, columns = grids.pop().get_geometry()
+    if rows == columns > 2:
+        return False
+    order = list(panels)
+    if columns > 1:
+        if rows > 1 and not any(a.get_title('left') for a in order if panels[a].rowspan.start):
+            order.sort(key=lambda axes: panels[axes].colspan.start)
+        for axes in order:
+            row = panels[axes].rowspan
+            left = next(a for a in order if panels[a].rowspan == row)
+            axes.set_ylabel(axes.get_ylabel() or left.get_ylabel())
+            axes.tick_params(labelleft=True)
+        grid = figure.add_gridspec(len(order), 1)
+        for at, axes in enumerate(order):
+            axes.set_subplotspec(grid[at])
+    height = figure.get_size_inches()[1]
+    figure.set_size_inches(NARROW, height * len(order) / rows)
+    for legend in [*figure.legends]:
+        marks = [mark for mark in legend.legend_handles if mark is not None]
+        names = [text.get_text() for text in legend.get_texts()]
+        for count in (3, 2, 1):  # as many columns as there is room for
+            legend.remove()
+            legend = figure.legend(marks, names, loc='outside lower center', ncols=count)
+            figure.draw_without_rendering()
+            if legend.get_window_extent().width <= figure.bbox.width:
+                break
+    return True
+
+
 def _speak(figure: Figure) -> None:
     """Say sizes in the units of the motion that is drawn, or else is spoken of."""
     motion = figure.motion if isinstance(figure, Drawing) else None

@@ -22,7 +22,9 @@ MEASURE = """(() => {
   const shown = [...document.querySelectorAll('figure img')]
     .filter((picture) => picture.getBoundingClientRect().width > 0);
   return {
-    first: shown[0].className, fits: shown[0].getBoundingClientRect().width,
+    first: shown[0].className,
+    fits: Math.max(...shown.map((picture) => picture.getBoundingClientRect().right)),
+    small: shown.filter((picture) => picture.className != 'narrow').map((picture) => picture.alt),
     page: document.documentElement.scrollWidth,
     boxes: [...document.querySelectorAll('.scroll')]
       .filter((box) => box.scrollWidth > box.clientWidth).map((box) => box.textContent),
@@ -63,8 +65,10 @@ def test_a_report_fits_a_phone(which: str, tmp_path: Path) -> None:
     found = asyncio.run(measured(result.report(tmp_path / 'report.html')))
     assert found['tables'] >= 4
     assert found['page'] <= WIDTH
-    # The first picture is one made for it.
+    # Pictures are made for it, but for one of every pair of parameters.
     assert found['fits'] <= WIDTH
     assert found['first'] == 'narrow'
+    pairs = 'Distribution of each parameter, and of each pair.'
+    assert found['small'] == ([pairs] if which == 'calibration' else [])
     assert found['boxes'] == []
     assert found['broken'] == []
