@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal, TypeAlias, TypeGuard, cast
+from typing import Any, Literal, TypeAlias, TypeGuard, TypeVar, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,8 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from actuator_glue.errors import InputError
 from actuator_glue.even_times import uniform_period
 from actuator_glue.given import number
-from actuator_glue.motion import METRES, MOTIONS, WRITTEN, spoken
+from actuator_glue.motion import METRES, MOTIONS, TORQUES, WRITTEN, spoken
 from actuator_glue.si import FORCE, LENGTH
+
+T = TypeVar('T')
 
 Array: TypeAlias = NDArray[np.float64]
 Hold: TypeAlias = Literal['zoh', 'linear']
@@ -80,8 +82,8 @@ def _column(
     return column
 
 
-def _factor(unit: str, known: Mapping[str, float], name: str) -> float:
-    """Return how many SI units one unit is.
+def _of_unit(unit: str, known: Mapping[str, T], name: str) -> T:
+    """Return what a table says of a unit.
 
     Raises:
         InputError: a unit that is not known.
@@ -276,7 +278,7 @@ class Record:
             force: measured actuator force, shape (n,) [force_unit]; None where there is none.
             unit: of both displacements, 'm', 'mm', 'um', 'cm' or 'in'; or of another motion,
                 'deg', 'rad', 'counts', 'V', '%'.
-            force_unit: 'N', 'kN', 'MN', 'lbf' or 'kip'.
+            force_unit: 'N', 'kN', 'MN', 'lbf' or 'kip'; of an angle 'Nm' or 'kNm', too.
             stiffness: specimen stiffness [N/m], 0 for a free actuator; None where not known.
             hold: how the command runs between its samples, 'zoh' or 'linear'.
 
@@ -287,8 +289,10 @@ class Record:
             >>> Record.from_arrays([0.0, 0.01, 0.02], [0, 1, 2], [0, 0, 1], unit='mm')
             Record(actuator: 3 samples at 100 Hz (0.03 s), stiffness not known, zoh)
         """
-        motion, length = MOTIONS.get(unit) or (METRES, _factor(unit, LENGTH, 'unit'))
-        newton = _factor(force_unit, FORCE, 'force_unit')
+        moves = {of: (METRES, metres) for of, metres in LENGTH.items()} | MOTIONS
+        motion, length = _of_unit(unit, moves, 'unit')
+        forces = FORCE | TORQUES if motion == MOTIONS['deg'][0] else FORCE
+        newton = _of_unit(force_unit, forces, 'force_unit')
         period, start_ns = _clock(time, '')
         channels = {'command': command, 'measured': measured}
         if force is not None:

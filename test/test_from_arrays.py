@@ -54,6 +54,15 @@ def test_dates_are_times(time: Any) -> None:
     assert datetime.fromtimestamp(made.start_ns * 1e-9, UTC).hour == 12
 
 
+def test_an_angle_comes_with_its_torque() -> None:
+    """Newton metres where newtons stand; of a displacement there is no torque."""
+    made = ag.Record.from_arrays(TIME, U, X, F, unit='deg', force_unit='kNm')
+    assert made.motion == 'deg' and made.force is not None
+    np.testing.assert_allclose(made.force, 1e3 * F, rtol=1e-15)
+    with pytest.raises(ag.InputError, match="force_unit 'kNm' is not known; use one of N, "):
+        ag.Record.from_arrays(TIME, U, X, F, unit='mm', force_unit='kNm')
+
+
 def test_columns_of_a_table_and_lists_are_arrays() -> None:
     """What pandas and Python hold is the same record."""
     table = pd.DataFrame({'t': TIME, 'u': U, 'x': X})
@@ -68,7 +77,10 @@ def test_columns_of_a_table_and_lists_are_arrays() -> None:
 @pytest.mark.parametrize(
     ('change', 'told'),
     [
-        ({'unit': 'parsec'}, r"unit 'parsec' is not known; use one of m, cm, mm"),
+        (
+            {'unit': 'parsec'},
+            r"unit 'parsec' is not known; use one of m, cm, mm.* deg, .* counts, .* V, ",
+        ),
         ({'unit': None}, 'unit None'),
         ({'force_unit': 'kg'}, "force_unit 'kg'"),
         ({'time': np.cumsum(0.005 + 0.004 * np.sin(np.arange(50.0)))}, r'jittered.*resample='),
