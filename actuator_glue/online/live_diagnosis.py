@@ -3,8 +3,8 @@
 A diagnosis is due when coverage breaks, when the estimator's prior is contradicted, and, while
 names are tied or structure remains, each time that twice as much has been received; while an
 alarm stands, each time that twice as much has been received since it began. It is of all data, or,
-of a machine that was sound until it changed, of those since: what the estimator learned before is
-its prior, and stands for the others. What it says replaces
+of a machine that was sound until it changed, of those since: where there is a calibration, what
+the estimator learned before is its prior, and stands for the others. What it says replaces
 what was added before: an addition that later data contradict is taken out, one that they do not
 support any more is carried beside Eq. (2) until forecasts tell.
 """
@@ -389,8 +389,11 @@ def _due(state: LiveState) -> str:
 class Memory:
     """What an estimator knew of Eq. (2)'s parameters before some samples; bounded.
 
-    Each sample counts once: what is known before records is the calibration that the estimator
-    began with, or its posterior of windows that ended before the records begin.
+    Nothing where it began without a calibration: along what no window tells its posterior is the
+    box, whose mean is a statement about the bounds. An effect that tells a little of it would be
+    found with the size that goes with that. Else each sample counts once: what is known before
+    records is the calibration that the estimator began with, or its posterior of windows that
+    ended before the records begin.
 
     Attributes:
         settings: of the estimator; None before they are known.
@@ -434,10 +437,6 @@ class Memory:
         while first_ns is not None and len(self._known) > 1 and self._known[1].last_ns < first_ns:
             self._known.popleft()
 
-    def learned_before(self, first_ns: int) -> bool:
-        """Whether a posterior is known whose samples ended before a time [ns]."""
-        return any(one.last_ns < first_ns for one in self._known)
-
     def before(self, first_ns: int) -> tuple[Carried, Drift, float] | None:
         """Return what was known before records that begin at a time [ns].
 
@@ -445,7 +444,7 @@ class Memory:
             Draws that have drifted to that time, by how much they drift, and their age [s]; None
             where nothing was known.
         """
-        if self.settings is None:
+        if self.settings is None or self._carried is None:
             return None
         drift = self.settings.drifts()
         earlier = [one for one in self._known if one.last_ns < first_ns]
@@ -453,8 +452,6 @@ class Memory:
             known = earlier[-1]
             age = (first_ns - known.middle_ns) * 1e-9
             return known.carried.drifted(drift, age).later(age), drift, age
-        if self._carried is None:
-            return None
         since = 0 if self._began_ns is None else max(first_ns - self._began_ns, 0)
         age = self.settings.prior_age + since * 1e-9
         return self._carried.drifted(drift, age), drift, age
@@ -465,10 +462,7 @@ def looked_at(
 ) -> tuple[list[Record], tuple[Carried, Drift, float] | None]:
     """Return what a look is of, and what was known before, as `Memory.before`.
 
-    That is what has come since so many seconds of data where a posterior stands for those before;
-    else all that is kept.
+    That is what has come since so many seconds of data; all where that is too short.
     """
-    recent = collector.records(since=since)
-    if not recent or not memory.learned_before(recent[0].start_ns):
-        recent = collector.records()
-    return recent, memory.before(recent[0].start_ns) if recent else None
+    records = collector.records(since=since) or collector.records()
+    return records, memory.before(records[0].start_ns) if records else None

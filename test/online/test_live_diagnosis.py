@@ -278,14 +278,24 @@ def test_what_a_look_is_of_begins_where_the_estimator_knows_what_was_before():
         collector.setup(item) if isinstance(item, StreamSetup) else collector.push(item)
     assert collector.received == 60.0
     start = collector.first_ns
-    (record,), prior = live.looked_at(collector, memory, 45.0)
-    assert record.duration == 60.0 and prior is None
-    memory.setup(EstimatorSettings(prior='sequential'), None)
+    memory.setup(EstimatorSettings(prior='sequential'), known(0.0, 100.0).carried)
+    memory.began(start)
     memory.learn(replace(known(0.0), middle_ns=start, last_ns=start + 44_000_000_000), start)
-    (record,), (_, _, age) = live.looked_at(collector, memory, 45.0)
+    (record,), (learned, _, age) = live.looked_at(collector, memory, 45.0)
     assert record.duration == 15.0 and record.start_ns == start + 45_000_000_000
-    assert age == 45.0
+    assert age == 45.0 and learned.draws[:, 0].mean() == pytest.approx(134.0)
+    (record,), (calibrated, _, age) = live.looked_at(collector, memory, 0.0)
+    assert record.duration == 60.0
+    assert age == 0.0 and calibrated.draws[:, 0].mean() == pytest.approx(100.0)
     assert live.looked_at(Collector(9.0), memory, 0.0) == ([], None)
+
+
+def test_what_an_estimator_learned_without_a_calibration_is_not_handed_over():
+    """Where one stiffness leaves alpha_2 open its posterior is the box: 7 +- 1.5 MN/m, not 0.3."""
+    memory = live.Memory()
+    memory.setup(EstimatorSettings(prior='sequential'), None)
+    memory.learn(known(44.0), 0)
+    assert memory.before(45_000_000_000) is None
 
 
 def test_an_addition_that_a_look_does_not_support_is_carried_beside_eq_2():
