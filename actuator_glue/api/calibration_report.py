@@ -200,9 +200,9 @@ def _parameters(found: CalibrationData, name: Callable[[str], str]) -> html.Tabl
     for (n, p), (low, high) in zip(found.parameters.items(), ends, strict=True):
         factor, unit = said_in(p.unit, *p.bounds)
         before = f'{plain(factor * p.bounds[0])} to {plain(factor * p.bounds[1])} {unit}'.rstrip()
-        rows.append(
-            [name(n), meanings.get(n, ''), before, spread(p.mean, float(low), float(high), p.unit)]
-        )
+        after = spread(p.mean, float(low), float(high), p.unit)
+        after += ', little more than its prior' if p.prior_dominated else ''
+        rows.append([name(n), meanings.get(n, ''), before, after])
     known = '' if found.prior is None else f', and what {source_name(found.prior.source)} knew'
     header = ['parameter', 'what it is', 'before', 'after']
     caption = f'Parameters before (bounds{known}) and after (means, 95 % intervals).'

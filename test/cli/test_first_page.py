@@ -86,6 +86,17 @@ def test_terminal_and_report_agree(
     assert low == pytest.approx(mean - 1.96 * sd, rel=2e-3)
 
 
+def test_what_only_the_prior_says_is_marked(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """A free actuator tells of the valve alone, and of no parameter of the load by itself."""
+    main(['calibrate', str(folder / 'free.csv'), '--stiffness', '0', '--evaluations', '16000'])
+    rows = capsys.readouterr().out.partition('Parameters before')[2].partition('Delay:')[0]
+    marked = re.findall(r'^ (\w+) .* little more than its prior\s*$', rows, re.MULTILINE)
+    assert {'alpha_2', 'alpha_3'} <= set(marked)
+    assert 'beta_1' in rows and 'beta_1' not in marked
+
+
 def test_the_next_command_reads_as_this_one_did(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
