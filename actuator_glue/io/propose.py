@@ -19,11 +19,11 @@ from actuator_glue.velocity_command import is_velocity
 _WORDS = {
     'time': r'time|zeit|temps|tiempo|timestamp|^t$|\bsec(onds)?\b',
     'command': r'command|cmd|target|refer|\bref\b|desired|\bdes\b|set.?point|\bsp\b|demand|soll|'
-    r'input|program|f(ü|ue)hrung|vorgabe|consigne',
+    r'input|program|f(ü|ue)hrung|vorgabe|consign[ea]|riferim|goal|wanted|指令|目[标標]|[设設]定',
     'measured': r'meas|actual|feedback|\bfbk?\b|\bist|respon|achieved|lvdt|encoder|output|posi|'
-    r'\bpos\b|displ|\bdisp\b|stroke|kolbenweg|\bweg\b',
-    'force': r'force|load|kraft|\bcell\b|fuerza|effort|torque|moment|belastung|^f[xyz]?\d?$|'
-    r'\blc\d?\b|^([kM] ?)?N$',
+    r'\bpos\b|displ|\bdisp\b|stroke|kolbenweg|\bweg\b|d[ée]plac|desplaz|spostam|位移|[变変]位',
+    'force': r'force|load|kraft|\bcell\b|fuerza|effort|torque|moment|belastung|forza|荷重|载荷|'
+    r'^f[xyz]?\d?$|\blc\d?\b|^([kM] ?)?N$',
 }
 # What has a word of these is no displacement, whatever else it is called.
 _NO_LENGTH = re.compile(

@@ -34,7 +34,27 @@ def roles(found: dict) -> dict[str, str]:
 COMMANDS = ['Command 2', 'cmd', 'Set Point', 'SetPoint', 'Target', 'x_desired', 'Ref']
 COMMANDS += ['Reference', 'Sollwert', 'Demand pos', 'Commanded displacement', 'pos_sp', 'x_des']
 COMMANDS += ['Führungsgröße', 'consigne', 'axis1.setpoint', 'cmd_fb', 'Wegsoll', 'PosDes']
-FORCES = ['Load [kN]', 'force', 'Kraft', 'Actuator Load', 'F [N]', 'F', 'Torque', 'LC1', 'kN']
+COMMANDS += [
+    'Consigna de posición',
+    'riferimento',
+    'Goal position',
+    'wanted',
+    '目标位移',
+    '指令変位',
+]
+FORCES = [
+    'Load [kN]',
+    'force',
+    'Kraft',
+    'Actuator Load',
+    'F [N]',
+    'F',
+    'Torque',
+    'LC1',
+    'kN',
+    'Forza',
+    '荷重',
+]
 
 
 @pytest.mark.parametrize('name', COMMANDS)
