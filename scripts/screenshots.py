@@ -111,7 +111,7 @@ def both(folders: dict[str, Path], file: Path) -> None:
     whole = Image.new('RGB', (rows[0].width, sum(r.height + GAP for r in rows) - GAP), 'white')
     for i, row in enumerate(rows):
         whole.paste(row, (0, i * (row.height + GAP)))
-    whole.quantize(48).save(file, optimize=True)
+    whole.quantize(128, Image.Quantize.MAXCOVERAGE).save(file, optimize=True)
 
 
 def run(tree: Path, out: Path, tests: Path) -> Path:
