@@ -4,28 +4,33 @@ from __future__ import annotations
 
 import statistics
 import time
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
-from actuator_glue.inference.choice import choose_model
+from actuator_glue.inference.choice import ModelChoice, choose_model
 from actuator_glue.io.bag_reader import decoded
 from actuator_glue.io.bag_records import write_record
 from actuator_glue.io.bag_writer import BagWriter
 from actuator_glue.model import commands, linear
 from actuator_glue.online import job as window_job
 from actuator_glue.online.estimator import Estimator
-from actuator_glue.online.playback import at_once, give, items, replay, stream
+from actuator_glue.online.playback import Item, at_once, give, items, replay, stream
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Preview
+from actuator_glue.online.structures import Proposal, Proposed
 from actuator_glue.records import Record
+from actuator_glue.sample_block import Block
 from actuator_glue.setups import StreamSetup
 from actuator_glue.workers.reports import Reports
 
 THETA = np.array([134.0, 1.1e9, 2.5e5, 0.5])
 RATE = 1000.0
+# The first windows of a model take longer, as they may.
+_BEGINS = 20
 SETTINGS = EstimatorSettings(window=10.0, hop=0.05, settle=1.0, time_budget=0.045, draws=100)
 
 
@@ -80,6 +85,71 @@ def live(seconds: float) -> dict[str, float]:
         'rhat_p99': float(np.quantile(rhat[20:], 0.99)),
         'ess_p50': float(np.median(ess[20:])),
     }
+
+
+def deadlines(seconds: float, leading: tuple[str, ...] = (), hop: float = 0.05) -> dict[str, Any]:
+    """Return how many windows of one structure are missed, and of three with the same leading.
+
+    Both take the same stream in turns, window by window, as live: while a window is computed
+    samples go on, and what is too late is dropped. The clock is the processor's, so that whatever
+    else the computer does counts for neither. A window is missed that has no posterior two hops
+    after its last sample.
+
+    Args:
+        seconds: of the stream.
+        leading: effects of the one structure.
+        hop: time from one window to the next [s]; nine tenths of it are the time budget.
+    """
+    settings = replace(SETTINGS, hop=hop, time_budget=0.9 * hop)
+    every = dict.fromkeys((leading, ('backlash',), ('coulomb-friction',), ()))
+    three = (Proposed(choose_model(names), 0.5 - 0.25 * bool(i)) for i, names in enumerate(every))
+    taken = {
+        1: _Taken(settings, choose_model(leading)),
+        3: _Taken(settings, Proposal(tuple(three))),
+    }
+    for item in stream(_record(seconds), block=round(hop * RATE)):
+        for one in taken.values():
+            one.take(item)
+    windows = round((seconds - settings.window) / hop) + 1 - _BEGINS
+    found: dict[str, Any] = {'windows': windows}
+    for count, one in taken.items():
+        latencies = np.array([latency for number, latency in one.latencies if number > _BEGINS])
+        found[f'missed_{count}'] = windows - int((latencies <= 2.0 * hop).sum())
+        found[f'latency_{count}_p50_ms'] = 1e3 * float(np.median(latencies))
+        found[f'latency_{count}_p99_ms'] = 1e3 * float(np.quantile(latencies, 0.99))
+    return found
+
+
+class _Taken:
+    """A live estimator beside others, each on a core of its own; arguments as `Estimator`."""
+
+    def __init__(self, settings: EstimatorSettings, model: ModelChoice | Proposal) -> None:
+        self.estimator = Estimator(settings, model, live=True)
+        self.latencies: list[tuple[int, float]] = []
+        self._free = 0.0
+
+    def take(self, item: Item) -> None:
+        """Take what arrives, and compute what there is time for until then."""
+        give(self.estimator, item)
+        if not isinstance(item, Block):
+            return
+        arrived, hop = (item.index + len(item)) / RATE, self.estimator.settings.hop
+        if self._free > arrived:
+            return
+        self.estimator.drop(lambda window: arrived - window.end / RATE > hop)
+        if (job := self.estimator.next_job()) is None:
+            return
+        began = time.process_time()
+
+        def expired(share: float) -> bool:
+            # What follows the sampling takes a fifth.
+            return time.process_time() > began + 0.8 * share * job.seconds
+
+        result = window_job.run(job, expired)
+        self.estimator.finish(result)
+        self._free = arrived + time.process_time() - began
+        if not result.failure:
+            self.latencies.append((job.window.number, self._free - job.window.end / RATE))
 
 
 def replayed(seconds: float = 300.0, repeats: int = 7) -> dict[str, Any]:

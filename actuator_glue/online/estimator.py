@@ -41,6 +41,9 @@ MAX_WAITING = 4
 # Times the budget that a window may take at most, after others that ended without a posterior,
 # and what remains of that with each that has one.
 MOST_PATIENCE, _CALMER = 8.0, 0.8
+# It is the turn of a structure that has not been sampled in so many windows, and where it has a
+# posterior for so much of a window's length: until then hardly any other samples have come.
+TURN, _NEWS = 3, 0.5
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -111,6 +114,8 @@ class _Member:
         epoch: actuator that they are of.
         frozen: its last posterior, with which it forecasts where there is no time for it.
         waited: windows since.
+        patience: times the budget that a window may take where it is its turn.
+        cut: what was left over, the last time, ended before it had reached its posterior.
         before: it was there before those that are carried now: they have to do better.
         worse: successive windows whose forecasts were worse than of one that was there before.
     """
@@ -121,6 +126,8 @@ class _Member:
     epoch: int = -1
     frozen: FrozenPosterior | None = None
     waited: int = 0
+    patience: float = 1.0
+    cut: bool = False
     before: bool = False
     worse: int = 0
 
@@ -135,13 +142,12 @@ class _Before:
 
 
 def _patience(before: float, result: WindowResult | WindowFit) -> float:
-    """Return how many times the budget the next window may take.
+    """Return how many times the budget a structure may take the next time.
 
-    Twice as many after one that ended without a posterior for want of time, of the likeliest
-    structure or of another whose turn it was: else the next one begins, and ends, where that did.
-    Fewer again after each that has all.
+    Twice as many after it ended without a posterior for want of time: else it begins, and ends,
+    where it did. Fewer again after each time that it has one.
     """
-    if result.starved or any(one.starved for one in result.rivals):
+    if result.starved:
         return min(2.0 * before, MOST_PATIENCE)
     return before if result.failure else max(1.0, _CALMER * before)
 
@@ -271,7 +277,17 @@ class Estimator:
             self._resume(window, self.schedule.begun.get(window.number))
             if not self._course.exact or len(stops) != len(self._members):
                 stops = (None,) * len(self._members)
-        jobs = [self._job(m, window, stop) for m, stop in zip(self._members, stops, strict=True)]
+        due = self._due()
+        patience = self._patience if due is None else max(self._patience, due.patience)
+        jobs = [
+            replace(
+                self._job(member, window, stop),
+                patience=patience,
+                usual=self._patience / patience,
+                due=member is due,
+            )
+            for member, stop in zip(self._members, stops, strict=True)
+        ]
         ahead = self._ahead.between(window.end, jobs[0].forecast[1], window.record.period)
         shares = self._shares().tolist()
         jobs = [replace(job, weight=share) for job, share in zip(jobs, shares, strict=True)]
@@ -317,8 +333,19 @@ class Estimator:
             prior=prior,
             standing=member.frozen if member.epoch == window.epoch else None,
             waited=member.waited,
-            patience=self._patience,
+            cut=member.cut,
         )
+
+    def _due(self) -> _Member | None:
+        """Return whose turn it is beside the likeliest structure; None for nobody's."""
+        stepped = [member for member in self._members[1:] if member.model.effects]
+        if not stepped:
+            return None
+        longest = max(stepped, key=lambda member: member.waited)
+        news = math.ceil(_NEWS * self.settings.window / self.settings.hop)
+        begins = longest.frozen is None and longest.patience < MOST_PATIENCE
+        turn = TURN if begins else max(TURN, news)
+        return longest if longest.waited >= turn else None
 
     def finish(self, result: WindowResult | WindowFit) -> list[Event]:
         """Take the result of the running job, or its first part, all that the next one needs."""
@@ -335,6 +362,11 @@ class Estimator:
             self._frozen.append(result.frozen)
             del self._frozen[:-MAX_FROZEN]
         events: list[Event] = []
+        for member, rival in zip(self._members[1:], result.rivals, strict=True):
+            member.cut = rival.cut or (member.cut and bool(rival.failure))
+            if rival.starved and member.patience == MOST_PATIENCE:
+                member.waited = -1  # it has had all there is: others have their turn
+            member.patience = _patience(member.patience, rival)
         for member, found in zip(self._members, (result, *result.rivals), strict=True):
             member.waited += 1
             if found.failure:

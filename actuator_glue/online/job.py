@@ -31,8 +31,6 @@ Expired: TypeAlias = Callable[[float], bool]
 # Share of the time budget after which no further structure is begun: half of it is what one with
 # effects takes until it is warm.
 _BEGIN = 0.5
-# A structure that has not been sampled in so many windows has the other half.
-PATIENCE = 3
 # Draws whose mean response is the forecast that a structure's weight is judged by.
 _FEW = 32
 # Generations that R-hat and ESS are computed from.
@@ -131,9 +129,9 @@ def fit(job: Job, expired: Expired | None = None) -> WindowFit:
 
     Where several structures are carried, those without effects come first, for they are quick.
     The likeliest has all the time that is left then; of the others, who waited longest first,
-    those that there is still time for. Who has waited `PATIENCE` windows has half of the time,
-    where the likeliest has reached its posterior in the other half. One that is not sampled keeps
-    its posterior, and forecasts with it.
+    those that there is still time for, and was the last time. Whose turn it is has half of the
+    time, where the likeliest has reached its posterior in the other half, and beyond what is usual
+    until it has one itself. One that is not sampled keeps its posterior, and forecasts with it.
     """
     jobs = (job, *job.rivals)
     found = [
@@ -141,23 +139,30 @@ def fit(job: Job, expired: Expired | None = None) -> WindowFit:
         for one in jobs
     ]
     stepped = [i for i in range(1, len(jobs)) if jobs[i].model.effects]
-    stepped.sort(key=lambda i: (-jobs[i].waited, i))
-    due = stepped[0] if stepped and jobs[stepped[0]].waited >= PATIENCE else None
+    stepped.sort(key=lambda i: (not jobs[i].due, -jobs[i].waited, i))
+    due = any(one.due for one in job.rivals)
     quick = [i for i in range(len(jobs)) if not jobs[i].model.effects]
     for i in dict.fromkeys((*quick, 0, *stepped)):
-        if i > 0 and _no_time(jobs[i], expired, 1.0 if i == due else _BEGIN):
-            found[i] = replace(found[i], starved=i == due)
+        turn = jobs[i].due
+        if i > 0 and _no_time(jobs[i], expired, 1.0 if turn else _BEGIN * job.usual):
+            found[i] = replace(found[i], starved=turn)
             continue
         if i > 0 and jobs[i].stop_at == 0:
             continue
-        share = _BEGIN if i == 0 and due is not None else 1.0
-        sampled = _fit(jobs[i], None if expired is None else partial(_spent, expired, share))
+        share, longest = job.usual, 1.0
+        if i == 0:
+            share = _BEGIN if due else 1.0
+        elif jobs[i].model.effects and not turn:
+            longest = share
+        clock = None if expired is None else partial(_spent, expired, share, longest)
+        sampled = _fit(jobs[i], clock)
         if i == 0 and sampled.failure:
             return sampled
         if i > 0:
             # Whose turn it was not has had what was left over, and no claim to more.
-            sampled = replace(sampled, starved=sampled.starved and i == due)
-            if not _warm(sampled):
+            warm = _warm(sampled)
+            sampled = replace(sampled, starved=sampled.starved and turn, cut=not (warm or turn))
+            if not warm:
                 sampled = replace(sampled, frozen=found[i].frozen)
         found[i] = sampled
     leading, *rivals = found
@@ -173,9 +178,9 @@ def fit(job: Job, expired: Expired | None = None) -> WindowFit:
     )
 
 
-def _spent(expired: Expired, share: float, reached: bool) -> bool:
-    """Whether a structure's share of the time is spent: all of it until it has a posterior."""
-    return expired(share if reached else 1.0)
+def _spent(expired: Expired, share: float, longest: float, reached: bool) -> bool:
+    """Whether a structure's share of the time is spent; the longest until it has a posterior."""
+    return expired(share if reached else longest)
 
 
 def _fit(job: Job, expired: Callable[[bool], bool] | None) -> WindowFit:
@@ -193,7 +198,9 @@ def _warm(fitted: WindowFit) -> bool:
 
 def _no_time(job: Job, expired: Expired | None, share: float) -> bool:
     """Whether a structure is passed over in this window: a share of the time is spent."""
-    return expired is not None and bool(job.model.effects) and expired(share)
+    if expired is None or not job.model.effects:
+        return False
+    return (job.cut and not job.due) or expired(share)
 
 
 def _errors(job: Job) -> tuple[float, ...]:

@@ -62,8 +62,11 @@ class Job:
         proposal: what is carried from this window on, where that is new.
         standing: the structure's last posterior; it forecasts with that where it is not sampled.
         waited: windows that it has not been sampled in.
-        patience: times the budget that it may take, for want of time left those before it without
-            a posterior.
+        patience: times the budget that the window may take, for want of time left those before it
+            without a posterior.
+        usual: share of that time that it may take for others than the one whose turn it is.
+        due: it is this structure's turn.
+        cut: what was left over, the last time, ended before it had reached its posterior.
     """
 
     window: Window
@@ -81,6 +84,9 @@ class Job:
     standing: FrozenPosterior | None = None
     waited: int = 0
     patience: float = 1.0
+    usual: float = 1.0
+    due: bool = False
+    cut: bool = False
 
     @property
     def evaluations(self) -> int:
@@ -93,7 +99,8 @@ class Job:
     def seconds(self) -> float:
         """Longest time the window may be computed [s]."""
         budget = self.settings.time_budget
-        return self.patience * (max(budget, FIRST) if self.afresh else budget)
+        first = self.afresh or any(one.due and one.afresh for one in self.rivals)
+        return self.patience * (max(budget, FIRST) if first else budget)
 
     @property
     def forecast(self) -> tuple[int, int]:
@@ -129,6 +136,7 @@ class WindowFit:
         complete: the sampling was not ended early.
         failure: why there is nothing of all this; empty where there is.
         starved: there is nothing because the sampling ended before it had reached the posterior.
+        cut: so it is, and it was nobody's turn.
         rivals: the same of the other structures that are carried.
         errors: mean square error of the forecasts that the window has judged, of each structure,
             the likeliest first [m^2]; empty where only one is carried or there were none.
@@ -147,6 +155,7 @@ class WindowFit:
     complete: bool = False
     failure: str = ''
     starved: bool = False
+    cut: bool = False
     rivals: tuple[WindowFit, ...] = ()
     errors: tuple[float, ...] = ()
 

@@ -8,9 +8,9 @@ from online_streams import SETTINGS, record
 
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.online.estimator import Estimator, Schedule
-from actuator_glue.online.job import PATIENCE, WindowResult, fit, run
+from actuator_glue.online.job import WindowResult, fit, run
 from actuator_glue.online.playback import stream
-from actuator_glue.online.sampling import ADAPT
+from actuator_glue.online.sampling import ADAPT, FIRST
 from actuator_glue.online.stream import Dropped, Preview
 from actuator_glue.online.structures import Proposal, Proposed
 from actuator_glue.setups import StreamSetup
@@ -123,7 +123,7 @@ def test_a_rival_takes_half_of_the_time_only_from_a_posterior():
     for item in stream(record(2.5), 100):
         estimator.setup(item) if isinstance(item, StreamSetup) else estimator.push(item)
     job = estimator.next_job()
-    job = replace(job, rivals=tuple(replace(one, waited=PATIENCE) for one in job.rivals))
+    job = replace(job, rivals=tuple(replace(one, due=True) for one in job.rivals))
     shares = []
 
     def expired(share):
@@ -136,3 +136,55 @@ def test_a_rival_takes_half_of_the_time_only_from_a_posterior():
     assert not fitted.failure
     late = fit(job, lambda share: True)
     assert late.starved and late.failure
+
+
+def three(settings, computed):
+    """The jobs of a live estimator of three structures, computed so."""
+    every = ((), ('delay',), ('bias',))
+    estimator = Estimator(
+        settings, Proposal(tuple(Proposed(choose_model(e), 0.2 if e else 0.6) for e in every))
+    )
+    for item in stream(record(7.8), 50):
+        estimator.setup(item) if isinstance(item, StreamSetup) else estimator.push(item)
+        while (job := estimator.next_job()) is not None:
+            yield job
+            estimator.finish(computed(job))
+
+
+def delayed(job):
+    """The second structure's job."""
+    return next(one for one in job.rivals if one.model.effects == ('delay',))
+
+
+def test_the_others_take_turns_as_samples_are_new_not_as_windows_are():
+    """Twenty windows a second and each had its turn in every third: all of them came late."""
+    settings = replace(SETTINGS, window=2.0, hop=0.2, time_budget=0.2, evaluations=2000)
+    # Time for whose turn it is, and nothing left over.
+    jobs = three(settings, lambda job: run(job, lambda share: share < 1.0))
+    turns = [job.window.number for job in jobs if delayed(job).due]
+    # Half of a window is five hops; the first time there is no posterior to wait with.
+    assert turns == [3, 9, 15, 21, 27]
+
+
+def test_nobody_else_has_the_time_that_a_turn_needs_beyond_the_usual():
+    def in_vain(job):
+        result = run(job, lambda share: share < 1.0)
+        late = [replace(one, starved=True, failure='late', archive=None) for one in result.rivals]
+        pairs = zip(job.rivals, result.rivals, late, strict=True)
+        return replace(result, rivals=tuple(bad if job.due else one for job, one, bad in pairs))
+
+    jobs = three(SETTINGS, in_vain)
+    first = [next(jobs) for _ in range(7)]
+    # The first window of a model has a second, and twice as much as the turn comes to nothing.
+    told = [(job.patience, job.usual, delayed(job).due, job.seconds) for job in first[2:]]
+    assert told == [
+        (1.0, 1.0, False, SETTINGS.time_budget),
+        (1.0, 1.0, True, FIRST),
+        (2.0, 0.5, True, 2.0 * FIRST),
+        (4.0, 0.25, True, 4.0 * FIRST),
+        (8.0, 0.125, True, 8.0 * FIRST),
+    ]
+    # Then the other one has its turn, and this one waits.
+    job = next(jobs)
+    assert not delayed(job).due and delayed(job).waited == 0
+    assert any(one.due for one in job.rivals)
