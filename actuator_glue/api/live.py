@@ -20,7 +20,7 @@ from actuator_glue.records import Array, Record
 
 # Of the usual effort of a diagnosis, at most: what takes a core more than half a minute comes too
 # late for the samples that it is about, and the next look has more of them.
-EFFORT = 0.4
+EFFORT = 0.6
 # Eq. (2) alone is carried beside every addition, at least with this weight, until its forecasts
 # exclude it: what a diagnosis is sure of, it is sure of for the data that it has seen.
 _PLAIN = 0.02

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,9 @@ from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import rms
 from actuator_glue.inference.least_squares.free_run import Model
 from actuator_glue.records import Array
+
+# Per side: simulation and half width of the band, of the fitting and of the held-out part.
+Curves: TypeAlias = dict[str, tuple[Array, Array, Array, Array]]
 
 _RESAMPLES = 1000
 _NORMAL_95 = 1.959964
@@ -154,7 +158,7 @@ def verify(
     seed: int,
     line: Line | None = None,
     tried: int = 1,
-) -> tuple[HeldOutError, tuple[float, float], dict[str, tuple[Array, Array, Array, Array]]]:
+) -> tuple[HeldOutError, tuple[float, float], Curves]:
     """Compare both structures on data that decided nothing.
 
     A line found in the fitting part belongs to the noise here: its phase in the held-out part
@@ -223,9 +227,7 @@ def verify(
     return error, (coverage[0], coverage[1]), curves
 
 
-def traces(
-    data: Data, held_out: bool, curves: dict[str, tuple[Array, Array, Array, Array]]
-) -> list[Trace]:
+def traces(data: Data, held_out: bool, curves: Curves) -> list[Trace]:
     """Cut the joined curves into records for pictures."""
     at = 2 if held_out else 0
     out = []

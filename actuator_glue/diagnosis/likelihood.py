@@ -122,9 +122,7 @@ class Likelihood:
         It is uniform in the logarithms otherwise.
         """
         data = self.scorer.data
-        # As many as the kernels take at once, where there are more than chains.
-        least = LANES if len(theta) > 2 * LANES else LANES // 2
-        parts = chunks(len(theta), data.target.size, least)
+        parts = chunks(len(theta), data.target.size, LANES)  # which the kernels take at once
         found = np.concatenate(list(self.each(self._of_some, [theta[some] for some in parts])))
         return found if data.prior is None else found + data.prior.log_density(theta)
 

@@ -53,7 +53,7 @@ class Thresholds:
     beam: int = 3
     tried: int = 5
     evaluations: int = 12_000
-    effort: float = 1.5e8
+    effort: float = 1e8
     use_force: bool = False
 
     def material(self, noise: float, stroke: float) -> float:

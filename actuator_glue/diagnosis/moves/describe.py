@@ -87,6 +87,8 @@ def learned(selection: BeamSearch, found: Selection, complete: bool = False) -> 
     names = _offered(search)
     best = found.final
     for turn in range(_MOST):
+        if search.effort.over:
+            break
         selection.progress('learned term', turn / _MOST)
         # A wrong name of the catalogue may stand where the term belongs: Eq. (2) starts, too.
         starts = [best] if turn or not best.effects else [best, search.trial(())]
@@ -217,6 +219,8 @@ def _additions(
     """Return the best structure with one more term, where it is worth more than the present."""
     search, worth, cost = selection.search, [], math.log(len(names))
     for start in starts:
+        if search.effort.over:
+            break
         new = [n for n in names if n not in start.effects]
         for trial in search.additions(start, search.screened(start, new)[:_REFITS]):
             least = selection.material

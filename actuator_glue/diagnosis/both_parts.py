@@ -1,0 +1,93 @@
+"""What both parts of the records say of an answer: one look at the held-out part, and the verdict.
+
+The fitting part chose the structure; the part that decided nothing bears it out, or not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from actuator_glue.diagnosis import agreement, held_out_reach, told_effects, verdict
+from actuator_glue.diagnosis.agreement import Homogeneity
+from actuator_glue.diagnosis.answer_posterior import AnswerPosterior, estimates
+from actuator_glue.diagnosis.estimate import Estimate
+from actuator_glue.diagnosis.finding import Finding
+from actuator_glue.diagnosis.fitting_verdict import Decision
+from actuator_glue.diagnosis.held_out import COMPLETE, HeldOutError, Verdict
+from actuator_glue.diagnosis.held_out_look import Curves, verify
+from actuator_glue.diagnosis.learned.term import is_learned
+from actuator_glue.diagnosis.wrong_setup import WrongSetup
+from actuator_glue.records import Array
+
+
+@dataclass(frozen=True)
+class BothParts:
+    """What both parts say.
+
+    Attributes:
+        verdict: see DiagnosisData.
+        decision: that of the fitting part, as certain as both parts let it be.
+        effects: additions with sizes, rivals and probabilities.
+        error: held-out error before and after.
+        coverage: share of held-out samples in the 95 % band, before and after.
+        curves: simulations and bands of both parts, for pictures.
+        stretches: sizes of each effect in halves of the records.
+        estimates: of all parameters of the structure that is told.
+        estimates_before: of Eq. (2)'s without any addition.
+        draws: that the estimates are quantiles of (m, p).
+        setup: another set-up that explains the records; None for the one given.
+    """
+
+    verdict: Verdict
+    decision: Decision
+    effects: tuple[Finding, ...]
+    error: HeldOutError
+    coverage: tuple[float, float]
+    curves: Curves
+    stretches: dict[str, Homogeneity]
+    estimates: dict[str, Estimate]
+    estimates_before: dict[str, Estimate]
+    draws: Array
+    setup: WrongSetup | None
+
+
+def of(drawn: AnswerPosterior, other: WrongSetup | None, seed: int) -> BothParts:
+    """Look at the held-out part once, and say what both parts come to.
+
+    Args:
+        drawn: the answer of the fitting part and its posterior.
+        other: another set-up under which Eq. (2) explains the records far better, if there is one.
+        seed: seed of the intervals and of the sham effect.
+    """
+    result, before, after = drawn.result, drawn.before, drawn.after
+    decision, found, held = result.decision, result.found, result.prepared.held
+    error, coverage, curves = verify(
+        result.data, held, before, after, decision.noise, seed, result.line, len(found.singles)
+    )
+    error = held_out_reach.reached_by_both(
+        error, found.material, result.scorer, held, before, after
+    )
+    judged = verdict.of_both_parts(decision.verdict, bool(decision.names), error, found.material)
+    described = any(map(is_learned, decision.final.structure.entries))
+    if other is not None and described and judged in COMPLETE:
+        # A description of what another set-up explains with none describes the set-up.
+        judged = 'unexplained'
+    draws, fixed = drawn.spread(judged in COMPLETE)
+    sizes = estimates(drawn.space, after.model, draws, fixed)
+    certain = verdict.certainty(decision.certainty, error, found.material)
+    decision = replace(decision, certainty=certain)
+    stretches = agreement.agreement(decision.final, result.scorer)
+    effects = told_effects.of(decision, found, sizes, stretches)
+    return BothParts(
+        verdict=verdict.named(judged, effects),
+        decision=decision,
+        effects=effects,
+        error=error,
+        coverage=coverage,
+        curves=curves,
+        stretches=stretches,
+        estimates=sizes,
+        estimates_before=drawn.estimates_before(),
+        draws=draws,
+        setup=result.prepared.setup or (None if judged in COMPLETE else other),
+    )
