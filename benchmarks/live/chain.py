@@ -19,6 +19,7 @@ from actuator_glue.online.knowledge import Known
 from actuator_glue.online.playback import stream
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Contradicted, Event
+from actuator_glue.online.trust import Contradiction
 from actuator_glue.records import Record
 from actuator_glue.sample_block import Block
 from actuator_glue.setups import StreamSetup
@@ -99,6 +100,7 @@ class _Loop:
         self._state, self._memory = live.init(wanted), live.Memory()
         self._memory.setup(settings, carried)
         self._waiting: list[tuple[float, live.Concluded]] = []
+        self._contradiction = Contradiction()
         self._now = 0.0
 
     def push(self, block: Block) -> None:
@@ -126,7 +128,9 @@ class _Loop:
             if prediction.kind == 'noise' and prediction.coverage is not None:
                 self._take(live.Judged(float(prediction.coverage[-1]), prediction.number))
         weights = tuple((frozenset(m.effects), w) for m, w in self.estimator.weights)
-        contradicted = any(isinstance(event, Contradicted) for event in told)
+        alarms = [event for event in told if isinstance(event, Contradicted)]
+        self._contradiction.take(result, alarms)
+        contradicted = self._contradiction.since_ns is not None
         self._take(live.Estimated(contradicted, weights))
         if self._state.trusted:
             self._memory.learn(_known(result, self._settings), self.collector.first_ns)
