@@ -12,6 +12,7 @@ from actuator_glue.errors import InputError
 Array: TypeAlias = NDArray[np.float64]
 
 # A sample may lie this far off the uniform grid, in periods: rounded time stamps do.
+_DAY = 86_400.0  # s
 _TOLERANCE = 0.25
 # Share of the steps that differ so far from their median where a clock is uneven throughout: a
 # few that do are gaps.
@@ -43,6 +44,8 @@ def uniform_period(time: Array, where: str) -> float:
     if back.any():
         at = int(back.argmax())
         how, remedy = 'goes back', 'sort the record, or cut it there'
+        if abs(steps[at] + _DAY) < 1.0:
+            remedy = 'times of day pass midnight there: give the dates, too, or cut the record'
         if steps[at] == 0.0:
             how, remedy = 'stands still', 'cut the record there'
             if steps.min() == 0.0 < steps.max():

@@ -20,10 +20,12 @@ Resample: TypeAlias = float | tuple[float, By]
 # Times of the samples, a channel, samples per second that are wanted: the channel at even times.
 _Interpolate: TypeAlias = Callable[[Array, Array, float], Array]
 
-# Of the mean rate of the samples. Straight lines fold what is faster into the band below it; far
-# above there would be samples that nobody measured.
+# Of the mean rate of the samples. Straight lines fold what is faster into the band below it, and
+# finer ones are the same; a finer command is one that is not cut at its samples.
 _LEAST: dict[By, float] = {'band-limited': 0.1, 'lines': 0.8}
-_MOST = 2.0
+_MOST: dict[By, float] = {'band-limited': 10.0, 'lines': 2.0}
+# Of the command's spread: more that straight lines between its even samples miss is told.
+_STRAIGHT = 2e-3
 _LONGEST_STEP = 5.0  # median steps without a sample: beyond it is a gap, not jitter
 _KEPT = 0.95  # share of its amplitude that a sine keeps in the band that is told
 # Stamps that stay within so many steps of an even clock may be those of a log, and the samples
@@ -36,8 +38,10 @@ _FELT, _EXACT = 0.1, 1e-3
 _LOOK = 20_000  # samples from which band and noise are told
 _WINDOW = ('kaiser', 8.0)  # a ripple of 2e-4; scipy's own has 1e-3
 _APART = 64  # samples between impulses, farther than any of them is felt
+# A parabola's root mean square over its line, of what it is in the middle.
+_OF_MIDDLE = np.sqrt(8.0 / 15.0)
 # A parabola's mean square over its step, and its error over two steps at the sample between.
-_WITHIN = np.sqrt(8.0 / 15.0) / 4.0
+_WITHIN = _OF_MIDDLE / 4.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +62,9 @@ class Resampled:
             place of them [s]; 0 where the stamps were taken.
         jitter: root mean square by which the times that were taken may still be off [s].
         moved: what that is by the velocity of the measured displacement, root mean square [m].
+        cut: root mean square of what the command leaves beside straight lines between its even
+            samples, where that matters [m]; else 0.
+        finer: samples per second at which it would not [Hz]; 0 where there is no such rate.
     """
 
     values: dict[str, Array]
@@ -70,6 +77,8 @@ class Resampled:
     late: float
     jitter: float
     moved: float
+    cut: float
+    finer: float
 
     def told(self) -> str:
         """Return what was done and lost, in a line."""
@@ -93,6 +102,12 @@ class Resampled:
                 f'; the times may be off by {1e3 * self.jitter:.2g} ms (rms), which is '
                 f'{1e6 * self.moved:.2g} um of noise at the velocities of this record'
             )
+        if self.cut:
+            line += (
+                '; straight between its samples the command misses '
+                f'{1e6 * self.cut:.2g} um (rms), which parameters will make up for'
+            )
+            line += f': --resample {self.finer:.0f} keeps it' if self.finer else ''
         return line
 
     def name(self) -> str:
@@ -142,14 +157,15 @@ def resample_evenly(
             f'{where}: {steps[at]:.4g} s without samples after sample {at}; nobody knows what '
             'happened there: cut the record there before it is resampled'
         )
-    if not _LEAST[by] <= rate * mean <= _MOST:
+    if not _LEAST[by] <= rate * mean <= _MOST[by]:
         raise InputError(
             f'{where}: there are {1.0 / mean:.4g} samples per second; resample to between '
-            f'{_LEAST[by] / mean:.3g} and {_MOST / mean:.3g} Hz, not {rate:g}'
+            f'{_LEAST[by] / mean:.3g} and {_MOST[by] / mean:.3g} Hz, not {rate:g}'
         )
     taken = even if len(even) else time - time[0]
     interpolate = _lines if by == 'lines' else _band_limited
     jitter = _jitter(taken, channels['measured'])
+    cut, finer = (0.0, 0.0) if by == 'lines' else _cut(taken, channels['command'], rate)
     return Resampled(
         values={role: interpolate(taken, column, rate) for role, column in channels.items()},
         period=1.0 / rate,
@@ -163,6 +179,8 @@ def resample_evenly(
         late=float(np.std(time - time[0] - even)) if len(even) else 0.0,
         jitter=jitter,
         moved=jitter * _speed(taken, channels['measured']),
+        cut=cut,
+        finer=finer,
     )
 
 
@@ -183,6 +201,24 @@ def _band_limited(time: Array, column: Array, rate: float) -> Array:
     finer = int(np.ceil(2.0 * mean / rate))
     fine = spline(np.minimum(_even_times(time, rate * finer), time[-1]))
     return np.asarray(scipy.signal.resample_poly(fine, 1, finer, window=_WINDOW, padtype='line'))
+
+
+def _cut(time: Array, command: Array, rate: float) -> tuple[float, float]:
+    """Return what straight lines between even samples miss of a command, and a rate at which not.
+
+    It falls with the square of the rate. Both are zero where it does not matter.
+    """
+    curve = scipy.interpolate.CubicSpline(time, command)
+    at = _even_times(time, rate)
+    ends = curve(at)
+    middle = curve(at[:-1] + 0.5 / rate) - 0.5 * (ends[:-1] + ends[1:])
+    missed = _OF_MIDDLE * float(np.sqrt(np.mean(middle**2)))
+    share = missed / (_STRAIGHT * max(float(np.std(command)), 1e-300))
+    if share <= 1.0:
+        return 0.0, 0.0
+    mean = (len(time) - 1) / float(time[-1])
+    finer = 10.0 * np.ceil(0.1 * rate * np.sqrt(share))
+    return missed, float(finer) if finer <= _MOST['band-limited'] * mean else 0.0
 
 
 def _band(interpolate: Callable[[Array, float], Array], time: Array, rate: float) -> float:

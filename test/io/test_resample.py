@@ -123,11 +123,28 @@ def test_what_the_stamps_are_worth_is_told_in_micrometres() -> None:
     assert resample_evenly(channels(TIME, TIME, 5e-6), 27, where='x').jitter == 0.0
 
 
+def test_a_command_that_lines_cut_is_told_with_a_rate_that_keeps_it() -> None:
+    """A sine of 3 Hz at 27 Hz: what its chords miss; at the rate that is told next to nothing."""
+    fast = 5e-3 * np.sin(2.0 * np.pi * 3.0 * TIME)
+    values = {'time': TIME, 'command': fast, 'measured': fast}
+    made = resample_evenly(values, 27, where='x')
+    dense = np.arange(27 * 200) / (27.0 * 200.0)
+    exact = 5e-3 * np.sin(2.0 * np.pi * 3.0 * dense)
+    chords = np.interp(dense, dense[::200], exact[::200])
+    assert made.cut == pytest.approx(np.sqrt(np.mean((exact - chords)[:-200] ** 2)), rel=0.05)
+    assert f'the command misses {1e6 * made.cut:.2g} um' in made.told()
+    assert made.told().endswith(f'--resample {made.finer:.0f} keeps it')
+    better = resample_evenly(values, made.finer, where='x')
+    assert better.cut == 0.0
+    assert 'the command misses' not in better.told()
+    assert resample_evenly(channels(TIME, TIME), 27, where='x').cut < made.cut
+
+
 @pytest.mark.parametrize(
     ('time', 'rate', 'words'),
     [
-        (TIME, 2, r'26\.\d+ samples per second; resample to between 2\.\d+ and 53'),
-        (TIME, 100, 'not 100'),
+        (TIME, 2, r'26\.\d+ samples per second; resample to between 2\.\d+ and 26\d'),
+        (TIME, 300, 'not 300'),
         (TIME, -1, 'not -1'),
         (TIME + 3.0 * (TIME > 50.0), 27, r'3\.\d+ s without samples .*nobody knows'),
         (
