@@ -11,8 +11,8 @@ from actuator_glue.errors import InputError
 
 Array: TypeAlias = NDArray[np.float64]
 
-# A sample may lie this far off the uniform grid, in periods: rounded time stamps do.
 _DAY = 86_400.0  # s
+# A sample may lie this far off the uniform grid, in periods: rounded time stamps do.
 _TOLERANCE = 0.25
 # Share of the steps that differ so far from their median where a clock is uneven throughout: a
 # few that do are gaps.

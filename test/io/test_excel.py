@@ -54,7 +54,9 @@ def test_times_of_day_over_midnight_are_refused(tmp_path: Path) -> None:
     """They go back there: nothing says which day it is."""
     start = datetime.datetime(2024, 5, 3, 23, 59, 58)
     times = [(start + datetime.timedelta(seconds=s)).time() for s in SECONDS.tolist()]
-    with pytest.raises(InputError, match=r'time goes back at sample 200 .*pass midnight there: give the dates'):
+    with pytest.raises(
+        InputError, match=r'time goes back at sample 200 .*pass midnight there: give the dates'
+    ):
         read(workbook(tmp_path / 'a.xlsx', times))
 
 
