@@ -16,7 +16,7 @@ from actuator_glue.online.fitting import starting_points
 from actuator_glue.online.forecast import FrozenPosterior
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.knowledge import Knowledge
-from actuator_glue.online.sampling import Job, WindowFit
+from actuator_glue.online.sampling import MOST_PATIENCE, Job, WindowFit
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import (
     Dropped,
@@ -38,9 +38,8 @@ from actuator_glue.setups import StreamSetup
 MAX_FROZEN = 8
 # After a stall of the whole computer several hops arrive at once.
 MAX_WAITING = 4
-# Times the budget that a window may take at most, after others that ended without a posterior,
-# and what remains of that with each that has one.
-MOST_PATIENCE, _CALMER = 8.0, 0.8
+# What remains of the patience with each window that has a posterior.
+_CALMER = 0.8
 # It is the turn of a structure that has not been sampled in so many windows, and where it has a
 # posterior for so much of a window's length: until then hardly any other samples have come.
 TURN, _NEWS = 3, 0.5
@@ -114,7 +113,6 @@ class _Member:
         epoch: actuator that they are of.
         frozen: its last posterior, with which it forecasts where there is no time for it.
         waited: windows since.
-        patience: times the budget that a window may take where it is its turn.
         cut: what was left over, the last time, ended before it had reached its posterior.
         before: it was there before those that are carried now: they have to do better.
         worse: successive windows whose forecasts were worse than of one that was there before.
@@ -126,7 +124,6 @@ class _Member:
     epoch: int = -1
     frozen: FrozenPosterior | None = None
     waited: int = 0
-    patience: float = 1.0
     cut: bool = False
     before: bool = False
     worse: int = 0
@@ -142,10 +139,10 @@ class _Before:
 
 
 def _patience(before: float, result: WindowResult | WindowFit) -> float:
-    """Return how many times the budget a structure may take the next time.
+    """Return how many times the budget the next window may take.
 
-    Twice as many after it ended without a posterior for want of time: else it begins, and ends,
-    where it did. Fewer again after each time that it has one.
+    Twice as many after one that ended without a posterior for want of time: else the next one
+    begins, and ends, where that did. Fewer again after each that has one.
     """
     if result.starved:
         return min(2.0 * before, MOST_PATIENCE)
@@ -278,14 +275,8 @@ class Estimator:
             if not self._course.exact or len(stops) != len(self._members):
                 stops = (None,) * len(self._members)
         due = self._due()
-        patience = self._patience if due is None else max(self._patience, due.patience)
         jobs = [
-            replace(
-                self._job(member, window, stop),
-                patience=patience,
-                usual=self._patience / patience,
-                due=member is due,
-            )
+            replace(self._job(member, window, stop), due=member is due)
             for member, stop in zip(self._members, stops, strict=True)
         ]
         ahead = self._ahead.between(window.end, jobs[0].forecast[1], window.record.period)
@@ -333,6 +324,7 @@ class Estimator:
             prior=prior,
             standing=member.frozen if member.epoch == window.epoch else None,
             waited=member.waited,
+            patience=self._patience,
             cut=member.cut,
         )
 
@@ -343,8 +335,7 @@ class Estimator:
             return None
         longest = max(stepped, key=lambda member: member.waited)
         news = math.ceil(_NEWS * self.settings.window / self.settings.hop)
-        begins = longest.frozen is None and longest.patience < MOST_PATIENCE
-        turn = TURN if begins else max(TURN, news)
+        turn = TURN if longest.frozen is None else max(TURN, news)
         return longest if longest.waited >= turn else None
 
     def finish(self, result: WindowResult | WindowFit) -> list[Event]:
@@ -364,9 +355,8 @@ class Estimator:
         events: list[Event] = []
         for member, rival in zip(self._members[1:], result.rivals, strict=True):
             member.cut = rival.cut or (member.cut and bool(rival.failure))
-            if rival.starved and member.patience == MOST_PATIENCE:
+            if rival.starved:
                 member.waited = -1  # it has had all there is: others have their turn
-            member.patience = _patience(member.patience, rival)
         for member, found in zip(self._members, (result, *result.rivals), strict=True):
             member.waited += 1
             if found.failure:

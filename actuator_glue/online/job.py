@@ -149,11 +149,8 @@ def fit(job: Job, expired: Expired | None = None) -> WindowFit:
             continue
         if i > 0 and jobs[i].stop_at == 0:
             continue
-        share, longest = job.usual, 1.0
-        if i == 0:
-            share = _BEGIN if due else 1.0
-        elif jobs[i].model.effects and not turn:
-            longest = share
+        share = job.usual * (_BEGIN if i == 0 and due else 1.0)
+        longest = 1.0 if turn else job.usual
         clock = None if expired is None else partial(_spent, expired, share, longest)
         sampled = _fit(jobs[i], clock)
         if i == 0 and sampled.failure:

@@ -36,6 +36,9 @@ ADAPT = 20
 # Time a model's first window may take [s], whatever the budget: before there is a posterior
 # nothing is late, and a window that is cut short leaves the next one where it began itself.
 FIRST = 1.0
+# Times the budget that a window may take at most: after others that ended without a posterior, or
+# for a structure whose turn it is, until it has one.
+MOST_PATIENCE = 8.0
 # Share of the last posterior's points, spread, that must be alive in the next: so few that mostly
 # one temperature leads there.
 SURVIVORS = 0.35
@@ -62,9 +65,8 @@ class Job:
         proposal: what is carried from this window on, where that is new.
         standing: the structure's last posterior; it forecasts with that where it is not sampled.
         waited: windows that it has not been sampled in.
-        patience: times the budget that the window may take, for want of time left those before it
-            without a posterior.
-        usual: share of that time that it may take for others than the one whose turn it is.
+        patience: times the budget that it may take, for want of time left those before it without
+            a posterior.
         due: it is this structure's turn.
         cut: what was left over, the last time, ended before it had reached its posterior.
     """
@@ -84,7 +86,6 @@ class Job:
     standing: FrozenPosterior | None = None
     waited: int = 0
     patience: float = 1.0
-    usual: float = 1.0
     due: bool = False
     cut: bool = False
 
@@ -99,8 +100,18 @@ class Job:
     def seconds(self) -> float:
         """Longest time the window may be computed [s]."""
         budget = self.settings.time_budget
-        first = self.afresh or any(one.due and one.afresh for one in self.rivals)
-        return self.patience * (max(budget, FIRST) if first else budget)
+        turns = [max(MOST_PATIENCE * budget, FIRST * one.afresh) for one in self.rivals if one.due]
+        return max(self._usual, *turns, 0.0)
+
+    @property
+    def usual(self) -> float:
+        """Share of that time for all but the structure whose turn it is."""
+        return self._usual / self.seconds
+
+    @property
+    def _usual(self) -> float:
+        budget = self.settings.time_budget
+        return self.patience * (max(budget, FIRST) if self.afresh else budget)
 
     @property
     def forecast(self) -> tuple[int, int]:

@@ -128,11 +128,12 @@ def test_a_rival_takes_half_of_the_time_only_from_a_posterior():
 
     def expired(share):
         shares.append(share)
-        return len(shares) > 150 if share == 1.0 else share == 0.5
+        return len(shares) > 150 if share == 1.0 else share == 0.125
 
     fitted = fit(job, expired)
-    # All of it until there is a posterior, then half: the other half is the rival's.
-    assert shares[0] == 1.0 and shares.index(0.5) >= 2 * ADAPT
+    # All that is usual until there is a posterior, then half of it: what is left is the rival's.
+    assert job.usual == 0.25
+    assert shares[0] == 0.25 and shares.index(0.125) >= 2 * ADAPT
     assert not fitted.failure
     late = fit(job, lambda share: True)
     assert late.starved and late.failure
@@ -174,17 +175,17 @@ def test_nobody_else_has_the_time_that_a_turn_needs_beyond_the_usual():
         return replace(result, rivals=tuple(bad if job.due else one for job, one, bad in pairs))
 
     jobs = three(SETTINGS, in_vain)
-    first = [next(jobs) for _ in range(7)]
-    # The first window of a model has a second, and twice as much as the turn comes to nothing.
-    told = [(job.patience, job.usual, delayed(job).due, job.seconds) for job in first[2:]]
+    first = [next(jobs) for _ in range(6)]
+    told = [(job.seconds, job.usual, [one.due for one in job.rivals]) for job in first[2:]]
+    whole = 8.0 * SETTINGS.time_budget
     assert told == [
-        (1.0, 1.0, False, SETTINGS.time_budget),
-        (1.0, 1.0, True, FIRST),
-        (2.0, 0.5, True, 2.0 * FIRST),
-        (4.0, 0.25, True, 4.0 * FIRST),
-        (8.0, 0.125, True, 8.0 * FIRST),
+        (SETTINGS.time_budget, 1.0, [False, False]),
+        (whole, 0.125, [True, False]),
+        # It has had all there is: the other one has its turn, and this one waits.
+        (whole, 0.125, [False, True]),
+        (SETTINGS.time_budget, 1.0, [False, False]),
     ]
-    # Then the other one has its turn, and this one waits.
-    job = next(jobs)
-    assert not delayed(job).due and delayed(job).waited == 0
-    assert any(one.due for one in job.rivals)
+    assert delayed(first[4]).waited == 0
+    # A first posterior may take a second, however short a window's budget is.
+    short = replace(first[3], settings=replace(SETTINGS, time_budget=0.01, hop=0.01))
+    assert (short.seconds, short.usual) == (FIRST, 0.01)

@@ -3,6 +3,7 @@
 import math
 import pickle
 from dataclasses import replace
+from functools import partial
 from itertools import pairwise
 from types import SimpleNamespace
 
@@ -264,8 +265,9 @@ def hurried(seconds=6.0, budget=200):
     for item in stream(lost_motion(seconds)):
         give(estimator, item)
         while (job := estimator.next_job()) is not None:
-            steps = iter(range(10**9))
-            found.append(run(job, lambda share, steps=steps: next(steps) > share * budget))
+            steps, whole = iter(range(10**9)), budget / job.usual
+            spent = partial(lambda steps, whole, share: next(steps) > share * whole, steps, whole)
+            found.append(run(job, spent))
             assert not found[-1].failure
             estimator.finish(found[-1])
     return found
