@@ -48,6 +48,8 @@ def _of_one(rows: Sequence[Row], commit: str, cases: int) -> str:
         told += ' Only machines that hide no effect (`--hidden nothing`).'
     elif len(rows) == FEW:
         told += ' Each effect once (`--few`).'
+    elif 2 * sum(not row['effects'] for row in rows) > len(rows):
+        told += ' Machines that hide no effect were run more often (`--hidden nothing`).'
     return f'## Commit {commit}\n\n{told}\n\n{_required(rows)}\n{_streams(rows)}'
 
 

@@ -55,6 +55,9 @@ def test_what_was_measured_stands_beside_what_is_required():
     assert '| 90 % | 1 of 2 |' in told and '| all of 50 | 1 of 2 |' in told
     assert '| 15 s | 16 s of 2 |' in told and '| none | 1 of 4 |' in told
     assert told.count('\n## Commit') == 1
+    assert 'were run more often' not in told
+    healthy = [row(seed) for seed in range(10, 15)]
+    assert 'were run more often' in page([*rows, *healthy], 300)
     both = page([*rows, {k: v for k, v in row(5, commit='old').items() if k != 'worse'}], 300)
     assert both.count('\n## Commit') == 2 and '| none | 1 of 4 |' in both
 
