@@ -33,6 +33,9 @@ MSVC = ['-1.#IND00', '1.#QNAN', '1.#QNAN0', '1.#SNAN', '1.#INF', '-1.#INF00', '1
 OTHERS = ['nan(ind)', '-nan(ind)', 'nan(snan)', 'inf', '-Infinity', '#DIV/0!', '-', 'OL']
 
 
+BRACKETED = (('Command', 'mm'), ('Position', 'mm'), ('Load', 'N'))
+
+
 def table(
     path: Path, rows: list[list[str]], names: tuple[str, ...] = NAMES, by: str = ','
 ) -> Path:
@@ -270,3 +273,19 @@ def test_units_of_no_column_are_nobodys(tmp_path: Path) -> None:
     (tmp_path / 'a.txt').write_text('\n'.join(lines) + '\n')
     with pytest.raises(InputError, match='has no unit'):
         read(tmp_path / 'a.txt')
+
+
+@pytest.mark.parametrize(('by', 'inside'), [(',', '8800 (0,1):'), (';', 'axis 1;2, '), (',', '')])
+def test_a_delimiter_in_brackets_parts_no_names(tmp_path: Path, by: str, inside: str) -> None:
+    """Names of Instron's controllers, without quotes; by the map the units are theirs."""
+    names = ['Total Time (s)', *(f'{n}({inside}{n}) ({u})' for n, u in BRACKETED)]
+    path = table(tmp_path / 'a.csv', ROWS, tuple(names), by)
+    columns = look(path).columns
+    assert [column.name for column in columns] == names
+    assert [column.unit for column in columns] == ['s', 'mm', 'mm', 'N']
+    given = zip(
+        ('time', 'command', 'measured', 'force'), names, ('s', 'mm', 'mm', 'N'), strict=True
+    )
+    channels = parse_channel_map({r: {'column': n, 'unit': u} for r, n, u in given}, 'map')
+    record = read(path, channels=channels)
+    np.testing.assert_allclose(record.measured, [1e-3 * float(row[2]) for row in ROWS], rtol=1e-12)
