@@ -11,7 +11,17 @@ from markupsafe import Markup
 from matplotlib.figure import Figure
 
 from actuator_glue.errors import InputError
-from actuator_glue.report.html import Note, Page, Picture, Section, Table, Text, render, write
+from actuator_glue.report.html import (
+    Note,
+    Page,
+    Picture,
+    Section,
+    Table,
+    Text,
+    fragment,
+    render,
+    write,
+)
 
 
 class Checker(HTMLParser):
@@ -97,3 +107,31 @@ def test_a_phone_shows_the_page_in_its_width(tmp_path: Path) -> None:
         assert display == ('grid' if stacked and int(inner) <= 640 else 'table-cell')
         assert int(image) <= int(inner)
         assert stacked or int(image) >= 600
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason='no browser')
+def test_a_table_in_a_notebook_keeps_its_columns_apart(tmp_path: Path) -> None:
+    """Whatever the page around it says of tables; numbers stand at the right."""
+    look = '<style>td, th { padding: 0; text-align: left; }</style>'
+    asked = """<script>addEventListener('load', () => {
+      const cell = getComputedStyle(document.querySelector('td:last-child'));
+      document.title = [cell.textAlign, parseFloat(cell.paddingLeft)].join(' '); })</script>"""
+    table = fragment([Table(('number', 'median'), [('delay', '31.4')], 'T')])
+    path = tmp_path / 'page.html'
+    path.write_text(f'<!DOCTYPE html><html>{look}{table}{asked}</html>')
+    options = ['--headless=new', '--no-sandbox', '--disable-gpu', '--virtual-time-budget=2000']
+    dom = subprocess.run(
+        [
+            str(CHROMIUM),
+            *options,
+            f'--user-data-dir={tmp_path / "u"}',
+            '--dump-dom',
+            path.as_uri(),
+        ],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
+    ).stdout
+    side, room = re.findall(r'<title>(.*?)</title>', dom)[0].split()
+    assert side == 'right' and float(room) > 5.0
