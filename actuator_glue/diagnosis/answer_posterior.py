@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.diagnosis import companions, discrepancy, model_form, posterior, ridge
-from actuator_glue.diagnosis.alternatives import alternatives
 from actuator_glue.diagnosis.conclusion import Conclusion
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.held_out import COMPLETE
@@ -23,6 +22,7 @@ from actuator_glue.diagnosis.mixed_draws import MixedDraws, mixed
 from actuator_glue.diagnosis.posterior import Draws
 from actuator_glue.diagnosis.stages import Progress, Stage
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.ties import tied_structures
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.at_bound import Pressed, pressed
 from actuator_glue.inference.least_squares.each import Each
@@ -150,7 +150,7 @@ def sampled(
         after = Side(final.model, final.fit.theta, told.points)
     out = AnswerPosterior(
         result, before, after, told, told, MixedDraws.of(told.points, final.effects), final,
-        alternatives(result), rng,
+        tied_structures(search, found), rng,
     )  # fmt: skip
     if decision.verdict in COMPLETE and not result.effort.over:
         out = replace(out, larger=companions.with_companions(result.selection, final))

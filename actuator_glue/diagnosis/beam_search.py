@@ -9,12 +9,13 @@ from dataclasses import replace
 from actuator_glue.diagnosis import false_alarms, pairs, ranking
 from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.judge import Judge
-from actuator_glue.diagnosis.ranking import compare, removed, worth
+from actuator_glue.diagnosis.ranking import removed, worth
 from actuator_glue.diagnosis.search import Search, by_score
 from actuator_glue.diagnosis.search_step import SearchStep
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.stages import EFFECTS, Progress
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.ties import compare
 from actuator_glue.diagnosis.trial import Trial
 
 # Rounds in which members may be swapped for better or simpler ones.

@@ -16,11 +16,12 @@ import numpy as np
 
 from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.force import newtons_per_metre, with_forces
-from actuator_glue.diagnosis.ranking import compare, weights, worth
+from actuator_glue.diagnosis.ranking import weights, worth
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.ties import compare
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import Fit, fit, rms
@@ -36,7 +37,7 @@ class Ranked:
 
     Attributes:
         trials: best first.
-        rivals: names in the order of the trials, as `ranking.compare` gives them.
+        rivals: names in the order of the trials, as `ties.compare` gives them.
         errors: rms error of each name's force [N].
     """
 

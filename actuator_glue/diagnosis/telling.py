@@ -56,7 +56,7 @@ def told(
         verdict=both.verdict,
         effects=both.effects,
         error=both.error,
-        candidates=told_effects.candidates(found, result.seen),
+        candidates=told_effects.candidates(result.selection, found, result.seen),
         coverage=both.coverage,
         alarm=alarm_of(found, result.seen, both.decision, data, seed, settings.false_alarms, each),
         advice=(

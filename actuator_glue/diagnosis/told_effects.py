@@ -12,11 +12,12 @@ from actuator_glue.diagnosis.agreement import Homogeneity
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.finding import Candidate, Finding, Rival
 from actuator_glue.diagnosis.fitting_verdict import Decision
+from actuator_glue.diagnosis.judge import Judge
 from actuator_glue.diagnosis.learned import term as learned_term
 from actuator_glue.diagnosis.learned.forms import CAUSES
 from actuator_glue.diagnosis.measured.measurement import Measured
 from actuator_glue.diagnosis.one_record import OneRecord
-from actuator_glue.diagnosis.ranking import standard_error, weights
+from actuator_glue.diagnosis.ranking import standard_error
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.effects import CATALOGUE
@@ -129,20 +130,28 @@ def _excludes_neutral(sizes: Sequence[Estimate]) -> bool:
     return any(s.neutral is None or not s.lower <= s.neutral <= s.upper for s in how_much)
 
 
-def candidates(found: Selection, seen: tuple[Measured, ...]) -> tuple[Candidate, ...]:
-    """Return every effect tried at the first turn and those of the measurement, best first."""
-    base = found.base.scores
-    known = weights(np.stack([*(t.scores for t in found.singles), base]))
+def candidates(
+    judge: Judge, found: Selection, seen: tuple[Measured, ...]
+) -> tuple[Candidate, ...]:
+    """Return every effect tried at the first turn and those of the measurement, best first.
+
+    Args:
+        judge: weighs structures.
+        found: what the fitting part says.
+        seen: effects of the measurement.
+    """
+    base, singles = found.base, found.singles
+    best = min(singles, key=lambda t: judge.behind(t, base))
+    odds = judge.odds(base, best, singles)
     rows = [
         Candidate(
-            t.added, float((t.scores - base).sum()), t.fit.rms, float(w),
-            standard_error(t.scores - base),
+            t.added, float((t.scores - base.scores).sum()), t.fit.rms, share / sum(odds),
+            standard_error(t.scores - base.scores),
         )
-        for t, w in zip(found.singles, known, strict=False)
+        for t, share in zip(singles, odds, strict=False)
     ]  # fmt: skip
-    base_rms = found.base.fit.rms
     rows += [
-        Candidate(m.name, m.nats, float(np.sqrt(max(0.0, base_rms**2 - m.rms**2))), math.nan)
+        Candidate(m.name, m.nats, float(np.sqrt(max(0.0, base.fit.rms**2 - m.rms**2))), math.nan)
         for m in seen
     ]
     return tuple(sorted(rows, key=lambda c: c.error))

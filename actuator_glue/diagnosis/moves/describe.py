@@ -15,19 +15,21 @@ from functools import partial
 
 from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.conclusion import Conclusion
-from actuator_glue.diagnosis.learned.forms import forms
+from actuator_glue.diagnosis.learned.forms import CAUSES, forms
 from actuator_glue.diagnosis.learned.friction import DRY, FALLING, SHAPES
 from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.moves import names_beside_term
 from actuator_glue.diagnosis.moves.move import Asking
-from actuator_glue.diagnosis.ranking import MUCH, decisive, least_removed, removed
+from actuator_glue.diagnosis.ranking import removed
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
+from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
 
 Way = Callable[[BeamSearch, Selection], Selection | None]
 _LONG = 100_000  # samples
 _MOST = 2  # learned terms
+_MUCH = 0.5  # of what matters: a description in the place of a name removes so much
 _REFITS = 4  # per structure and turn
 # Another shape of the same cause removes so much of what matters; and more than means over samples
 # and the steps of a simulation leave, of the stroke.
@@ -128,8 +130,8 @@ def instead(selection: BeamSearch, found: Selection) -> Selection | None:
     best = max(whole, key=lambda trial: _merit(search, trial))
     least = math.log(len(names))
     if len(found.final.effects) == 1:
-        least = decisive(search, selection.settings)
-        much = least_removed(best.added, found.final.effects, selection.material)
+        least = _decisive(search, selection.settings)
+        much = _least_removed(best.added, found.final.effects, selection.material)
         if removed(found.final, best) < much:
             return None
     if _gain(search, best, found.final) <= least:
@@ -155,12 +157,12 @@ def reshaped(selection: BeamSearch, found: Selection) -> Selection | None:
     if not told:
         return None
     _offered(search)
-    least = decisive(search, selection.settings)
+    least = _decisive(search, selection.settings)
     selection.progress('learned term', 0.0)
     # In its place, or beside it: friction may fall with velocity, too.
     best = named
     in_place = [search.without(named, name) for name in told]
-    for starts, share in ((in_place, _SHAPED), ([named], MUCH)):
+    for starts, share in ((in_place, _SHAPED), ([named], _MUCH)):
         seen = max(share * selection.material, _STEPS * search.scale().stroke)
         below = best.mean_square - 0.5 * seen**2  # or nearly
         if found.left >= selection.material:
@@ -282,3 +284,17 @@ def _merit(search: Search, trial: Trial) -> float:
     if not search.scorer.likely:
         return -search.scorer.left_out_error(trial.fit)
     return float(trial.scores.sum()) - len(trial.fit.theta)
+
+
+def _decisive(search: Search, settings: Thresholds) -> float:
+    """Return by how many nats a description, one of many, must be better than a name."""
+    forms = sum(map(is_learned, search.entries.values()))
+    return settings.nats + math.log(max(forms, 1))
+
+
+def _least_removed(form: str, names: Sequence[str], material: float) -> float:
+    """Return what a description must remove in the place of names, which are more than it [m].
+
+    Half of what matters, or all of that where it is another shape of one of them.
+    """
+    return material if CAUSES.get(form) in names else _MUCH * material

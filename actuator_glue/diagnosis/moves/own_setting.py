@@ -12,15 +12,15 @@ from dataclasses import replace
 
 import numpy as np
 
+from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.conclusion import Conclusion
-from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.moves.move import Asking
 from actuator_glue.diagnosis.one_record import OneRecord
-from actuator_glue.diagnosis.ranking import removed, standard_error, weights
+from actuator_glue.diagnosis.ranking import removed
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
-from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.ties import compare
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import fit
@@ -29,14 +29,13 @@ from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
 
 SETTINGS = ('gain', 'bias', 'delay', 'clock-skew')
-_TIED = 4.0  # nats
 
 
 def own_setting(result: Conclusion, asking: Asking) -> Conclusion | None:
     """Return the answer with one record's own setting in it, where that explains the records."""
     asking.tell('one record', 0.0)
     limit, held = result.decision.limit, result.prepared.held.records
-    found = setting(result.selection.search, result.found, limit, held, asking.settings)
+    found = setting(result.selection, result.found, limit, held)
     return None if found is None else result.of(result.selection, found)
 
 
@@ -53,7 +52,7 @@ def _members(data: Data, held: Sequence[Record], index: int) -> tuple[Record, ..
 
 
 def setting(
-    search: Search, found: Selection, limit: float, held: Sequence[Record], settings: Thresholds
+    selection: BeamSearch, found: Selection, limit: float, held: Sequence[Record]
 ) -> Selection | None:
     """Ask whether one record's own setting explains what common sizes do not.
 
@@ -61,15 +60,15 @@ def setting(
     evidence of any addition, less a nat per parameter and the logarithm of how many were tried.
 
     Args:
-        search: the search that ended with `found`; its noise is taken anew from the answer.
+        selection: what ended with `found`; its noise is taken anew from the answer.
         found: what effects of common size explain.
         limit: structure above which records count as unexplained [m].
         held: held-out records, which share a setting through their stiffness.
-        settings: thresholds.
 
     Returns:
         The attribution with the setting added, or None.
     """
+    search, settings = selection.search, selection.settings
     data = search.data
     if len(data.records) < 2 or search.scorer is None:
         return None
@@ -94,7 +93,7 @@ def setting(
         gained = evidence(tried[0].scores, common.scores) - cost
         if gained < settings.nats:
             continue
-        return _attribution(search, found, start, tried, (left, noise))
+        return _attribution(selection, found, start, tried, (left, noise))
     return None
 
 
@@ -113,31 +112,26 @@ def _rescored(search: Search, trial: Trial) -> Trial:
 
 
 def _attribution(
-    search: Search,
+    selection: BeamSearch,
     found: Selection,
     start: Trial,
     tried: Sequence[Trial],
     parts: tuple[float, float],
 ) -> Selection:
     """What was found, with the best setting and its rivals in place of common sizes."""
-    best = tried[0]
-    known = weights(np.stack([t.scores for t in (*tried, start)]))
-    rivals = []
-    for trial, weight in zip(tried, known, strict=False):
-        if trial is best or trial.added != best.added:
-            nats = max(0.0, evidence(best.scores, trial.scores))
-            stderr = standard_error(best.scores - trial.scores)
-            tied = trial is not best and nats < _TIED
-            excess = removed(trial, best)
-            share = float(weight)
-            rivals.append(Rival(trial.added, nats, stderr, excess, tied, share))
+    search, best = selection.search, tried[0]
+    assert search.scorer is not None
+    nearest = {t.added: t for t in reversed(tried)}  # the record that each fits best
+    others = [t for name, t in nearest.items() if name != best.added]
+    odds = selection.odds(start, best, others)
+    rivals = compare(start, best, others, odds, search.scorer, selection.settings)
     gained = evidence(best.scores, start.scores)
     kept = {n: found.rivals[n] for n in start.effects}
     return replace(
         found,
         base=search.trial(()),
         final=best,
-        rivals=kept | {best.added: tuple(rivals)},
+        rivals=kept | {best.added: rivals},
         removed={n: found.removed[n] for n in start.effects} | {best.added: removed(start, best)},
         evidence={n: found.evidence[n] for n in start.effects} | {best.added: gained},
         left=parts[0],

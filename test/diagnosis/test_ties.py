@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from actuator_glue.diagnosis import alternatives, mixed_draws, posterior
+from actuator_glue.diagnosis import mixed_draws, posterior, ties
 from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.identifiable import Working
 from actuator_glue.inference.least_squares.space import Space
@@ -24,7 +24,7 @@ def rival(name: str, tied: bool, probability: float) -> Rival:
 
 
 def told(own: Any = None) -> Any:
-    """A conclusion: a sensor's lag, a delay tied with it, and play, which is certain."""
+    """A selection: a sensor's lag, a delay tied with it, and play, which is certain."""
     rows = {
         'sensor-lag': (
             rival('sensor-lag', True, 0.6),
@@ -34,17 +34,14 @@ def told(own: Any = None) -> Any:
         'backlash': (rival('backlash', True, 0.9),),
     }
     final = SimpleNamespace(effects=('backlash', 'sensor-lag'), own=own)
-    return SimpleNamespace(
-        decision=SimpleNamespace(final=final, names=final.effects),
-        found=SimpleNamespace(rivals=rows),
-        selection=SimpleNamespace(search=SimpleNamespace(known=lambda names: names)),
-    )
+    return SimpleNamespace(final=final, rivals=rows)
 
 
 def test_a_tied_name_has_its_odds() -> None:
     """A third of the weight against two; what is not tied has none, nor one record's setting."""
-    assert alternatives.alternatives(told()) == [(('backlash', 'delay'), pytest.approx(0.5))]
-    assert alternatives.alternatives(told(own='a record')) == []
+    search: Any = SimpleNamespace(known=lambda names: names)
+    assert ties.tied_structures(search, told()) == [(('backlash', 'delay'), pytest.approx(0.5))]
+    assert ties.tied_structures(search, told(own='a record')) == []
 
 
 def test_parameters_are_those_of_all_structures() -> None:
