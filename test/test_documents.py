@@ -27,6 +27,7 @@ FENCE = re.compile(r'^```(\S*)\n(.*?)^```', re.MULTILINE | re.DOTALL)
 LINK = re.compile(r'\]\(([^)\s]+)\)')
 
 WORDS = 2500  # of a page that somebody is to read
+KIND_WORDS = 1500  # of the one page for a kind of user
 # Pages of tables that a script writes, and why they are longer.
 LONGER = {'messages_reference.md': 'a table for each message, looked up by its name'}
 
@@ -111,6 +112,14 @@ def test_a_page_is_read_in_a_quarter_of_an_hour(page: Path) -> None:
     text = page.read_text('utf-8')
     assert (len(text.split()) > WORDS) == (page.name in LONGER), f'{page.name} is too long'
     assert page.name not in LONGER or '<!-- Everything below is written by scripts/' in text
+
+
+def test_each_kind_of_user_has_a_short_page() -> None:
+    """For whoever runs the actuator, the computers, or the numbers."""
+    kinds = {page.stem: len(page.read_text('utf-8').split()) for page in PAGES}
+    kinds = {stem: words for stem, words in kinds.items() if stem.startswith('for_')}
+    assert set(kinds) == {'for_test_engineers', 'for_ros_engineers', 'for_statisticians'}
+    assert max(kinds.values()) < KIND_WORDS
 
 
 @pytest.mark.parametrize('page', PAGES, ids=name)
