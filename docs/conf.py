@@ -19,6 +19,6 @@ myst_heading_anchors = 4
 suppress_warnings = ['myst.header', 'misc.highlighting_failure']
 # Every notebook runs in the build, from the folder of the checkout's example data.
 nb_execution_mode = 'force'
-nb_execution_timeout = 300
+nb_execution_timeout = 900  # s; the first one may have to compile
 nb_execution_raise_on_error = True
 nb_execution_show_tb = True
