@@ -289,3 +289,11 @@ def test_a_delimiter_in_brackets_parts_no_names(tmp_path: Path, by: str, inside:
     channels = parse_channel_map({r: {'column': n, 'unit': u} for r, n, u in given}, 'map')
     record = read(path, channels=channels)
     np.testing.assert_allclose(record.measured, [1e-3 * float(row[2]) for row in ROWS], rtol=1e-12)
+
+
+def test_a_delimiter_in_quotes_parts_no_name_either(tmp_path: Path) -> None:
+    """Four names above five entries are refused: the fourth is no two."""
+    rows = [[str(i), *row] for i, row in enumerate(ROWS)]
+    path = table(tmp_path / 'a.csv', rows, ('time_s', 'command_mm', 'measured_mm', '"force, N"'))
+    with pytest.raises(InputError, match='4 names, but 5 entries'):
+        read(path)

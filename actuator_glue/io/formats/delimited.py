@@ -212,7 +212,7 @@ def _names(line: str, delimiter: str | None, widths: set[int]) -> list[str]:
     # What numpy.savetxt is told to write behind its `#` need not be parted as its rows are.
     own = fields_of(line, next((d for d in DELIMITERS if d in line), None))
     names = own if len(own) in widths else names
-    if len(names) not in widths and delimiter is not None:
+    if len(names) > max(widths) and delimiter is not None and '"' not in line:
         # As in `Position(8800 (0,1):Position) (mm)`, without quotes.
         whole = re.split(re.escape(delimiter) + r'(?![^()\[\]]*[)\]])', line)
         names = [name.strip() for name in whole] if len(whole) in widths else names
