@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import product
+from itertools import chain, product
 from typing import Any
 
 import numpy as np
@@ -154,13 +154,26 @@ class Features:
             yield from self._kept
             return
         kept, room = list[tuple[int, str, NDArray[np.float32]]](), _KEPT
-        for i, name, feature in library(self.data, self.theta, plays=True):
+        common = library(self.data, self.theta, plays=True)
+        for i, name, feature in chain(common, self._settings()):
             room -= feature.size
             if room >= 0:
                 kept.append((i, name, feature.astype(np.float32)))
             yield i, name, feature
         if room >= 0:
             self._kept = kept
+
+    def _settings(self) -> Iterator[tuple[int, str, Array]]:
+        """Yield motion and velocity of each of several records under one stiffness.
+
+        A gain or a delay of one record alone is no response that they share.
+        """
+        kinds, data = self.past.kinds, self.data
+        for i, (motion, mask) in enumerate(zip(self.past.motions, data.masks, strict=True)):
+            if kinds.count(kinds[i]) > 1:
+                yield i, f'gain of record {i + 1}', motion[mask]
+                velocity = np.gradient(motion, data.periods[i])
+                yield i, f'delay of record {i + 1}', velocity[mask]
 
     def products(self, scorer: Scorer, fit: Fit) -> Array:
         """Products of all rows with each other in each fold, whitened, (_FOLDS, r, r).
@@ -196,7 +209,7 @@ class Features:
         self._white, data, past = None, self.data, self.past
         table: dict[str, NDArray[np.float32]] = {}
         for i, name, feature in self.library():
-            row = table.setdefault(name, np.empty(data.target.size, dtype=np.float32))
+            row = table.setdefault(name, np.zeros(data.target.size, dtype=np.float32))
             row[data.parts[i]] = whiten(feature.astype(np.float64), scorer.taps[i])
         rows, first = list(table.values()), len(table)
         size = first + past.count * len(past.lags)
