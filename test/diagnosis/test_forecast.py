@@ -12,6 +12,7 @@ from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.inference.least_squares.data import Data
+from actuator_glue.model import commands
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
 
@@ -20,21 +21,17 @@ THETA = [133.65, 1.1005e9, 2.4927e5, 1.0]
 
 
 def selected(
-    effects: tuple[str, ...],
-    sizes: list[float],
-    rng: np.random.Generator,
-    fading: float = 0.0,
-    gains: tuple[float, float] = (1.0, 1.0),
+    effects: tuple[str, ...], sizes: list[float], rng: np.random.Generator, fading: float = 0.0
 ) -> BeamSearch:
     """Eq. (2) fitted to two random commands of 30 s, 0.1 to 9 Hz, that may fade (1/s)."""
     n, records = int(30 * RATE), []
-    for gain in gains:
+    for _ in range(2):
         sos = signal.butter(3, [0.1, 9.0], 'bandpass', fs=RATE, output='sos')
         u = signal.sosfilt(sos, rng.standard_normal(n)) * np.minimum(1.0, np.arange(n) / 256)
         u *= np.exp(-fading * np.arange(n) / RATE)
         u *= 2e-3 / np.abs(u).max()
         still = Record(u, u, 1 / RATE, 250e3)
-        y = gain * Structure(effects).simulate([*THETA, *sizes], still).reshape(-1)
+        y = Structure(effects).simulate([*THETA, *sizes], still).reshape(-1)
         records.append(replace(still, measured=y + NOISE * rng.standard_normal(n)))
     search = Search(Data.whole(records), ('delay',))
     found = BeamSearch(search, Thresholds(), lambda stage, share: None)
@@ -64,12 +61,22 @@ def test_what_has_a_memory_is_no_noise(
 
 
 def test_the_gain_of_one_record_is_no_noise(rng_seed: int) -> None:
-    """Of two records under one stiffness: one is 8 % larger, which no response of both explains.
+    """Of two records under one stiffness one is 8 % larger: no response of both explains that.
 
-    It was noise of 21 um, and the model was enough.
+    Without features of each record noise was told as 15.6 to 16.8 um (five seeds).
     """
-    found = selected((), [], np.random.default_rng(rng_seed), gains=(1.0, 1.08))
-    assert found.noise == pytest.approx(NOISE, rel=0.1)
+    records = []
+    for i, (stiffness, gain) in enumerate(((0.0, 1.0), (250e3, 1.08), (250e3, 1.0))):
+        u = commands.noise(256.0, 10.0, 0.2, 8.0, seed=3 * rng_seed + i)
+        still = Record(u := u * 2e-3 / np.abs(u).max(), u, 1 / 256, stiffness)
+        y = Structure(()).simulate(THETA, replace(still, command=gain * u)).reshape(-1)
+        noise = NOISE * np.random.default_rng((rng_seed, i)).standard_normal(len(u))
+        records.append(replace(still, measured=y + noise))
+    found = BeamSearch(
+        Search(Data.whole(records), ('delay',)), Thresholds(), lambda stage, share: None
+    )
+    found.renoise()
+    assert found.noise == pytest.approx(NOISE, rel=0.2)
     assert found.first > found.material
 
 
