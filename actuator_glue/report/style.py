@@ -9,12 +9,13 @@ import re
 from collections.abc import Callable
 from functools import wraps
 from pathlib import Path
-from typing import ParamSpec, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 import matplotlib.style
 import numpy as np
 from matplotlib.axis import Axis
 from matplotlib.backend_bases import RendererBase
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
@@ -170,11 +171,12 @@ def narrowed(figure: Figure) -> bool:
     for legend in [*figure.legends]:
         marks = [mark for mark in legend.legend_handles if mark is not None]
         names = [text.get_text() for text in legend.get_texts()]
+        canvas: Any = FigureCanvasAgg(figure)
+        renderer = canvas.get_renderer()
         for count in (3, 2, 1):  # as many columns as there is room for
             legend.remove()
             legend = figure.legend(marks, names, loc='outside lower center', ncols=count)
-            figure.draw_without_rendering()
-            if legend.get_window_extent().width <= figure.bbox.width:
+            if legend.get_window_extent(renderer).width <= figure.bbox.width:
                 break
     return True
 
@@ -203,9 +205,12 @@ def save(figure: Figure, path: Path) -> Path:
 @styled
 def png(figure: Figure) -> bytes:
     """Return a figure as a PNG image."""
-    buffer = io.BytesIO()
+    buffer, shown = io.BytesIO(), figure.dpi
+    figure.set_dpi(float(matplotlib.rcParams['savefig.dpi']))
     _speak(figure)
-    figure.savefig(buffer, format='png')
+    canvas: Any = FigureCanvasAgg(figure)
+    canvas.print_png(buffer)  # `savefig` would draw it twice
+    figure.set_dpi(shown)
     return buffer.getvalue()
 
 
