@@ -15,7 +15,7 @@ from actuator_glue.hybrid.indicators import TargetMotion
 from actuator_glue.hybrid.stability import tracking
 from actuator_glue.hygiene.clean import clean, common_initial, initial_state
 from actuator_glue.hygiene.despike import despiked
-from actuator_glue.inference.least_squares.data import LANES, SETTLE, chunks
+from actuator_glue.inference.least_squares.data import SETTLE, chunks
 from actuator_glue.model.effects import Scale, scale
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
@@ -160,7 +160,7 @@ def record_tracking(
     if np.ptp(counted.command) > 0.0:
         target = TargetMotion(counted.command, record.period)
         # All at once a long test takes gigabytes.
-        for part in chunks(len(some), len(record), LANES):
+        for part in chunks(len(some), len(record)):
             moved = structure.simulate(some[part], record, initial=initial, origin=origin)
             finite = np.isfinite(moved[:, settle:]).all(axis=1)
             drawn += [_numbers(counted, target, x) for x in moved[finite, settle:]]

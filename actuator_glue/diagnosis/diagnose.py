@@ -60,9 +60,10 @@ def diagnose(
     if settings.use_force:
         check_forces(records)
     ready = prepare(records, held, known)
-    given = base_fit(wrong_setup.stretched(ready.fit))
+    some = wrong_setup.stretched(ready.fit)
+    given = base_fit(some)
     if first_look is not None:
-        first_look(FirstLook.of(wrong_setup.stretched(ready.fit), given, settings))
+        first_look(FirstLook.of(some, given, settings))
     other = wrong_setup.find(ready.fit, settings, given=given)
     # What a wrong set-up leaves is nothing that the actuator does.
     search = as_given if other is not None and other.enough else conclude

@@ -15,7 +15,7 @@ import numpy as np
 from actuator_glue.diagnosis.discrepancy import Discrepancy, ScaleMixture
 from actuator_glue.diagnosis.identifiable import Straight, Working, derivatives
 from actuator_glue.diagnosis.score import Scorer
-from actuator_glue.inference.least_squares.data import LANES, Data, chunks
+from actuator_glue.inference.least_squares.data import Data, chunks
 from actuator_glue.inference.least_squares.each import Each
 from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.inference.least_squares.fit import fit as fit_to
@@ -122,7 +122,7 @@ class Likelihood:
         It is uniform in the logarithms otherwise.
         """
         data = self.scorer.data
-        parts = chunks(len(theta), data.target.size, LANES)  # which the kernels take at once
+        parts = chunks(len(theta), data.target.size)
         found = np.concatenate(list(self.each(self._of_some, [theta[some] for some in parts])))
         return found if data.prior is None else found + data.prior.log_density(theta)
 

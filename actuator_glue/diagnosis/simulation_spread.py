@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy
 
-from actuator_glue.inference.least_squares.data import LANES, Data, chunks
+from actuator_glue.inference.least_squares.data import Data, chunks
 from actuator_glue.inference.least_squares.fit import rms
 from actuator_glue.inference.least_squares.free_run import Model
 from actuator_glue.records import Array
@@ -41,7 +41,7 @@ def spread(
     every = max(1, len(rows) * centre.size // _KEPT)
     count, total, squares = 0, np.zeros_like(centre), np.zeros_like(centre)
     kept: list[Array] = []
-    for some in chunks(len(rows), data.target.size, LANES):
+    for some in chunks(len(rows), data.target.size):
         off = data.simulate(model, draws[rows[some]]) - centre
         off = off[np.isfinite(off).all(axis=1)]
         count += len(off)

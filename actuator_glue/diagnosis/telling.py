@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -15,9 +15,11 @@ from actuator_glue.diagnosis.held_out import COMPLETE
 from actuator_glue.diagnosis.held_out_look import traces
 from actuator_glue.diagnosis.learned import term as learned_term
 from actuator_glue.diagnosis.next_experiment import Experiment, ranked
+from actuator_glue.diagnosis.preparation import Prepared
 from actuator_glue.diagnosis.response import Response
 from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.hygiene import rest
 from actuator_glue.hygiene.clean import rest_samples
 from actuator_glue.inference.least_squares.each import Each
@@ -52,6 +54,9 @@ def told(
     final = both.decision.final
     pressed = drawn.pressed()
     experiments = _experiments(drawn)
+    learned = learned_term.described(final, data, sizes)
+    contradicted = advice.contradicted(both.error, found.material)
+    still = _at_rest(drawn)
     return DiagnosisData(
         verdict=both.verdict,
         effects=both.effects,
@@ -64,20 +69,20 @@ def told(
             *advice.at_bound(pressed, sizes),
             *([result.onset.sentence()] if result.onset else []),
             *advice.ended(result.effort),
-            *(term.sentence() for term in learned_term.described(final, data, sizes)),
+            *(term.sentence() for term in learned),
             *advice.of(both.decision, found, result.generic, both.stretches, experiments),
-            *advice.contradicted(both.error, found.material),
+            *contradicted,
             *advice.zeros(both.error, found.material),
-            *_beside(drawn, both),
+            *_beside(drawn, final, bool(contradicted)),
             *advice.unidentified(data, sizes),
             *advice.unconverged(float(np.fmax(drawn.alone.rhat, drawn.told.rhat))),
-            *rest.compared(data.records, _at_rest(drawn), both.decision.noise),
+            *rest.compared(data.records, still, both.decision.noise),
             *([prior.remark()] if prior else []),
             *prepared.told,
         ),
         base={p.name: sizes[p.name] for p in BASE},
         structure=final.effects,
-        learned=learned_term.described(final, data, sizes),
+        learned=learned,
         base_before={n: e for n, e in both.estimates_before.items() if n in sizes},
         responses=_responses(drawn),
         experiments=experiments,
@@ -105,15 +110,19 @@ def told(
         at_bound=pressed,
         effort=result.effort.share,
         preparation=tuple(prepared.told),
-        sampling=tuple(_sampling(drawn)),
+        sampling=tuple(_sampling(prepared, still)),
     )
 
 
-def _beside(drawn: AnswerPosterior, both: BothParts) -> tuple[str, ...]:
-    """Say what may be there beside what is told: too small to matter, or held-out records'."""
-    result, final = drawn.result, both.decision.final
-    missed = bool(advice.contradicted(both.error, result.found.material))
-    held = result.prepared.held
+def _beside(drawn: AnswerPosterior, final: Trial, missed: bool) -> tuple[str, ...]:
+    """Say what may be there beside what is told: too small to matter, or held-out records'.
+
+    Args:
+        drawn: the answer of the fitting part and its posterior.
+        final: the structure that is told.
+        missed: whether the held-out part shows more than noise.
+    """
+    result, held = drawn.result, drawn.result.prepared.held
     said = companions.sentences(final, drawn.larger, held, missed)
     if said or not missed or result.decision.verdict not in COMPLETE or result.effort.over:
         return said
@@ -147,10 +156,9 @@ def _at_rest(drawn: AnswerPosterior) -> list[float | None]:
     ]
 
 
-def _sampling(drawn: AnswerPosterior) -> Iterator[Json]:
-    """Yield what each record was as recorded, and as fitted."""
-    prepared = drawn.result.prepared
-    rows = (prepared.fit.records, prepared.fit.recorded, prepared.impulses, _at_rest(drawn))
+def _sampling(prepared: Prepared, still: Sequence[float | None]) -> Iterator[Json]:
+    """Yield what each record was as recorded, and as fitted; its noise at rest is `still` [m]."""
+    rows = (prepared.fit.records, prepared.fit.recorded, prepared.impulses, still)
     for record, whole, impulses, noise in zip(*rows, strict=True):
         yield {
             'source': record.source,

@@ -143,9 +143,10 @@ def candidates(
     base, singles = found.base, found.singles
     best = min(singles, key=lambda t: judge.behind(t, base))
     odds = judge.odds(base, best, singles)
+    total = sum(odds)
     rows = [
         Candidate(
-            t.added, float((t.scores - base.scores).sum()), t.fit.rms, share / sum(odds),
+            t.added, float((t.scores - base.scores).sum()), t.fit.rms, share / total,
             standard_error(t.scores - base.scores),
         )
         for t, share in zip(singles, odds, strict=False)

@@ -77,6 +77,25 @@ MEASURE = """<script>addEventListener('load', () => { document.title = [
   document.querySelector('img').clientWidth].join(' '); })</script></html>"""
 
 
+def title_of(path: Path, window: int) -> str:
+    """The title that a page gives itself, in a window so wide [px]."""
+    dom = subprocess.run(
+        [
+            str(CHROMIUM),
+            *['--headless=new', '--no-sandbox', '--disable-gpu', '--virtual-time-budget=2000'],
+            f'--user-data-dir={path.with_name(str(window))}',
+            f'--window-size={window},900',
+            '--dump-dom',
+            path.as_uri(),
+        ],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=60,
+    ).stdout
+    return str(re.findall(r'<title>(.*?)</title>', dom)[0])
+
+
 @pytest.mark.skipif(CHROMIUM is None, reason='no browser')
 def test_a_phone_shows_the_page_in_its_width(tmp_path: Path) -> None:
     """Long names break, wide tables scroll alone, pictures fit, rows of text are stacked."""
@@ -86,23 +105,8 @@ def test_a_phone_shows_the_page_in_its_width(tmp_path: Path) -> None:
     page = Page('T' * 60, 'a_long_name' * 9, [Section('S', [prose, picture, wide])])
     path = tmp_path / 'page.html'
     path.write_text(render(page).replace('</html>', MEASURE))
-    options = ['--headless=new', '--no-sandbox', '--disable-gpu', '--virtual-time-budget=2000']
     for window, stacked in ((390, True), (1200, False)):
-        dom = subprocess.run(
-            [
-                str(CHROMIUM),
-                *options,
-                f'--user-data-dir={tmp_path / str(window)}',
-                f'--window-size={window},900',
-                '--dump-dom',
-                path.as_uri(),
-            ],
-            capture_output=True,
-            text=True,
-            check=True,
-            timeout=60,
-        ).stdout
-        inner, width, display, image = re.findall(r'<title>(.*?)</title>', dom)[0].split()
+        inner, width, display, image = title_of(path, window).split()
         assert int(width) <= int(inner)
         assert display == ('grid' if stacked and int(inner) <= 640 else 'table-cell')
         assert int(image) <= int(inner)
@@ -119,19 +123,5 @@ def test_a_table_in_a_notebook_keeps_its_columns_apart(tmp_path: Path) -> None:
     table = fragment([Table(('number', 'median'), [('delay', '31.4')], 'T')])
     path = tmp_path / 'page.html'
     path.write_text(f'<!DOCTYPE html><html>{look}{table}{asked}</html>')
-    options = ['--headless=new', '--no-sandbox', '--disable-gpu', '--virtual-time-budget=2000']
-    dom = subprocess.run(
-        [
-            str(CHROMIUM),
-            *options,
-            f'--user-data-dir={tmp_path / "u"}',
-            '--dump-dom',
-            path.as_uri(),
-        ],
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=60,
-    ).stdout
-    side, room = re.findall(r'<title>(.*?)</title>', dom)[0].split()
+    side, room = title_of(path, 1200).split()
     assert side == 'right' and float(room) > 5.0

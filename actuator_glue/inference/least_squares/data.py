@@ -29,12 +29,11 @@ _BLOCK = 1 << 21
 LANES = 32  # of the kernels, which take as long for fewer
 # A record that is simulated finer has so many times its samples at most, and so many in all.
 _FINER, _LONGEST = 8, 600_000
-_ROWS = LANES // 2  # two threads share the draws of one step
 
 
-def chunks(rows: int, columns: int, least: int = _ROWS) -> Iterator[slice]:
-    """Yield slices of rows, of so few that their columns stay within a block, or of `least`."""
-    size = max(1, _BLOCK // max(columns, 1) // least) * least
+def chunks(rows: int, columns: int) -> Iterator[slice]:
+    """Yield slices of rows, of so few that their columns stay within a block, or of `LANES`."""
+    size = max(1, _BLOCK // max(columns, 1) // LANES) * LANES
     for begin in range(0, rows, size):
         yield slice(begin, begin + size)
 
@@ -201,7 +200,7 @@ class Data:
         i = same[0]
         record, count = self._runs_as(model, i)
         initial, origin = self.initials[i], self.origins[i]
-        for some in chunks(len(table), len(record), LANES):
+        for some in chunks(len(table), len(record)):
             part = out[some]
             for which, at, y in parts(model, table[some], record, initial, origin, count):
                 for j in same:
