@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
+from functools import partial
 
 from actuator_glue.diagnosis import false_alarms, pairs, ranking
 from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.judge import Judge
 from actuator_glue.diagnosis.ranking import removed, worth
-from actuator_glue.diagnosis.search import Search, by_score
+from actuator_glue.diagnosis.search import Asked, Search, by_score
 from actuator_glue.diagnosis.search_step import SearchStep
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.stages import EFFECTS, Progress
@@ -39,12 +40,16 @@ class BeamSearch(Judge):
 
     def extend(self, beam: Sequence[Trial], stage: int) -> list[Trial]:
         """Refit every structure of the beam with its most promising further effects."""
+        label = EFFECTS[min(stage, len(EFFECTS)) - 1]
+        self.progress(label, 0.0)
+        asked = [
+            Asked(current, tuple(self.search.screened(current, names)[: self.settings.tried]))
+            for current in beam
+            for names in [self.search.others(current)]
+        ]
         found: dict[tuple[str, ...], Trial] = {}
-        for i, current in enumerate(beam):
-            self.progress(EFFECTS[min(stage, len(EFFECTS)) - 1], i / len(beam))
-            names = self.search.others(current)
-            tried = self.search.screened(current, names)[: self.settings.tried]
-            for trial in self.search.additions(current, tried, valves=False):
+        for row in self.search.additions_to(asked, partial(self.progress, label), valves=False):
+            for trial in row:
                 found.setdefault(trial.effects, trial)
         return sorted(found.values(), key=by_score)
 
@@ -150,8 +155,7 @@ class BeamSearch(Judge):
 
     def pruned(self, current: Trial) -> Trial:
         """Remove members that are not worth their parameters."""
-        for name in current.effects if len(current.effects) > 1 else ():
-            rest = self.search.without(current, name)
+        for rest in self.search.without_each(current) if len(current.effects) > 1 else ():
             if not self.better(current, rest, self.least(current, rest)):
                 return self.pruned(rest)
         return current
@@ -166,9 +170,9 @@ class BeamSearch(Judge):
             rivals: dict[str, tuple[Rival, ...]] = {}
             best, complete = current, self.left(current) < self.material
             most = self.settings.tried if complete else _OPEN_TRIED
-            for name in current.effects:
-                rest = self.search.without(current, name)
-                trials = self._in_place(current, rest, name, most, complete)
+            rests = self.search.without_each(current)
+            in_place = self._in_place(current, rests, most, complete)
+            for name, rest, trials in zip(current.effects, rests, in_place, strict=True):
                 rivals[name] = self._rivals(rest, current, name, trials)
                 for trial in trials:
                     if self.behind(trial, best) < 0.0 and pairs.both_worth(self, trial):
@@ -182,15 +186,28 @@ class BeamSearch(Judge):
         return current, rivals
 
     def _in_place(
-        self, current: Trial, rest: Trial, name: str, most: int, complete: bool
-    ) -> list[Trial]:
-        """Refit with what promises most in the place of a member: one effect, or two."""
-        names = self.search.others(current)
-        if len(current.effects) > 1:
-            names = self.search.screened(rest, names)[:most]
-        below = ranking.left_by_rivals(rest, current)
-        trials = self.search.additions(rest, names, below=below)
-        return [*trials, *pairs.rivals(self.search, name, trials, most, below, complete)]
+        self, current: Trial, rests: Sequence[Trial], most: int, complete: bool
+    ) -> list[list[Trial]]:
+        """Refit with what promises most in the place of each member: one effect, or two.
+
+        Args:
+            current: the structure.
+            rests: the structure without each of its members.
+            most: effects tried in the place of one of several members.
+            complete: whether nothing material is left.
+        """
+        search, asked = self.search, []
+        for rest in rests:
+            names = search.others(current)
+            if len(current.effects) > 1:
+                names = search.screened(rest, names)[:most]
+            below = ranking.left_by_rivals(rest, current)
+            asked.append(Asked(rest, tuple(names), below))
+        singles = search.additions_to(asked)
+        return [
+            [*trials, *pairs.rivals(search, name, trials, most, a.below, complete)]
+            for name, trials, a in zip(current.effects, singles, asked, strict=True)
+        ]
 
     def _rivals(
         self, rest: Trial, best: Trial, name: str, trials: Sequence[Trial]

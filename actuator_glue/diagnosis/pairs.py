@@ -60,7 +60,9 @@ def both_worth(judge: Judge, pair: Trial) -> bool:
     names = pair.added.split(BESIDE)
     if len(names) == 1:
         return True
-    return all(judge.better(pair, judge.search.without(pair, n), 0.0) for n in names)
+    search = judge.search
+    rests = list(search.each(lambda name: search.without(pair, name), names))
+    return all(judge.better(pair, rest, 0.0) for rest in rests)
 
 
 def screened(

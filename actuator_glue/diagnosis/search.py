@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Sequence
 from copy import copy
 from dataclasses import dataclass, field, fields, replace
@@ -39,6 +40,34 @@ _LONG = 5.0  # times its stretches: there they tell which minimum is the lowest
 def by_score(trial: Trial) -> float:
     """Sort the best out-of-sample score first."""
     return -float(trial.scores.sum())
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What a structure is refitted with.
+
+    Attributes:
+        current: the structure.
+        names: of further effects, one at a time.
+        below: mean squared error that one leaves whose refit is worth finishing [m^2].
+    """
+
+    current: Trial
+    names: tuple[str, ...]
+    below: float = np.inf
+
+
+def _worth_finishing(row: Sequence[Trial], below: float) -> list[Trial]:
+    """Return those near the best of some trials, best first, and what leaves less by far.
+
+    Short of its optimum a fit has a bad score, but is not worth the last digits where another is
+    far better.
+    """
+    error = row[0].mean_square if row else 0.0
+    tried = [t for i, t in enumerate(row[:_POLISHED]) if i < 2 or t.mean_square < 1.5 * error]
+    least = sorted(row[_POLISHED:], key=lambda t: t.mean_square)[:2]
+    tried += [t for t in least if 1.5 * t.mean_square < error]
+    return [t for t in tried if t.mean_square < below]
 
 
 @dataclass
@@ -254,22 +283,34 @@ class Search:
         Those near the best are finished, from a slower and a quicker valve too if need be, where
         they leave a mean squared error `below` what matters [m^2].
         """
-        wanted = [n for n in (names or self.names) if n not in current.effects]
+        asked = Asked(current, tuple(names or self.names), below)
+        return self.additions_to([asked], progress, valves=valves)[0]
 
-        out: list[Trial] = []
-        for trial in self.each(lambda n: self.add(current, n), wanted):
-            out.append(trial)
-            progress(len(out) / len(wanted))
-        out.sort(key=by_score)
-        # Only what is near the best is worth the last digits, or what leaves less by far: short of
-        # its optimum a fit has a bad score.
-        error = out[0].mean_square if out else 0.0
-        tried = [t for i, t in enumerate(out[:_POLISHED]) if i < 2 or t.mean_square < 1.5 * error]
-        least = sorted(out[_POLISHED:], key=lambda t: t.mean_square)[:2]
-        tried += [t for t in least if 1.5 * t.mean_square < error]
-        tried = [t for t in tried if t.mean_square < below]
-        rest = [t for t in out if all(t is not other for other in tried)]
-        return sorted([*self.each(lambda t: self.polish(t, valves), tried), *rest], key=by_score)
+    def additions_to(
+        self,
+        asked: Sequence[Asked],
+        progress: Callable[[float], None] = lambda share: None,
+        *,
+        valves: bool = True,
+    ) -> list[list[Trial]]:
+        """Refit several structures as `additions` does, all of their refits at the same time."""
+        wanted = [[(a.current, n) for n in a.names if n not in a.current.effects] for a in asked]
+        # Two structures may lead to the same one: it is refitted from the first.
+        first: dict[frozenset[str], tuple[Trial, str]] = {}
+        for current, name in itertools.chain(*wanted):
+            first.setdefault(frozenset((*current.effects, name)), (current, name))
+        for i, _ in enumerate(self.each(lambda pair: self.add(*pair), first.values())):
+            progress((i + 1) / len(first))
+        rows = [sorted((self.add(*pair) for pair in row), key=by_score) for row in wanted]
+        worth = [_worth_finishing(row, a.below) for row, a in zip(rows, asked, strict=True)]
+        last = {frozenset(t.effects): t for t in itertools.chain(*worth)}
+        for _ in self.each(lambda trial: self.polish(trial, valves), last.values()):
+            pass
+        for trial in itertools.chain(*worth):
+            self.polish(trial, valves)
+        return [
+            sorted((self.trial(t.effects, t.added) for t in row), key=by_score) for row in rows
+        ]
 
     def screened(self, current: Trial, names: Iterable[str], *, beside: bool = False) -> list[str]:
         """Sort effects by what their signatures could remove from the present residual.
@@ -279,6 +320,10 @@ class Search:
         wanted = list(names)
         shares = list(self.each(lambda n: self.screen(current, n, beside=beside)[0], wanted))
         return [wanted[i] for i in np.argsort(-np.array(shares), kind='stable')]
+
+    def without_each(self, current: Trial) -> list[Trial]:
+        """Refit a structure with each of its effects taken away, in their order, as `without`."""
+        return list(self.each(lambda name: self.without(current, name), current.effects))
 
     def without(self, current: Trial, name: str) -> Trial:
         """Refit a structure with one effect taken away, from where the larger one stands.

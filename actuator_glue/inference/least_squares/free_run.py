@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.inference.least_squares.decimate import window
+from actuator_glue.jit import njit
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.model.structure import Structure
@@ -80,8 +81,16 @@ def _decimated(run: Iterator[Part], count: int, samples: int) -> Iterator[Part]:
         piece = np.concatenate([kept, y, last])
         n = max(0, (len(piece) - len(taps)) // count + 1)
         out = np.zeros((n, piece.shape[1]))
-        with np.errstate(all='ignore'):  # absurd parameters diverge
-            for i, tap in enumerate(taps[:, np.newaxis]):
-                out += tap * piece[i : i + n * count : count]
+        _add_filtered(piece, taps, count, out)
         yield which, first, out
         kept, first = piece[n * count :], first + n
+
+
+@njit(nogil=True)
+def _add_filtered(values: Array, taps: Array, count: int, out: Array) -> None:
+    """Add to each row of `out` (n, c) the taps' sum over `values` from every `count`-th row on."""
+    for i in range(out.shape[0]):
+        for k in range(len(taps)):
+            tap, row = taps[k], i * count + k
+            for n in range(out.shape[1]):
+                out[i, n] += tap * values[row, n]
