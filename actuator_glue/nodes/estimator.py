@@ -16,7 +16,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.io.calendar_time import calendar_time
 from actuator_glue.nodes import configuration, own_effects, spin, topics
-from actuator_glue.nodes.estimator_worker import compute, warm_up
+from actuator_glue.nodes.estimator_worker import compute, compute_beside, warm_up
 from actuator_glue.nodes.health import ERROR, Rate
 from actuator_glue.nodes.latched import Newest
 from actuator_glue.nodes.messages import publish
@@ -49,10 +49,12 @@ from actuator_glue.online.trust import (
 )
 from actuator_glue.online.windows import WrongRate
 from actuator_glue.setups import from_message
-from actuator_glue.workers.worker import DIED, DONE, FAILED, PROGRESS, Answer
+from actuator_glue.workers.worker import DIED, DONE, FAILED, PROGRESS, Answer, Worker
 
 # Windows of which most have to converge.
 JUDGED = 10
+# What is sampled beside the likeliest structure may wait.
+NICE = 10
 
 
 class EstimatorNode(WorkingNode):
@@ -74,6 +76,7 @@ class EstimatorNode(WorkingNode):
         self.settings = configuration.settings(values)
         self._carried = configuration.carried(values)
         self.employ(warm_up)
+        self._beside: Worker | None = None
         self._out = {topic: self.publisher(topic) for topic in topics.ESTIMATED}
         self._frequencies = tuple(values['tracking_frequencies'])
         service = self.create_service(SetModel, '~/set_model', self._set_model)
@@ -109,6 +112,9 @@ class EstimatorNode(WorkingNode):
         """Give up the running window."""
         if self.estimator.running is not None and not self.finished:
             self.give_up()
+        if self._beside is not None:
+            self.dismiss(self._beside)
+            self._beside = None
 
     def clock_jumped(self) -> None:
         """Nothing depends on the node's clock: windows follow the stamps of the samples."""
@@ -218,6 +224,7 @@ class EstimatorNode(WorkingNode):
     def _finish(self, result: WindowResult, seconds: float) -> None:
         events = self.estimator.finish(result)
         self._tell(events)
+        self._sample_beside()
         if result.failure:
             return
         self.contradiction.take(result, [e for e in events if isinstance(e, Contradicted)])
@@ -241,6 +248,28 @@ class EstimatorNode(WorkingNode):
                 f'window {result.window.number} took {latency:.3f} s from its last sample, '
                 f'budget {self.settings.time_budget:g} s',
             )
+
+    def _sample_beside(self) -> None:
+        """Have another structure sampled by a process that no window waits for."""
+        job = self.estimator.rival_job()
+        if job is None:
+            return
+        if self._beside is None:
+            # Only who carries several structures has one.
+            self._beside = self.colleague(self._sampled_beside, nice=NICE)
+        self._beside.submit(compute_beside, job)
+
+    def _sampled_beside(self, answer: Answer) -> None:
+        """Take what another structure's window gave."""
+        if not self.active or self._beside is None:
+            return
+        if answer.kind == DONE:
+            self.estimator.finish_rival(answer.payload)
+            return
+        if answer.kind == FAILED:
+            self.complain('internal error', str(answer.payload), ERROR)
+        self.estimator.abandon_rival()
+        self._sample_beside()
 
     def _announce(self, job: Job | None) -> None:
         """Publish what windows are estimated with, once per change."""

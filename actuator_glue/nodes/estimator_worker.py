@@ -9,8 +9,8 @@ from collections import deque
 from typing import NamedTuple
 
 from actuator_glue.api.tracking import FREQUENCIES, RecordTracking, window_tracking
-from actuator_glue.online.job import WindowResult, run
-from actuator_glue.online.sampling import Job
+from actuator_glue.online.job import WindowResult, renew, run
+from actuator_glue.online.sampling import Job, WindowFit
 from actuator_glue.workers.warm import warm_prior, warm_windows
 from actuator_glue.workers.worker import Tell
 
@@ -80,13 +80,13 @@ def compute(
     delay and amplitude at the frequencies [Hz], come afterwards where the deadline leaves time for
     them; None where not, or without a posterior.
     """
-    began = last = time.monotonic()
+    last = time.monotonic()
     end = deadline - 1.3 * _REPORT.seconds - ON_THE_WAY - SLACK * job.settings.time_budget
 
-    def expired(share: float) -> bool:
+    def expired() -> bool:
         nonlocal last
         last = time.monotonic()
-        return last > began + share * (end - began)
+        return last > end
 
     result = run(job, expired)
     _REPORT.add(time.monotonic() - last)
@@ -105,6 +105,11 @@ def compute(
     record = result.window.record
     stamp = record.stamp_ns(len(record) - 1)
     return Tracked(result.window.number, stamp, record.actuator, numbers)
+
+
+def compute_beside(job: Job, tell: Tell) -> WindowFit:
+    """Sample a structure beside the likeliest one, in a worker of its own."""
+    return renew(job)
 
 
 def warm_up() -> None:

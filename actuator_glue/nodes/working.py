@@ -5,10 +5,14 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Callable
+from typing import TypeAlias
 
 from actuator_glue.nodes import base
 from actuator_glue.nodes.health import ERROR
 from actuator_glue.workers.worker import DIED, Answer, Worker
+
+# Whose answer it is, who takes it, and the answer.
+_Said: TypeAlias = tuple[Worker, Callable[[Answer], None], Answer]
 
 
 class WorkingNode(base.SuiteNode):
@@ -33,16 +37,37 @@ class WorkingNode(base.SuiteNode):
 
     def employ(self, warm: Callable[[], None], nice: int = 0) -> None:
         """Start the worker, which ends at clean-up; arguments as `Worker`."""
-        self._answers: deque[Answer] = deque()
+        self._answers: deque[_Said] = deque()
         self._arrived = self.create_guard_condition(self.guarded(self._take_answers))
         self.at_cleanup(lambda: self.destroy_guard_condition(self._arrived))
         self.worker = Worker(self._hand_over, warm, nice)
         self.at_cleanup(self.worker.close)
 
+    def colleague(self, answered: Callable[[Answer], None], nice: int) -> Worker:
+        """Return another worker, which is not warmed up, until it is dismissed or clean-up.
+
+        Args:
+            answered: takes what it says, in the executor's thread; after DIED another has begun.
+            nice: as `Worker` takes it.
+        """
+
+        def hand_over(answer: Answer) -> None:
+            self._answers.append((worker, answered, answer))
+            self._arrived.trigger()
+
+        worker = Worker(hand_over, None, nice)
+        self.at_cleanup(worker.close)
+        return worker
+
+    def dismiss(self, worker: Worker) -> None:
+        """End another worker, whatever it does."""
+        worker.close(0.0)
+        self._forget(worker)
+
     def give_up(self) -> None:
         """End what the worker does; another begins."""
         self.worker.restart()
-        self._answers.clear()
+        self._forget(self.worker)
 
     def listen_when_ready(self) -> None:
         """Have `listen` called as soon as the worker is ready; call it on activation."""
@@ -73,14 +98,20 @@ class WorkingNode(base.SuiteNode):
 
     def _hand_over(self, answer: Answer) -> None:
         """Called from the listening thread: hand over to the executor."""
-        self._answers.append(answer)
+        self._answers.append((self.worker, self.answered, answer))
         self._arrived.trigger()
+
+    def _forget(self, worker: Worker) -> None:
+        """Let go of what a worker has said and nobody has taken."""
+        others = [said for said in self._answers if said[0] is not worker]
+        self._answers.clear()
+        self._answers.extend(others)
 
     def _take_answers(self) -> None:
         while self._answers:
-            answer = self._answers.popleft()
+            worker, answered, answer = self._answers.popleft()
             if answer.kind == DIED:
                 # Also of an inactive node: the next activation needs one.
                 self.complain('worker', f'{answer.payload}; starting another', ERROR)
-                self.worker.restart()
-            self.answered(answer)
+                worker.restart()
+            answered(answer)

@@ -19,6 +19,7 @@ from actuator_glue.online.knowledge import Knowledge
 from actuator_glue.online.sampling import MOST_PATIENCE, Job, WindowFit
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import (
+    Contradicted,
     Dropped,
     Event,
     Failed,
@@ -40,9 +41,9 @@ MAX_FROZEN = 8
 MAX_WAITING = 4
 # What remains of the patience with each window that has a posterior.
 _CALMER = 0.8
-# It is the turn of a structure that has not been sampled in so many windows, and where it has a
-# posterior for so much of a window's length: until then hardly any other samples have come.
-TURN, _NEWS = 3, 0.5
+# A structure beside the likeliest one is sampled anew after so much of a window's length: until
+# then hardly any other samples have come.
+NEWS = 0.1
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -102,7 +103,7 @@ class Schedule:
     begun: Mapping[int, Begun] = field(default_factory=dict)
 
 
-@dataclass(slots=True)
+@dataclass(slots=True, eq=False)
 class _Member:
     """A structure that is carried, and what is kept from its last result.
 
@@ -111,9 +112,8 @@ class _Member:
         knowledge: what earlier samples say of its parameters.
         archive: points that its next window starts from.
         epoch: actuator that they are of.
-        frozen: its last posterior, with which it forecasts where there is no time for it.
-        waited: windows since.
-        cut: what was left over, the last time, ended before it had reached its posterior.
+        frozen: its last posterior, with which it forecasts while it is not sampled.
+        waited: windows since that was taken.
         before: it was there before those that are carried now: they have to do better.
         worse: successive windows whose forecasts were worse than of one that was there before.
     """
@@ -124,9 +124,27 @@ class _Member:
     epoch: int = -1
     frozen: FrozenPosterior | None = None
     waited: int = 0
-    cut: bool = False
     before: bool = False
     worse: int = 0
+
+
+@dataclass(slots=True)
+class _Beside:
+    """A structure that is sampled beside the likeliest one.
+
+    Attributes:
+        member: it.
+        job: the window that it is sampled with.
+        handed: whoever computes it has it.
+        result: what came of it; None before it has come.
+        joins: the running job takes it in.
+    """
+
+    member: _Member
+    job: Job
+    handed: bool = False
+    result: WindowFit | None = None
+    joins: bool = False
 
 
 @dataclass(slots=True)
@@ -153,8 +171,11 @@ class Estimator:
     """Windows, warm start and forecasts; knows no clock, no process and no ROS.
 
     `push` what arrives, ask `next_job`, compute it wherever you like with `job.run`, hand the
-    result to `finish`. One job is out at a time. The results depend on the samples, the settings
-    and which windows were dropped or stopped early: a `Schedule` repeats those.
+    result to `finish`. One job is out at a time. Where several structures are carried, a job is
+    of the likeliest; ask `rival_job` after each `finish`, compute it beside with `job.renew`, and
+    hand what comes of it to `finish_rival`, whenever: the next job takes it in. The results depend
+    on the samples, the settings, which windows were dropped or stopped early, and which took in
+    what came from beside: a `Schedule` repeats those.
 
     Args:
         settings: settings; they do not change.
@@ -190,6 +211,7 @@ class Estimator:
         self._judged_to: int | None = None
         self._pending: Proposal | None = None
         self._members: list[_Member] = []
+        self._beside: _Beside | None = None
         self._begin(self.proposal)
         self._ahead = Ahead()
 
@@ -274,22 +296,75 @@ class Estimator:
             self._resume(window, self.schedule.begun.get(window.number))
             if not self._course.exact or len(stops) != len(self._members):
                 stops = (None,) * len(self._members)
-        due = self._due()
-        jobs = [
-            replace(self._job(member, window, stop), due=member is due)
-            for member, stop in zip(self._members, stops, strict=True)
-        ]
-        ahead = self._ahead.between(window.end, jobs[0].forecast[1], window.record.period)
-        shares = self._shares().tolist()
-        jobs = [replace(job, weight=share) for job, share in zip(jobs, shares, strict=True)]
+        self._take_in(window, stops)
+        job = self._job(self._members[0], window, stops[0])
+        weight, *shares = self._shares().tolist()
+        rivals = zip(self._members[1:], shares, strict=True)
         self.running = replace(
-            jobs[0],
-            ahead=ahead,
+            job,
+            ahead=self._ahead.between(window.end, job.forecast[1], window.record.period),
             frozen=self._judged(window),
-            rivals=tuple(jobs[1:]),
+            weight=weight,
+            rivals=tuple(self._rival(member, window, share) for member, share in rivals),
             proposal=None if proposal is None else self.proposal,
         )
         return self.running
+
+    def rival_job(self) -> Job | None:
+        """Return, once, what is to be sampled beside with `job.renew`; None where nothing is."""
+        beside = self._beside
+        if beside is None or beside.handed:
+            return None
+        beside.handed = True
+        return beside.job
+
+    def finish_rival(self, result: WindowFit) -> None:
+        """Take what came of a rival's job; what nobody waits for any more is let go of."""
+        beside = self._beside
+        if beside is None or beside.result is not None:
+            return
+        wanted = beside.job
+        if (result.window.number, result.model) == (wanted.window.number, wanted.model):
+            beside.result = result
+
+    def abandon_rival(self) -> None:
+        """Have `rival_job` return the same once more: its process has died."""
+        if self._beside is not None and self._beside.result is None:
+            self._beside.handed = False
+
+    def _take_in(self, window: Window, stops: Sequence[int | None]) -> None:
+        """Decide whether a window takes in what came from beside.
+
+        Live what has come by now; in a replay what the window took in.
+        """
+        beside = self._beside
+        if beside is None:
+            return
+        if beside.job.window.epoch != window.epoch:
+            self._beside = None  # of another actuator
+            return
+        stop = next(
+            stop
+            for member, stop in zip(self._members, stops, strict=True)
+            if member is beside.member
+        )
+        beside.joins = beside.result is not None and stop != 0
+
+    def _rival(self, member: _Member, window: Window, weight: float) -> Job:
+        """Return a structure that is sampled beside, as it forecasts from a window on."""
+        standing = member.frozen if member.epoch == window.epoch else None
+        beside, renewed = self._beside, 0
+        if beside is not None and beside.joins and beside.member is member:
+            assert beside.result is not None
+            renewed, standing = beside.result.evaluations, beside.result.frozen or standing
+        return Job(
+            window=window,
+            settings=self.settings,
+            model=member.model,
+            standing=standing,
+            renewed=renewed,
+            weight=weight,
+        )
 
     def _resume(self, window: Window, begun: Begun | None) -> None:
         """Begin where the live run did, where the window before could not be computed again."""
@@ -322,21 +397,8 @@ class Estimator:
             afresh=afresh,
             stop_at=stop,
             prior=prior,
-            standing=member.frozen if member.epoch == window.epoch else None,
-            waited=member.waited,
             patience=self._patience,
-            cut=member.cut,
         )
-
-    def _due(self) -> _Member | None:
-        """Return whose turn it is beside the likeliest structure; None for nobody's."""
-        stepped = [member for member in self._members[1:] if member.model.effects]
-        if not stepped:
-            return None
-        longest = max(stepped, key=lambda member: member.waited)
-        news = math.ceil(_NEWS * self.settings.window / self.settings.hop)
-        turn = TURN if longest.frozen is None else max(TURN, news)
-        return longest if longest.waited >= turn else None
 
     def finish(self, result: WindowResult | WindowFit) -> list[Event]:
         """Take the result of the running job, or its first part, all that the next one needs."""
@@ -352,26 +414,38 @@ class Estimator:
         if result.frozen is not None:
             self._frozen.append(result.frozen)
             del self._frozen[:-MAX_FROZEN]
-        events: list[Event] = []
-        for member, rival in zip(self._members[1:], result.rivals, strict=True):
-            member.cut = rival.cut or (member.cut and bool(rival.failure))
-            if rival.starved:
-                member.waited = -1  # it has had all there is: others have their turn
-        for member, found in zip(self._members, (result, *result.rivals), strict=True):
+        for member in self._members:
             member.waited += 1
-            if found.failure:
-                continue
-            if found.archive is not None:
-                member.archive, member.epoch, member.waited = found.archive, window.epoch, 0
-            if found.frozen is not None:
-                member.frozen = replace(found.frozen, beside=())
-            contradicted = member.knowledge.learn(window, found.learned, found.conflict)
+        events: list[Event] = list(_learned(self._members[0], result))
+        if self._beside is not None and self._beside.joins:
+            assert self._beside.result is not None
             # What a less likely structure contradicts is its own affair.
-            events += contradicted if member is self._members[0] else []
+            _learned(self._beside.member, self._beside.result)
+            self._beside = None
         leading = self._members[0]
         if leading.archive is not None:
             self._before = _Before(leading.archive, leading.model, leading.epoch)
-        return [*events, *self._weigh(result)]
+        events += self._weigh(result)
+        self._sample_beside(window)
+        return events
+
+    def _sample_beside(self, window: Window) -> None:
+        """Begin to sample the structure that has waited longest, where nobody is sampled beside.
+
+        After a window that is published: a replay has that, too.
+        """
+        rivals = self._members[1:]
+        if self._beside is not None and not any(self._beside.member is one for one in rivals):
+            self._beside = None
+        news = math.ceil(NEWS * self.settings.window / self.settings.hop)
+        due = [
+            one
+            for one in rivals
+            if one.frozen is None or one.epoch != window.epoch or one.waited >= news
+        ]
+        if self._beside is None and due:
+            longest = max(due, key=lambda member: member.waited)
+            self._beside = _Beside(longest, self._job(longest, window, None))
 
     def _begin(self, proposal: Proposal) -> None:
         """Carry these structures from now on; what one of them has learned before goes on.
@@ -379,7 +453,7 @@ class Estimator:
         Where there are several, Eq. (2) among them and what led before are what they have to do
         better than.
         """
-        self._pending = None
+        self._pending = self._beside = None
         led = self._members[0] if self._members else None
         began = None if led is None else led.knowledge.began_ns
         old = {frozenset(member.model.effects): member for member in self._members}
@@ -523,6 +597,18 @@ class Estimator:
             return None
         self._applied = len(due)
         return Proposal.of(due[-1])
+
+
+def _learned(member: _Member, found: WindowResult | WindowFit) -> list[Contradicted]:
+    """Keep what a structure's window gave; return what it contradicts."""
+    member.waited = 0
+    if found.failure:
+        return []
+    if found.archive is not None:
+        member.archive, member.epoch = found.archive, found.window.epoch
+    if found.frozen is not None:
+        member.frozen = replace(found.frozen, beside=())
+    return member.knowledge.learn(found.window, found.learned, found.conflict)
 
 
 def _box(model: ModelChoice) -> dict[str, tuple[float, float]]:

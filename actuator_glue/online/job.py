@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from typing import TypeAlias
 
 import numpy as np
@@ -26,11 +25,8 @@ from actuator_glue.online.stream import Window
 from actuator_glue.online.structures import pooled
 from actuator_glue.records import Array
 
-# Whether a share of the time budget is spent.
-Expired: TypeAlias = Callable[[float], bool]
-# Share of the time budget after which no further structure is begun: half of it is what one with
-# effects takes until it is warm.
-_BEGIN = 0.5
+# Whether the time budget is spent.
+Expired: TypeAlias = Callable[[], bool]
 # Draws whose mean response is the forecast that a structure's weight is judged by.
 _FEW = 32
 # Generations that R-hat and ESS are computed from.
@@ -66,12 +62,14 @@ class WindowResult:
         conflict: how far the window contradicts its prior.
         failure: why there is no posterior; empty where there is one.
         starved: the sampling ended before it had reached the posterior.
-        rivals: first parts of the other structures that are carried, without their chains.
+        rivals: the other structures that are carried: what they forecast with.
         errors: as in `WindowFit`.
         structures: effects of each structure that the numbers above are a mixture of, the
             likeliest first, which is `model`.
         weights: their weights, fixed before the window.
-        spent: likelihood evaluations of each, then of Eq. (2) where they are only held against it.
+        spent: likelihood evaluations of the likeliest; of each other's posterior where that has
+            come since the window before, else 0; then of Eq. (2) where they are only held against
+            it.
         parts: model and posterior of each by itself; None for one that has none yet.
         draws: some draws of the mixture, shape (m, p): where one structure is carried, those that
             the next window starts from.
@@ -118,8 +116,7 @@ def run(job: Job, expired: Expired | None = None) -> WindowResult:
 
     Args:
         job: what to compute.
-        expired: tells whether a share of the time budget, in (0, 1], is spent; None never stops
-            early.
+        expired: tells whether the time budget is spent; None never stops early.
     """
     return report(job, fit(job, expired))
 
@@ -127,77 +124,56 @@ def run(job: Job, expired: Expired | None = None) -> WindowResult:
 def fit(job: Job, expired: Expired | None = None) -> WindowFit:
     """Do the first part of `run`, all that the next job needs; a window may fail.
 
-    Where several structures are carried, those without effects come first, for they are quick.
-    The likeliest has all the time that is left then; of the others, who waited longest first,
-    those that there is still time for, and was the last time. Whose turn it is has half of the
-    time, where the likeliest has reached its posterior in the other half, and beyond what is usual
-    until it has one itself. One that is not sampled keeps its posterior, and forecasts with it.
+    The likeliest structure is sampled. The others, which `renew` samples beside, forecast with
+    their last posteriors.
     """
-    jobs = (job, *job.rivals)
-    found = [
-        WindowFit(job.window, one.model, frozen=sampling.stands(one), failure='no time was left')
-        for one in jobs
-    ]
-    stepped = [i for i in range(1, len(jobs)) if jobs[i].model.effects]
-    stepped.sort(key=lambda i: (not jobs[i].due, -jobs[i].waited, i))
-    due = any(one.due for one in job.rivals)
-    quick = [i for i in range(len(jobs)) if not jobs[i].model.effects]
-    for i in dict.fromkeys((*quick, 0, *stepped)):
-        turn = jobs[i].due
-        if i > 0 and _no_time(jobs[i], expired, 1.0 if turn else _BEGIN * job.usual):
-            found[i] = replace(found[i], starved=turn)
-            continue
-        if i > 0 and jobs[i].stop_at == 0:
-            continue
-        share = job.usual * (_BEGIN if i == 0 and due else 1.0)
-        longest = 1.0 if turn else job.usual
-        clock = None if expired is None else partial(_spent, expired, share, longest)
-        sampled = _fit(jobs[i], clock)
-        if i == 0 and sampled.failure:
-            return sampled
-        if i > 0:
-            # Whose turn it was not has had what was left over, and no claim to more.
-            warm = _warm(sampled)
-            sampled = replace(sampled, starved=sampled.starved and turn, cut=not (warm or turn))
-            if not warm:
-                sampled = replace(sampled, frozen=found[i].frozen)
-        found[i] = sampled
-    leading, *rivals = found
-    if not rivals:
+    leading = _fit(job, expired)
+    if leading.failure or not job.rivals:
         return leading
     assert leading.frozen is not None
+    rivals = tuple(
+        WindowFit(
+            job.window,
+            one.model,
+            frozen=sampling.stands(one),
+            failure='it is sampled beside',
+            evaluations=one.renewed,
+        )
+        for one in job.rivals
+    )
     beside = tuple(one.frozen for one in rivals if one.frozen is not None)
     return replace(
         leading,
-        rivals=tuple(rivals),
+        rivals=rivals,
         frozen=replace(leading.frozen, beside=beside),
         errors=_errors(job),
     )
 
 
-def _spent(expired: Expired, share: float, longest: float, reached: bool) -> bool:
-    """Whether a structure's share of the time is spent; the longest until it has a posterior."""
-    return expired(share if reached else longest)
+def renew(job: Job) -> WindowFit:
+    """Sample a window with one of the other structures, beside the likeliest one.
+
+    No clock ends it: what comes of it is the same whenever it comes. Chains that have not arrived
+    at their posterior forecast nothing.
+    """
+    fitted = _fit(job, None)
+    chains = fitted.chains
+    if chains is None:
+        return replace(fitted, evaluations=1)
+    return replace(
+        fitted,
+        chains=None,
+        frozen=fitted.frozen if chains.annealed else None,
+        evaluations=chains.evaluations,
+    )
 
 
-def _fit(job: Job, expired: Callable[[bool], bool] | None) -> WindowFit:
+def _fit(job: Job, expired: Expired | None) -> WindowFit:
     try:
         return sampling.fit(job, expired)
     except InputError as error:
         starved = isinstance(error, NoPosteriorError)
         return WindowFit(job.window, job.model, failure=str(error), starved=starved)
-
-
-def _warm(fitted: WindowFit) -> bool:
-    """Whether chains have arrived at their posterior: before that they forecast nothing."""
-    return fitted.chains is not None and fitted.chains.annealed
-
-
-def _no_time(job: Job, expired: Expired | None, share: float) -> bool:
-    """Whether a structure is passed over in this window: a share of the time is spent."""
-    if expired is None or not job.model.effects:
-        return False
-    return (job.cut and not job.due) or expired(share)
 
 
 def _errors(job: Job) -> tuple[float, ...]:
@@ -250,7 +226,7 @@ def _failed(job: Job, fitted: WindowFit, reason: str) -> WindowResult:
         conflict=fitted.conflict,
         failure=reason,
         starved=fitted.starved,
-        rivals=_lean(fitted),
+        rivals=fitted.rivals,
         errors=fitted.errors,
     )
 
@@ -292,13 +268,11 @@ def _report(job: Job, fitted: WindowFit, limits: bool) -> WindowResult:
         archive=fitted.archive,
         learned=fitted.learned,
         conflict=fitted.conflict,
-        rivals=_lean(fitted),
+        rivals=fitted.rivals,
         errors=fitted.errors,
         structures=tuple(one.model.effects for one, _ in each),
         weights=tuple(one.weight for one, _ in each),
-        spent=tuple(
-            0 if one.chains is None else one.chains.evaluations for one in (fitted, *fitted.rivals)
-        ),
+        spent=(chains.evaluations, *(one.evaluations for one in fitted.rivals)),
         parts=tuple(
             None if draws is None else (one.model, moments(draws, *one.model.bounds))
             for one, draws in each
@@ -307,21 +281,13 @@ def _report(job: Job, fitted: WindowFit, limits: bool) -> WindowResult:
     )
 
 
-def _lean(fitted: WindowFit) -> tuple[WindowFit, ...]:
-    """Return the first parts of the other structures without what is not needed any more."""
-    return tuple(replace(one, chains=None) for one in fitted.rivals)
-
-
 def _each(job: Job, fitted: WindowFit, chains: Chains) -> list[tuple[Job, Array | None]]:
     """Return each structure that has a weight, with draws (m, p); None before it has any."""
     found: list[tuple[Job, Array | None]] = [(job, chains.posterior())]
     for rival, one in zip(job.rivals, fitted.rivals, strict=True):
         if rival.weight == 0.0:
             continue
-        draws = None if one.frozen is None else one.frozen.draws
-        if one.chains is not None and _warm(one):
-            draws = one.chains.posterior()
-        found.append((rival, draws))
+        found.append((rival, None if one.frozen is None else one.frozen.draws))
     return found
 
 

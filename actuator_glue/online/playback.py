@@ -10,7 +10,7 @@ from actuator_glue.errors import InputError
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.choice import ModelChoice, choose_model
 from actuator_glue.online.estimator import Estimator, Schedule
-from actuator_glue.online.job import WindowResult, fit, report
+from actuator_glue.online.job import WindowResult, fit, renew, report
 from actuator_glue.online.sampling import Job, WindowFit
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Event, Failed, Preview, Rejected
@@ -67,8 +67,16 @@ def _sampled(items: Iterable[Item], estimator: Estimator) -> Iterator[Event | Sa
         while (job := estimator.next_job()) is not None:
             fitted = fit(job)
             yield from estimator.finish(fitted)
+            sample_beside(estimator)
             if not fitted.failure:
                 yield job, fitted
+
+
+def sample_beside(estimator: Estimator) -> None:
+    """Compute here and now what a live estimator has computed beside."""
+    job = estimator.rival_job()
+    if job is not None:
+        estimator.finish_rival(renew(job))
 
 
 def give(estimator: Estimator, item: Item) -> list[Event]:

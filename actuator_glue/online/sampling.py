@@ -36,8 +36,7 @@ ADAPT = 20
 # Time a model's first window may take [s], whatever the budget: before there is a posterior
 # nothing is late, and a window that is cut short leaves the next one where it began itself.
 FIRST = 1.0
-# Times the budget that a window may take at most: after others that ended without a posterior, or
-# for a structure whose turn it is, until it has one.
+# Times the budget that a window may take at most: after others that ended without a posterior.
 MOST_PATIENCE = 8.0
 # Share of the last posterior's points, spread, that must be alive in the next: so few that mostly
 # one temperature leads there.
@@ -60,15 +59,13 @@ class Job:
         ahead: commands from the window's end to the forecast's, shape (na,) [m], where known.
         frozen: earlier posteriors whose forecasts this window's samples judge.
         prior: what is known before the window; None for no more than the box.
-        rivals: what other structures that are carried have to do for the same window.
+        rivals: the other structures that are carried, as they forecast from this window on.
         weight: weight of the model among them, before the window.
         proposal: what is carried from this window on, where that is new.
-        standing: the structure's last posterior; it forecasts with that where it is not sampled.
-        waited: windows that it has not been sampled in.
+        standing: last posterior of a structure that is sampled beside; it forecasts with that.
+        renewed: likelihood evaluations of it, where it has come since the window before; else 0.
         patience: times the budget that it may take, for want of time left those before it without
             a posterior.
-        due: it is this structure's turn.
-        cut: what was left over, the last time, ended before it had reached its posterior.
     """
 
     window: Window
@@ -84,10 +81,8 @@ class Job:
     weight: float = 1.0
     proposal: Proposal | None = None
     standing: FrozenPosterior | None = None
-    waited: int = 0
+    renewed: int = 0
     patience: float = 1.0
-    due: bool = False
-    cut: bool = False
 
     @property
     def evaluations(self) -> int:
@@ -99,17 +94,6 @@ class Job:
     @property
     def seconds(self) -> float:
         """Longest time the window may be computed [s]."""
-        budget = self.settings.time_budget
-        turns = [max(MOST_PATIENCE * budget, FIRST * one.afresh) for one in self.rivals if one.due]
-        return max(self._usual, *turns, 0.0)
-
-    @property
-    def usual(self) -> float:
-        """Share of that time for all but the structure whose turn it is."""
-        return self._usual / self.seconds
-
-    @property
-    def _usual(self) -> float:
         budget = self.settings.time_budget
         return self.patience * (max(budget, FIRST) if self.afresh else budget)
 
@@ -147,8 +131,9 @@ class WindowFit:
         complete: the sampling was not ended early.
         failure: why there is nothing of all this; empty where there is.
         starved: there is nothing because the sampling ended before it had reached the posterior.
-        cut: so it is, and it was nobody's turn.
-        rivals: the same of the other structures that are carried.
+        evaluations: likelihood evaluations, of a structure that is sampled beside: at least 1,
+            also where it failed; 0 where nothing has come since the window before.
+        rivals: the other structures that are carried: what they forecast with.
         errors: mean square error of the forecasts that the window has judged, of each structure,
             the likeliest first [m^2]; empty where only one is carried or there were none.
     """
@@ -166,18 +151,17 @@ class WindowFit:
     complete: bool = False
     failure: str = ''
     starved: bool = False
-    cut: bool = False
+    evaluations: int = 0
     rivals: tuple[WindowFit, ...] = ()
     errors: tuple[float, ...] = ()
 
 
-def fit(job: Job, expired: Callable[[bool], bool] | None = None) -> WindowFit:
+def fit(job: Job, expired: Callable[[], bool] | None = None) -> WindowFit:
     """Sample one window.
 
     Args:
         job: what to compute.
-        expired: tells that the time is spent, and takes whether the posterior has been reached;
-            None never stops early.
+        expired: tells that the time is spent; None never stops early.
 
     Raises:
         InputError: the window calibrates nothing.
@@ -292,9 +276,7 @@ def _target(job: Job, shaping: float, near: Array | None) -> Target:
     ).target()
 
 
-def _sample(
-    job: Job, target: Target, expired: Callable[[bool], bool] | None
-) -> tuple[Chains, bool]:
+def _sample(job: Job, target: Target, expired: Callable[[], bool] | None) -> tuple[Chains, bool]:
     """Return chains of physical parameters, and whether they are all that was wanted."""
     settings, record = job.settings, job.window.record
     archive = job.archive
@@ -322,15 +304,14 @@ def _sample(
     return chains, complete
 
 
-def _stop(job: Job, expired: Callable[[bool], bool] | None) -> Callable[[State], bool] | None:
+def _stop(job: Job, expired: Callable[[], bool] | None) -> Callable[[State], bool] | None:
     """What ends the sampling early: the evaluations of the run that is repeated, or the clock."""
     if job.stop_at is not None:
         at = job.stop_at
         return lambda state: state.evaluations >= at
     if expired is None:
         return None
-    # So many steps after it has adapted are a posterior, if a rough one.
-    return lambda state: expired(state.made >= state.settings.adaptation + ADAPT)
+    return lambda state: expired()
 
 
 def _sampler(job: Job) -> SamplerSettings:

@@ -49,7 +49,8 @@ class Worker:
     Args:
         answer: called from a thread with each Answer.
         warm: picklable function called once at the start, to compile and import.
-        nice: added to the scheduling priority's niceness.
+        nice: added to the scheduling priority's niceness; where it is not 0, real-time priority
+            stays with whoever asks.
     """
 
     def __init__(
@@ -161,6 +162,8 @@ def serve(pipe: Connection) -> None:
         warm, nice = pipe.recv()
         if nice:
             os.nice(nice)
+            with suppress(OSError):
+                os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
         if warm is not None:
             warm()
         # What is there now stays: going through it for garbage takes 100 ms, two deadlines.

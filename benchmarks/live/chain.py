@@ -16,7 +16,7 @@ from actuator_glue.online.collect import Collector
 from actuator_glue.online.estimator import Estimator
 from actuator_glue.online.job import WindowResult, run
 from actuator_glue.online.knowledge import Known
-from actuator_glue.online.playback import stream
+from actuator_glue.online.playback import sample_beside, stream
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Contradicted, Event
 from actuator_glue.online.trust import Contradiction
@@ -115,6 +115,7 @@ class _Loop:
         while (job := self.estimator.next_job()) is not None:
             result = run(job)
             told = self.estimator.finish(result)
+            sample_beside(self.estimator)
             if job.proposal is not None:
                 self._take(live.Carries(job.window.number))
             if not result.failure:

@@ -72,7 +72,7 @@ class Live:
                 job = estimator.next_job()
                 self.models.append((number, models[1]))
             asked = iter(range(10**9))
-            expired = None if stop is None else (lambda _, asked=asked: next(asked) >= stop)
+            expired = None if stop is None else (lambda asked=asked: next(asked) >= stop)
             result = run(pickle.loads(pickle.dumps(job)), expired)
             self.events += estimator.finish(pickle.loads(pickle.dumps(result)))
             if number in drop:

@@ -281,7 +281,7 @@ def test_a_window_that_was_cut_short_gives_a_posterior_and_no_prior():
     for item in stream(record(3.0)):
         estimator.setup(item) if isinstance(item, StreamSetup) else estimator.push(item)
     estimator.finish(run(estimator.next_job()))
-    short = run(estimator.next_job(), lambda share: True)
+    short = run(estimator.next_job(), lambda: True)
     assert not short.failure and short.moments is not None
     assert len(short.draws) < 50 and short.learned is None
     assert estimator.finish(short) == []

@@ -8,11 +8,9 @@ from online_streams import SETTINGS, record
 
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.online.estimator import Estimator, Schedule
-from actuator_glue.online.job import WindowResult, fit, run
+from actuator_glue.online.job import WindowResult, run
 from actuator_glue.online.playback import stream
-from actuator_glue.online.sampling import ADAPT, FIRST
 from actuator_glue.online.stream import Dropped, Preview
-from actuator_glue.online.structures import Proposal, Proposed
 from actuator_glue.setups import StreamSetup
 
 
@@ -101,7 +99,7 @@ def test_a_window_without_time_is_followed_by_one_that_has_more():
 
     first = job().seconds
     for times in (2.0, 4.0, 8.0, 8.0):
-        result = run(estimator.running, lambda share: True)
+        result = run(estimator.running, lambda: True)
         assert result.starved and 'give it more time' in result.failure
         estimator.finish(result)
         assert job().seconds == times * first
@@ -112,80 +110,3 @@ def test_a_window_without_time_is_followed_by_one_that_has_more():
         estimator.finish(run(estimator.running))
         job()
     assert estimator.running.seconds == SETTINGS.time_budget
-
-
-def test_a_rival_takes_half_of_the_time_only_from_a_posterior():
-    """Whose turn it is waits where the likeliest has none yet, and the next window has more."""
-    both = Proposal(
-        (Proposed(choose_model(('delay',)), 0.5), Proposed(choose_model(('bias',)), 0.5))
-    )
-    estimator = Estimator(SETTINGS, both, live=True)
-    for item in stream(record(2.5), 100):
-        estimator.setup(item) if isinstance(item, StreamSetup) else estimator.push(item)
-    job = estimator.next_job()
-    job = replace(job, rivals=tuple(replace(one, due=True) for one in job.rivals))
-    shares = []
-
-    def expired(share):
-        shares.append(share)
-        return len(shares) > 150 if share == 1.0 else share == 0.125
-
-    fitted = fit(job, expired)
-    # All that is usual until there is a posterior, then half of it: what is left is the rival's.
-    assert job.usual == 0.25
-    assert shares[0] == 0.25 and shares.index(0.125) >= 2 * ADAPT
-    assert not fitted.failure
-    late = fit(job, lambda share: True)
-    assert late.starved and late.failure
-
-
-def three(settings, computed):
-    """The jobs of a live estimator of three structures, computed so."""
-    every = ((), ('delay',), ('bias',))
-    estimator = Estimator(
-        settings, Proposal(tuple(Proposed(choose_model(e), 0.2 if e else 0.6) for e in every))
-    )
-    for item in stream(record(7.8), 50):
-        estimator.setup(item) if isinstance(item, StreamSetup) else estimator.push(item)
-        while (job := estimator.next_job()) is not None:
-            yield job
-            estimator.finish(computed(job))
-
-
-def delayed(job):
-    """The second structure's job."""
-    return next(one for one in job.rivals if one.model.effects == ('delay',))
-
-
-def test_the_others_take_turns_as_samples_are_new_not_as_windows_are():
-    """Twenty windows a second and each had its turn in every third: all of them came late."""
-    settings = replace(SETTINGS, window=2.0, hop=0.2, time_budget=0.2, evaluations=2000)
-    # Time for whose turn it is, and nothing left over.
-    jobs = three(settings, lambda job: run(job, lambda share: share < 1.0))
-    turns = [job.window.number for job in jobs if delayed(job).due]
-    # Half of a window is five hops; the first time there is no posterior to wait with.
-    assert turns == [3, 9, 15, 21, 27]
-
-
-def test_nobody_else_has_the_time_that_a_turn_needs_beyond_the_usual():
-    def in_vain(job):
-        result = run(job, lambda share: share < 1.0)
-        late = [replace(one, starved=True, failure='late', archive=None) for one in result.rivals]
-        pairs = zip(job.rivals, result.rivals, late, strict=True)
-        return replace(result, rivals=tuple(bad if job.due else one for job, one, bad in pairs))
-
-    jobs = three(SETTINGS, in_vain)
-    first = [next(jobs) for _ in range(6)]
-    told = [(job.seconds, job.usual, [one.due for one in job.rivals]) for job in first[2:]]
-    whole = 8.0 * SETTINGS.time_budget
-    assert told == [
-        (SETTINGS.time_budget, 1.0, [False, False]),
-        (whole, 0.125, [True, False]),
-        # It has had all there is: the other one has its turn, and this one waits.
-        (whole, 0.125, [False, True]),
-        (SETTINGS.time_budget, 1.0, [False, False]),
-    ]
-    assert delayed(first[4]).waited == 0
-    # A first posterior may take a second, however short a window's budget is.
-    short = replace(first[3], settings=replace(SETTINGS, time_budget=0.01, hop=0.01))
-    assert (short.seconds, short.usual) == (FIRST, 0.01)

@@ -1,15 +1,15 @@
 """Structures side by side: weights by forecasts that were fixed before their data, mixtures."""
 
+import itertools
 import math
 import pickle
 from dataclasses import replace
-from functools import partial
 from itertools import pairwise
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from live import fields
+from live import fields, same
 from online_streams import RATE, SETTINGS, THETA, stream
 
 from actuator_glue.errors import InputError
@@ -20,9 +20,9 @@ from actuator_glue.model.parameters import NAMES
 from actuator_glue.model.structure import Structure
 from actuator_glue.online import conversion
 from actuator_glue.online.estimator import Estimator, Schedule
-from actuator_glue.online.job import WindowResult, run
+from actuator_glue.online.job import WindowResult, renew, run
 from actuator_glue.online.knowledge import Known
-from actuator_glue.online.playback import give, replay
+from actuator_glue.online.playback import give, replay, sample_beside
 from actuator_glue.online.replay_comparison import differences, published
 from actuator_glue.online.stream import Reweighed
 from actuator_glue.online.structures import Proposal, Proposed, moved, pooled, weights
@@ -112,6 +112,7 @@ def carried_side_by_side(items, at=2):
         while (job := estimator.next_job()) is not None:
             result = run(pickle.loads(pickle.dumps(job)))
             events += estimator.finish(pickle.loads(pickle.dumps(result)))
+            sample_beside(estimator)
             found.append(result)
             if job.proposal is not None:
                 models.append((job.window.number, job.proposal))
@@ -142,13 +143,16 @@ def test_bands_are_those_of_the_mixture_and_scored_as_they_were_frozen(ran):
         parts = result.frozen.parts
         shares = [len(part.draws) / SETTINGS.draws for part in parts]
         assert sum(shares) == pytest.approx(1.0, abs=0.01)
+        # One that has no posterior yet forecasts nothing.
+        told = zip(result.structures, result.weights, result.parts, strict=True)
+        weight = {name: share for name, share, part in told if part is not None}
         for part, share in zip(parts, shares, strict=True):
-            weight = dict(zip(result.structures, result.weights, strict=True))
-            assert share == pytest.approx(weight[part.model.effects], abs=0.01)
+            wanted = weight[part.model.effects] / sum(weight.values())
+            assert share == pytest.approx(wanted, abs=0.01)
 
 
 def test_each_structure_tells_what_the_parameters_are_if_it_is_true(ran):
-    result = next(r for r in ran[0] if len(r.structures) > 1)
+    result = next(r for r in ran[0] if len(r.structures) > 1 and None not in r.parts)
     told = conversion.posterior(result, 0.0)[1]
     assert told['structures'] == ['Eq. (2)', 'backlash'] and told['structure_sizes'] == [4, 5]
     assert told['structure_parameter_names'] == [*NAMES, *NAMES, 'backlash']
@@ -259,49 +263,118 @@ def three():
     )
 
 
-def hurried(seconds=6.0, budget=200):
-    """Results of a run whose clock counts steps: the likeliest takes more than half of them."""
-    estimator, found = Estimator(SETTINGS, three()), []
-    for item in stream(lost_motion(seconds)):
-        give(estimator, item)
-        while (job := estimator.next_job()) is not None:
-            steps, whole = iter(range(10**9)), budget / job.usual
-            spent = partial(lambda steps, whole, share: next(steps) > share * whole, steps, whole)
-            found.append(run(job, spent))
-            assert not found[-1].failure
-            estimator.finish(found[-1])
-    return found
+class Beside:
+    """A live estimator of three structures whose others take some windows, as they are told.
+
+    Args:
+        takes: windows that pass until what is sampled beside has come, one after another.
+        fails: windows that end without a posterior.
+    """
+
+    def __init__(self, takes, fails=(), seconds=7.0):
+        self.results, self.began = [], []
+        self.estimator = Estimator(SETTINGS, three(), live=True)
+        self.done, coming = {}, None
+        takes = itertools.cycle(takes)
+        for item in stream(lost_motion(seconds)):
+            give(self.estimator, item)
+            while True:
+                if coming is not None and coming[0] == 0:
+                    self.estimator.finish_rival(pickle.loads(pickle.dumps(coming[1])))
+                    coming = None
+                if (job := self.estimator.next_job()) is None:
+                    break
+                result = run(pickle.loads(pickle.dumps(job)))
+                if job.window.number in fails:
+                    result = WindowResult(job.window, SETTINGS, job.model, failure='out of time')
+                else:
+                    self.results.append(result)
+                    key = job.window.record.first_index, job.window.record.start_ns
+                    self.done[key] = job.window.number, result.spent
+                self.estimator.finish(result)
+                if coming is not None:
+                    coming = coming[0] - 1, coming[1]
+                elif (rival := self.estimator.rival_job()) is not None:
+                    self.began.append((rival.window.number, rival.model.effects))
+                    coming = next(takes), renew(pickle.loads(pickle.dumps(rival)))
+
+    def replayed(self):
+        """What a replay of it gives."""
+        schedule = Schedule(self.done, ((0, three()),))
+        again = replay(stream(lost_motion(7.0)), SETTINGS, three(), schedule=schedule)
+        return [r for r in again if isinstance(r, WindowResult)]
 
 
 @pytest.fixture(scope='module')
-def short_of_time():
-    return hurried()
+def slow_beside():
+    return Beside((2, 0, 3), fails=(4, 7))
 
 
-def test_who_has_waited_three_windows_has_half_of_the_time(short_of_time):
-    friction = [
-        r.spent[i]
-        for r in short_of_time
-        for i, names in enumerate(r.structures)
-        if names == ('coulomb-friction',)
-    ]
-    # The first window is the fourth that it waited for: it had none before.
-    assert len(friction) >= 4 and friction[:3] == [0, 0, 0] and friction[3] > 0
+def test_no_window_of_the_likeliest_waits_for_the_others(slow_beside):
+    """Its job holds nothing of them but what they forecast with."""
+    first = slow_beside.results[0]
+    assert first.structures[0] == ('backlash',) and first.spent[1:] == (0, 0)
+    assert first.parts[1:] == (None, None) and first.frozen.beside == ()
+    took = [any(r.spent[1:]) for r in slow_beside.results]
+    assert any(took) and not all(took)
+    assert all(r.spent[0] > 0 for r in slow_beside.results)
 
 
-def test_a_structure_without_time_forecasts_with_its_last_posterior(short_of_time):
-    pairs = [
-        (before, after)
-        for before, after in pairwise(short_of_time)
-        if len(after.rivals) == 2 and after.rivals[0].archive is None
-    ]
-    kept = [(a, b) for a, b in pairs if a.rivals[0].frozen is not None]
-    for before, after in kept:
-        old, new = before.rivals[0].frozen, after.rivals[0].frozen
-        np.testing.assert_array_equal(old.draws, new.draws)
-        assert new.start == after.frozen.start and new in after.frozen.beside
-        assert after.parts[1] is not None
-    assert kept
+def test_who_has_waited_longest_is_sampled_beside_and_one_at_a_time(slow_beside):
+    names = [name for _, name in slow_beside.began]
+    assert names[:3] == [('coulomb-friction',), (), ('coulomb-friction',)]
+    assert all(one != other for one, other in pairwise(names[:4]))
+    # Of a window that was published: nothing may depend on the others.
+    assert not {number for number, _ in slow_beside.began} & {4, 7}
+
+
+def test_one_that_is_not_sampled_forecasts_with_its_last_posterior(slow_beside):
+    """What has come is taken in once, and stands until the next."""
+    changed, stood = 0, 0
+    for before, after in pairwise(slow_beside.results):
+        olds = {one.model: one for one in before.frozen.beside}
+        spent = {one.model: one.evaluations for one in after.rivals}
+        for new in after.frozen.beside:
+            old = olds.get(new.model)
+            assert new.start == after.frozen.start
+            if spent[new.model]:
+                changed += 1
+                assert old is None or not np.array_equal(old.draws, new.draws)
+            elif old is not None:
+                stood += 1
+                np.testing.assert_array_equal(old.draws, new.draws)
+    assert changed >= 2 and stood >= 2
+
+
+def test_a_replay_takes_in_what_came_from_beside_where_the_live_run_did(slow_beside):
+    """To the last bit, though its own computer had it at once."""
+    twice = slow_beside.replayed()
+    assert len(twice) == len(slow_beside.results)
+    assert all(same(*pair) for pair in zip(slow_beside.results, twice, strict=True))
+    assert [r.spent for r in twice] == [r.spent for r in slow_beside.results]
+
+
+def test_what_nobody_waits_for_any_more_is_let_go_of():
+    estimator = Estimator(SETTINGS, three(), live=True)
+    items = stream(lost_motion(4.0))
+
+    def window():
+        while (job := estimator.next_job()) is None:
+            give(estimator, next(items))
+        estimator.finish(run(job))
+
+    window()
+    old = estimator.rival_job()
+    assert old is not None and estimator.rival_job() is None
+    estimator.abandon_rival()  # its process has died
+    assert estimator.rival_job() is old
+    late = renew(old)
+    estimator.set_model(choose_model(('backlash',)))
+    window()
+    estimator.finish_rival(late)
+    window()
+    assert [r for r, _ in estimator.weights] == [choose_model(('backlash',))]
+    assert estimator.rival_job() is None
 
 
 def weighing(*errors):

@@ -145,9 +145,9 @@ def test_a_stall_takes_the_time_for_sampling_from_no_other_window(
     """One slow moment after the sampling of a window left the next ten no time for theirs."""
     clock, sampled = Clock(), []
 
-    def window(job: Job, expired: Callable[[float], bool]) -> None:
+    def window(job: Job, expired: Callable[[], bool]) -> None:
         began = clock.now
-        while not expired(1.0):
+        while not expired():
             clock.sleep(1e-3)
         sampled.append(clock.now - began)
         clock.sleep(0.7 if len(sampled) - 1 in stalls else 0.04)
