@@ -9,10 +9,13 @@ import pytest
 from actuator_glue_msgs.srv import SetModel
 from ros_nodes import QUICK, RATE, recorded
 
+from actuator_glue.inference.choice import choose_model
 from actuator_glue.io.bag_reader import decoded, summarise
+from actuator_glue.nodes.diagnoser_worker import requested
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.playback import items, replay
 from actuator_glue.online.replay_comparison import compare, published
+from actuator_glue.online.structures import Proposal, Proposed
 from actuator_glue.records import Record
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -88,7 +91,7 @@ def test_the_model_changes_live_and_the_replay_repeats_it(start, probe, tmp_path
     start(
         'actuator_sim',
         rate=RATE,
-        duration=9.0,
+        duration=13.0,
         command='noise',
         frequency_end=8.0,
         wait_for=2,
@@ -115,11 +118,18 @@ def test_the_model_changes_live_and_the_replay_repeats_it(start, probe, tmp_path
     )
     assert taken.success, taken.message
     probe.until(lambda: probe.value('estimator', 'model') == 'delay', 10)
-    finish(probe, recorder, estimator, round(RATE * 10) + 1)
+    # Beside it another, which a process of its own samples whenever it can.
+    names = ('delay',), ('bias',)
+    two = Proposal(
+        tuple(Proposed(choose_model(n), w) for n, w in zip(names, (0.9, 0.1), strict=True))
+    )
+    assert probe.call(SetModel, 'estimator/set_model', requested(two)).success
+    finish(probe, recorder, estimator, round(RATE * 14) + 1)
     comparison, live = replayed(bag)
     assert comparison.identical, comparison.differing
     models = {tuple(m.effects) for m in live.posteriors.values()}
     assert models == {(), ('delay',)}
+    assert any(sum(list(m.structure_evaluations)[1:]) for m in live.posteriors.values())
     last = live.posteriors[max(live.posteriors)]
     assert list(last.parameter_names)[-1] == 'delay' and last.units[-1] == 's'
     assert last.mean[-1] == pytest.approx(0.004, abs=max(5 * last.stddev[-1], 5e-4))
