@@ -91,10 +91,12 @@ class Estimated:
     Attributes:
         contradicted: the alarm of the check of the prior stands.
         weights: effects and weight of each structure that is carried, the likeliest first.
+        contradicts: data since the first that contradict [s]; NaN where none do.
     """
 
     contradicted: bool
     weights: tuple[tuple[frozenset[str], float], ...]
+    contradicts: float = math.nan
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,8 +184,8 @@ class LiveState:
         seconds: data received since the stream began [s].
         coverages: of the last bands.
         judged: data there were when each of them was judged [s].
-        origin: data before those that looks are of [s]: until a sudden change of a machine that
-            nothing was added to.
+        origin: data before those that looks are of [s]: until a machine that nothing was added to
+            changed, suddenly or slowly.
         broken: their mean is below the limit.
         contradicted: the alarm of the check of the prior stands.
         since: window that the structures are carried from.
@@ -308,9 +310,17 @@ def _changed(state: LiveState) -> float:
 def _estimated(state: LiveState, given: Estimated) -> tuple[LiveState, tuple[Action, ...]]:
     rises = given.contradicted and not state.contradicted
     state = replace(state, contradicted=given.contradicted, weights=given.weights)
-    if rises:
-        what = 'samples contradict what the estimator knew of the parameters'
-        return replace(state, reason=state.reason or what), ()
+    if not rises:
+        return state, ()
+    what = 'samples contradict what the estimator knew of the parameters'
+    state = replace(state, reason=state.reason or what)
+    began = max(state.seconds - given.contradicts, 0.0)
+    sound = state.sound and not state.broken and not (state.weights and state.weights[0][0])
+    if sound and state.origin == 0.0 and math.isfinite(began):
+        # A slow change, which windows follow: with all data it would be judged by those before it.
+        # A later alarm is of the same one.
+        ready = max(state.ready, began + state.settings.minimum)
+        state = replace(state, origin=began, left_open=False, ready=ready)
     return state, ()
 
 

@@ -115,6 +115,26 @@ def test_a_contradicted_prior_is_looked_into_and_once():
     assert len(looks(actions)) == 1 and 'contradict' in looks(actions)[0]
 
 
+def test_a_slow_change_is_looked_for_in_the_data_since_it_began():
+    """Windows follow it, so that bands stay good; with those before, the model passed for enough."""
+    bands = [live.Judged(0.94)] * 3
+    state, actions = run(live.init(SETTINGS), live.Received(60.0), *bands)
+    state, actions = run(state, live.Estimated(True, (), 14.0), live.Received(65.5))
+    assert actions == []  # as much is waited for as a diagnosis needs
+    state, actions = run(state, live.Received(66.0))
+    assert [look.since for look in actions] == [46.0]
+    # The alarm fell silent and was raised again: it is the same change.
+    state, _ = run(state, live.Concluded(), live.Estimated(False, ()))
+    state, actions = run(state, live.Estimated(True, (), 9.0), live.Received(80.0))
+    assert [look.since for look in actions] == [46.0]
+    # Where bands were never good, or something was added, all data are looked at.
+    for first in (live.Judged(0.5), live.Estimated(False, ((PLAY, 1.0),))):
+        state, _ = run(live.init(SETTINGS), live.Received(15.0), *bands[:2], first)
+        weights = state.weights
+        _, actions = run(state, live.Estimated(True, weights, 9.0), live.Received(60.0))
+        assert [look.since for look in actions if isinstance(look, live.Look)] == [0.0]
+
+
 def test_what_later_data_contradict_is_taken_out_and_told():
     state, _ = run(broken(), live.Concluded(proposal('coulomb-friction'), left_open=True))
     state, _ = run(state, live.Estimated(False, ((frozenset({'coulomb-friction'}), 0.9),)))
