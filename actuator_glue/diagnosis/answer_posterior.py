@@ -146,7 +146,9 @@ def sampled(
     told = sample(found.base, stage='posterior before')
     before = after = Side(found.base.model, found.base.fit.theta, told.points)
     if final.effects:
-        told = sample(final, settings.evaluations)
+        # Of equations that are not the machine's intervals are widened by far more.
+        whole = decision.verdict in COMPLETE
+        told = sample(final, settings.evaluations // (1 if whole else 2))
         after = Side(final.model, final.fit.theta, told.points)
     out = AnswerPosterior(
         result, before, after, told, told, MixedDraws.of(told.points, final.effects), final,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import partial
@@ -23,14 +23,29 @@ from actuator_glue.diagnosis.trial import Trial
 _SWAPS = 4
 # Where something material remains what swaps mend terms may, too: fewer of both are tried.
 _OPEN, _OPEN_TRIED = 2, 3
+# What so many do not explain may have a plainer description than further names.
+_NAMES = 2
 
 
 class BeamSearch(Judge):
-    """Beam search over effect sets on one data set."""
+    """Beam search over effect sets on one data set.
 
-    def __init__(self, search: Search, settings: Thresholds, progress: Progress) -> None:
+    Args:
+        search: the structures.
+        settings: thresholds.
+        progress: takes progress.
+        described: whether a description explains all that names leave; no more are added then.
+    """
+
+    def __init__(
+        self,
+        search: Search,
+        settings: Thresholds,
+        progress: Progress,
+        described: Callable[[BeamSearch, Trial], bool] = lambda search, current: False,
+    ) -> None:
         super().__init__(search, settings)
-        self.progress = progress
+        self.progress, self.described = progress, described
 
     def apart(self) -> BeamSearch:
         """Return a selection to go on with: what it adds and its noise are its own."""
@@ -99,7 +114,10 @@ class BeamSearch(Judge):
                 threshold = max(threshold, s.later_share * removed(base, current))
             if self.left(current) < self.material or stage == s.most or self.search.effort.over:
                 break
-            ranked = self.extend(self.rescored(ranked[: s.beam]), stage + 1)
+            if stage == _NAMES and self.described(self, current):
+                break
+            width = max(1, s.beam + 1 - stage)  # the more there is, the fewer could lead on
+            ranked = self.extend(self.rescored(ranked[:width]), stage + 1)
             if ranked and self.left(current) >= self.material:
                 self.renoise(self._nearest(ranked))
                 ranked = self.rescored(ranked)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -21,6 +22,7 @@ from actuator_glue.diagnosis.search_step import SearchStep
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.stages import Progress
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
 
 
@@ -102,7 +104,12 @@ def concluded(
 
 
 def searched(
-    prepared: Prepared, search: Search, line: Line | None, settings: Thresholds, tell: Progress
+    prepared: Prepared,
+    search: Search,
+    line: Line | None,
+    settings: Thresholds,
+    tell: Progress,
+    described: Callable[[BeamSearch, Trial], bool],
 ) -> Conclusion:
     """Search for what the model lacks, one effect at a time, and say what that comes to.
 
@@ -112,8 +119,9 @@ def searched(
         line: hum that was taken out of the data before.
         settings: thresholds.
         tell: takes progress.
+        described: whether a description explains all that some names leave.
     """
-    selection = BeamSearch(search, settings, tell)
+    selection = BeamSearch(search, settings, tell, described)
     named = selection.run()
     if settings.use_force:
         before = named.final

@@ -13,6 +13,7 @@ from actuator_glue.diagnosis.first_look import FirstLook
 from actuator_glue.diagnosis.force import check_forces
 from actuator_glue.diagnosis.pipeline import as_given, conclude
 from actuator_glue.diagnosis.preparation import prepare
+from actuator_glue.diagnosis.remembered import Remembered
 from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.diagnosis.stages import Progress
 from actuator_glue.diagnosis.telling import told
@@ -35,6 +36,7 @@ def diagnose(
     first_look: Callable[[FirstLook], None] | None = None,
     settings: Thresholds | None = None,
     prior: GivenPrior | None = None,
+    remembered: Remembered | None = None,
 ) -> DiagnosisData:
     """Diagnose records whose specimen stiffness is known.
 
@@ -48,6 +50,8 @@ def diagnose(
         first_look: called once, seconds after the start, with what Eq. (2) leaves.
         settings: thresholds.
         prior: what an earlier calibration knew of Eq. (2)'s parameters.
+        remembered: what an earlier look at fewer data of the same machine left; receives what this
+            one leaves.
 
     Raises:
         InputError: stiffness not known, records too short, or nothing moves.
@@ -67,7 +71,9 @@ def diagnose(
     other = wrong_setup.find(ready.fit, settings, given=given)
     # What a wrong set-up leaves is nothing that the actuator does.
     search = as_given if other is not None and other.enough else conclude
-    result = search(ready, settings, each, tell, Effort(settings.effort))
+    remembered = remembered or Remembered()
+    effort = Effort(settings.effort, remembered.copied(), remembered)
+    result = search(ready, settings, each, tell, effort)
     drawn = sampled(result, settings, np.random.default_rng([seed, 1]), each, tell)
     tell('held-out', 0.0)
     both = both_parts.of(drawn, other, seed)

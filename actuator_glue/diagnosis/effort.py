@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from actuator_glue.diagnosis.remembered import Remembered
 from actuator_glue.inference.least_squares.fit import Fit
 
 
@@ -17,9 +18,13 @@ class Effort:
 
     Attributes:
         most: sub-steps after which no further search is begun.
+        earlier: what an earlier look at the same machine spares.
+        remembered: what this one leaves for the next.
     """
 
     most: float = math.inf
+    earlier: Remembered = field(default_factory=Remembered)
+    remembered: Remembered = field(default_factory=Remembered)
     _refits: list[int] = field(default_factory=list)
 
     def spent_on(self, found: Fit) -> Fit:

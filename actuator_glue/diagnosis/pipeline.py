@@ -10,6 +10,7 @@ from actuator_glue.diagnosis.conclusion import Conclusion, searched
 from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.measured import hum
 from actuator_glue.diagnosis.measured.hum import Line
+from actuator_glue.diagnosis.moves.describe import explains_rest
 from actuator_glue.diagnosis.moves.move import Asking, follow
 from actuator_glue.diagnosis.moves.registry import ACROSS, WITHIN
 from actuator_glue.diagnosis.preparation import Prepared
@@ -48,7 +49,7 @@ def as_given(
     """Say what Eq. (2) leaves, and each effect beside it, without any search."""
     tell('base fit', 0.0)
     prepared, search, line = _begun(prepared, settings, each, effort, fixed=True)
-    return searched(prepared, search, line, replace(settings, most=0), tell)
+    return searched(prepared, search, line, replace(settings, most=0), tell, explains_rest)
 
 
 def _within(
@@ -86,13 +87,13 @@ def _begun(
 
 def _moved(prepared: Prepared, search: Search, line: Line | None, asking: Asking) -> Conclusion:
     settings, tell = asking.settings, asking.tell
-    result = searched(prepared, search, line, settings, tell)
+    result = searched(prepared, search, line, settings, tell, explains_rest)
     if line is not None and result.found.final.effects:
         left = _line_left(prepared.fit, result.found.final)
         if left is None or not left.same_as(line):
             data = prepared.fit if left is None else hum.without(prepared.fit, left)
             search = Search(data, search.names, search.each, effort=search.effort)
-            result = searched(prepared, search, left, settings, tell)
+            result = searched(prepared, search, left, settings, tell, explains_rest)
     return follow(result, WITHIN, asking)
 
 

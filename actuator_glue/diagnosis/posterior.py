@@ -254,7 +254,7 @@ def sample(
             goal,
             seed,
             affordable,
-            settings=SamplerSettings(chains=32, population=128, steps=2, adaptation=20, parts=48),
+            settings=SamplerSettings(chains=64, population=128, steps=2, adaptation=20, parts=48),
             archive=near,
             enough=_enough,
             progress=lambda done, all_: progress(done / all_),

@@ -149,7 +149,13 @@ class Search:
         """Refit `current` with one more effect; with `each` where nothing else is meanwhile."""
         model = self.structure(*current.effects, name)
         key = frozenset(model.effects)
-        if key not in self._tried:
+        near = self.effort.earlier.ended.get(key)
+        if key not in self._tried and near is not None:
+            # Where an earlier look ended is near: neither stretches nor a population are asked.
+            starts = np.stack([near, self.screen(current, name)[1][0]])
+            found = self._fit(self.data, model, starts, iterations=_COARSE, tolerance=_TOLERANCE)
+            self._keep(key, found)
+        elif key not in self._tried:
             starts, part = self.screen(current, name)[1], self._stand_in(model)
             found = self._fit(part.data, model, starts, iterations=_COARSE, tolerance=_TOLERANCE)
             friction = not current.effects and self.entries[name].group == 'friction'
@@ -161,7 +167,7 @@ class Search:
                 found = self._fit(
                     self.data, model, found.theta, iterations=_FINISHED, tolerance=_TOLERANCE
                 )
-            self._tried[key] = found
+            self._keep(key, found)
         return self.trial(model.effects, name)
 
     def polish(self, trial: Trial, valves: bool = True) -> Trial:
@@ -178,7 +184,7 @@ class Search:
                 start = poles.starts(trial.structure, added, start, stiffness)
             if data is not self.data:
                 start = np.stack([self._fit(data, trial.structure, start).theta, before])
-            self._tried[key] = self._fit(self.data, trial.structure, start)
+            self._keep(key, self._fit(self.data, trial.structure, start))
             self._polished[key] = wanted
         return self.trial(trial.effects, trial.added)
 
@@ -195,8 +201,14 @@ class Search:
             lower = self._fit(self.data, model, found.theta, iterations=_LAST, space=space)
             if lower.rms < found.rms:
                 found = self._fit(self.data, model, lower.theta, iterations=_FINISHED)
-        self._tried[key] = found
+        self._keep(key, found)
         return self.trial(trial.effects, trial.added)
+
+    def _keep(self, key: frozenset[str], found: Fit) -> None:
+        """Note a refitted structure; the name of a learned term tells another look nothing."""
+        self._tried[key] = found
+        if key <= CATALOGUE.keys():
+            self.effort.remembered.ended[key] = found.theta
 
     def _fit(self, data: Data, model: Structure, starts: Array, **how: Any) -> Fit:
         return self.effort.spent_on(fit(data, model, starts, **how))

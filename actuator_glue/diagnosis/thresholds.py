@@ -29,7 +29,7 @@ class Thresholds:
             beside them and structure remains all the same: 1 of 15 was right, on 7 blind machines,
             where 55 % were told on average.
         most: most effects added.
-        beam: structures carried on from one size to the next.
+        beam: structures of one effect carried on to two; one fewer with each further effect.
         evaluations: of the posterior's likelihood, at most; 0 takes the Laplace approximation.
         tried: refits per structure after the first stage, best screened first.
         effort: work of all refits after which no further search is begun (diagnosis/effort.py).

@@ -21,7 +21,7 @@ from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.moves import names_beside_term
 from actuator_glue.diagnosis.moves.move import Asking
 from actuator_glue.diagnosis.ranking import removed
-from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.search import Asked, Search
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
@@ -58,6 +58,22 @@ def with_terms(result: Conclusion, asking: Asking) -> Conclusion | None:
     if described is None or described.left >= described.material:
         described = learned(selection, described or found) or described
     return None if described is None else result.of(selection, described)
+
+
+def explains_rest(selection: BeamSearch, current: Trial) -> bool:
+    """Whether a learned term leaves nothing material, alone or beside what was found.
+
+    Asked for before names are heaped up: where the machine is none of the catalogue's, some more
+    would take the time that a description needs.
+
+    Args:
+        selection: the model selection.
+        current: names that leave something material.
+    """
+    search = selection.search
+    names = _offered(search)
+    rows = _refitted(search, (search.trial(()), current), names)
+    return any(selection.left(trial) < selection.material for row in rows for trial in row)
 
 
 def ways(found: Selection) -> list[Way]:
@@ -211,6 +227,14 @@ def _gain(search: Search, best: Trial, other: Trial) -> float:
     return float(gain.sum()) + len(other.fit.theta) - len(best.fit.theta)
 
 
+def _refitted(search: Search, starts: Sequence[Trial], names: Sequence[str]) -> list[list[Trial]]:
+    """Refit structures with the terms that promise most beside each."""
+    new = [[n for n in names if n not in start.effects] for start in starts]
+    ranked = [search.screened(*pair)[:_REFITS] for pair in zip(starts, new, strict=True)]
+    asked = [Asked(*pair) for pair in zip(starts, map(tuple, ranked), strict=True)]
+    return search.additions_to(asked)
+
+
 def _additions(
     selection: BeamSearch,
     starts: Sequence[Trial],
@@ -219,19 +243,18 @@ def _additions(
     complete: bool,
 ) -> Trial | None:
     """Return the best structure with one more term, where it is worth more than the present."""
-    search, worth, cost = selection.search, [], math.log(len(names))
-    for start in starts:
-        if search.effort.over:
-            break
-        new = [n for n in names if n not in start.effects]
-        for trial in search.additions(start, search.screened(start, new)[:_REFITS]):
+    search, worth, cost = selection.search, list[Trial](), math.log(len(names))
+    rows = _refitted(search, starts, names)
+    plain = any(selection.left(trial) < selection.material for row in rows for trial in row)
+    for start, row in zip(starts, rows, strict=True):
+        for trial in row:
             least = selection.material
             if start is not best:
                 # In the place of names it must explain the rest, and be more than tied with them:
-                # while something remains a name is worth more than a description. One that says
-                # more than all of them is where to begin.
+                # while something remains a name is worth more than a description. Where no term
+                # explains all, one that says more than all of them is where to begin.
                 whole = selection.left(trial) < selection.material
-                if not whole and _gain(search, trial, best) > cost:
+                if not plain and _gain(search, trial, best) > cost:
                     begun = names_beside_term.with_names(selection, trial)
                     if begun is not None and selection.better(begun, best, least, cost):
                         worth.append(begun)

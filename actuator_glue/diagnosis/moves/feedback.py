@@ -13,7 +13,7 @@ from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.candidates import FAULTS, FEEDBACK
 from actuator_glue.diagnosis.conclusion import Conclusion
 from actuator_glue.diagnosis.moves import describe
-from actuator_glue.diagnosis.moves.move import Asking
+from actuator_glue.diagnosis.moves.move import Asking, after
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
 
@@ -28,7 +28,10 @@ def fed_back(result: Conclusion, asking: Asking) -> Conclusion | None:
     found = in_the_loop(result.selection, result.found)
     if found is None:
         return None
-    return _described(result, found) or result.of(result.selection, found)
+    if described := _described(result, found):
+        return after(result, described, 'a description in place of a fault inside the loop')
+    closed = result.of(result.selection, found)
+    return after(result, closed, "the transducer's fault inside the loop")
 
 
 def _described(result: Conclusion, inside: Selection) -> Conclusion | None:

@@ -38,11 +38,25 @@ class AnswerMove:
         what: what it does, for people; empty where it tells its own steps.
         when: whether it is asked for beside an answer.
         make: returns another answer; None where the one so far stands.
+        each_time: whether it is asked for beside the same answer in more data of a machine, too.
     """
 
     what: str
     when: Callable[[Conclusion], bool]
     make: Callable[[Conclusion, Asking], Conclusion | None]
+    each_time: bool = True
+
+    def made(self, result: Conclusion, asking: Asking) -> Conclusion | None:
+        """Return another answer; None where the one so far stands, or stood before."""
+        if self.each_time:
+            return self.make(result, asking)
+        effects, samples = frozenset(result.found.final.effects), result.data.target.size
+        if result.effort.earlier.would_refuse(self.what, effects, samples):
+            return None
+        other = self.make(result, asking)
+        if other is None:
+            result.effort.remembered.refused[self.what, effects] = samples
+        return other
 
 
 Groups: TypeAlias = tuple[tuple[AnswerMove, ...], ...]
@@ -64,7 +78,7 @@ def follow(result: Conclusion, groups: Groups, asking: Asking) -> Conclusion:
         for move in group:
             if result.effort.over:
                 return result
-            other = move.make(result, asking) if move.when(result) else None
+            other = move.made(result, asking) if move.when(result) else None
             if other is not None:
                 result = after(result, other, move.what) if move.what else other
                 break

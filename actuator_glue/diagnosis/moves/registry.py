@@ -31,8 +31,8 @@ from actuator_glue.diagnosis.moves.move import (
 # With one hold, since one moment.
 WITHIN: Final[Groups] = (
     (
-        AnswerMove("the transducer's fault inside the loop", always, feedback.fed_back),
-        AnswerMove('a description in place of names', complete, describe.plainer),
+        AnswerMove('', always, feedback.fed_back),
+        AnswerMove('a description in place of names', complete, describe.plainer, each_time=False),
     ),
     (AnswerMove('effects reserved for the rest', unexplained, reserved.with_reserved),),
     (AnswerMove("one record's own setting", unexplained, own_setting.own_setting),),
