@@ -102,7 +102,7 @@ def test_diagnose_takes_files(
         api.diagnose([str(file)], Named(file), seed=None, prior=posterior, prior_age=age)
     for (given,) in (seen['records'], seen['held']):
         np.testing.assert_array_equal(given.measured, record.measured)
-    assert type(seen['seed']) is int and seen['prior'].age_s == 3600.0
+    assert type(seen['seed']) is int and seen['before'].prior.age_s == 3600.0
     monkeypatch.undo()
     held = api.simulate(
         api.Command('noise', rate=100, duration=6, high=5), stiffness=250e3, seed=4

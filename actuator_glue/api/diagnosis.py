@@ -27,6 +27,7 @@ from actuator_glue.api.tracking import RecordTracking, ready, records_tracking, 
 from actuator_glue.diagnosis import diagnose as core
 from actuator_glue.diagnosis.estimate import Estimate, Json
 from actuator_glue.diagnosis.first_look import FirstLook
+from actuator_glue.diagnosis.remembered import Before, Remembered
 from actuator_glue.diagnosis.result import SCHEMA, DiagnosisData
 from actuator_glue.diagnosis.stages import ShareDone
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -327,6 +328,7 @@ def diagnose(
     stiffness: Stiffness = None,
     progress: Progress | bool | None = None,
     first_look: Callable[[FirstLook], None] | None = None,
+    remembered: Remembered | None = None,
     **changes: Unpack[DiagnosisChanges],
 ) -> Diagnosis:
     """Ask whether Eq. (2) explains records and, if not, which effects it lacks.
@@ -342,6 +344,8 @@ def diagnose(
         progress: called with (stage, share of it done in [0, 1]); True for a bar, False for none;
             None for a bar in a notebook.
         first_look: called once, seconds after the start, with what Eq. (2) leaves.
+        remembered: what looking at fewer records of the same machine left, for a quicker answer;
+            receives what this call leaves.
         changes: options by name.
 
     Returns:
@@ -378,7 +382,9 @@ def diagnose(
                 use_force=options.use_force,
                 effort=options.effort * Thresholds().effort,
             ),
-            prior=given_prior(options.prior, options.drift, options.prior_age),
+            before=Before(
+                given_prior(options.prior, options.drift, options.prior_age), remembered
+            ),
         )
     values = {f.name: getattr(found, f.name) for f in fields(found)}
     if found.complete and (told := doubts(found, [*given, *held])):

@@ -13,7 +13,7 @@ from actuator_glue.diagnosis.first_look import FirstLook
 from actuator_glue.diagnosis.force import check_forces
 from actuator_glue.diagnosis.pipeline import as_given, conclude
 from actuator_glue.diagnosis.preparation import prepare
-from actuator_glue.diagnosis.remembered import Remembered
+from actuator_glue.diagnosis.remembered import Before, Remembered
 from actuator_glue.diagnosis.result import DiagnosisData
 from actuator_glue.diagnosis.stages import Progress
 from actuator_glue.diagnosis.telling import told
@@ -22,7 +22,6 @@ from actuator_glue.inference.least_squares.base_prior import BasePrior
 from actuator_glue.inference.least_squares.each import Each
 from actuator_glue.inference.least_squares.fit import base_fit
 from actuator_glue.inference.least_squares.space import UPPER
-from actuator_glue.inference.prior_use import GivenPrior
 from actuator_glue.records import Record
 
 
@@ -35,8 +34,7 @@ def diagnose(
     progress: Progress | None = None,
     first_look: Callable[[FirstLook], None] | None = None,
     settings: Thresholds | None = None,
-    prior: GivenPrior | None = None,
-    remembered: Remembered | None = None,
+    before: Before | None = None,
 ) -> DiagnosisData:
     """Diagnose records whose specimen stiffness is known.
 
@@ -49,14 +47,13 @@ def diagnose(
         progress: called with (stage, share done in [0, 1]).
         first_look: called once, seconds after the start, with what Eq. (2) leaves.
         settings: thresholds.
-        prior: what an earlier calibration knew of Eq. (2)'s parameters.
-        remembered: what an earlier look at fewer data of the same machine left; receives what this
-            one leaves.
+        before: what was known of the machine.
 
     Raises:
         InputError: stiffness not known, records too short, or nothing moves.
     """
-    settings = settings or Thresholds()
+    settings, before = settings or Thresholds(), before or Before()
+    prior = before.prior
     tell = progress or (lambda stage, share: None)
     held = [holdout] if isinstance(holdout, Record) else list(holdout or ())
     tell('check', 0.0)
@@ -71,7 +68,7 @@ def diagnose(
     other = wrong_setup.find(ready.fit, settings, given=given)
     # What a wrong set-up leaves is nothing that the actuator does.
     search = as_given if other is not None and other.enough else conclude
-    remembered = remembered or Remembered()
+    remembered = before.remembered or Remembered()
     effort = Effort(settings.effort, remembered.copied(), remembered)
     result = search(ready, settings, each, tell, effort)
     drawn = sampled(result, settings, np.random.default_rng([seed, 1]), each, tell)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from actuator_glue.inference.prior_use import GivenPrior
 from actuator_glue.records import Array
 
 # A move that was refused in so much of the data would be refused again.
@@ -36,3 +37,16 @@ class Remembered:
             samples: counted now.
         """
         return self.refused.get((what, effects), 0) >= _STILL * samples
+
+
+@dataclass(frozen=True, slots=True)
+class Before:
+    """What was known of a machine before its records.
+
+    Attributes:
+        prior: what an earlier calibration knew of Eq. (2)'s parameters.
+        remembered: what an earlier look at fewer data left; receives what this one leaves.
+    """
+
+    prior: GivenPrior | None = None
+    remembered: Remembered | None = None

@@ -20,7 +20,7 @@ from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.each import Each
 from actuator_glue.inference.least_squares.fit import Fit, base_fit, fit, rms
-from actuator_glue.inference.least_squares.space import Space
+from actuator_glue.inference.least_squares.space import Space, sum_of_squares
 from actuator_glue.inference.least_squares.stretches import Part, stretches
 from actuator_glue.model.effects import CATALOGUE, Effect, Scale, scale
 from actuator_glue.model.parameters import BASE
@@ -29,10 +29,13 @@ from actuator_glue.records import Array
 
 _COARSE = 8  # iterations of every refit; those in the running go on
 _TOLERANCE = 1e-4
+# Relative gain of a step that a refit in the running does not go on for. A hundredth of a nat of a
+# structure's weight is 1e-5 of the squared error where that is that of noise (weights.py).
+_DONE = 1e-5
 _FINISHED = 2  # iterations on all samples after those on stretches of them
 _PROMISING = 0.95  # of the error at most is left by friction that is looked at twice
 _POLISHED = 4
-_LAST = 60  # iterations at most of a structure that is told
+_LAST, _LEAST_GAIN = 60, 1e-6  # iterations at most of a structure that is told, and tolerance
 _FINER = 0.1  # of a usual finite-difference step
 _LONG = 5.0  # times its stretches: there they tell which minimum is the lowest
 
@@ -151,9 +154,10 @@ class Search:
         key = frozenset(model.effects)
         near = self.effort.earlier.ended.get(key)
         if key not in self._tried and near is not None:
-            # Where an earlier look ended is near: neither stretches nor a population are asked.
             starts = np.stack([near, self.screen(current, name)[1][0]])
-            found = self._fit(self.data, model, starts, iterations=_COARSE, tolerance=_TOLERANCE)
+            sums = sum_of_squares(self.data.target - self.data.simulate(model, starts))
+            start = starts[np.argmin(sums)]
+            found = self._fit(self.data, model, start, iterations=_COARSE, tolerance=_TOLERANCE)
             self._keep(key, found)
         elif key not in self._tried:
             starts, part = self.screen(current, name)[1], self._stand_in(model)
@@ -195,10 +199,11 @@ class Search:
         friction that sticks and slips differences do not point down.
         """
         key, model = frozenset(trial.effects), trial.structure
-        found = self._fit(self.data, model, trial.fit.theta, iterations=_LAST)
+        last: dict[str, Any] = {'iterations': _LAST, 'tolerance': _LEAST_GAIN}
+        found = self._fit(self.data, model, trial.fit.theta, **last)
         if finely:
             space = Space(model, self.data.duration, _FINER)
-            lower = self._fit(self.data, model, found.theta, iterations=_LAST, space=space)
+            lower = self._fit(self.data, model, found.theta, space=space, **last)
             if lower.rms < found.rms:
                 found = self._fit(self.data, model, lower.theta, iterations=_FINISHED)
         self._keep(key, found)
@@ -207,11 +212,12 @@ class Search:
     def _keep(self, key: frozenset[str], found: Fit) -> None:
         """Note a refitted structure; the name of a learned term tells another look nothing."""
         self._tried[key] = found
-        if key <= CATALOGUE.keys():
+        # Over the kinks of friction a refit ends wherever it comes to: it is searched for anew.
+        if all(n in CATALOGUE and CATALOGUE[n].group != 'friction' for n in key):
             self.effort.remembered.ended[key] = found.theta
 
     def _fit(self, data: Data, model: Structure, starts: Array, **how: Any) -> Fit:
-        return self.effort.spent_on(fit(data, model, starts, **how))
+        return self.effort.spent_on(fit(data, model, starts, **{'tolerance': _DONE, **how}))
 
     def _stand_in(self, model: Structure) -> Part:
         """Return the data that structures are refitted to roughly."""

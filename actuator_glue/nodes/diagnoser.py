@@ -16,6 +16,7 @@ from actuator_glue_msgs.srv import SetModel
 from rclpy.action import ActionServer, CancelResponse, GoalResponse
 
 from actuator_glue import sample_block
+from actuator_glue.diagnosis.remembered import Remembered
 from actuator_glue.diagnosis.stages import ShareDone
 from actuator_glue.errors import InputError
 from actuator_glue.nodes import diagnoser_worker, own_effects, spin, topics
@@ -75,6 +76,7 @@ class DiagnoserNode(WorkingNode):
         self.collector = Collector(values['keep'])
         self.loop = live.init(diagnoser_worker.settings(values))
         self.memory = live.Memory()
+        self._remembered = Remembered()
         self._explained = Explained()
         self._last = float('-inf')
         self.every(0.2, self._check)
@@ -132,6 +134,7 @@ class DiagnoserNode(WorkingNode):
         self._tell(self.collector.push(block))
         if self.collector.received < before:
             self.memory.forget()
+            self._remembered = Remembered()
         if self.collector.received != before:
             self._take(live.Received(self.collector.received))
 
@@ -154,7 +157,8 @@ class DiagnoserNode(WorkingNode):
     def _posterior(self, message: Any) -> None:
         self._explained.posterior(message)
         contradicted = bool(message.prior_contradicted)
-        self._take(live.Estimated(contradicted, conversion.weights(message)))
+        weights, contradicts = conversion.weights(message), float(message.contradicted_for)
+        self._take(live.Estimated(contradicted, weights, contradicts))
 
     def _draws(self, message: Any) -> None:
         if self.loop.trusted and self.memory.settings is not None:
@@ -188,6 +192,7 @@ class DiagnoserNode(WorkingNode):
                 seed=values['seed'],
                 apply=values['apply'],
                 reason=wanted.reason,
+                remembered=self._remembered,
             )
         )
 
@@ -207,7 +212,7 @@ class DiagnoserNode(WorkingNode):
             request = diagnoser_worker.asked(handle.request, streamed)
             if streamed:
                 request = replace(request, known=self.memory.before(streamed[0].start_ns))
-            self._take(live.Asked(bool(streamed)))
+            self._take(live.Requested(bool(streamed)))
             self._start(request)
         except InputError as error:
             self._fail(diagnoser_worker.Outcome(message=str(error)))
@@ -247,6 +252,8 @@ class DiagnoserNode(WorkingNode):
         self._explained.diagnosis(outcome.diagnosis.to_json())
         self.get_logger().info(outcome.message)
         self._request, self._told = None, outcome
+        if outcome.remembered is not None:
+            self._remembered = outcome.remembered
         self._take(outcome.concluded)
         if self._swap is None:
             self._finish(outcome)

@@ -16,6 +16,7 @@ from actuator_glue_msgs.srv import SetModel
 from actuator_glue.api.diagnosis import Diagnosis, diagnose
 from actuator_glue.api.live import EFFORT, concluded, given
 from actuator_glue.diagnosis.finding import Finding
+from actuator_glue.diagnosis.remembered import Remembered
 from actuator_glue.errors import InputError
 from actuator_glue.inference.carried import Carried, Drift
 from actuator_glue.io.load import load_records
@@ -59,6 +60,7 @@ class Request:
         apply: the estimator is to go on with the augmented model.
         known: what the estimator knew before the records: draws, drift and age [s].
         reason: why the stream is diagnosed; empty where it was asked for.
+        remembered: what the look at the stream before left.
     """
 
     records: tuple[Record, ...] = ()
@@ -70,13 +72,15 @@ class Request:
     apply: bool = False
     known: tuple[Carried, Drift, float] | None = None
     reason: str = ''
+    remembered: Remembered = field(default_factory=Remembered)
 
 
 @dataclass(slots=True)
 class Outcome:
     """What came of it; `diagnosis` is None where `message` says why not.
 
-    `concluded` is what it means for the estimator, `reason` why the stream was diagnosed.
+    `concluded` is what it means for the estimator, `reason` why the stream was diagnosed,
+    `remembered` what the next look begins with.
     """
 
     diagnosis: Diagnosis | None = None
@@ -86,6 +90,7 @@ class Outcome:
     applied: bool = False
     concluded: Concluded = field(default_factory=Concluded)
     reason: str = ''
+    remembered: Remembered | None = None
 
 
 def asked(goal: Any, live: tuple[Record, ...]) -> Request:
@@ -129,6 +134,7 @@ def work(request: Request, tell: Tell) -> Outcome:
             effort=1.0 if request.paths else EFFORT,
             prior=given(request.known),
             progress=lambda stage, fraction: tell((stage, fraction)),
+            remembered=request.remembered,
         )
     except InputError as error:
         return Outcome(message=str(error))
@@ -139,6 +145,7 @@ def work(request: Request, tell: Tell) -> Outcome:
         actuator=records[0].actuator,
         concluded=concluded(found, records, request.apply),
         reason=request.reason,
+        remembered=None if request.paths else request.remembered,
     )
 
 

@@ -105,7 +105,7 @@ class Began:
 
 
 @dataclass(frozen=True, slots=True)
-class Asked:
+class Requested:
     """Somebody has asked for a diagnosis, which begins now.
 
     Attributes:
@@ -135,7 +135,7 @@ class Concluded:
     supported: frozenset[str] | None = None
 
 
-Input: TypeAlias = Received | Judged | Carries | Estimated | Began | Asked | Concluded
+Input: TypeAlias = Received | Judged | Carries | Estimated | Began | Requested | Concluded
 
 
 @dataclass(frozen=True, slots=True)
@@ -257,7 +257,7 @@ def step(state: LiveState, given: Input) -> tuple[LiveState, tuple[Action, ...]]
             state, told = _estimated(state, given)
         case Began():
             state = _began(state)
-        case Asked():
+        case Requested():
             looked = state.seconds if given.streamed else state.looked
             return replace(state, running=True, looked=looked), ()
         case Concluded():

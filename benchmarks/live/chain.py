@@ -9,6 +9,7 @@ import numpy as np
 
 from actuator_glue.api.diagnosis import diagnose
 from actuator_glue.api.live import EFFORT, concluded, given
+from actuator_glue.diagnosis.remembered import Remembered
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.online import live_diagnosis as live
@@ -98,6 +99,7 @@ class _Loop:
         self.collector = Collector(KEPT)
         self._settings, self._seed = settings, seed
         self._state, self._memory = live.init(wanted), live.Memory()
+        self._remembered = Remembered()
         self._memory.setup(settings, carried)
         self._waiting: list[tuple[float, live.Concluded]] = []
         self._contradiction = Contradiction()
@@ -132,7 +134,8 @@ class _Loop:
         alarms = [event for event in told if isinstance(event, Contradicted)]
         self._contradiction.take(result, alarms)
         contradicted = self._contradiction.since_ns is not None
-        self._take(live.Estimated(contradicted, weights))
+        contradicts = self._contradiction.lasted(result.window)
+        self._take(live.Estimated(contradicted, weights, contradicts))
         if self._state.trusted:
             self._memory.learn(_known(result, self._settings), self.collector.first_ns)
 
@@ -161,7 +164,14 @@ class _Loop:
     def _look(self, since: float) -> live.Concluded:
         records, known = live.looked_at(self.collector, self._memory, since)
         began = time.process_time()
-        found = diagnose(records, seed=self._seed, jobs=1, effort=EFFORT, prior=given(known))
+        found = diagnose(
+            records,
+            seed=self._seed,
+            jobs=1,
+            effort=EFFORT,
+            prior=given(known),
+            remembered=self._remembered,
+        )
         self.out.looks.append(time.process_time() - began)
         self.out.said.append((self._now, found.summary()))
         return concluded(found, records)

@@ -8,6 +8,7 @@ from scipy.stats import multivariate_normal
 from test_diagnose import QUICK, THETA, make
 
 from actuator_glue.diagnosis.diagnose import diagnose
+from actuator_glue.diagnosis.remembered import Before
 from actuator_glue.errors import InputError
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.least_squares.base_prior import BasePrior
@@ -73,7 +74,7 @@ def test_what_one_stiffness_leaves_open_is_known_from_the_calibration() -> None:
     """Base parameters about as wide as the prior at most, and right; the effect is still named."""
     record = make(['backlash'], [6e-5], 31)[1]
     alone = diagnose([record], settings=QUICK, seed=2)
-    found = diagnose([record], settings=QUICK, seed=2, prior=given(known(THETA, 0.05)))
+    found = diagnose([record], settings=QUICK, seed=2, before=Before(given(known(THETA, 0.05))))
     assert [e.name for e in found.effects] == ['backlash']
     for i, name in enumerate(NAMES):
         told, before = found.base[name], alone.base[name]
@@ -89,8 +90,7 @@ def test_what_one_stiffness_leaves_open_is_known_from_the_calibration() -> None:
 def test_a_prior_that_is_wrong_is_told_first() -> None:
     """An actuator that is softer by a tenth than a calibration to one per cent says."""
     records = make([], [], 7)
-    found = diagnose(
-        records[:2], records[2], settings=QUICK, prior=given(known(THETA * [1, 1, 1.1, 1], 0.01))
-    )
+    before = Before(given(known(THETA * [1, 1, 1.1, 1], 0.01)))
+    found = diagnose(records[:2], records[2], settings=QUICK, before=before)
     assert found.prior is not None and found.prior.contradicted
     assert found.advice[0].startswith('the records contradict the prior from monday.npz')

@@ -143,17 +143,17 @@ def test_what_later_data_contradict_is_taken_out_and_told():
     (told,) = [a for a in actions if isinstance(a, live.Say)]
     assert told.kind == 'taken out' and 'coulomb-friction' in told.message
     state, _ = run(state, live.Estimated(False, ((PLAY, 0.9),)))
-    _, actions = run(state, live.Asked(), live.Concluded(proposal()))
+    _, actions = run(state, live.Requested(), live.Concluded(proposal()))
     assert carries(actions) == [()]
 
 
 def test_what_is_carried_already_is_not_handed_over_again_unless_it_is_in_doubt():
     state, _ = run(broken(), live.Concluded(proposal('backlash'), left_open=True))
     sure = live.Estimated(False, ((PLAY, 0.97), (frozenset(), 0.03)))
-    _, actions = run(state, sure, live.Asked(), live.Concluded(proposal('backlash')))
+    _, actions = run(state, sure, live.Requested(), live.Concluded(proposal('backlash')))
     assert carries(actions) == []
     unsure = live.Estimated(False, ((PLAY, 0.45), (frozenset(), 0.4)))
-    _, actions = run(state, unsure, live.Asked(), live.Concluded(proposal('backlash')))
+    _, actions = run(state, unsure, live.Requested(), live.Concluded(proposal('backlash')))
     assert carries(actions) == [('backlash',)]
 
 
@@ -323,7 +323,7 @@ def test_an_addition_that_a_look_does_not_support_is_carried_beside_eq_2():
     undecided = live.Concluded(None, 'nothing is supported that could be added', True)
     supported = replace(undecided, supported=frozenset({'coulomb-friction', 'delay'}))
     against = replace(undecided, supported=frozenset())
-    state, _ = run(broken(), live.Concluded(proposal('coulomb-friction')), sure, live.Asked())
+    state, _ = run(broken(), live.Concluded(proposal('coulomb-friction')), sure, live.Requested())
     assert carries(run(state, undecided)[1]) == carries(run(state, supported)[1]) == []
     _, (told, carry) = run(state, against)
     assert told.kind == 'in doubt' and 'coulomb-friction' in told.message
