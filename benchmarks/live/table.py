@@ -28,7 +28,8 @@ Streams that hide something are listed; what no stream of a commit could show is
 
 Intervals are of the parameters of Eq. (2) that a window tells, not of those that the prior's
 bounds do (`prior_dominated`). Half of the streams know a calibration; what no window tells of its
-four parameters stays as it was drawn, inside its interval for the whole stream or outside.
+four parameters stays as it was drawn, inside its interval for the whole stream or outside. Each
+window's prior is what those before it say: standard errors are of streams, as if each were one.
 
 """
 
@@ -134,8 +135,15 @@ def _inside(rows: Sequence[Row]) -> str:
     counted = sum(row['windows'] for row in rows)
     if not counted:
         return 'none'
-    inside = sum(row['inside'] * row['windows'] for row in rows if row['windows'])
-    return f'{inside / counted:.1%} of {counted}'
+    some = [row for row in rows if row['windows']]
+    share = sum(row['inside'] * row['windows'] for row in some) / counted
+    told = f'{share:.1%} of {counted} in {len(some)} streams'
+    if len(some) < 2:
+        return told
+    # Windows of one stream know what those before it do: streams are independent, they are not.
+    squares = sum((row['windows'] * (row['inside'] - share)) ** 2 for row in some)
+    error = np.sqrt(squares * len(some) / (len(some) - 1.0)) / counted
+    return f'{told} (standard error {error:.1%})'
 
 
 def _share(true: Sequence[Any]) -> str:

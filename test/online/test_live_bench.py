@@ -47,11 +47,12 @@ def test_what_was_measured_stands_beside_what_is_required():
         row(1),
         row(2, added=40.0),
         row(3, ('delay',), **found, **times),
-        row(4, ('gain',), **(times | {'delay': 20.0, 'windows': 300, 'worse': 4})),
+        row(4, ('gain',), **(times | {'delay': 20.0, 'windows': 300, 'inside': 0.92, 'worse': 4})),
     ]
     told = page(rows, 300)
     assert '4 of 300 streams (seeds 1 to 4), commit abc.' in told
-    assert '| 93 to 97 % | 96.0% of 400 |' in told  # 100 and 300 windows
+    # 100 windows and 300; their parts are 3 windows more and 3 less than 93 %.
+    assert '| 93 to 97 % | 93.0% of 400 in 2 streams (standard error 1.5%) |' in told
     assert '| 90 % | 1 of 2 |' in told and '| all of 50 | 1 of 2 |' in told
     assert '| 15 s | 16 s of 2 |' in told and '| none | 1 of 4 |' in told
     assert told.count('\n## Commit') == 1

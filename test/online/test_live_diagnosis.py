@@ -116,7 +116,7 @@ def test_a_contradicted_prior_is_looked_into_and_once():
 
 
 def test_a_slow_change_is_looked_for_in_the_data_since_it_began():
-    """Windows follow it, so that bands stay good; with those before, the model passed for enough."""
+    """Windows follow it and bands stay good; with those before, the model passed for enough."""
     bands = [live.Judged(0.94)] * 3
     state, actions = run(live.init(SETTINGS), live.Received(60.0), *bands)
     state, actions = run(state, live.Estimated(True, (), 14.0), live.Received(65.5))
