@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import replace
@@ -22,7 +23,7 @@ from actuator_glue.diagnosis.trial import Trial
 # Rounds in which members may be swapped for better or simpler ones.
 _SWAPS = 4
 # Where something material remains what swaps mend terms may, too: fewer of both are tried.
-_OPEN, _OPEN_TRIED = 2, 3
+_OPEN, _OPEN_TRIED = 1, 3
 # What so many do not explain may have a plainer description than further names.
 _NAMES = 2
 
@@ -97,7 +98,7 @@ class BeamSearch(Judge):
         base, singles = self.search.trial(()), self.rescored(singles)
         self.nats = false_alarms.threshold(*self.search.signatures(), s.false_alarms)
         current, ranked, threshold = base, list(singles), self.material
-        steps = [SearchStep.to(base, 'Eq. (2) alone')]
+        steps, described = [SearchStep.to(base, 'Eq. (2) alone')], False
         for stage in range(1, s.most + 1):
             best = self._first_worth(ranked, current, threshold)
             if best is None and self.left(current) >= self.material:
@@ -114,7 +115,7 @@ class BeamSearch(Judge):
                 threshold = max(threshold, s.later_share * removed(base, current))
             if self.left(current) < self.material or stage == s.most or self.search.effort.over:
                 break
-            if stage == _NAMES and self.described(self, current):
+            if stage == _NAMES and (described := self.described(self, current)):
                 break
             width = max(1, s.beam + 1 - stage)  # the more there is, the fewer could lead on
             ranked = self.extend(self.rescored(ranked[:width]), stage + 1)
@@ -122,7 +123,7 @@ class BeamSearch(Judge):
                 self.renoise(self._nearest(ranked))
                 ranked = self.rescored(ranked)
             current = self.search.trial(current.effects, current.added)
-        found = self.checked(current, base, singles)
+        found = self.checked(current, base, singles, exchanged=not described)
         if set(found.final.effects) != set(current.effects):
             steps.append(
                 SearchStep.to(found.final, 'each held against its absence and its rivals')
@@ -158,13 +159,26 @@ class BeamSearch(Judge):
         assert scorer is not None
         return min(trials, key=lambda t: scorer.left_out_error(t.fit))
 
-    def checked(self, current: Trial, base: Trial, singles: Sequence[Trial]) -> Selection:
-        """Compare each member with its absence and its rivals, and note its evidence."""
+    def checked(
+        self, current: Trial, base: Trial, singles: Sequence[Trial], *, exchanged: bool = True
+    ) -> Selection:
+        """Compare each member with its absence and its rivals, and note its evidence.
+
+        Args:
+            current: the structure.
+            base: Eq. (2).
+            singles: every single effect.
+            exchanged: whether rivals are refitted, and take a member's place where they are
+                better; else those are told that are known.
+        """
         current = self.pruned(current)
-        for name in current.effects:
-            current = self.search.polish(replace(current, added=name))
-        current = self.search.finished(current, finely=self.left(current) >= self.material)
-        current, rivals = self.settle(current)
+        if exchanged:
+            for name in current.effects:
+                current = self.search.polish(replace(current, added=name))
+            open_ = self.left(current) >= self.material
+            current, rivals = self.settle(self.search.finished(current, finely=open_))
+        else:
+            rivals = self._known_rivals(current)
         gains, nats = worth(self.search, current)
         return Selection(
             base, tuple(singles), current, rivals, gains, nats,
@@ -182,26 +196,41 @@ class BeamSearch(Judge):
         """Go on to what has more weight with one member exchanged, until nothing has.
 
         Returns:
-            The structure, and the rivals of each of its members.
+            The structure, and the rivals of each of its members; where the rounds end with an
+            exchange, those that are known.
         """
-        for attempt in range(_SWAPS):
-            rivals: dict[str, tuple[Rival, ...]] = {}
-            best, complete = current, self.left(current) < self.material
-            most = self.settings.tried if complete else _OPEN_TRIED
+        complete = self.left(current) < self.material
+        most = self.settings.tried if complete else _OPEN_TRIED
+        for _ in range(_SWAPS if complete else _OPEN):
             rests = self.search.without_each(current)
             in_place = self._in_place(current, rests, most, complete)
-            for name, rest, trials in zip(current.effects, rests, in_place, strict=True):
-                rivals[name] = self._rivals(rest, current, name, trials)
-                for trial in trials:
-                    if self.behind(trial, best) < 0.0 and pairs.both_worth(self, trial):
-                        best = trial
-            # The last members stay, so that the rivals told are theirs.
-            last = attempt == (_SWAPS if complete else _OPEN) - 1 or self.search.effort.over
-            if best is current or last:
-                break
+            best = current
+            for trial in itertools.chain(*in_place):
+                if self.behind(trial, best) < 0.0 and pairs.both_worth(self, trial):
+                    best = trial
+            if best is current:
+                return current, self._all_rivals(current, rests, in_place)
             # Beside what came others may be worth nothing any more.
             current = self.pruned(best)
-        return current, rivals
+            if self.search.effort.over:
+                break
+        return current, self._known_rivals(current)
+
+    def _known_rivals(self, current: Trial) -> dict[str, tuple[Rival, ...]]:
+        rests = self.search.without_each(current)
+        known = [self._known_in_place(current, rest) for rest in rests]
+        return self._all_rivals(current, rests, known)
+
+    def _known_in_place(self, current: Trial, rest: Trial) -> list[Trial]:
+        """Return what was refitted with another effect in the place of a member."""
+        tried = [(n, self.search.known((*rest.effects, n))) for n in self.search.others(current)]
+        return [replace(trial, added=name) for name, trial in tried if trial is not None]
+
+    def _all_rivals(
+        self, current: Trial, rests: Sequence[Trial], in_place: Sequence[Sequence[Trial]]
+    ) -> dict[str, tuple[Rival, ...]]:
+        rows = zip(current.effects, rests, in_place, strict=True)
+        return {name: self._rivals(rest, current, name, trials) for name, rest, trials in rows}
 
     def _in_place(
         self, current: Trial, rests: Sequence[Trial], most: int, complete: bool

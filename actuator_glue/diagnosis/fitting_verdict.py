@@ -30,9 +30,8 @@ class Decision:
         measured: measurement effects, named as findings.
         noise: rms of what no structure explains [m].
         left: rms structure that remains, without what measurement effects cause [m].
-        certainty: what the names' probabilities are multiplied with: what the catalogue's own
-            lapses leave, and, where structure remains, the share of it that they explain and a
-            generic regression does not explain better.
+        certainty: where structure remains, the share of it that the names explain and a generic
+            regression does not explain better; else 1.
         limit: rms structure above which a model counts as unexplained [m].
         remaining: where the rest sits, for the JSON.
     """
@@ -84,8 +83,7 @@ def decide(
         measured=seen,
         noise=found.noise,
         left=left,
-        certainty=(1.0 - settings.outside)
-        * (_certainty(found, left, surrogate, settings) if doubted else 1.0),
+        certainty=_certainty(found, left, surrogate) if doubted else 1.0,
         limit=limit,
         remaining={'left': left, 'limit': limit, **remaining(data, final.fit.error)},
     )
@@ -95,22 +93,22 @@ def _described(found: Selection) -> bool:
     return any(is_learned(e) for e in found.final.structure.entries)
 
 
-def _certainty(found: Selection, left: float, surrogate: Surrogate, settings: Thresholds) -> float:
+def _certainty(found: Selection, left: float, surrogate: Surrogate) -> float:
     """Return the share of the structure that is the names' own doing, in [0, 1].
 
     What they explain of the structure, times what a regression of as many parameters leaves of
     what they leave: a smooth function of the motion that does much better says that the names
-    stand for it. So does a learned term beside which structure remains: the catalogue does not
-    hold the machine.
+    stand for it. What a learned term explains beside them is not theirs.
     """
     # Not of the structure found at first: under a stationary command most of it passes for noise
     # until something explains it.
     gained = max(0.0, found.base.mean_square - found.final.mean_square)
-    explained = gained / (gained + left**2) if gained > 0.0 else 0.0
+    terms = [e.name for e in found.final.structure.entries if is_learned(e)]
+    named = max(0.0, gained - sum(found.removed[n] ** 2 for n in terms))
+    explained = named / (gained + left**2) if gained > 0.0 else 0.0
     theirs = surrogate.structure_error**2 - found.noise**2
     generic = max(0.0, surrogate.error**2 - found.noise**2)
-    own = explained * (settings.described if _described(found) else 1.0)
-    return own * (min(1.0, generic / theirs) if theirs > 0.0 else 1.0)
+    return explained * (min(1.0, generic / theirs) if theirs > 0.0 else 1.0)
 
 
 def _band(frequency: Array, excess: Array) -> list[float]:

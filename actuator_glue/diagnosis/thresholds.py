@@ -23,11 +23,6 @@ class Thresholds:
         left_share: and above this share of the structure found at first remains;
         beaten_noise, beaten_share: as left_noise and left_share, where a generic surrogate
             explains more than the names do (0.28 of the noise is found in noise alone).
-        outside: probability that a name stands for something the catalogue does not hold though
-            nothing remains: 4 of 177 blind cases (docs/scores.md).
-        described: what the probability of names is multiplied with where learned terms stand
-            beside them and structure remains all the same: 1 of 15 was right, on 7 blind machines,
-            where 55 % were told on average.
         most: most effects added.
         beam: structures of one effect carried on to two; one fewer with each further effect.
         evaluations: of the posterior's likelihood, at most; 0 takes the Laplace approximation.
@@ -47,13 +42,11 @@ class Thresholds:
     left_share: float = 0.3
     beaten_noise: float = 0.3
     beaten_share: float = 0.15
-    outside: float = 0.025
-    described: float = 0.2
     most: int = 6
     beam: int = 3
     tried: int = 5
     evaluations: int = 12_000
-    effort: float = 1e8
+    effort: float = 7e7
     use_force: bool = False
 
     def material(self, noise: float, stroke: float) -> float:

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from actuator_glue.diagnosis import reliability
 from actuator_glue.diagnosis.agreement import Homogeneity
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.finding import Candidate, Finding, Rival
@@ -21,10 +22,6 @@ from actuator_glue.diagnosis.ranking import standard_error
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.effects import CATALOGUE
-
-# Probability at most of a name whose size may be nothing by its own interval: of those told with
-# 95 % 7 of 12 were right on 299 blind machines, and 127 of 129 of all others (docs/scores.md).
-_MAY_BE_NOTHING = 0.7
 
 
 def _measured_estimates(effect: Measured) -> dict[str, Estimate]:
@@ -47,8 +44,8 @@ def of(
         described = learned_term.is_learned(entries[name])
         # A learned term describes; there is no cause by its name that might be true.
         own = {p.name: estimates[p.name] for p in entries[name].parameters}
-        plausible = _excludes_neutral(tuple(own.values()))
-        rivals = _told(name, found.rivals[name], decision.certainty, plausible)
+        sizes = _how_much(tuple(own.values()))
+        rivals = _told(name, found.rivals[name], decision.certainty, sizes)
         tied = [r for r in rivals if r.tied]
         gained = found.removed[name]
         out.append(
@@ -63,7 +60,7 @@ def of(
                 error_without=float(np.sqrt(found.final.mean_square + gained**2)),
                 error_with=found.final.fit.rms,
                 evidence=found.evidence[name],
-                plausible=plausible,
+                plausible=any(map(_excludes_neutral, sizes)),
                 agrees_across_windows=stretches[name].agree,
                 windows=stretches[name].values,
                 records=_records_of(decision.final, name),
@@ -108,26 +105,29 @@ def _records_of(trial: Trial, name: str) -> tuple[str, ...]:
 
 
 def _told(
-    name: str, rivals: Sequence[Rival], certainty: float, plausible: bool
+    name: str, rivals: Sequence[Rival], certainty: float, sizes: Sequence[Estimate]
 ) -> tuple[Rival, ...]:
-    """Return rivals with the probability that is told of them.
+    """Return rivals with the probability that is told of them, which is calibrated together.
 
     A probability says no more than the interval beside it, which may hold nothing of the effect.
     """
-    own = certainty * next((r.probability for r in rivals if r.name == name), 0.0)
-    if not plausible and own > _MAY_BE_NOTHING:
-        certainty *= _MAY_BE_NOTHING / own
-    return tuple(replace(r, probability=certainty * r.probability) for r in rivals)
+    weight = sum(r.probability for r in rivals)
+    sure = max(map(reliability.sureness, sizes), default=1.0)
+    known = reliability.calibrated(certainty * sure * weight) / weight
+    return tuple(replace(r, probability=known * r.probability) for r in rivals)
 
 
-def _excludes_neutral(sizes: Sequence[Estimate]) -> bool:
-    """Whether an interval of an effect's sizes holds nothing that leaves the model as it is.
+def _how_much(sizes: Sequence[Estimate]) -> list[Estimate]:
+    """Return the sizes that say how much there is of an effect; others say how it goes.
 
-    The first parameter says how much there is of an effect, and so does each that is none of it
-    at zero; others say how it goes.
+    They are the first one, and each that is none of it at zero.
     """
-    how_much = [s for i, s in enumerate(sizes) if i == 0 or s.neutral == 0.0]
-    return any(s.neutral is None or not s.lower <= s.neutral <= s.upper for s in how_much)
+    return [s for i, s in enumerate(sizes) if i == 0 or s.neutral == 0.0]
+
+
+def _excludes_neutral(size: Estimate) -> bool:
+    """Whether the interval of a size holds nothing that leaves the model as it is."""
+    return size.neutral is None or not size.lower <= size.neutral <= size.upper
 
 
 def candidates(
