@@ -1,7 +1,9 @@
-"""Whether probabilities and intervals are what they say: `reliability.py FOLDER...`.
+"""Whether probabilities and intervals are what they say: `reliability.py [--fit] FOLDER...`.
 
 Reads the answers that campaigns left (`FOLDER/**/*.json`), counts how often names were right that
-were given a probability, and how often 95 % intervals held the true size.
+were given a probability, and how often 95 % intervals held the true size. With `--fit` it prints
+the curve from shares of the weight to probabilities that these machines ask for: of seeds below
+1000, which are not reported.
 """
 
 from __future__ import annotations
@@ -14,10 +16,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import statsmodels.api as sm
 from equivalents import OTHERWISE, catalogued
 from score import share
 from statsmodels.stats.proportion import proportion_confint
 
+from actuator_glue.diagnosis import reliability
 from actuator_glue.model.parameters import NAMES
 from actuator_glue.report import style
 
@@ -54,6 +58,32 @@ def named(results: Iterable[Json]) -> list[tuple[float, bool, bool]]:
                 held = true & {effect['name'], *others}
                 out.append((effect['probability'], effect['name'] in true, bool(held)))
     return out
+
+
+def behind_names(results: Iterable[Json]) -> list[tuple[float, bool]]:
+    """Share of the weight behind every name and its rivals, and whether one told is right."""
+    out = []
+    for result in results:
+        true = truths(result)
+        for effect in result['diagnosis']['effects']:
+            if effect['probability'] is not None:
+                told = {n for pair in effect['alternatives'] for n in pair.split(' + ')}
+                right = bool(true & {effect['name'], *told})
+                out.append((reliability.share_of(1.0 - effect['none_of_these']), right))
+    return out
+
+
+def curve(rows: list[tuple[float, bool]]) -> tuple[float, float]:
+    """Return intercept and slope of the log odds of being right (Platt 1999).
+
+    A few right ones and a few wrong ones are added, in effect, so that no probability is certain.
+    """
+    right = np.array([hit for _, hit in rows])
+    x = np.array([reliability.log_odds(share) for share, _ in rows])
+    y = np.where(right, (right.sum() + 1) / (right.sum() + 2), 1 / ((~right).sum() + 2))
+    found = sm.GLM(y, sm.add_constant(x), family=sm.families.Binomial()).fit()
+    intercept, slope = map(float, found.params)
+    return intercept, slope
 
 
 def bins(rows: list[tuple[float, bool, bool]]) -> list[Json]:
@@ -149,8 +179,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('folders', nargs='+', type=Path)
     parser.add_argument('--picture', type=Path)
+    parser.add_argument('--fit', action='store_true', help='print the curve these ask for')
     args = parser.parse_args()
     results = answers(args.folders)
+    if args.fit:
+        pairs = behind_names(results)
+        intercept, slope = curve(pairs)
+        print(f'{len(pairs)} names of {len(results)} machines: {intercept:.2f}, {slope:.2f}')
     rows = bins(named(results))
     print(f'{len(results)} machines\n\n{table(rows)}\n')
     sizes, base = coverage(results)
