@@ -13,7 +13,7 @@ from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.search import Search, by_score
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
-from actuator_glue.diagnosis.weights import TELLING, price
+from actuator_glue.diagnosis.weights import TELLING, log_weight, price
 from actuator_glue.inference.least_squares.fit import Fit
 
 # Of what matters: two that remove this share each remove what matters.
@@ -105,14 +105,14 @@ class Judge:
             alike: rms error that costs a nat between equations for the same thing, beside that
                 of what matters [m].
         """
+        tells = math.hypot(TELLING * self.material, alike)
+        return self._log_weight(other, tells) - self._log_weight(trial, tells)
+
+    def _log_weight(self, trial: Trial, tells: float) -> float:
         search, scorer = self.search, self.search.scorer
         assert scorer is not None
-        left, theirs = (scorer.left_out_error(t.fit) for t in (trial, other))
-        tells = math.hypot(TELLING * self.material, alike)
-        mine, prices = (
-            price(t.structure, search.entries, len(search.names)) for t in (trial, other)
-        )
-        return (left**2 - theirs**2) / tells**2 + mine - prices
+        cost = price(trial.structure, search.entries, len(search.names))
+        return log_weight(scorer.left_out_error(trial.fit), tells, cost)
 
     def odds(self, rest: Trial, best: Trial, trials: Sequence[Trial]) -> list[float]:
         """Return the weights of rivals in the place of an effect, and of none, beside its own.

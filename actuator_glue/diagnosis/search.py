@@ -322,13 +322,20 @@ class Search:
         rows = [sorted((self.add(*pair) for pair in row), key=by_score) for row in wanted]
         worth = [_worth_finishing(row, a.below) for row, a in zip(rows, asked, strict=True)]
         last = {frozenset(t.effects): t for t in itertools.chain(*worth)}
-        for _ in self.each(lambda trial: self.polish(trial, valves), last.values()):
-            pass
-        for trial in itertools.chain(*worth):
-            self.polish(trial, valves)
-        return [
-            sorted((self.trial(t.effects, t.added) for t in row), key=by_score) for row in rows
-        ]
+        done = dict(
+            zip(
+                last,
+                self.each(lambda trial: self.polish(trial, valves), last.values()),
+                strict=True,
+            )
+        )
+        out = []
+        for row, finished in zip(rows, worth, strict=True):
+            # From another valve, too, where it is this structure's addition that asks for that.
+            done |= {frozenset(t.effects): self.polish(t, valves) for t in finished}
+            known = [(t, done.get(frozenset(t.effects), t)) for t in row]
+            out.append(sorted((replace(k, added=t.added) for t, k in known), key=by_score))
+        return out
 
     def screened(self, current: Trial, names: Iterable[str], *, beside: bool = False) -> list[str]:
         """Sort effects by what their signatures could remove from the present residual.

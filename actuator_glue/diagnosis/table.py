@@ -1,14 +1,14 @@
-"""The table of structures: all that were refitted, each with what it leaves of blocks left out."""
+"""The table of structures: all that were refitted, each with its weight."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 
 from actuator_glue.diagnosis.score import Scorer
-from actuator_glue.inference.least_squares.fit import Fit
+from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.weights import TELLING, log_weight, price
 from actuator_glue.json_value import JsonObject
-from actuator_glue.model.structure import Structure
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,6 +22,9 @@ class Row(JsonObject):
         error: rms error of the refit over the fitting part [m].
         left_out: rms error of all blocks of the fitting part, each under parameters refitted
             without it, by one Gauss-Newton step [m].
+        price: what it costs beside that: its parameters, and of how many it could have been
+            chosen [nats].
+        log_weight: logarithm of its weight beside that of the first row [nats].
         chosen: whether it is the structure that is told.
     """
 
@@ -30,28 +33,35 @@ class Row(JsonObject):
     units: dict[str, str]
     error: float
     left_out: float
+    price: float
+    log_weight: float
     chosen: bool
 
 
-def rows(
-    tried: Iterable[tuple[Structure, Fit]], scorer: Scorer, chosen: tuple[str, ...]
-) -> tuple[Row, ...]:
-    """Return a row for every structure that was refitted, least error left out first.
+def rows(search: Search, scorer: Scorer, material: float, chosen: tuple[str, ...]) -> list[Row]:
+    """Return a row for every structure that was refitted, greatest weight first (weights.py).
 
     Args:
-        tried: structures with their refits.
+        search: what was refitted.
         scorer: blocks of the fitting part.
+        material: least rms error that matters [m].
         chosen: effects of the structure that is told.
     """
-    table = [
-        Row(
-            effects=model.effects,
-            parameters=dict(zip(model.names, map(float, fit.theta), strict=True)),
-            units={p.name: p.unit for p in model.parameters},
-            error=fit.rms,
-            left_out=scorer.left_out_error(fit),
-            chosen=set(model.effects) == set(chosen),
+    table = []
+    for model, fit in search.left_at_most(math.inf):
+        left, cost = scorer.left_out_error(fit), price(model, search.entries, len(search.names))
+        table.append(
+            Row(
+                effects=model.effects,
+                parameters=dict(zip(model.names, map(float, fit.theta), strict=True)),
+                units={p.name: p.unit for p in model.parameters},
+                error=fit.rms,
+                left_out=left,
+                price=cost,
+                log_weight=log_weight(left, TELLING * material, cost),
+                chosen=set(model.effects) == set(chosen),
+            )
         )
-        for model, fit in tried
-    ]
-    return tuple(sorted(table, key=lambda row: row.left_out))
+    most = max(row.log_weight for row in table)
+    beside = (replace(row, log_weight=row.log_weight - most) for row in table)
+    return sorted(beside, key=lambda row: -row.log_weight)

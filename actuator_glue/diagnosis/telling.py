@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -89,8 +88,8 @@ def told(
         onset=result.onset,
         prior=prior,
         setup=both.setup,
-        structures=table.rows(
-            result.selection.search.left_at_most(math.inf), result.scorer, final.effects
+        structures=tuple(
+            table.rows(result.selection.search, result.scorer, found.material, final.effects)
         ),
         names=tuple(p.name for p in after.model.parameters),
         posterior=both.draws,

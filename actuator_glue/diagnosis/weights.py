@@ -23,6 +23,17 @@ from actuator_glue.model.structure import Structure
 TELLING = 0.05
 
 
+def log_weight(left_out: float, tells: float, cost: float) -> float:
+    """Return the logarithm of a structure's weight, up to what all have in common [nats].
+
+    Args:
+        left_out: rms error of blocks left out [m].
+        tells: rms error that costs a nat, `TELLING` of what matters [m].
+        cost: its price [nats].
+    """
+    return -((left_out / tells) ** 2) - cost
+
+
 def price(structure: Structure, entries: Mapping[str, Effect], named: int) -> float:
     """Return what a structure costs beside what it leaves [nats].
 

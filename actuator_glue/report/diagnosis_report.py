@@ -15,6 +15,7 @@ from actuator_glue.report.html import Block, Note, Page, Picture, Section, Table
 from actuator_glue.report.learned_figure import learned_terms
 from actuator_glue.report.quantity import plain, said_in, word
 
+_ROWS = 8  # of the table of structures
 _SAMPLERS = {
     'importance': '{effective_draws:.0f} effective draws by importance sampling, k {pareto_k:.2f}',
     'dream': '{effective_draws:.0f} effective draws by DREAM(ZS), R-hat {rhat:.3f}',
@@ -168,11 +169,31 @@ def _search(found: DiagnosisData) -> Section:
             Table(
                 header,
                 rows,
-                'Steps that were taken on the fitting part, noise included in what they leave; '
-                f'{len(found.structures)} structures were refitted for the last search alone.',
+                'Steps that were taken on the fitting part, noise included in what they leave.',
                 prose=True,
-            )
+            ),
+            _structures(found),
         ],
+    )
+
+
+def _structures(found: DiagnosisData) -> Table:
+    rows = [
+        [
+            structure_name(row.effects) + (' (told)' if row.chosen else ''),
+            _um(row.left_out),
+            plain(row.price),
+            plain(row.log_weight),
+        ]
+        for i, row in enumerate(found.structures)
+        if i < _ROWS or row.chosen or not row.effects
+    ]
+    return Table(
+        ['structure', 'leaves of blocks left out [um]', 'price [nats]', 'log weight [nats]'],
+        rows,
+        f'The table of the last search: {len(found.structures)} structures were refitted, '
+        'those of the greatest weight stand here, and Eq. (2).',
+        prose=True,
     )
 
 
