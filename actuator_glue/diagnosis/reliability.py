@@ -3,9 +3,9 @@
 A share says what the records tell of the names in the catalogue: their weight beside that of none
 of them (weights.py), how much of the structure they explain in both parts of the records, and how
 surely their sizes are not nothing. What it does not know is how often the catalogue itself
-misleads; that was counted, on machines that decide nothing else
-(`benchmarks/blind/reliability.py --fit`), as a straight line between the log odds of the share and
-those of being right (Platt 1999).
+misleads, and how often a name is right all the same: both were counted, on machines that decide
+nothing else (`benchmarks/blind/reliability.py --fit`). By the law of total probability the curve
+is the straight line between them.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ import math
 
 from actuator_glue.diagnosis.estimate import Estimate
 
-# Intercept and slope.
-CURVE = 0.0, 1.0
-_EDGE = 1e-3
+# How often names are right where nothing of the weight is theirs, and where all is: 51 names of 60
+# blind machines of four generators, seeds 500 on and 70000 to 70014.
+CURVE = 0.2, 0.95
 
 
 def calibrated(share: float, curve: tuple[float, float] = CURVE) -> float:
@@ -24,21 +24,16 @@ def calibrated(share: float, curve: tuple[float, float] = CURVE) -> float:
 
     Args:
         share: of the weight that stands behind them, in [0, 1].
-        curve: intercept and slope.
+        curve: how often names are right where no weight is theirs, and where all is.
     """
-    return 1.0 / (1.0 + math.exp(-curve[0] - curve[1] * log_odds(share)))
+    luck, known = curve
+    return luck + (known - luck) * min(max(share, 0.0), 1.0)
 
 
 def share_of(probability: float, curve: tuple[float, float] = CURVE) -> float:
     """Return the share of the weight behind a probability, in [0, 1]: `calibrated` reversed."""
-    odds = (math.log(probability / (1.0 - probability)) - curve[0]) / curve[1]
-    return 1.0 / (1.0 + math.exp(-odds))
-
-
-def log_odds(share: float) -> float:
-    """Return the log odds of a share; nearer to 0 or 1 than a thousandth it counts as that."""
-    share = min(max(share, _EDGE), 1.0 - _EDGE)
-    return math.log(share / (1.0 - share))
+    luck, known = curve
+    return min(max((probability - luck) / (known - luck), 0.0), 1.0)
 
 
 def sureness(size: Estimate) -> float:

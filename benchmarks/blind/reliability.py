@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import statsmodels.api as sm
+import scipy
 from equivalents import OTHERWISE, catalogued
 from score import share
 from statsmodels.stats.proportion import proportion_confint
@@ -74,16 +74,21 @@ def behind_names(results: Iterable[Json]) -> list[tuple[float, bool]]:
 
 
 def curve(rows: list[tuple[float, bool]]) -> tuple[float, float]:
-    """Return intercept and slope of the log odds of being right (Platt 1999).
+    """Return how often names are right where no weight is theirs, and where all is.
 
-    A few right ones and a few wrong ones are added, in effect, so that no probability is certain.
+    The likeliest line; one that is right and one that is wrong are added at both of its ends
+    (Laplace's rule), so that no probability is certain.
     """
-    right = np.array([hit for _, hit in rows])
-    x = np.array([reliability.log_odds(share) for share, _ in rows])
-    y = np.where(right, (right.sum() + 1) / (right.sum() + 2), 1 / ((~right).sum() + 2))
-    found = sm.GLM(y, sm.add_constant(x), family=sm.families.Binomial()).fit()
-    intercept, slope = map(float, found.params)
-    return intercept, slope
+    rows = [*rows, (0.0, True), (0.0, False), (1.0, True), (1.0, False)]
+    share, right = (np.array(column) for column in zip(*rows, strict=True))
+
+    def unlikely(ends: Any) -> float:
+        told = ends[0] + (ends[1] - ends[0]) * share
+        return -float(np.sum(np.log(np.where(right, told, 1.0 - told))))
+
+    inside = [(1e-3, 1.0 - 1e-3)] * 2
+    luck, known = scipy.optimize.minimize(unlikely, [0.2, 0.9], bounds=inside).x
+    return float(luck), float(known)
 
 
 def bins(rows: list[tuple[float, bool, bool]]) -> list[Json]:
@@ -184,8 +189,8 @@ def main() -> int:
     results = answers(args.folders)
     if args.fit:
         pairs = behind_names(results)
-        intercept, slope = curve(pairs)
-        print(f'{len(pairs)} names of {len(results)} machines: {intercept:.2f}, {slope:.2f}')
+        luck, known = curve(pairs)
+        print(f'{len(pairs)} names of {len(results)} machines: {luck:.3f}, {known:.3f}')
     rows = bins(named(results))
     print(f'{len(results)} machines\n\n{table(rows)}\n')
     sizes, base = coverage(results)

@@ -1,23 +1,20 @@
 """How often names are right that a share of the weight stands behind."""
 
-import math
-
 import pytest
 
 from actuator_glue.diagnosis.estimate import Estimate
-from actuator_glue.diagnosis.reliability import calibrated, sureness
+from actuator_glue.diagnosis.reliability import calibrated, share_of, sureness
 
 
 def test_more_weight_is_never_less_probable_and_never_certain() -> None:
     told = [calibrated(share / 100) for share in range(101)]
     assert told == sorted(told)
-    assert told[0] < 0.5 < told[-1] < 1.0
+    assert 0.0 < told[0] < 0.5 < told[-1] < 1.0
 
 
-def test_a_straight_line_between_log_odds() -> None:
-    assert calibrated(0.8, (0.0, 1.0)) == pytest.approx(0.8)
-    # Odds of 9, to the power of a half, times two thirds: 2.
-    assert calibrated(0.9, (math.log(2.0 / 3.0), 0.5)) == pytest.approx(2.0 / 3.0)
+def test_a_straight_line_between_luck_and_knowledge() -> None:
+    assert calibrated(0.75, (0.1, 0.9)) == pytest.approx(0.7)
+    assert share_of(0.7, (0.1, 0.9)) == pytest.approx(0.75)
 
 
 @pytest.mark.parametrize(
