@@ -23,11 +23,14 @@ from actuator_glue.inference.choice import choose_model
 from actuator_glue.online.collect import Collector
 from actuator_glue.online.knowledge import Known
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.structures import Proposal, Proposed
+from actuator_glue.online.structures import MOST, Proposal, Proposed
 from actuator_glue.records import Record
 
 # The likeliest structure is proposed again where it has less weight than this by now.
 _DOUBTED = 0.5
+# Weight of what leads, beside a part of it that explains all data as well: forecasts whose mean
+# square is better by a fifth of that of what matters have it lead again.
+_MORE = 0.3
 # Over so many times as many bands, half of what they may lack of their level is a break, too: an
 # error of the noise's own size that never goes.
 _LASTING, _LEVEL = 4, 0.95
@@ -359,9 +362,18 @@ def _concluded(state: LiveState, given: Concluded) -> tuple[LiveState, tuple[Act
         said = (Say('diagnosis', f'the estimator goes on as it is: {given.why_not}'),)
         return state, said if given.why_not else ()
     wanted = frozenset(given.proposal.structures[0].model.effects)
-    if wanted == leading and weight >= _DOUBTED:
-        return state, ()
     out = tuple(sorted(leading - wanted))
+    if wanted == leading and weight >= _DOUBTED:
+        # What was in doubt, and neither forecasts nor another look have found since, is out.
+        asked = {frozenset(one.model.effects) for one in given.proposal.structures}
+        more = [effects for effects, _ in state.weights if effects > wanted]
+        out = tuple(sorted({name for one in more if one not in asked for name in one - wanted}))
+        if not out:
+            return state, ()
+    if wanted and wanted < leading and weight >= _DOUBTED:
+        # A look tells what is material in all data, forecasts what is lost without the rest.
+        doubt = Say('in doubt', f'{", ".join(out)}: all data are explained as well without')
+        return _began(state), (doubt, Carry(_without(leading, given.proposal)))
     told: tuple[Action, ...] = ()
     if out:
         told = (Say('taken out', f'{", ".join(out)}: later data contradict it'),)
@@ -372,6 +384,15 @@ def _evenly(effects: frozenset[str]) -> Proposal:
     """Return effects and Eq. (2) alone, as likely as each other: forecasts tell which."""
     both = tuple(sorted(effects)), ()
     return Proposal(tuple(Proposed(choose_model(names), 0.5) for names in both))
+
+
+def _without(effects: frozenset[str], fewer: Proposal) -> Proposal:
+    """Return a proposal of fewer effects than lead, and these beside it: forecasts tell which."""
+    ours = fewer.structures[: MOST - 1]
+    total = sum(one.weight for one in ours)
+    less = [replace(one, weight=(1.0 - _MORE) * one.weight / total) for one in ours]
+    more = Proposed(choose_model(tuple(sorted(effects))), _MORE)
+    return replace(fewer, structures=(*less, more))
 
 
 def _due(state: LiveState) -> str:

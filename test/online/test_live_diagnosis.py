@@ -17,7 +17,7 @@ from actuator_glue.online.collect import Collector
 from actuator_glue.online.knowledge import Known
 from actuator_glue.online.playback import stream
 from actuator_glue.online.settings import EstimatorSettings
-from actuator_glue.online.structures import Proposal
+from actuator_glue.online.structures import Proposal, Proposed
 from actuator_glue.records import Record
 from actuator_glue.setups import StreamSetup
 
@@ -133,6 +133,35 @@ def test_a_slow_change_is_looked_for_in_the_data_since_it_began():
         weights = state.weights
         _, actions = run(state, live.Estimated(True, weights, 9.0), live.Received(60.0))
         assert [look.since for look in actions if isinstance(look, live.Look)] == [0.0]
+
+
+def test_what_is_immaterial_to_a_look_is_left_to_forecasts():
+    """Each look took friction out, and forecasts had it back, to the end of the stream."""
+    both = frozenset({'backlash', 'coulomb-friction'})
+    state, _ = run(broken(), live.Concluded(proposal('backlash', 'coulomb-friction')))
+    state, _ = run(state, live.Estimated(False, ((both, 0.95), (PLAY, 0.05))), live.Requested())
+    less = Proposal(
+        (Proposed(choose_model(('backlash',)), 0.9), Proposed(choose_model(), 0.1)), 4e-6
+    )
+    _, actions = run(state, live.Concluded(less))
+    said, carry = actions
+    assert said.kind == 'in doubt' and 'coulomb-friction' in said.message
+    assert carry.taken_out == () and carry.proposal.material == 4e-6
+    told = {frozenset(one.model.effects): one.weight for one in carry.proposal.structures}
+    assert told == pytest.approx({PLAY: 0.63, frozenset(): 0.07, both: 0.3})
+    # Where another look does without it, and forecasts have not brought it back, it is out.
+    after = live.Estimated(False, ((PLAY, 0.7), (both, 0.3)))
+    _, actions = run(state, after, live.Concluded(less))
+    assert actions[-1].taken_out == ('coulomb-friction',)
+    tied = replace(less, structures=(*less.structures, Proposed(choose_model(sorted(both)), 0.1)))
+    assert run(state, after, live.Concluded(tied))[1] == []
+    # Where nothing of it is found any more, or forecasts doubt it, it is out.
+    for found, weight in ((proposal(), 0.95), (less, 0.4)):
+        doubted, _ = run(state, live.Estimated(False, ((both, weight), (PLAY, 1.0 - weight))))
+        _, actions = run(doubted, live.Concluded(found))
+        assert actions[-1].taken_out == tuple(
+            sorted(both - set(found.structures[0].model.effects))
+        )
 
 
 def test_what_later_data_contradict_is_taken_out_and_told():
