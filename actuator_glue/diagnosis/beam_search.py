@@ -128,7 +128,7 @@ class BeamSearch(Judge):
             steps.append(
                 SearchStep.to(found.final, 'each held against its absence and its rivals')
             )
-        return replace(found, steps=tuple(steps))
+        return replace(found, steps=tuple(steps), described=described)
 
     def _first_worth(
         self, ranked: Sequence[Trial], current: Trial, threshold: float

@@ -26,6 +26,7 @@ class Selection:
         material: materiality threshold [m].
         nats: evidence that any addition must have.
         steps: of the search that added one effect at a time; none where something else led here.
+        described: whether that ended as one learned term leaves nothing material.
     """
 
     base: Trial
@@ -40,3 +41,4 @@ class Selection:
     material: float
     nats: float
     steps: tuple[SearchStep, ...] = ()
+    described: bool = False

@@ -106,6 +106,11 @@ def unexplained(result: Conclusion) -> bool:
     return result.decision.verdict == 'unexplained'
 
 
+def described(result: Conclusion) -> bool:
+    """Whether the search ended as one learned term leaves nothing material."""
+    return unexplained(result) and result.found.described
+
+
 def left(result: Conclusion) -> bool:
     """Whether something material is left, of records that share all settings."""
     material = result.decision.left >= result.found.material

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from actuator_glue.diagnosis.conclusion import Conclusion
+from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.measured import hum
 from actuator_glue.diagnosis.moves.learned_terms import LEARNED_TERMS
 from actuator_glue.diagnosis.moves.move import Asking, after, follow
@@ -34,11 +35,7 @@ def with_the_right_hold(first: Conclusion, asking: Asking) -> Conclusion:
     if first.decision.verdict != 'unexplained':
         return described
     held = follow(first, LEARNED_TERMS, asking)
-    fewer = len(described.found.final.fit.theta) < len(held.found.final.fit.theta)
-    whole = described.decision.verdict != 'unexplained'
-    # A hold is a plainer answer than a term that leads by half a sample as well.
-    least = 0.0 if whole and fewer else asking.settings.nats
-    return described if _gained(held, described) >= least else held
+    return described if _explains_more(held, described, asking) else held
 
 
 def _linearly(first: Conclusion, asking: Asking) -> Conclusion | None:
@@ -58,15 +55,28 @@ def _linearly(first: Conclusion, asking: Asking) -> Conclusion | None:
     if before - base.rms**2 < first.found.material**2:
         return None
     asking.tell('other hold', 0.0)
-    if first.decision.verdict == 'missing-effect' and _explains_less(first, other, base):
+    described = any(map(is_learned, first.found.final.structure.entries))
+    named = first.decision.verdict == 'missing-effect' and not described
+    if named and _explains_less(first, other, base):
         return None
     second = asking.conclude(other)
-    if _gained(first, second) < asking.settings.nats:
+    if not _explains_more(first, second, asking):
         return None
     errors, enough = (before**0.5, base.rms), second.decision.verdict == 'none'
     setup = WrongSetup.between(prepared.fit, other.fit, errors, enough, taken=True)
     second = replace(second, prepared=replace(second.prepared, setup=setup))
     return after(first, second, 'the command runs linearly between its samples')
+
+
+def _explains_more(first: Conclusion, second: Conclusion, asking: Asking) -> bool:
+    """Whether the second, with the other hold, explains more beyond chance.
+
+    Or all that remains with fewer parameters: a hold is a plainer answer than a term that leads by
+    half a sample as well.
+    """
+    fewer = len(second.found.final.fit.theta) < len(first.found.final.fit.theta)
+    whole = second.decision.verdict != 'unexplained'
+    return _gained(first, second) >= (0.0 if whole and fewer else asking.settings.nats)
 
 
 def _gained(first: Conclusion, second: Conclusion) -> float:

@@ -24,12 +24,17 @@ from actuator_glue.diagnosis.moves.move import (
     Groups,
     always,
     complete,
+    described,
     if_complete,
     unexplained,
 )
 
 # With one hold, since one moment.
 WITHIN: Final[Groups] = (
+    (
+        AnswerMove("one record's own setting", described, own_setting.own_setting),
+        AnswerMove('learned terms', described, describe.with_terms),
+    ),
     (
         AnswerMove('', always, feedback.fed_back),
         AnswerMove('a description in place of names', complete, describe.plainer, each_time=False),
