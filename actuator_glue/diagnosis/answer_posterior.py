@@ -146,7 +146,7 @@ def sampled(
     told = sample(found.base, stage='posterior before')
     before = after = Side(found.base.model, found.base.fit.theta, told.points)
     if final.effects:
-        # Of equations that are not the machine's intervals are widened by far more.
+        # Where something is left the choice of equations widens intervals more than chains could.
         whole = decision.verdict in COMPLETE
         told = sample(final, settings.evaluations // (1 if whole else 2))
         after = Side(final.model, final.fit.theta, told.points)

@@ -35,7 +35,7 @@ class BeamSearch(Judge):
         search: the structures.
         settings: thresholds.
         progress: takes progress.
-        described: whether a description explains all that names leave; no more are added then.
+        explains_rest: whether a description explains all that names leave; no more are added then.
     """
 
     def __init__(
@@ -43,10 +43,10 @@ class BeamSearch(Judge):
         search: Search,
         settings: Thresholds,
         progress: Progress,
-        described: Callable[[BeamSearch, Trial], bool] = lambda search, current: False,
+        explains_rest: Callable[[BeamSearch, Trial], bool] = lambda search, current: False,
     ) -> None:
         super().__init__(search, settings)
-        self.progress, self.described = progress, described
+        self.progress, self.explains_rest = progress, explains_rest
 
     def apart(self) -> BeamSearch:
         """Return a selection to go on with: what it adds and its noise are its own."""
@@ -115,7 +115,7 @@ class BeamSearch(Judge):
                 threshold = max(threshold, s.later_share * removed(base, current))
             if self.left(current) < self.material or stage == s.most or self.search.effort.over:
                 break
-            if stage == _NAMES and (described := self.described(self, current)):
+            if stage == _NAMES and (described := self.explains_rest(self, current)):
                 break
             width = max(1, s.beam + 1 - stage)  # the more there is, the fewer could lead on
             ranked = self.extend(self.rescored(ranked[:width]), stage + 1)

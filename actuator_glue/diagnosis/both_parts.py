@@ -15,7 +15,7 @@ from actuator_glue.diagnosis.finding import Finding
 from actuator_glue.diagnosis.fitting_verdict import Decision
 from actuator_glue.diagnosis.held_out import COMPLETE, HeldOutError, Verdict
 from actuator_glue.diagnosis.held_out_look import Curves, verify
-from actuator_glue.diagnosis.learned.term import is_learned
+from actuator_glue.diagnosis.learned.term import any_learned
 from actuator_glue.diagnosis.wrong_setup import WrongSetup
 from actuator_glue.records import Array
 
@@ -68,7 +68,7 @@ def of(drawn: AnswerPosterior, other: WrongSetup | None, seed: int) -> BothParts
         error, found.material, result.scorer, held, before, after
     )
     judged = verdict.of_both_parts(decision.verdict, bool(decision.names), error, found.material)
-    described = any(map(is_learned, decision.final.structure.entries))
+    described = any_learned(decision.final.structure)
     if other is not None and described and judged in COMPLETE:
         # A description of what another set-up explains with none describes the set-up.
         judged = 'unexplained'

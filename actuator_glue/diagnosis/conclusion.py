@@ -109,7 +109,7 @@ def searched(
     line: Line | None,
     settings: Thresholds,
     tell: Progress,
-    described: Callable[[BeamSearch, Trial], bool],
+    explains_rest: Callable[[BeamSearch, Trial], bool],
 ) -> Conclusion:
     """Search for what the model lacks, one effect at a time, and say what that comes to.
 
@@ -119,9 +119,9 @@ def searched(
         line: hum that was taken out of the data before.
         settings: thresholds.
         tell: takes progress.
-        described: whether a description explains all that some names leave.
+        explains_rest: whether a description explains all that some names leave.
     """
-    selection = BeamSearch(search, settings, tell, described)
+    selection = BeamSearch(search, settings, tell, explains_rest)
     named = selection.run()
     if settings.use_force:
         before = named.final

@@ -8,7 +8,7 @@ import numpy as np
 
 from actuator_glue.diagnosis.estimate import Json
 from actuator_glue.diagnosis.held_out import Verdict
-from actuator_glue.diagnosis.learned.term import is_learned
+from actuator_glue.diagnosis.learned.term import any_learned, is_learned
 from actuator_glue.diagnosis.measured.measurement import Measured
 from actuator_glue.diagnosis.regression import Surrogate
 from actuator_glue.diagnosis.score import splits_of
@@ -75,7 +75,9 @@ def decide(
     elif found.final.effects or seen:
         verdict = 'missing-effect'
     final = found.final
-    doubted = verdict == 'unexplained' or (_described(found) and left >= found.material)
+    doubted = verdict == 'unexplained' or (
+        any_learned(found.final.structure) and left >= found.material
+    )
     return Decision(
         verdict=verdict,
         final=final,
@@ -87,10 +89,6 @@ def decide(
         limit=limit,
         remaining={'left': left, 'limit': limit, **remaining(data, final.fit.error)},
     )
-
-
-def _described(found: Selection) -> bool:
-    return any(is_learned(e) for e in found.final.structure.entries)
 
 
 def _certainty(found: Selection, left: float, surrogate: Surrogate) -> float:

@@ -322,20 +322,10 @@ class Search:
         rows = [sorted((self.add(*pair) for pair in row), key=by_score) for row in wanted]
         worth = [_worth_finishing(row, a.below) for row, a in zip(rows, asked, strict=True)]
         last = {frozenset(t.effects): t for t in itertools.chain(*worth)}
-        done = dict(
-            zip(
-                last,
-                self.each(lambda trial: self.polish(trial, valves), last.values()),
-                strict=True,
-            )
-        )
-        out = []
-        for row, finished in zip(rows, worth, strict=True):
-            # From another valve, too, where it is this structure's addition that asks for that.
-            done |= {frozenset(t.effects): self.polish(t, valves) for t in finished}
-            known = [(t, done.get(frozenset(t.effects), t)) for t in row]
-            out.append(sorted((replace(k, added=t.added) for t, k in known), key=by_score))
-        return out
+        polished = self.each(lambda trial: self.polish(trial, valves), last.values())
+        done = dict(zip(last, polished, strict=True))
+        known = [[(done.get(frozenset(t.effects), t), t.added) for t in row] for row in rows]
+        return [sorted((replace(t, added=n) for t, n in row), key=by_score) for row in known]
 
     def screened(self, current: Trial, names: Iterable[str], *, beside: bool = False) -> list[str]:
         """Sort effects by what their signatures could remove from the present residual.

@@ -38,7 +38,9 @@ class Row(JsonObject):
     chosen: bool
 
 
-def rows(search: Search, scorer: Scorer, material: float, chosen: tuple[str, ...]) -> list[Row]:
+def rows(
+    search: Search, scorer: Scorer, material: float, chosen: tuple[str, ...]
+) -> tuple[Row, ...]:
     """Return a row for every structure that was refitted, greatest weight first (weights.py).
 
     Args:
@@ -64,4 +66,4 @@ def rows(search: Search, scorer: Scorer, material: float, chosen: tuple[str, ...
         )
     most = max(row.log_weight for row in table)
     beside = (replace(row, log_weight=row.log_weight - most) for row in table)
-    return sorted(beside, key=lambda row: -row.log_weight)
+    return tuple(sorted(beside, key=lambda row: -row.log_weight))

@@ -88,8 +88,8 @@ def told(
         onset=result.onset,
         prior=prior,
         setup=both.setup,
-        structures=tuple(
-            table.rows(result.selection.search, result.scorer, found.material, final.effects)
+        structures=table.rows(
+            result.selection.search, result.scorer, found.material, final.effects
         ),
         names=tuple(p.name for p in after.model.parameters),
         posterior=both.draws,

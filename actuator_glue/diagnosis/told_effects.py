@@ -45,7 +45,7 @@ def of(
         # A learned term describes; there is no cause by its name that might be true.
         own = {p.name: estimates[p.name] for p in entries[name].parameters}
         sizes = _how_much(tuple(own.values()))
-        rivals = _told(name, found.rivals[name], decision.certainty, sizes)
+        rivals = _told(found.rivals[name], decision.certainty, sizes)
         tied = [r for r in rivals if r.tied]
         gained = found.removed[name]
         out.append(
@@ -105,7 +105,7 @@ def _records_of(trial: Trial, name: str) -> tuple[str, ...]:
 
 
 def _told(
-    name: str, rivals: Sequence[Rival], certainty: float, sizes: Sequence[Estimate]
+    rivals: Sequence[Rival], certainty: float, sizes: Sequence[Estimate]
 ) -> tuple[Rival, ...]:
     """Return rivals with the probability that is told of them, which is calibrated together.
 

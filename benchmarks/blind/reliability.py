@@ -2,8 +2,8 @@
 
 Reads the answers that campaigns left (`FOLDER/**/*.json`), counts how often names were right that
 were given a probability, and how often 95 % intervals held the true size. With `--fit` it prints
-the curve from shares of the weight to probabilities that these machines ask for: of seeds below
-1000, which are not reported.
+the curve from shares of the weight to probabilities that these machines ask for: give it none
+that are to be judged.
 """
 
 from __future__ import annotations
@@ -47,6 +47,11 @@ def truths(result: Json) -> set[str]:
     return {catalogued(name) for name in result['effects']}
 
 
+def _tied(effect: Json) -> set[str]:
+    """A name and those that are tied with it."""
+    return {effect['name'], *(n for pair in effect['alternatives'] for n in pair.split(' + '))}
+
+
 def named(results: Iterable[Json]) -> list[tuple[float, bool, bool]]:
     """Probability of every name that has one, whether the name is right, whether its set is."""
     out = []
@@ -54,9 +59,8 @@ def named(results: Iterable[Json]) -> list[tuple[float, bool, bool]]:
         true = truths(result)
         for effect in result['diagnosis']['effects']:
             if effect['probability'] is not None:
-                others = [n for pair in effect['alternatives'] for n in pair.split(' + ')]
-                held = true & {effect['name'], *others}
-                out.append((effect['probability'], effect['name'] in true, bool(held)))
+                held = bool(true & _tied(effect))
+                out.append((effect['probability'], effect['name'] in true, held))
     return out
 
 
@@ -67,9 +71,8 @@ def behind_names(results: Iterable[Json]) -> list[tuple[float, bool]]:
         true = truths(result)
         for effect in result['diagnosis']['effects']:
             if effect['probability'] is not None:
-                told = {n for pair in effect['alternatives'] for n in pair.split(' + ')}
-                right = bool(true & {effect['name'], *told})
-                out.append((reliability.share_of(1.0 - effect['none_of_these']), right))
+                share_behind = reliability.share_of(1.0 - effect['none_of_these'])
+                out.append((share_behind, bool(true & _tied(effect))))
     return out
 
 

@@ -18,7 +18,7 @@ def size(lower: float, upper: float, neutral: float | None) -> Estimate:
 def test_a_name_whose_size_may_be_nothing_is_not_sure(far: float) -> None:
     """All names in its place keep their odds, and none of these has the rest."""
     rows = [Rival(n, 0.0, 0.0, 0.0, True, p) for n, p in (('delay', 0.9), ('sensor-lag', 0.1))]
-    told = told_effects._told('delay', rows, 0.95, [size(far - 2.0, far + 2.0, 0.0)])
+    told = told_effects._told(rows, 0.95, [size(far - 2.0, far + 2.0, 0.0)])
     side = float(scipy.stats.norm.cdf(far))
     assert sum(r.probability for r in told) == pytest.approx(calibrated(0.95 * side))
     assert told[1].probability / told[0].probability == pytest.approx(1 / 9)

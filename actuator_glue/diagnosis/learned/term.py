@@ -14,6 +14,7 @@ from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.effects import Effect
 from actuator_glue.model.effects.terms.definition import entries, mapping
+from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 
 _UNITS = {symbol: unit_text(powers) for symbol, powers in DIMENSIONS.items()}
@@ -80,6 +81,11 @@ class LearnedTerm:
 def is_learned(effect: Effect) -> bool:
     """Whether an effect is a term that a diagnosis learned, now or before."""
     return effect.source == LEARNED
+
+
+def any_learned(structure: Structure) -> bool:
+    """Whether a structure has a learned term."""
+    return any(map(is_learned, structure.entries))
 
 
 def described(

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from actuator_glue.diagnosis.conclusion import Conclusion
-from actuator_glue.diagnosis.learned.term import is_learned
+from actuator_glue.diagnosis.learned.term import any_learned
 from actuator_glue.diagnosis.measured import hum
 from actuator_glue.diagnosis.moves.learned_terms import LEARNED_TERMS
 from actuator_glue.diagnosis.moves.move import Asking, after, follow
@@ -55,7 +55,7 @@ def _linearly(first: Conclusion, asking: Asking) -> Conclusion | None:
     if before - base.rms**2 < first.found.material**2:
         return None
     asking.tell('other hold', 0.0)
-    described = any(map(is_learned, first.found.final.structure.entries))
+    described = any_learned(first.found.final.structure)
     named = first.decision.verdict == 'missing-effect' and not described
     if named and _explains_less(first, other, base):
         return None

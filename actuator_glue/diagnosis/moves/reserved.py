@@ -43,7 +43,7 @@ def with_reserved(first: Conclusion, asking: Asking) -> Conclusion | None:
         if not any(better(t, first.scorer) for s in starts for t in search.additions(s, reserved)):
             continue
         second = searched(
-            prepared, search, line, asking.settings, asking.tell, first.selection.described
+            prepared, search, line, asking.settings, asking.tell, first.selection.explains_rest
         )
         found = second.found.final
         told = set(found.effects) & set(reserved) or second.decision.verdict != 'unexplained'
