@@ -13,6 +13,7 @@ from actuator_glue.diagnosis.verdict import against
 from actuator_glue.inference.carried import FEWEST, Carried, Drift
 from actuator_glue.inference.choice import ModelChoice, choose_model
 from actuator_glue.inference.prior_use import GivenPrior
+from actuator_glue.inference.transforms.inverse_response import Ridge
 from actuator_glue.online.knowledge import Known
 from actuator_glue.online.live_diagnosis import Concluded
 from actuator_glue.online.structures import LEAVES, MOST, Proposal, Proposed
@@ -24,6 +25,8 @@ EFFORT = 0.6
 # Eq. (2) alone is carried beside every addition, at least with this weight, until its forecasts
 # exclude it: what a diagnosis is sure of, it is sure of for the data that it has seen.
 _PLAIN = 0.02
+# What one stiffness leaves open.
+_OIL = 'alpha_2'
 # Weight of a structure with effects that have no probability: learned terms.
 _DESCRIBED = 0.9
 
@@ -68,10 +71,12 @@ def proposed(found: Diagnosis, records: Sequence[Record]) -> Proposal:
     """Return the structures that a diagnosis leaves possible, with what it knows of their sizes.
 
     The one it tells comes with its posterior, which stands for the middle of the data that it is
-    of; those that are tied with it come without, and Eq. (2) alone beside them.
+    of, and leaves open what they do; those that are tied with it come without, and Eq. (2) alone
+    beside them.
     """
     start, end = _since(found, records), records[-1].stamp_ns(len(records[-1]) - 1)
     model, draws = _within_bounds(found)
+    draws = _opened(found, records, model, draws)
     middle, known = (start + end) // 2, None
     if len(draws) >= FEWEST:
         carried = Carried.thinned(model.names, draws).later((middle - start) * 1e-9)
@@ -110,6 +115,23 @@ def _within_bounds(found: Diagnosis) -> tuple[ModelChoice, Array]:
         return choose_model(found.structure), inside
     start = dict(zip(names, np.median(inside, axis=0).tolist(), strict=True))
     return choose_model(found.structure, start=start), inside
+
+
+def _opened(
+    found: Diagnosis, records: Sequence[Record], model: ModelChoice, draws: Array
+) -> Array:
+    """Return draws (m, p) as wide as one stiffness leaves them inside the box.
+
+    Along that ridge a diagnosis draws from around its fit only, which says nothing of where on it
+    the machine is: as a prior it would be believed.
+    """
+    stiffness = {record.known_stiffness() for record in records}
+    told = found.prior is not None or found.base[_OIL].identified
+    if told or len(stiffness) > 1 or not len(draws):
+        return draws
+    return Ridge(model.names, *model.bounds, stiffness.pop()).opened(
+        draws, np.random.default_rng(0)
+    )
 
 
 def _weight(found: Diagnosis) -> float:

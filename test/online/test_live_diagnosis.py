@@ -387,6 +387,8 @@ def found_play(alpha_2, spread):
         effects=(effect,),
         onset=None,
         alarm=SimpleNamespace(threshold=5e-6),
+        prior=None,
+        base={'alpha_2': SimpleNamespace(identified=spread < 1e6)},
     )
 
 
@@ -396,9 +398,34 @@ def test_what_a_record_leaves_open_is_handed_over_inside_the_box():
     record = Record(1e-3 * command, 1e-3 * command, 0.005, 250e3)
     told = proposed(found_play(4e6, 2e7), [record]).structures[0]
     draws = told.known.carried.draws
-    assert draws[:, 2].min() > 0.0 and draws[:, 2].max() < 1e7
+    assert draws[:, 2].min() >= 0.0 and draws[:, 2].max() <= 1e7
     assert draws[:, 0].mean() == pytest.approx(134.0, rel=2e-3)
     assert 0.0 < told.model.start[2] < 1e7
     # Where hardly any lies inside nothing is known; the structure is carried all the same.
     told = proposed(found_play(-1e9, 1e7), [record]).structures[0]
     assert told.known is None and told.model.effects == ('backlash',) and told.weight == 0.97
+
+
+def test_what_one_stiffness_leaves_open_is_handed_over_as_open():
+    """Draws that lie around a fit along the ridge, at 7 MN/m where the truth may be 1."""
+    command = np.sin(np.linspace(0.0, 60.0, 1000))
+    record = Record(1e-3 * command, 1e-3 * command, 0.005, 250e3)
+    found = found_play(7e6, 3e5)
+    closed = proposed(found, [record]).structures[0].known.carried.draws
+    assert closed[:, 2].std() == pytest.approx(3e5, rel=0.1)
+    found.base['alpha_2'].identified = False
+    told = proposed(found, [record]).structures[0]
+    draws, (lower, upper) = told.known.carried.draws, told.model.bounds
+    assert ((draws >= lower) & (draws <= upper)).all()
+    # Of the box alone (k + alpha_2)^3 is uniform between what the other bounds leave.
+    oil = (draws[:, 2] + 250e3) ** 3
+    assert oil.mean() / oil.max() == pytest.approx(0.5, abs=0.05)
+    # What the record does tell is as it was.
+    ratio = draws[:, 1] / (draws[:, 2] + 250e3)
+    before = found.joint[:, 1] / (found.joint[:, 2] + 250e3)
+    ends = np.quantile(before, [0.1, 0.9])
+    assert np.quantile(ratio, [0.1, 0.9]) == pytest.approx(ends, rel=0.01)
+    # A calibration tells where on the ridge the machine is.
+    found.prior = object()
+    kept = proposed(found, [record]).structures[0].known.carried.draws
+    assert kept[:, 2].std() == pytest.approx(3e5, rel=0.1)

@@ -86,6 +86,18 @@ class Ridge:
             )
         return x, log_jacobian
 
+    def opened(self, x: Array, rng: np.random.Generator) -> Array:
+        """Return parameters (n, p), n at most m, of (m, p), with what one stiffness leaves open.
+
+        That is alpha_2 given the others' coordinates, at k = 0 alpha_3, too: it is drawn as the
+        box alone has it. Where that takes another parameter out of the box there is no draw.
+        """
+        z = self.forward(x)
+        left = [2] if self._k > 0.0 else [2, 3]
+        z[:, left] = rng.standard_normal((len(z), len(left)))
+        out, log_jacobian = self.inverse(np.clip(z, self.lower, self.upper))
+        return np.asarray(out[np.isfinite(log_jacobian)])
+
     def compiled(self, form: Compiled) -> Compiled | None:
         """Return the compiled form of a log likelihood in these coordinates, if there is one."""
         if len(self._low) != 4:
