@@ -107,6 +107,20 @@ def informative_prior(
     return replace(found, carried=carried, mixture=scaled(walked, carried.factor))
 
 
+def carried_coordinates(
+    names: tuple[str, ...], low: Array, high: Array, stiffness: float | None
+) -> Transform:
+    """Return the coordinates in which what is carried of parameters is a mixture of normals.
+
+    Args:
+        names: the parameters, those of Eq. (2) first where there is a stiffness.
+        low: their lower bounds (p,).
+        high: their upper bounds (p,).
+        stiffness: specimen stiffness of a record [N/m]; None for logarithms.
+    """
+    return Log(low, high) if stiffness is None else Ridge(names, low, high, stiffness)
+
+
 @lru_cache(maxsize=16)
 def _fitted(
     carried: Carried,
@@ -133,9 +147,8 @@ def _fitted(
             f'{", ".join(beyond)}; widen the bounds or calibrate anew'
         )
     draws = np.ascontiguousarray(draws[inside])
-    transform: Transform = Log(low, high)
-    if stiffness is not None and shared[:4] == names[:4] and len(shared) >= 4:
-        transform = Ridge(shared, low, high, stiffness)
+    ridged = stiffness is not None and shared[:4] == names[:4] and len(shared) >= 4
+    transform = carried_coordinates(shared, low, high, stiffness if ridged else None)
     mixture = fitted(transform.forward(draws), carried.components)
     return InformativePrior(shared, columns, transform, mixture, carried)
 

@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from actuator_glue.errors import InputError
-from actuator_glue.inference.carried import FEWEST, Carried, later
+from actuator_glue.inference.carried import DRAWS, FEWEST, Carried, later
 from actuator_glue.inference.chains import Chains
 from actuator_glue.inference.choice import ModelChoice
 from actuator_glue.inference.convergence import quick_rhat_and_ess
+from actuator_glue.inference.informative_prior import carried_coordinates
+from actuator_glue.inference.normal_fit import refined
 from actuator_glue.inference.posterior import Problem, Target, sample
 from actuator_glue.inference.predictive import ResidualModel, fit_residual
 from actuator_glue.inference.prior_conflict import Conflict, conflict
@@ -194,14 +196,30 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> WindowFit:
             sensor_noise(residual, record.command[settle:], white),
         ),
         archive=joined(posterior[spread(len(posterior), ARCHIVE)], job.archive),
-        learned=(
-            Carried.thinned(job.model.names, posterior)
-            if job.settings.prior == 'sequential' and chains.annealed and len(posterior) >= FEWEST
-            else None
-        ),
+        learned=_learned(job, chains, posterior),
         conflict=None if target.prior is None else conflict(target.prior, posterior),
         complete=complete,
     )
+
+
+def _learned(job: Job, chains: Chains, posterior: Array) -> Carried | None:
+    """Return what later windows begin with, without the scatter of draws (m, p).
+
+    As a normal density in the coordinates in which it is their prior: what no window tells goes
+    through as it was.
+    """
+    model = job.model
+    wanted = job.settings.prior == 'sequential' and chains.annealed
+    if not wanted or len(posterior) < FEWEST:
+        return None
+    coordinates = carried_coordinates(
+        model.names, *model.bounds, job.window.record.known_stiffness()
+    )
+    at = coordinates.forward(posterior)
+    log_density = chains.log_density[chains.burn :].reshape(-1) + coordinates.inverse(at)[1]
+    found = refined(at[spread(len(at), DRAWS)], at, log_density)
+    draws, log_jacobian = coordinates.inverse(found)
+    return Carried(model.names, draws[np.isfinite(log_jacobian)])
 
 
 def _frozen(job: Job, draws: Array, residual: ResidualModel, noise: float) -> FrozenPosterior:
