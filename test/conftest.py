@@ -65,6 +65,15 @@ def rng_seed(request: pytest.FixtureRequest) -> int:
 
 
 @pytest.fixture
+def undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pictures of reports are made and not drawn, which takes most of a report's time.
+
+    For tests that read what a report says; that it can be drawn, test/report and test/view ask.
+    """
+    monkeypatch.setattr('actuator_glue.report.style.png', lambda figure: b'a picture')
+
+
+@pytest.fixture
 def overlapping_texts() -> Callable[..., list[tuple[str, str]]]:
     """Return a function: pairs of texts printed over each other, and texts cut off."""
     import matplotlib as mpl

@@ -65,6 +65,7 @@ def test_the_combinations_are_those_of_the_actuator(stiffness: float) -> None:
     assert found.sources[0].stiffness_n_per_m is None
 
 
+@pytest.mark.usefixtures('undrawn')
 def test_what_it_is_told_and_kept(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """By the command line as by the library; the force says what the stiffness may be."""
     write(tmp_path / 'a.csv', replace(simulated(250e3), source='a.csv'))

@@ -95,6 +95,7 @@ def test_a_calibration_is_kept(posterior: ag.Calibration, tmp_path: Path) -> Non
             ag.Calibration.load(wrong)
 
 
+@pytest.mark.usefixtures('undrawn')
 def test_a_calibration_is_shown(posterior: ag.Calibration, tmp_path: Path) -> None:
     """Figures, a report, a table for notebooks, and arviz's form of the draws."""
     assert len(posterior.plot().axes) == 16
@@ -111,6 +112,7 @@ def test_a_calibration_is_shown(posterior: ag.Calibration, tmp_path: Path) -> No
     assert mean == pytest.approx(posterior.parameters['alpha_2'].mean)
 
 
+@pytest.mark.usefixtures('undrawn')
 def test_a_diagnosis_is_kept_and_shown(
     record: ag.Record, posterior: ag.Calibration, tmp_path: Path
 ) -> None:
@@ -145,6 +147,7 @@ def test_a_diagnosis_is_kept_and_shown(
         ag.Calibration.load(tmp_path / 'diagnosis.npz')
 
 
+@pytest.mark.usefixtures('undrawn')
 def test_a_replay_is_kept_and_shown(record: ag.Record, tmp_path: Path) -> None:
     """The same for a replay, whose windows may be of a model with an effect of the user's own."""
     effect = ag.effects.term(

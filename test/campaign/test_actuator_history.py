@@ -179,6 +179,7 @@ def test_sides_of_a_repair_differ(repaired: Path, capsys: pytest.CaptureFixture[
         compare(repaired, '1999-01-01', days[0])
 
 
+@pytest.mark.usefixtures('undrawn')
 def test_a_page_and_a_prior_for_each_actuator(
     repaired: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

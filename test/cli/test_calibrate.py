@@ -238,6 +238,7 @@ def test_results_do_not_depend_on_where_they_are_written(
     assert content['parameters'] == again['parameters']
 
 
+@pytest.mark.usefixtures('undrawn')
 def test_what_is_left_is_asked_whether_it_is_noise(run, tmp_path: Path, rng_seed: int) -> None:
     """Play that nobody declared: the first line, the exit code, JSON and the report say so.
 

@@ -49,6 +49,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
+@pytest.mark.usefixtures('undrawn')
 def test_terminal_and_report_agree(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -97,6 +98,7 @@ def test_what_only_the_prior_says_is_marked(
     assert 'beta_1' in rows and 'beta_1' not in marked
 
 
+@pytest.mark.usefixtures('undrawn')
 def test_the_next_command_reads_as_this_one_did(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -59,6 +59,7 @@ def rows_of(page: str) -> str:
 
 
 @pytest.mark.parametrize('verb', ['calibrate', pytest.param('diagnose', marks=pytest.mark.slow)])
+@pytest.mark.usefixtures('undrawn')
 def test_a_size_has_one_interval(
     verb: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

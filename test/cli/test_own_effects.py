@@ -77,6 +77,7 @@ def test_simulate_and_calibrate(own: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures('undrawn')
 def test_diagnose_and_report(own: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The diagnosis names it among the whole catalogue; the report shows its equation."""
     effects.load_effects(own)

@@ -115,6 +115,7 @@ def test_a_learned_term_travels(found: Diagnosis, tmp_path: Path) -> None:
         effects.unregister(effect.name)
 
 
+@pytest.mark.usefixtures('undrawn')
 def test_a_report_shows_the_equation(found: Diagnosis, tmp_path: Path) -> None:
     """The equation of an effect that no catalogue has."""
     text = found.report(tmp_path / 'report.html').read_text()

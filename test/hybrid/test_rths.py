@@ -205,6 +205,7 @@ def test_a_calibration_hands_out_its_transfer_function() -> None:
         posterior(effects=('delay',)).transfer_function(250e3)
 
 
+@pytest.mark.usefixtures('undrawn')
 def test_the_result_is_kept_and_shown(tmp_path: Path) -> None:
     """File, figure, report, notebook."""
     found = ag.rths('benchmark_case_1', posterior(), draws=50)

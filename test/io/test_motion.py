@@ -241,6 +241,7 @@ def test_the_command_plot_speaks_it(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     assert [labels[0] for labels in seen] == ['displacement [mm]', 'displacement [V]']
 
 
+@pytest.mark.usefixtures('undrawn')
 def test_a_diagnosis_speaks_it(tmp_path: Path) -> None:
     """Headline, picture, report and table, from the library as from the command line."""
     test = ag.simulate(ag.Command(rate=RATE, duration=8.0), stiffness=0.0, seed=3)

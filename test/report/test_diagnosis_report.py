@@ -174,6 +174,7 @@ def test_what_was_not_added_is_not_drawn() -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.usefixtures('undrawn')
 def test_paths_stand_in_one_table() -> None:
     """The headline names files; where they lay is told once for each."""
     found = diagnosis(6e-5)
@@ -190,6 +191,7 @@ def test_paths_stand_in_one_table() -> None:
     assert 'nothing was added' in page
 
 
+@pytest.mark.usefixtures('undrawn')
 def test_first_page_says_what_came_out_and_what_to_do() -> None:
     """Verdict, certainty, errors, response, equation, tests to come; glossary, provenance."""
     sine = Sine(5.0, 1e-3, 0.9, (0.89, 0.91), -20.0, (-21.0, -19.0), 0.0111, (0.011, 0.0112))
@@ -232,6 +234,7 @@ def test_chains_that_stand_still_have_no_r_hat_and_a_report_all_the_same() -> No
     assert diagnosis_report._drawn(still) == 'nan effective draws by DREAM(ZS), R-hat nan'
 
 
+@pytest.mark.usefixtures('undrawn')
 def test_the_answer_comes_first_and_what_was_done_to_the_records_last() -> None:
     """Verdict, how sure, picture, errors, parameters, what to do, what to type; sampling last."""
     sampling = tuple(f'record {i} at 1000 Hz is fitted at 250 Hz' for i in range(3))
