@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from actuator_glue.jit import njit
 from actuator_glue.model.effects.effect import Scale
 from actuator_glue.model.effects.layout import LANES
 from actuator_glue.model.effects.terms import machine as m
@@ -72,15 +73,27 @@ def run(
     for j, row in enumerate((m.BETA_1, m.ALPHA_1_BETA_0, m.ALPHA_2, m.ALPHA_3)):
         g[row] = theta[j]
     made.prepare(g)
-    code, row = made.parts[program.PART[place]], _REGISTERS[SIGNAL[place]]
-    count = len(motion[SIGNAL[place]])
-    out = np.empty((count, LANES))
-    for i in np.repeat(range(count), pieces):
-        for symbol, trace in motion.items():
-            g[_REGISTERS[symbol]] = trace[i]
-        m.once(code, g)
-        out[i] = g[row]
-        if made.parts[m.KEEP]:
-            g[row] = motion[SIGNAL[place]][i]
-            m.once(made.parts[m.KEEP], g)
+    signal, parts = SIGNAL[place], made.parts
+    rows = np.array([_REGISTERS[symbol] for symbol in motion])
+    out = np.empty((len(motion[signal]), LANES))
+    codes = int(parts[program.PART[place]]), int(parts[m.KEEP])
+    traces = np.array([np.asarray(trace, dtype=np.float64) for trace in motion.values()])
+    _follow(g, *codes, list(motion).index(signal), rows, traces, pieces, out)
     return out
+
+
+@njit(nogil=True)
+def _follow(
+    g: Array, code: int, keep: int, own: int, rows: Array, traces: Array, pieces: int, out: Array
+) -> None:
+    """Write what a part makes of its own signal, of traces (s, n) of registers (s,)."""
+    for i in range(traces.shape[1]):
+        for _ in range(pieces):
+            for j in range(len(rows)):
+                g[rows[j]] = traces[j, i]
+            if code:
+                m.execute(code, g, g)
+            out[i] = g[rows[own]]
+            if keep:
+                g[rows[own]] = traces[own, i]
+                m.execute(keep, g, g)
