@@ -25,24 +25,39 @@ QUICK = Thresholds(evaluations=0)
 SHARP = replace(QUICK, noise_share=0.4)
 
 
-def make(effects: Sequence[str], sizes: Sequence[float], seed: int) -> list[Record]:
+def make(
+    effects: Sequence[str], sizes: Sequence[float], seed: int, seconds: float = 24.0
+) -> list[Record]:
     """Two sweeps and a held-out record of another kind, 10 um of noise."""
-    rng = np.random.default_rng(seed)
-    shaking = np.cumsum(rng.standard_normal(len(T)))
+    rng, time = np.random.default_rng(seed), np.arange(int(seconds * RATE)) / RATE
+    sweep = 2e-3 * np.sin(np.pi * (10.0 / seconds) * time**2)
+    shaking = np.cumsum(rng.standard_normal(len(time)))
     shaking = np.convolve(shaking - np.convolve(shaking, np.ones(129) / 129, 'same'), [0.5, 0.5])
-    shaking = 2e-3 * np.sin(T / 4) * shaking[: len(T)] / np.abs(shaking).max()
+    shaking = 2e-3 * np.sin(time / 4) * shaking[: len(time)] / np.abs(shaking).max()
     model = Structure(effects)
     out = []
-    for command, k in ((SWEEP, 0.0), (SWEEP, 250e3), (shaking, 250e3)):
+    for command, k in ((sweep, 0.0), (sweep, 250e3), (shaking, 250e3)):
         silent = Record(command, command, 1 / RATE, stiffness=k)
         y = model.simulate(np.append(THETA, sizes), silent)
-        out.append(Record(command, y + 1e-5 * rng.standard_normal(len(T)), 1 / RATE, stiffness=k))
+        y = y + 1e-5 * rng.standard_normal(len(time))
+        out.append(Record(command, y, 1 / RATE, stiffness=k))
     return out
 
 
+@pytest.fixture
+def few_forms(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No learned term but the sensor's."""
+
+    def sensors(scale: Scale, known: Container[str] = ()) -> tuple[Effect, ...]:
+        return tuple(effect for effect in forms(scale, known) if effect.place == 'sensor')
+
+    monkeypatch.setattr(describe, 'forms', sensors)
+
+
+@pytest.mark.usefixtures('few_forms')
 def test_a_healthy_machine_is_left_alone() -> None:
     """Noise alone, with 20 N of friction: immaterial."""
-    a, b, held = make(['coulomb-friction'], [20.0], 11)
+    a, b, held = make(['coulomb-friction'], [20.0], 11, 12.0)
     found = diagnose([a, b], held, settings=QUICK)
     assert found.verdict == 'none'
     assert found.effects == ()
@@ -118,9 +133,10 @@ def test_an_effect_pressed_against_its_bound_is_told_first() -> None:
     assert found.to_json()['at_bound'][0]['name'] == 'null_offset'
 
 
+@pytest.mark.usefixtures('few_forms')
 def test_play_is_named_and_removed() -> None:
     """60 um of play: the name, its size within 3 %, and the error down to the noise."""
-    a, b, held = make(['backlash'], [6e-5], 12)
+    a, b, held = make(['backlash'], [6e-5], 12, 12.0)
     stages: list[str] = []
     found = diagnose([a, b], held, progress=lambda s, x: stages.append(s), settings=QUICK)
     assert found.verdict == 'missing-effect'
@@ -158,16 +174,6 @@ def test_play_is_named_and_removed() -> None:
         'removable_removed',
     }
     assert out['candidates'][0]['name'] == 'backlash'
-
-
-@pytest.fixture
-def few_forms(monkeypatch: pytest.MonkeyPatch) -> None:
-    """No learned term but the sensor's."""
-
-    def sensors(scale: Scale, known: Container[str] = ()) -> tuple[Effect, ...]:
-        return tuple(effect for effect in forms(scale, known) if effect.place == 'sensor')
-
-    monkeypatch.setattr(describe, 'forms', sensors)
 
 
 @pytest.mark.slow
