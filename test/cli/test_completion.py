@@ -2,11 +2,14 @@
 
 import shutil
 import subprocess
+from functools import cache
 
 import pytest
 
-from actuator_glue.cli.completion import script
+from actuator_glue.cli import completion
 from actuator_glue.cli.main import commands, main
+
+script = cache(completion.script)  # it asks every command for its options
 
 
 def bash(*words: str, shell: str = 'bash') -> list[str]:

@@ -181,7 +181,7 @@ def test_a_simulated_clock_that_jumps_back_is_said_and_survived(start, probe):
     for node in nodes:
         probe.until(lambda node=node: node in probe.health, 60, node)
     probe.until(lambda: probe.number('estimator', 'samples') > 0, 60, 'samples')
-    clock.now = 50.0
+    clock.jump(-50.0)
     for node, process in nodes.items():
         probe.until(lambda node=node: 'the clock jumped by -' in probe.faults[node], 15, node)
         assert process.alive
