@@ -181,8 +181,8 @@ def written(tmp_path: Path, *command: object) -> dict[str, object]:
 def test_the_command_line_gives_the_same_numbers(tmp_path: Path) -> None:
     """Defaults included: nothing is said but the file, its stiffness, and fewer evaluations."""
     file = tmp_path / 'test.csv'
-    made = ag.simulate(ag.Command(rate=200.0, duration=15.0), stiffness=250e3, seed=2)
-    options = '--rate 200 --duration 15 --stiffness 250e3 --seed 2 --unit m'
+    made = ag.simulate(ag.Command(rate=200.0, duration=10.0), stiffness=250e3, seed=2)
+    options = '--rate 200 --duration 10 --stiffness 250e3 --seed 2 --unit m'
     code = main(['simulate', str(file), *options.split()])
     assert code == 0
     record = ag.load(file, stiffness=250e3)
@@ -222,7 +222,7 @@ def test_the_script_of_the_readme_runs(
     text = (Path(__file__).parents[1] / 'README.md').read_text(encoding='utf-8')
     script = text.split('```python\n')[1].split('```')[0]
     monkeypatch.chdir(tmp_path)
-    shape = ('--rate', '200', '--duration', '20')
+    shape = ('--rate', '200', '--duration', '12')
     for name, k, more in (
         ('free', '0', shape),
         ('clamped', '250e3', shape),

@@ -188,7 +188,7 @@ def test_the_robust_compensator_is_better_in_its_worst_percentile(benchmark_draw
             replace(found, draws=draws),
             compensator=kind,
             draws=160,
-            ground_motion=artificial(5, 20.0),
+            ground_motion=artificial(5, 10.0),
         ).virtual
         assert virtual is not None and virtual.j2_percentile_95 is not None
         worst[kind] = virtual.j2_percentile_95

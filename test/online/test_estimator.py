@@ -58,7 +58,8 @@ def test_bands_are_made_before_their_data():
     ids=['default', 'settle short of the budget', 'windows side by side', 'no settle', 'effect'],
 )
 def test_scored_bands_are_the_published_ones_to_the_bit(changes, effects):
-    whole, settings = record(9.0), replace(SETTINGS, **changes)
+    settings = replace(SETTINGS, **changes)
+    whole = record(5.0 + 2.0 * settings.hop)
     more = {'settings': settings, 'model': choose_model(effects)}
     told = results([Preview(0, whole.period, whole.command), *stream(whole)], **more)
     plain = results(stream(whole), **more)

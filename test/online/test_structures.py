@@ -84,7 +84,7 @@ def test_knowledge_outside_the_bounds_is_refused():
 SIZE = 6e-5
 
 
-def lost_motion(seconds=14.0, seed=3):
+def lost_motion(seconds=10.0, seed=3):
     """A stream with play of 60 um beyond 10 um of noise."""
     command = noise(RATE, seconds, 0.2, 8.0, seed=seed)
     clean = Structure(('backlash',))

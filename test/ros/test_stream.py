@@ -128,8 +128,11 @@ def test_the_model_changes_live_and_the_replay_repeats_it(start, probe, tmp_path
     )
     assert probe.call(SetModel, 'estimator/set_model', requested(two)).success
     # That process starts while others want the same cores: the stream lasts until it has answered.
-    beside = lambda: any(sum(list(m.structure_evaluations)[1:]) for m in told)  # noqa: E731
-    probe.until(beside, 100, 'the second structure was sampled')
+    probe.until(
+        lambda: any(sum(list(m.structure_evaluations)[1:]) for m in told),
+        100,
+        'the second structure was sampled',
+    )
     assert simulator.end() == 0, simulator.text
     finish(probe, recorder, estimator, 1)
     comparison, live = replayed(bag)
