@@ -85,6 +85,16 @@ class Shares(Space):
         out[..., self._log] = np.log(np.maximum(out[..., self._log], 1e-300))
         return super().z(out)
 
+    def logs(self, z: Array) -> Array:
+        """As `Space.logs`."""
+        return np.asarray(np.log(self.theta(z)[..., :_P]))
+
+    def log_slopes(self, z: Array) -> Array:
+        """As `Space.log_slopes`: what is a share grows with the oil, too."""
+        out, oil = super().log_slopes(z), np.exp(z[2])
+        out[2, self._shared[:_P]] = oil / (oil + self._stiffness)
+        return out
+
     def _oil(self, theta: Array) -> Array:
         return np.asarray(theta[..., 2:3] + self._stiffness)
 

@@ -8,6 +8,7 @@ from scipy.stats import multivariate_normal
 from test_diagnose import QUICK, THETA, make
 
 from actuator_glue.diagnosis.diagnose import diagnose
+from actuator_glue.diagnosis.global_search import Shares
 from actuator_glue.diagnosis.remembered import Before
 from actuator_glue.errors import InputError
 from actuator_glue.inference.carried import Carried
@@ -67,6 +68,23 @@ def test_a_fit_ends_at_the_most_probable_parameters() -> None:
     around = found.theta * np.exp(2e-3 * np.random.default_rng(2).standard_normal((40, 4)))
     assert (cost(around) > cost(found.theta[None]) - 1e-3).all()
     assert cost(plain.theta[None]) > cost(found.theta[None]) + 0.1
+
+
+def test_a_prior_is_the_same_in_shares_of_the_oil() -> None:
+    """Refits of friction ended with a thousand times its force: the prior took shares for logs."""
+    record = make(['coulomb-friction'], [150.0], 5)[1]
+    free, model = Data.whole([record]), Structure(('coulomb-friction',))
+    data = replace(free, prior=BasePrior(known(1.01 * THETA, 0.02), UPPER))
+    space = Shares(model, data.duration, record.known_stiffness())
+    theta = np.array([*(1.02 * THETA), 140.0])
+    z = space.z(theta)
+    np.testing.assert_allclose(space.logs(z), np.log(theta[:4]), rtol=1e-12)
+    moved = space.logs(z + 1e-6 * np.eye(5)) - space.logs(z)
+    np.testing.assert_allclose(moved / 1e-6, space.log_slopes(z), rtol=1e-4, atol=1e-6)
+    usual, shares = (fit(data, model, theta, space=s) for s in (None, space))
+    # Over the kinks of friction either ends within a percent or so.
+    np.testing.assert_allclose(shares.theta, usual.theta, rtol=0.02)
+    assert usual.theta[4] == pytest.approx(150.0, rel=0.05)
 
 
 @pytest.mark.slow

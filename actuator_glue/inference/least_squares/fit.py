@@ -76,7 +76,7 @@ def rms(error: Array) -> float:
 
 
 @np.errstate(over='ignore')  # a step that diverges is worse than any
-def _objective(data: Data, z: Array, sums: Array) -> Array:
+def _objective(data: Data, space: Space, z: Array, sums: Array) -> Array:
     """Sums of squares (s,) at z (s, p), enlarged by the penalty of a prior.
 
     Its logarithm times -N/2 is the log posterior density, the noise integrated out. However far
@@ -84,19 +84,20 @@ def _objective(data: Data, z: Array, sums: Array) -> Array:
     """
     if data.prior is None:
         return sums
-    square = (data.prior.pull(z) ** 2).sum(axis=-1)
+    square = (data.prior.pull(space.logs(z)) ** 2).sum(axis=-1)
     return np.asarray(sums * np.exp(np.minimum(square / data.target.size, _FURTHEST)))
 
 
 def _informed(
-    data: Data, z: Array, jac: Array, error: Array, square: float
+    data: Data, space: Space, z: Array, jac: Array, error: Array, square: float
 ) -> tuple[Array, Array]:
     """Jacobian (p, N) and error (N,) at z, with rows for a prior in units of the error's rms."""
     if data.prior is None:
         return jac, error
     size = np.sqrt(square / data.target.size)
-    more = size * data.prior.slopes(len(z))
-    return np.hstack([jac, more]), np.concatenate([error, -size * data.prior.pull(z)])
+    logs = space.logs(z)
+    more = size * space.log_slopes(z) @ data.prior.slopes(len(logs))
+    return np.hstack([jac, more]), np.concatenate([error, -size * data.prior.pull(logs)])
 
 
 @np.errstate(all='ignore')  # a start that diverges proposes nothing worth taking
@@ -164,7 +165,7 @@ def fit(
     sse = sum_of_squares(error)
     alive = sse < _MOST
     z, output, error, sse = z[alive], output[alive], error[alive], sse[alive]
-    cost = _objective(data, z, sse)
+    cost = _objective(data, space, z, sse)
     if not len(z):
         first = space.z(np.atleast_2d(starts))[0]
         # Every start diverged: a metre of error, which nothing prefers.
@@ -201,7 +202,7 @@ def fit(
         tries = np.stack(
             [
                 _proposals(
-                    *_informed(data, z[r], jac, error[r], sse[r]),
+                    *_informed(data, space, z[r], jac, error[r], sse[r]),
                     z[r],
                     damping[r] * factors,
                     space,
@@ -215,7 +216,7 @@ def fit(
         for i, r in enumerate(rows):
             errors = data.target - tried[i]
             sums = sum_of_squares(errors)
-            costs = _objective(data, tries[i], sums)
+            costs = _objective(data, space, tries[i], sums)
             best = int(np.argmin(costs))
             if costs[best] < cost[r]:
                 pace[r], before = cost[r] - costs[best], cost[r]

@@ -50,6 +50,14 @@ class Space:
         out[..., :_P] = np.log(np.maximum(out[..., :_P], 1e-300))
         return np.clip(out, self.lower, self.upper)
 
+    def logs(self, z: Array) -> Array:
+        """Logarithms (..., 4) of Eq. (2)'s parameters at working coordinates (..., p)."""
+        return np.asarray(z[..., :_P])
+
+    def log_slopes(self, z: Array) -> Array:
+        """Derivatives of `logs` to working coordinates, (p, 4), at one point (p,)."""
+        return np.eye(len(z), _P)
+
     def steps(self, z: Array) -> Array:
         """Finite-difference steps (..., p): 1 % of an effect's size, so that kinks average out."""
         steps = np.broadcast_to(self._steps, z.shape).copy()
