@@ -20,48 +20,37 @@ _ENOUGH = 5
 _RATIO, _SHIFT = 2.0, 0.5
 
 
-def refined(draws: Array, at: Array, log_density: Array) -> Array:
-    """Return draws (m, p) stretched and moved to the normal that a log density tells.
+def refined(draws: Array, log_density: Array) -> Array:
+    """Return draws stretched and moved to the normal density that their log densities tell.
 
-    They are returned as they are where it is not nearly normal, or `at` are too few.
+    They are returned as they are where that is not nearly normal, or they are too few.
 
     Args:
-        draws: coordinates of some draws (m, p).
-        at: coordinates of draws of the same density (n, p), whose log density is known.
-        log_density: at these (n,) [nats], of the coordinates, up to a constant.
+        draws: coordinates (m, p).
+        log_density: of the coordinates at the draws (m,) [nats], up to a constant.
     """
-    found = _normal(at, log_density)
-    spread = np.cov(draws.T, bias=True).reshape(draws.shape[1], -1)
-    if found is None or np.linalg.matrix_rank(spread) < len(spread):
-        return draws
-    mean, covariance = found
-    unit = np.linalg.solve(np.linalg.cholesky(spread), (draws - draws.mean(axis=0)).T)
-    return np.asarray(mean + (np.linalg.cholesky(covariance) @ unit).T)
-
-
-def _normal(at: Array, log_density: Array) -> tuple[Array, Array] | None:
-    """Return mean (p,) and covariance (p, p); None where the density is no such normal."""
-    count = at.shape[1]
+    count = draws.shape[1]
     row, column = np.triu_indices(count)
-    spread = np.cov(at.T, bias=True).reshape(count, -1)
-    few = len(at) < _ENOUGH * (1 + count + len(row))
+    spread = np.cov(draws.T, bias=True).reshape(count, -1)
+    few = len(draws) < _ENOUGH * (1 + count + len(row))
     if few or not np.isfinite(log_density).all() or np.linalg.matrix_rank(spread) < count:
-        return None
-    middle, scale = at.mean(axis=0), np.linalg.cholesky(spread)
-    y = np.linalg.solve(scale, (at - middle).T).T
-    features = np.hstack([np.ones((len(y), 1)), y, y[:, row] * y[:, column]])
+        return draws
+    middle, scale = draws.mean(axis=0), np.linalg.cholesky(spread)
+    y = np.linalg.inv(scale) @ (draws - middle).T
+    features = np.vstack([np.ones((1, len(draws))), y, y[row] * y[column]])
     logs = log_density - log_density.mean()
-    found = np.linalg.solve(features.T @ features, features.T @ logs)
-    unexplained = float(np.var(logs - features @ found))
+    found = np.linalg.solve(features @ features.T, features @ logs)
+    unexplained = float(np.var(logs - found @ features))
     if unexplained > (1.0 - _EXPLAINED) * float(np.var(logs)):
-        return None
+        return draws
     precision = np.zeros((count, count))
     precision[row, column] = -found[1 + count :]
     precision += precision.T
     values = np.linalg.eigvalsh(precision)
     if not 1.0 / _RATIO < values[0] <= values[-1] < _RATIO:
-        return None
+        return draws
     shift = np.linalg.solve(precision, found[1 : 1 + count])
     if np.abs(shift).max() > _SHIFT:
-        return None
-    return middle + scale @ shift, scale @ np.linalg.inv(precision) @ scale.T
+        return draws
+    unit = np.linalg.cholesky(np.linalg.inv(precision)) @ y
+    return np.asarray(middle + (scale @ (shift[:, np.newaxis] + unit)).T)

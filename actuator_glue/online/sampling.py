@@ -215,10 +215,10 @@ def _learned(job: Job, chains: Chains, posterior: Array) -> Carried | None:
     coordinates = carried_coordinates(
         model.names, *model.bounds, job.window.record.known_stiffness()
     )
-    at = coordinates.forward(posterior)
-    log_density = chains.log_density[chains.burn :].reshape(-1) + coordinates.inverse(at)[1]
-    found = refined(at[spread(len(at), DRAWS)], at, log_density)
-    draws, log_jacobian = coordinates.inverse(found)
+    some = spread(len(posterior), DRAWS)
+    at = coordinates.forward(posterior[some])
+    log_density = chains.log_density[chains.burn :].reshape(-1)[some] + coordinates.inverse(at)[1]
+    draws, log_jacobian = coordinates.inverse(refined(at, log_density))
     return Carried(model.names, draws[np.isfinite(log_jacobian)])
 
 
