@@ -4,7 +4,6 @@ import re
 import tomllib
 from pathlib import Path
 
-import pytest
 from catkin_pkg.changelog import Changelog, populate_changelog_from_rst
 
 import actuator_glue
@@ -26,10 +25,9 @@ def faults(name: str, text: str) -> list[str]:
     return found
 
 
-@pytest.mark.parametrize('path', FRAGMENTS, ids=lambda p: p.name)
-def test_a_fragment_is_one_line_of_a_kind_that_is_known(path: Path) -> None:
+def test_a_fragment_is_one_line_of_a_kind_that_is_known() -> None:
     """So that the changelog is no diary."""
-    assert faults(path.name, path.read_text(encoding='utf-8')) == []
+    assert not [f for p in FRAGMENTS for f in faults(p.name, p.read_text(encoding='utf-8'))]
 
 
 def test_what_a_fragment_must_not_be() -> None:

@@ -125,9 +125,9 @@ def test_the_delay_of_play_is_that_of_sines_as_large_as_the_test() -> None:
 
 
 def test_intervals_of_delay_hold_it(rng_seed: int) -> None:
-    """Four machines: fewer than four of eight intervals hold it once in a thousand runs.
+    """Four machines: fewer than four of eight intervals hold it once in 2000 runs at most.
 
-    Even if those of a machine go together: three of four that miss, 4.8e-4.
+    That is if those of a machine go together: three of four that miss, 4.8e-4.
     """
     rng = np.random.default_rng(rng_seed)
     hits = [hit for _ in range(4) for hit in hits_of_a_calibration(rng)]
