@@ -45,7 +45,7 @@ def test_defaults_are_those_of_the_options(name: str) -> None:
 
 def test_a_notebook_completes_them() -> None:
     """What IPython asks: jedi, of the objects that are there."""
-    jedi = pytest.importorskip('jedi')
+    jedi = pytest.importorskip('jedi', reason='no jedi, which comes with IPython')
     for typed, wanted in {
         'ag.calibrate(records, eval': 'evaluations=',
         'ag.diagnose(records, false': 'false_alarms=',

@@ -77,7 +77,7 @@ def test_a_notebook_shows_pictures(
     results: dict[str, Any], record: ag.Record, posterior: ag.Calibration, tmp_path: Path
 ) -> None:
     """What IPython asks of a figure of ours gives a PNG, though nobody imported pyplot."""
-    formatters = pytest.importorskip('IPython.core.formatters')
+    formatters = pytest.importorskip('IPython.core.formatters', reason='no IPython')
     formatter = formatters.DisplayFormatter()
     figures = [posterior.plot(), posterior.plot_bands(record)]
     figures += [results[name].plot() for name in ('P(unstable)', 'window')]

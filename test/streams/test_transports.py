@@ -267,7 +267,7 @@ def test_a_stream_of_lsl_with_another_number_of_channels_is_not_heard(channels):
     """Channels known by their place alone are as many as the layout has."""
     its = layout(PLAIN_PAIR)
     at = address('lsl')
-    pylsl = pytest.importorskip('pylsl')
+    pylsl = pytest.importorskip('pylsl', reason='no pylsl: pip install "actuator_glue[lab]"')
     with closing(listen(at, terms(its))) as listener:
         name = at.removeprefix('lsl:')
         info = pylsl.StreamInfo(name, 'servo', channels, 1000.0, 'double64', f'{name}-sender')
