@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 from scipy import signal
-from trials import ENTRIES, THETA, trial
+from trials import THETA, entries, trial
 
 from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.candidates import mean_effects
@@ -87,7 +87,7 @@ class Displaced:
     material: float = 2e-6
     settings: Thresholds = field(default_factory=Thresholds)
     search: 'Displaced' = field(init=False)
-    entries: dict[str, Effect] = field(default_factory=lambda: ENTRIES)
+    entries: dict[str, Effect] = field(default_factory=entries)
 
     def __post_init__(self) -> None:
         """Search and selection are one here."""

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from trials import ENTRIES, trial
+from trials import entries, trial
 
 from actuator_glue.diagnosis.judge import Judge
 from actuator_glue.diagnosis.thresholds import Thresholds
@@ -20,7 +20,10 @@ class Left:
     """A search whose structures leave what their fit does."""
 
     names = tuple(f'effect {i}' for i in range(30))
-    entries = ENTRIES
+
+    def __init__(self) -> None:
+        """Have every effect to choose from."""
+        self.entries = entries()
 
     @property
     def scorer(self) -> 'Left':
@@ -47,9 +50,9 @@ def test_more_parameters_and_more_choices_cost() -> None:
     assert delay == pytest.approx(5.0 + math.log(30.0))
     two = price(Structure(('delay', 'viscous-damping')), CATALOGUE, 30)
     assert two == pytest.approx(6.0 + math.log(435.0))
-    forms = [e for e in ENTRIES.values() if e.name.startswith('learned')]
+    forms = [e for e in entries().values() if e.name.startswith('learned')]
     term = Structure([forms[0]])
-    assert price(term, ENTRIES, 30) == pytest.approx(len(term.parameters) + math.log(len(forms)))
+    assert price(term, entries(), 30) == pytest.approx(len(term.parameters) + math.log(len(forms)))
 
 
 def test_a_tenth_of_what_matters_costs_four_nats(judge: Judge) -> None:
