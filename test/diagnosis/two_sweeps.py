@@ -30,10 +30,11 @@ def selected(
     stroke: float,
     hertz: float,
     seconds: float,
+    seed: int = 1,
 ) -> tuple[BeamSearch, Selection]:
     """Sweeps with two specimens; `names` are tried, all parameters of an effect are its size."""
     u = sweep(stroke, hertz, seconds)
-    return selected_of(names, motions(effects, THETA, u, (100e3, 400e3)))
+    return selected_of(names, motions(effects, THETA, u, (100e3, 400e3)), seed)
 
 
 def motions(
@@ -52,7 +53,7 @@ def motions(
 def selected_of(
     names: tuple[str, ...],
     tests: Iterable[tuple[float, Array, Array]],
-    seed: int | None = None,
+    seed: int = 1,
 ) -> tuple[BeamSearch, Selection]:
     """What `names` say of stiffness, command and displacement of each test, noise added."""
     rng = np.random.default_rng(seed)
