@@ -9,15 +9,33 @@ SOURCES = sorted(TESTS.rglob('*.py'))
 SEEDED = {'default_rng', 'SeedSequence', 'PCG64', 'RandomState', 'Random'}
 
 
+def optional(function: ast.FunctionDef) -> set[str]:
+    """Return the parameters of a function that are None where nothing is given."""
+    given = function.args
+    last = given.args[len(given.args) - len(given.defaults) :]
+    both = [*zip(last, given.defaults, strict=True)]
+    both += [(a, d) for a, d in zip(given.kwonlyargs, given.kw_defaults, strict=True) if d]
+    return {a.arg for a, default in both if ast.unparse(default) == 'None'}
+
+
 def unseeded(text: str) -> list[int]:
-    """Return the lines where a generator is made without a seed."""
+    """Return the lines where a generator is made without a seed, or maybe without one."""
+    tree = ast.parse(text)
+    unknown = {
+        call: optional(function)
+        for function in ast.walk(tree)
+        if isinstance(function, ast.FunctionDef)
+        for call in ast.walk(function)
+    }
     return [
         node.lineno
-        for node in ast.walk(ast.parse(text))
+        for node in ast.walk(tree)
         if isinstance(node, ast.Call)
         and ast.unparse(node.func).rpartition('.')[2] in SEEDED
         and not [
-            a for a in (*node.args, *node.keywords) if ast.unparse(a) not in ('None', 'seed=None')
+            a
+            for a in (*node.args, *node.keywords)
+            if ast.unparse(a) not in {'None', 'seed=None', *unknown.get(node, ())}
         ]
     ]
 
@@ -38,3 +56,6 @@ def test_what_has_no_seed_is_seen() -> None:
     assert not unseeded(
         'a = np.random.default_rng(1)\nb = Random(seed)\nc = default_rng(seed=n)\n'
     )
+    for head, wrong in (('a, seed=None', True), ('*, seed=None', True), ('seed=1, b=None', False)):
+        text = f'def made({head}):\n    return default_rng(seed)\n'
+        assert unseeded(text) == [2] * wrong
