@@ -148,7 +148,7 @@ def sampled(
     if final.effects:
         # Where something is left the choice of equations widens intervals more than chains could.
         whole = decision.verdict in COMPLETE
-        told = sample(final, settings.evaluations // (1 if whole else 2))
+        told = sample(final, settings.evaluations // (1 if whole else 4))
         after = Side(final.model, final.fit.theta, told.points)
     out = AnswerPosterior(
         result, before, after, told, told, MixedDraws.of(told.points, final.effects), final,

@@ -76,7 +76,7 @@ class BeamSearch(Judge):
         """
         here, names = current.effects, self.search.others(current)
         new = [n for n in names if self.search.known((*here, n)) is None]
-        return self.search.additions(current, self.promising(current, new), valves=False)
+        return self._rough(current, self.promising(current, new))
 
     def promising(self, current: Trial, names: Sequence[str]) -> list[str]:
         """Return the effects that promise most beside the present ones."""
@@ -85,8 +85,12 @@ class BeamSearch(Judge):
     def next_worth(self, current: Trial) -> Trial | None:
         """Return a structure with one more name of those that promise most; None without worth."""
         names = self.promising(current, self.search.others(current))
-        ranked = self.search.additions(current, names, valves=False)
-        return self._first_worth(ranked, current, self.material)
+        return self._first_worth(self._rough(current, names), current, self.material)
+
+    def _rough(self, current: Trial, names: Sequence[str]) -> list[Trial]:
+        """Refit a structure with each of some further effects; what may matter is finished."""
+        below = self.promised(current)
+        return self.search.additions(current, names, valves=False, below=below)
 
     def run(self) -> Selection:
         """Add effects while each is worth it, then check each against its rivals."""

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from actuator_glue.diagnosis import force_ranking, regression
+from actuator_glue.diagnosis import force_ranking, regression, table
 from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.fitting_verdict import Decision, decide
 from actuator_glue.diagnosis.measured import at_recorded_rate
 from actuator_glue.diagnosis.measured.hum import Line
 from actuator_glue.diagnosis.measured.measurement import Measured
+from actuator_glue.diagnosis.one_record import OneRecord
 from actuator_glue.diagnosis.onset.onset import Appeared, Onset, dated
 from actuator_glue.diagnosis.preparation import Prepared
 from actuator_glue.diagnosis.regression import Surrogate
@@ -21,9 +23,12 @@ from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.search_step import SearchStep
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.stages import Progress
+from actuator_glue.diagnosis.table import Row
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
+
+LINEAR = 'command linear between samples'
 
 
 @dataclass(frozen=True)
@@ -42,6 +47,7 @@ class Conclusion:
         selection: what chose `found`, to go on from.
         history: the steps that led here.
         appeared: where all this is about the data since something appeared, what is known of that.
+        others: rows of the searches that it took the place of, or was held against.
     """
 
     prepared: Prepared
@@ -55,6 +61,34 @@ class Conclusion:
     selection: BeamSearch
     history: tuple[SearchStep, ...]
     appeared: Appeared | None = None
+    others: tuple[Row, ...] = ()
+
+    @property
+    def scope(self) -> str:
+        """What the structure that is told holds for; empty for all records as they were given."""
+        own = self.decision.final.own
+        alone = own.scope if isinstance(own, OneRecord) else ''
+        return ', '.join(filter(None, (self._around, alone)))
+
+    @property
+    def _around(self) -> str:
+        """What the search was about."""
+        hold = LINEAR if self.prepared.setup is not None else ''
+        return ', '.join(filter(None, (hold, self.appeared.scope if self.appeared else '')))
+
+    def rows(self) -> tuple[Row, ...]:
+        """Return every structure that was refitted on the way here, without weights."""
+        own = table.rows(self.selection.search, self.scorer)
+        return (*self.in_scope(own), *self.others)
+
+    def in_scope(self, own: tuple[Row, ...]) -> tuple[Row, ...]:
+        """Return rows of this answer's data as rows of all records as they were given."""
+        cost = math.log(2.0) if self.prepared.setup is not None else 0.0
+        if self.appeared is not None:
+            before = self.appeared.before.fit
+            own = table.since(own, before, self.data.target.size)
+            cost += len(before.theta) + 1.0  # parameters of its own, and when
+        return table.scoped(own, self._around, cost) if self._around else own
 
     @property
     def effort(self) -> Effort:
@@ -71,7 +105,7 @@ class Conclusion:
     def of(self, selection: BeamSearch, found: Selection) -> Conclusion:
         """Return what another selection of effects says about the same records."""
         other = concluded(self.prepared, selection, found, self.line)
-        return replace(other, appeared=self.appeared)
+        return replace(other, appeared=self.appeared, others=self.others)
 
     def complete(self, selection: BeamSearch, found: Selection | None) -> Conclusion | None:
         """Return another answer about the same records, if there is one and it is complete."""

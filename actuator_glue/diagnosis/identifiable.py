@@ -92,7 +92,7 @@ class Straight:
         margin = _ROUNDING * np.where(np.arange(len(fit)) < _P, low, high - low)
         low, high = low - margin, high + margin
         names = [p.name for p in model.parameters]
-        self._ridge = Ridge(names, low, high, stiffness, middle)
+        self._ridge = Ridge(names, low, high, stiffness, middle, model.parameters)
         # Logarithms and normal scores; what is known less well than this is not known.
         self.widest = np.where(
             np.arange(len(fit)) < _P, 1.0, self._ridge.upper - self._ridge.lower

@@ -18,6 +18,8 @@ from actuator_glue.inference.least_squares.fit import Fit
 
 # Of what matters: two that remove this share each remove what matters.
 _PART = 0.5**0.5
+# Of what matters: a rough refit that removes less does not come to it with its last digits.
+_ROUGHLY = 0.5
 
 
 class Judge:
@@ -128,6 +130,10 @@ class Judge:
         alike = self.settings.tie_share * removed(rest, best)
         behind = [*(self.behind(t, best, alike) for t in trials), self.behind(rest, best)]
         return [math.exp(-max(b, 0.0)) for b in behind]
+
+    def promised(self, current: Trial) -> float:
+        """Mean squared error that a rough refit leaves which may come to matter [m^2]."""
+        return current.mean_square - (_ROUGHLY * self.material) ** 2
 
     def part(self) -> float:
         """Error that one of two effects must remove which matter only together [m]."""

@@ -8,7 +8,7 @@ from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.parameters import Parameter
 from actuator_glue.model.structure import Structure
-from actuator_glue.records import Array, Record
+from actuator_glue.records import Array, Record, source_name
 
 
 class OneRecord:
@@ -24,6 +24,11 @@ class OneRecord:
         self._inner = Structure(effects)
         self.own, self.records = own, records
         self._off = [float(p.neutral or 0.0) for p in CATALOGUE[own].parameters]
+
+    @property
+    def scope(self) -> str:
+        """Which effect acts in which record only."""
+        return f'{self.own} in {source_name(self.records[0].source) or "one record"} only'
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

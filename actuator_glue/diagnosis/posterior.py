@@ -43,7 +43,7 @@ _UNLIKELY = 10.0  # nats behind the first optimum: another one has next to no sh
 _HALVINGS = 40  # bring any point of it inside the bounds of the prior
 # Samples that chains simulate, all evaluations together, and evaluations they have anyway. Ten
 # minutes of 10 kHz take 4 ms each: where 2600 did not do, 12 000 did not, as a ridge was left.
-_SIMULATED, _FEWEST = 2_000_000_000, 2_600
+_SIMULATED, _FEWEST = 200_000_000, 2_600
 
 
 class Draws(NamedTuple):

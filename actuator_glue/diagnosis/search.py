@@ -35,6 +35,7 @@ _DONE = 1e-5
 _FINISHED = 2  # iterations on all samples after those on stretches of them
 _PROMISING = 0.95  # of the error at most is left by friction that is looked at twice
 _POLISHED = 4
+_FAR = 1.5  # times another's squared error: too far behind for the last digits to matter
 _LAST, _LEAST_GAIN = 60, 1e-6  # iterations at most of a structure that is told, and tolerance
 _FINER = 0.1  # of a usual finite-difference step
 _LONG = 5.0  # times its stretches: there they tell which minimum is the lowest
@@ -67,9 +68,9 @@ def _worth_finishing(row: Sequence[Trial], below: float) -> list[Trial]:
     far better.
     """
     error = row[0].mean_square if row else 0.0
-    tried = [t for i, t in enumerate(row[:_POLISHED]) if i < 2 or t.mean_square < 1.5 * error]
+    tried = [t for i, t in enumerate(row[:_POLISHED]) if i < 2 or t.mean_square < _FAR * error]
     least = sorted(row[_POLISHED:], key=lambda t: t.mean_square)[:2]
-    tried += [t for t in least if 1.5 * t.mean_square < error]
+    tried += [t for t in least if _FAR * t.mean_square < error]
     return [t for t in tried if t.mean_square < below]
 
 
@@ -155,8 +156,7 @@ class Search:
         near = self.effort.earlier.ended.get(key)
         if key not in self._tried and near is not None:
             starts = np.stack([near, self.screen(current, name)[1][0]])
-            sums = sum_of_squares(self.data.target - self.data.simulate(model, starts))
-            start = starts[np.argmin(sums)]
+            start = self._lowest(starts, model.effects)
             found = self._fit(self.data, model, start, iterations=_COARSE, tolerance=_TOLERANCE)
             self._keep(key, found)
         elif key not in self._tried:
@@ -218,6 +218,11 @@ class Search:
 
     def _fit(self, data: Data, model: Structure, starts: Array, **how: Any) -> Fit:
         return self.effort.spent_on(fit(data, model, starts, **{'tolerance': _DONE, **how}))
+
+    def _lowest(self, starts: Array, effects: Sequence[str]) -> Array:
+        """Return the parameters (p,) of some (s, p) that leave the least error."""
+        simulated = self.data.simulate(self.structure(*effects), starts)
+        return np.asarray(starts[np.argmin(sum_of_squares(self.data.target - simulated))])
 
     def _stand_in(self, model: Structure) -> Part:
         """Return the data that structures are refitted to roughly."""
@@ -351,9 +356,12 @@ class Search:
         if (key, current.effects) not in self._descended:
             self._descended.add((key, current.effects))
             kept = np.delete(current.fit.theta, current.structure.columns(name))
-            start = np.tile(kept, (2, 1))
-            start[1, : len(BASE)] = self._tried[frozenset()].theta
-            again = self._fit(self.data, self.structure(*effects), start)
+            starts = np.tile(kept, (2, 1))
+            starts[1, : len(BASE)] = self._tried[frozenset()].theta
+            model, start = self.structure(*effects), self._lowest(starts, effects)
+            again = self._fit(self.data, model, start, tolerance=_TOLERANCE)
+            if again.rms**2 < _FAR * current.mean_square:
+                again = self._fit(self.data, model, again.theta)
             if key not in self._tried or again.rms < self._tried[key].rms:
                 self._tried[key] = again
             self._polished.setdefault(key, 1)

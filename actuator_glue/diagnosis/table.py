@@ -1,13 +1,21 @@
-"""The table of structures: all that were refitted, each with its weight."""
+"""The table of structures: all that a diagnosis refitted, in every scope, each with its weight.
+
+A scope is what a structure holds for, where that is not all records as they were given: one record
+alone, the data since a moment, a command that runs linearly. It is a row like any other: what it
+leaves counts over all data, and its choice has a price.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.weights import TELLING, log_weight, price
+from actuator_glue.inference.least_squares.fit import Fit
+from actuator_glue.inference.least_squares.free_run import Model
 from actuator_glue.json_value import JsonObject
 
 
@@ -17,6 +25,7 @@ class Row(JsonObject):
 
     Attributes:
         effects: beside Eq. (2); none for Eq. (2) alone.
+        scope: what it holds for; empty for all records as they were given.
         parameters: of the refit, by name, physical units.
         units: of these.
         error: rms error of the refit over the fitting part [m].
@@ -29,41 +38,95 @@ class Row(JsonObject):
     """
 
     effects: tuple[str, ...]
+    scope: str
     parameters: dict[str, float]
     units: dict[str, str]
     error: float
     left_out: float
     price: float
-    log_weight: float
-    chosen: bool
+    log_weight: float = math.nan
+    chosen: bool = False
 
 
-def rows(
-    search: Search, scorer: Scorer, material: float, chosen: tuple[str, ...]
-) -> tuple[Row, ...]:
-    """Return a row for every structure that was refitted, greatest weight first (weights.py).
+def rows(search: Search, scorer: Scorer) -> tuple[Row, ...]:
+    """Return a row for every structure that a search refitted; none has a weight yet.
 
     Args:
         search: what was refitted.
         scorer: blocks of the fitting part.
-        material: least rms error that matters [m].
-        chosen: effects of the structure that is told.
     """
-    table = []
-    for model, fit in search.left_at_most(math.inf):
-        left, cost = scorer.left_out_error(fit), price(model, search.entries, len(search.names))
-        table.append(
-            Row(
-                effects=model.effects,
-                parameters=dict(zip(model.names, map(float, fit.theta), strict=True)),
-                units={p.name: p.unit for p in model.parameters},
-                error=fit.rms,
-                left_out=left,
-                price=cost,
-                log_weight=log_weight(left, TELLING * material, cost),
-                chosen=set(model.effects) == set(chosen),
-            )
+    count = len(search.names)
+    return tuple(
+        row(model, model.effects, fit, scorer, price(model, search.entries, count))
+        for model, fit in search.left_at_most(math.inf)
+    )
+
+
+def row(
+    model: Model, effects: tuple[str, ...], fit: Fit, scorer: Scorer, cost: float, scope: str = ''
+) -> Row:
+    """Return the row of one structure.
+
+    Args:
+        model: what simulates it.
+        effects: beside Eq. (2).
+        fit: its refit.
+        scorer: blocks of the fitting part.
+        cost: its price [nats].
+        scope: what it holds for.
+    """
+    values = zip(model.parameters, map(float, fit.theta), strict=True)
+    units = {p.name: p.unit for p in model.parameters}
+    parameters = {p.name: value for p, value in values}
+    left_out = scorer.left_out_error(fit)
+    return Row(effects, scope, parameters, units, fit.rms, left_out, cost)
+
+
+def scoped(some: Iterable[Row], scope: str, cost: float) -> tuple[Row, ...]:
+    """Return rows in a further scope, whose choice costs so many nats."""
+    return tuple(
+        replace(r, scope=', '.join(filter(None, (scope, r.scope))), price=r.price + cost)
+        for r in some
+    )
+
+
+def since(some: Iterable[Row], before: Fit, samples: int) -> tuple[Row, ...]:
+    """Return rows of the data since a moment as rows of all data.
+
+    Args:
+        some: rows of the data since then.
+        before: what holds before the moment, with parameters of its own.
+        samples: that count since then.
+    """
+    early = before.error.size / (before.error.size + samples)
+
+    def all_(late: float) -> float:
+        return math.sqrt(early * before.rms**2 + (1.0 - early) * late**2)
+
+    return tuple(replace(r, error=all_(r.error), left_out=all_(r.left_out)) for r in some)
+
+
+def weighed(
+    some: Iterable[Row], material: float, effects: tuple[str, ...], scope: str
+) -> tuple[Row, ...]:
+    """Return rows with their weights, greatest first (weights.py); of equal ones the nearer fit.
+
+    Args:
+        some: rows of all searches.
+        material: least rms error that matters [m].
+        effects: of the structure that is told.
+        scope: of the structure that is told.
+    """
+    best: dict[tuple[str, frozenset[str]], Row] = {}
+    for r in sorted(some, key=lambda r: r.left_out):
+        best.setdefault((r.scope, frozenset(r.effects)), r)
+    told = scope, frozenset(effects)
+    found = [
+        replace(
+            r, chosen=key == told, log_weight=log_weight(r.left_out, TELLING * material, r.price)
         )
-    most = max(row.log_weight for row in table)
-    beside = (replace(row, log_weight=row.log_weight - most) for row in table)
-    return tuple(sorted(beside, key=lambda row: -row.log_weight))
+        for key, r in best.items()
+    ]
+    most = max(r.log_weight for r in found)
+    beside = (replace(r, log_weight=r.log_weight - most) for r in found)
+    return tuple(sorted(beside, key=lambda r: -r.log_weight))

@@ -88,9 +88,7 @@ def told(
         onset=result.onset,
         prior=prior,
         setup=both.setup,
-        structures=table.rows(
-            result.selection.search, result.scorer, found.material, final.effects
-        ),
+        structures=table.weighed(result.rows(), found.material, final.effects, result.scope),
         names=tuple(p.name for p in after.model.parameters),
         posterior=both.draws,
         which=drawn.mixture.which,

@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from actuator_glue.jit import njit
 from actuator_glue.model import identifiable
 from actuator_glue.model.effects import CATALOGUE
-from actuator_glue.model.parameters import Coordinate
+from actuator_glue.model.parameters import Coordinate, Parameter
 from actuator_glue.records import Array
 
 _njit: Any = partial(njit, fastmath=False)
@@ -47,9 +47,15 @@ _SLOWEST = 0.1  # 1/s
 _LEAST_OIL = 100.0
 
 
-def columns(names: Sequence[str]) -> NDArray[np.int64]:
-    """Return the parameters (c, 2) with a coordinate of their own: column, and which it is."""
-    kinds = {p.name: p.coordinate for e in CATALOGUE.values() for p in e.parameters}
+def columns(names: Sequence[str], beside: Sequence[Parameter] = ()) -> NDArray[np.int64]:
+    """Return the parameters (c, 2) with a coordinate of their own: column, and which it is.
+
+    Args:
+        names: the parameters.
+        beside: those that the catalogue does not know, as of learned terms.
+    """
+    known = (p for e in CATALOGUE.values() for p in e.parameters)
+    kinds = {p.name: p.coordinate for p in (*known, *beside)}
     order = get_args(Coordinate)
     found = [(order.index(kind), j) for j, name in enumerate(names) if (kind := kinds.get(name))]
     return np.array([(j, kind) for kind, j in sorted(found)], dtype=np.int64).reshape(-1, 2)

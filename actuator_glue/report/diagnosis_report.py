@@ -180,7 +180,9 @@ def _search(found: DiagnosisData) -> Section:
 def _structures(found: DiagnosisData) -> Table:
     rows = [
         [
-            structure_name(row.effects) + (' (told)' if row.chosen else ''),
+            structure_name(row.effects)
+            + (f' ({row.scope})' if row.scope else '')
+            + (' (told)' if row.chosen else ''),
             _um(row.left_out),
             plain(row.price),
             plain(row.log_weight),
@@ -191,7 +193,7 @@ def _structures(found: DiagnosisData) -> Table:
     return Table(
         ['structure', 'leaves of blocks left out [um]', 'price [nats]', 'log weight [nats]'],
         rows,
-        f'The table of the last search: {len(found.structures)} structures were refitted, '
+        f'The table: {len(found.structures)} structures were refitted, '
         'those of the greatest weight stand here, and Eq. (2).',
         prose=True,
     )

@@ -22,6 +22,13 @@ class Answer:
     effects: tuple[str, ...]
     effort: Effort = field(default_factory=Effort)
     history: tuple[SearchStep, ...] = ()
+    others: tuple[str, ...] = ()
+    selection: Any = field(default_factory=lambda: SimpleNamespace(search='one for all'))
+
+    @property
+    def found(self) -> tuple[str, ...]:
+        """What was chosen: the same object for the same answer."""
+        return self.effects
 
     @property
     def decision(self) -> Any:
@@ -39,6 +46,15 @@ def adding(name: str, *, when: bool = True, taken: bool = True) -> Any:
     return AnswerMove(f'add {name}', lambda result: when, make)
 
 
+def holding_against(row: str) -> Any:
+    """A move that leaves the answer as it is, with a row of what it was held against."""
+    return AnswerMove(
+        'hold it against more',
+        lambda result: True,
+        lambda result, asking: replace(result, others=(*result.others, row)),
+    )
+
+
 def followed(*groups: tuple[Any, ...], effort: Effort | None = None) -> Any:
     """Return what moves come to from nothing."""
     start: Any = Answer((), effort or Effort(), (SearchStep('Eq. (2) alone', (), 4, 2e-5),))
@@ -51,6 +67,13 @@ def test_of_a_group_the_first_move_that_is_taken_ends_it() -> None:
     assert told.effects == ('b', 'd')
     assert [s.what for s in told.history] == ['Eq. (2) alone', 'add b', 'add d']
     assert [s.parameters for s in told.history] == [4, 5, 6]
+
+
+def test_what_an_answer_was_held_against_stays_in_the_table() -> None:
+    """No move was taken, so the next of the group is asked for, and no step is told."""
+    told = followed((holding_against('a'), adding('b')), (adding('c'),))
+    assert told.effects == ('b', 'c') and len(told.history) == 3
+    assert told.others.count('a') >= 1
 
 
 def test_what_is_not_asked_for_is_not_taken() -> None:

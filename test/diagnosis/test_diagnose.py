@@ -13,6 +13,7 @@ from actuator_glue.diagnosis.learned.forms import forms
 from actuator_glue.diagnosis.moves import describe
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.errors import InputError
+from actuator_glue.model.commands import sweep
 from actuator_glue.model.effects import CATALOGUE, Effect, Scale
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Record
@@ -269,7 +270,23 @@ def test_a_command_that_ran_linearly_is_seen() -> None:
     found = diagnose(records, settings=QUICK)
     assert found.verdict == 'none'
     assert found.error.after == pytest.approx(1e-5, rel=0.1)
-    assert any('--hold linear' in line for line in found.advice)
+    assert found.setup is not None and found.setup.taken and found.setup.changed == ('hold',)
+
+
+@pytest.mark.slow
+def test_a_command_that_ran_linearly_is_seen_beside_an_effect() -> None:
+    """Under the wrong hold play was friction, since a moment, beside a gain that drifts."""
+    command = sweep(128.0, 40.0, 0.2, 10.0)
+    command *= 2e-3 / np.abs(command).max()
+    record = Record(command, command, 1 / 128.0, stiffness=250e3, hold='linear', source='a')
+    theta = np.array([134.0, 1.1e9, 2.5e5, 0.5, 6e-5])
+    clean = Structure(('backlash',)).simulate(theta, record).reshape(-1)
+    noise = 5e-6 * np.random.default_rng(3).standard_normal(len(clean))
+    found = diagnose([replace(record, measured=clean + noise, hold='zoh')], settings=QUICK)
+    assert found.verdict == 'missing-effect' and found.structure == ('backlash',)
+    first = found.structures[0]
+    assert first.chosen and first.scope == 'command linear between samples'
+    assert {row.scope for row in found.structures} == {'', first.scope}
 
 
 def test_unknown_stiffness_is_refused() -> None:

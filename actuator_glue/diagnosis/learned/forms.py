@@ -8,7 +8,7 @@ it is screened, refitted and compared as the effects of the catalogue are.
 
 from __future__ import annotations
 
-from collections.abc import Container
+from collections.abc import Container, Sequence
 from itertools import groupby
 from typing import Final
 
@@ -28,7 +28,7 @@ from actuator_glue.diagnosis.learned.sizes import (
 from actuator_glue.model.effects import Effect, Scale
 from actuator_glue.model.effects.terms.entry import starting_from, term
 from actuator_glue.model.effects.terms.expression import PLACES, SIGNAL
-from actuator_glue.model.parameters import Parameter
+from actuator_glue.model.parameters import Coordinate, Parameter
 
 # Terms added to the signal of a place: products of what is known there, '|x|' for a modulus.
 # Odd ones keep both directions alike, even ones do not; those with k act with a specimen only.
@@ -126,8 +126,18 @@ def _added(
         unit = [a - b for a, b in zip(unit, DIMENSIONS[symbol], strict=True)]
     largest = LARGEST * signal_size(place, sizes) / full
     return _effect(
-        place, name, f'{signal} + {{a}}*{text}', unit, (-largest, largest), f'size of {text}'
-    )
+        place, name, f'{signal} + {{a}}*{text}', unit, (-largest, largest), f'size of {text}',
+        _coordinate(place, factors),
+    )  # fmt: skip
+
+
+def _coordinate(place: str, factors: Sequence[str]) -> Coordinate | None:
+    """Return what a size is sampled as: forces and flows count as shares of the oil's stiffness.
+
+    So it is where one of them is added to what has not this unit already.
+    """
+    share = place in ('force', 'specimen', 'flow') and 'q' not in ''.join(factors)
+    return 'share' if share else None
 
 
 def _written(factor: str, sizes: dict[str, float]) -> str:
@@ -217,7 +227,11 @@ def _turbulent(sizes: dict[str, float]) -> Effect:
     return term(
         'learned-flow-sqrt-f',
         f'flow: q = q + {name}*f/sqrt(abs(f) + {1e-2 * sizes["f"]:.3g})',
-        (Parameter(name, 'N^0.5/s', -largest, largest, 'flow over the root of the force', 0.0),),
+        (
+            Parameter(
+                name, 'N^0.5/s', -largest, largest, 'flow over the root of the force', 0.0, 'share'
+            ),
+        ),
         source=LEARNED,
     )
 
@@ -243,12 +257,13 @@ def _effect(
     unit: list[int],
     bounds: tuple[float, float],
     meaning: str,
+    coordinate: Coordinate | None = None,
 ) -> Effect:
     parameter = f'{place}_{name}'.replace('-', '_')
     left = SIGNAL[PLACES[place]]
     return term(
         f'learned-{place}-{name}',
         f'{place}: {left} = {equation.format(a=parameter)}',
-        (Parameter(parameter, unit_text(unit), *bounds, meaning, 0.0),),
+        (Parameter(parameter, unit_text(unit), *bounds, meaning, 0.0, coordinate),),
         source=LEARNED,
     )

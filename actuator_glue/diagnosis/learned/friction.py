@@ -63,6 +63,6 @@ def _dry(place: str, name: str, sizes: Mapping[str, float]) -> tuple[str, Parame
     Negative it would weaken faster than the oil column is stiff.
     """
     if place == 'specimen':
-        return f'k*{name}', Parameter(name, 'm', 0.0, sizes['x'], 'friction as m', 0.0)
+        return f'k*{name}', Parameter(name, 'm', 0.0, sizes['x'], 'friction as m', 0.0, 'share')
     largest = LARGEST * signal_size(place, sizes)
-    return name, Parameter(name, 'N', 0.0, largest, 'friction as N', 0.0)
+    return name, Parameter(name, 'N', 0.0, largest, 'friction as N', 0.0, 'share')

@@ -17,6 +17,7 @@ from actuator_glue.diagnosis.moves.move import Asking, after
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
 
+_FAR = 1.5  # times the squared error so far: no last digits make that up with fewer parameters
 _OWN = 2  # parameters: of the least fault and of the share that is fed back
 
 
@@ -63,8 +64,12 @@ def in_the_loop(selection: BeamSearch, found: Selection) -> Selection | None:
     tried: list[Trial] = []
     for name in FAULTS:
         starts = [search.known((name,)), before if name in before.effects else None]
-        tried += [search.polish(search.add(s, FEEDBACK), valves=False) for s in starts if s]
+        tried += [search.add(s, FEEDBACK) for s in starts if s]
     cost = math.log(max(1, len(tried)))
+    fewer = [len(t.fit.theta) <= len(before.fit.theta) for t in tried]
+    below = [_FAR * before.mean_square if f else selection.promised(before) for f in fewer]
+    pairs = zip(tried, below, strict=True)
+    tried = [search.polish(t, valves=False) for t, most in pairs if t.mean_square < most]
 
     def better(trial: Trial) -> bool:
         least = 0.0 if len(trial.fit.theta) <= len(before.fit.theta) else selection.material

@@ -37,7 +37,7 @@ class AnswerMove:
     Attributes:
         what: what it does, for people; empty where it tells its own steps.
         when: whether it is asked for beside an answer.
-        make: returns another answer; None where the one so far stands.
+        make: returns another answer; None, or the same with more rows, where that stands.
         each_time: whether it is asked for beside the same answer in more data of a machine, too.
     """
 
@@ -54,7 +54,7 @@ class AnswerMove:
         if result.effort.earlier.would_refuse(self.what, effects, samples):
             return None
         other = self.make(result, asking)
-        if other is None:
+        if other is None or other.found is result.found:
             result.effort.remembered.refused[self.what, effects] = samples
         return other
 
@@ -79,16 +79,27 @@ def follow(result: Conclusion, groups: Groups, asking: Asking) -> Conclusion:
             if result.effort.over:
                 return result
             other = move.made(result, asking) if move.when(result) else None
-            if other is not None:
-                result = after(result, other, move.what) if move.what else other
-                break
+            if other is None:
+                continue
+            if other.found is result.found:  # it stands, held against more
+                result = other
+                continue
+            result = after(result, other, move.what) if move.what else other
+            break
     return result
 
 
 def after(before: Conclusion, result: Conclusion, what: str) -> Conclusion:
-    """Return an answer with the history of the one that it takes the place of."""
+    """Return an answer with the history, and the rows, of the one that it takes the place of."""
     step = SearchStep.to(result.decision.final, what)
-    return replace(result, history=(*before.history, step))
+    return beside(replace(result, history=(*before.history, step)), before)
+
+
+def beside(result: Conclusion, other: Conclusion) -> Conclusion:
+    """Return an answer with the rows of another one that it was held against."""
+    if other.selection.search is result.selection.search:
+        return replace(result, others=(*result.others, *other.others))
+    return replace(result, others=(*result.others, *other.rows()))
 
 
 def always(result: Conclusion) -> bool:

@@ -10,12 +10,14 @@ from actuator_glue.diagnosis.conclusion import Conclusion
 from actuator_glue.diagnosis.learned.term import any_learned
 from actuator_glue.diagnosis.measured import hum
 from actuator_glue.diagnosis.moves.learned_terms import LEARNED_TERMS
-from actuator_glue.diagnosis.moves.move import Asking, after, follow
+from actuator_glue.diagnosis.moves.move import Asking, after, beside, follow
 from actuator_glue.diagnosis.preparation import Prepared
 from actuator_glue.diagnosis.score import evidence
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.wrong_setup import WrongSetup
 from actuator_glue.inference.least_squares.fit import Fit, fit
+
+_SINGLES = 3  # best single effects that are refitted with the other hold
 
 
 def with_the_right_hold(first: Conclusion, asking: Asking) -> Conclusion:
@@ -31,18 +33,22 @@ def with_the_right_hold(first: Conclusion, asking: Asking) -> Conclusion:
     other = _linearly(first, asking)
     if other is None:
         return follow(first, LEARNED_TERMS, asking)
+    if not _explains_more(first, other, asking):
+        return follow(beside(first, other), LEARNED_TERMS, asking)
+    other = after(first, other, 'the command runs linearly between its samples')
     described = follow(other, LEARNED_TERMS, asking)
     if first.decision.verdict != 'unexplained':
         return described
     held = follow(first, LEARNED_TERMS, asking)
-    return described if _explains_more(held, described, asking) else held
+    return described if _explains_more(held, described, asking) else beside(held, described)
 
 
 def _linearly(first: Conclusion, asking: Asking) -> Conclusion | None:
-    """Return what is found with the other hold, where that explains more.
+    """Return what is found with the other hold, where it may explain more.
 
-    An answer that leaves nothing and explains less with the other hold is not searched for again:
-    of a large effect that Eq. (2) leaves, either hold may leave more.
+    It is searched for where Eq. (2) alone, or one of the best structures so far, explains more
+    with it: of a large effect that Eq. (2) leaves, either hold may leave more. An answer that
+    leaves nothing and explains less with it is not searched for again.
     """
     prepared = first.prepared
     held_commands = any(r.hold == 'zoh' for r in prepared.fit.recorded)
@@ -52,20 +58,20 @@ def _linearly(first: Conclusion, asking: Asking) -> Conclusion | None:
     other = replace(prepared, fit=fitted, held=held)
     base = Search(other.fit, ()).base()
     before = first.found.base.mean_square + (first.line.rms**2 if first.line else 0.0)
-    if before - base.rms**2 < first.found.material**2:
-        return None
+    gains = _gains(first, other, base)
+    if max(gains) < asking.settings.nats:
+        if before - base.rms**2 < first.found.material**2:
+            return None
+        described = any_learned(first.found.final.structure)
+        named = first.decision.verdict == 'missing-effect' and not described
+        if named and gains[0] < 0.0:
+            return None
     asking.tell('other hold', 0.0)
-    described = any_learned(first.found.final.structure)
-    named = first.decision.verdict == 'missing-effect' and not described
-    if named and _explains_less(first, other, base):
-        return None
     second = asking.conclude(other)
-    if not _explains_more(first, second, asking):
-        return None
     errors, enough = (before**0.5, base.rms), second.decision.verdict == 'none'
     setup = WrongSetup.between(prepared.fit, other.fit, errors, enough, taken=True)
     second = replace(second, prepared=replace(second.prepared, setup=setup))
-    return after(first, second, 'the command runs linearly between its samples')
+    return replace(second, others=second.in_scope(second.others))
 
 
 def _explains_more(first: Conclusion, second: Conclusion, asking: Asking) -> bool:
@@ -86,11 +92,18 @@ def _gained(first: Conclusion, second: Conclusion) -> float:
     return gained - len(b.theta) + len(a.theta)
 
 
-def _explains_less(first: Conclusion, other: Prepared, base: Fit) -> bool:
-    """Whether what was found explains less with the other hold, whose Eq. (2) is fitted."""
-    found = first.found.final
+def _gains(first: Conclusion, other: Prepared, base: Fit) -> list[float]:
+    """Return the nats by which structures explain more with the other hold than what was found.
+
+    What was found itself, first, then the best single effects; less their further parameters.
+    """
+    found, scorer = first.found.final, first.scorer
     data = other.fit if first.line is None else hum.without(other.fit, first.line)
-    starts = np.stack([found.fit.theta, found.fit.theta])
-    starts[1, : len(base.theta)] = base.theta
-    again, scorer = fit(data, found.model, starts), first.scorer
-    return evidence(scorer.block_scores(again), scorer.block_scores(found.fit)) < 0.0
+    out, known = [], scorer.block_scores(found.fit)
+    for trial in (found, *first.found.singles[:_SINGLES]):
+        starts = np.stack([trial.fit.theta, trial.fit.theta])
+        starts[1, : len(base.theta)] = base.theta
+        again = first.effort.spent_on(fit(data, trial.model, starts))
+        more = len(again.theta) - len(found.fit.theta)
+        out.append(evidence(scorer.block_scores(again), known) - more)
+    return out

@@ -20,8 +20,10 @@ from actuator_glue.diagnosis.ranking import removed
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
+from actuator_glue.diagnosis.table import Row, row
 from actuator_glue.diagnosis.ties import compare
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.diagnosis.weights import price
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import fit
 from actuator_glue.model.effects import CATALOGUE
@@ -31,12 +33,16 @@ from actuator_glue.records import Record
 SETTINGS = ('gain', 'bias', 'delay', 'clock-skew')
 
 
-def own_setting(result: Conclusion, asking: Asking) -> Conclusion | None:
-    """Return the answer with one record's own setting in it, where that explains the records."""
+def own_setting(result: Conclusion, asking: Asking) -> Conclusion:
+    """Return the answer with one record's own setting in it, where that explains the records.
+
+    Else the same answer, with the rows of what was tried.
+    """
     asking.tell('one record', 0.0)
     limit, held = result.decision.limit, result.prepared.held.records
-    found = setting(result.selection, result.found, limit, held)
-    return None if found is None else result.of(result.selection, found)
+    found, rows = setting(result.selection, result.found, limit, held)
+    result = replace(result, others=(*result.others, *result.in_scope(rows)))
+    return result if found is None else result.of(result.selection, found)
 
 
 def _members(data: Data, held: Sequence[Record], index: int) -> tuple[Record, ...]:
@@ -53,7 +59,7 @@ def _members(data: Data, held: Sequence[Record], index: int) -> tuple[Record, ..
 
 def setting(
     selection: BeamSearch, found: Selection, limit: float, held: Sequence[Record]
-) -> Selection | None:
+) -> tuple[Selection | None, tuple[Row, ...]]:
     """Ask whether one record's own setting explains what common sizes do not.
 
     The setting must leave at most `limit` of structure, remove a material error and gain the
@@ -66,12 +72,12 @@ def setting(
         held: held-out records, which share a setting through their stiffness.
 
     Returns:
-        The attribution with the setting added, or None.
+        The attribution with the setting added, or None; and a row for each that was tried.
     """
     search, settings = selection.search, selection.settings
-    data = search.data
+    data, rows = search.data, list[Row]()
     if len(data.records) < 2 or search.scorer is None:
-        return None
+        return None, ()
     for effects in sorted({(), found.final.effects}, key=len):
         start = search.trial(effects)
         names = [n for n in SETTINGS if n not in effects]
@@ -80,6 +86,7 @@ def setting(
             for name in names
             for i in range(len(data.records))
         ]
+        rows += [_row(search, t, start.structure, len(tried)) for t in tried]
         tried.sort(key=lambda t: -float(t.scores.sum()))
         best = tried[0]
         parts = splits_of(data, best.fit.error)
@@ -93,8 +100,16 @@ def setting(
         gained = evidence(tried[0].scores, common.scores) - cost
         if gained < settings.nats:
             continue
-        return _attribution(selection, found, start, tried, (left, noise))
-    return None
+        return _attribution(selection, found, start, tried, (left, noise)), tuple(rows)
+    return None, tuple(rows)
+
+
+def _row(search: Search, trial: Trial, rest: Structure, tried: int) -> Row:
+    """Return the row of a structure with one record's own setting, one of so many."""
+    assert search.scorer is not None and isinstance(trial.model, OneRecord)
+    more = len(trial.model.parameters) - len(rest.parameters)
+    cost = price(rest, search.entries, len(search.names)) + more + float(np.log(tried))
+    return row(trial.model, trial.effects, trial.fit, search.scorer, cost, trial.model.scope)
 
 
 def _fitted(search: Search, start: Trial, name: str, records: tuple[Record, ...]) -> Trial:

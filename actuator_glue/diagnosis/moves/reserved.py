@@ -30,6 +30,9 @@ def with_reserved(first: Conclusion, asking: Asking) -> Conclusion | None:
         names = *usual.names, *reserved
         ways.insert(0, (Search(prepared.fit, names, usual.each, effort=usual.effort), None))
 
+    # Beside Eq. (2) alone, too, it must be better than what was found.
+    below = first.selection.promised(before)
+
     def better(after: Trial, scorer: Scorer) -> bool:
         known = replace(before, scores=scorer.block_scores(before.fit))
         return first.selection.better(after, known, first.found.material, cost)
@@ -40,7 +43,8 @@ def with_reserved(first: Conclusion, asking: Asking) -> Conclusion | None:
         starts = [
             search.trial(t.effects) for t in (first.found.base, before) if search.known(t.effects)
         ]
-        if not any(better(t, first.scorer) for s in starts for t in search.additions(s, reserved)):
+        tried = [t for s in starts for t in search.additions(s, reserved, below=below)]
+        if not any(better(t, first.scorer) for t in tried):
             continue
         second = searched(
             prepared, search, line, asking.settings, asking.tell, first.selection.explains_rest

@@ -102,7 +102,8 @@ def _since(
         rivals = first.found.final, bare, found.final
         if not moments.explains(sides, rivals, nats, found.material):
             return None
-        return replace(second, appeared=Appeared(first.data, moment, bare))
+        later = replace(second, appeared=Appeared(first.data, moment, bare))
+        return replace(later, others=later.in_scope(second.others))
 
     near = told(math.inf)
     if near is None or near.onset is None:

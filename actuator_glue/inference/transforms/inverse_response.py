@@ -28,6 +28,7 @@ import numpy as np
 
 from actuator_glue.inference.compiled import Compiled
 from actuator_glue.model import identifiable, identifiable_effects
+from actuator_glue.model.parameters import Parameter
 from actuator_glue.records import Array
 
 # ln d1/n0 (lag of the loop, 1 us .. 1000 s) and ln d2/n0 (natural frequency 1000 .. 0.05 Hz): no
@@ -45,15 +46,22 @@ class Ridge:
         high: upper bounds, (p,).
         stiffness: specimen stiffness k [N/m].
         middle: time of the record's middle since the test began [s].
+        beside: parameters that the catalogue does not know, as of learned terms.
     """
 
     def __init__(
-        self, names: Sequence[str], low: Array, high: Array, stiffness: float, middle: float = 0.0
+        self,
+        names: Sequence[str],
+        low: Array,
+        high: Array,
+        stiffness: float,
+        middle: float = 0.0,
+        beside: Sequence[Parameter] = (),
     ) -> None:
         self._low, self._high = low, high
         self._k = stiffness
         self._middle = middle
-        self._at = identifiable_effects.columns(names)
+        self._at = identifiable_effects.columns(names, beside)
         self.lower, self.upper = identifiable_effects.bounds(self._at, stiffness, low, high)
         self.lower[:4], self.upper[:4] = -identifiable.EDGE, identifiable.EDGE
         self.lower[0], self.upper[0] = _LAG

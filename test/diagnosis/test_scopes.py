@@ -1,0 +1,70 @@
+"""Structures of every scope are rows of one table."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from actuator_glue.diagnosis.learned.forms import forms
+from actuator_glue.diagnosis.table import Row, scoped, since, weighed
+from actuator_glue.inference.least_squares.fit import Fit
+from actuator_glue.inference.transforms.inverse_response import Ridge
+from actuator_glue.model.effects import Scale
+from actuator_glue.model.structure import Structure
+
+MATERIAL = 5e-6
+
+
+def row(*effects: str, left: float, price: float = 5.0, scope: str = '') -> Row:
+    """A row that leaves so much [um], without parameters."""
+    return Row(effects, scope, {}, {}, 1e-6 * left, 1e-6 * left, price)
+
+
+def test_a_scope_costs_its_choice() -> None:
+    """What another scope leaves less must be worth more than that."""
+    plain, other = row(left=10.0), row(left=10.0)
+    table = weighed([plain, *scoped([other], 'linear', np.log(2.0))], MATERIAL, (), '')
+    assert [r.scope for r in table] == ['', 'linear']
+    assert table[0].chosen and not table[1].chosen
+    assert table[1].log_weight == pytest.approx(-np.log(2.0))
+
+
+def test_scopes_of_scopes_are_told_together() -> None:
+    inner = row('gain', left=1.0, scope='gain in b only')
+    (told,) = scoped([inner], 'since 3.0 s of a', 5.0)
+    assert told.scope == 'since 3.0 s of a, gain in b only' and told.price == 10.0
+
+
+def test_what_holds_since_a_moment_counts_over_all_data() -> None:
+    """A quarter of the samples leave 2 um before it, the others 4 um since then."""
+    before = Fit(np.zeros(4), np.full(100, 2e-6), np.zeros((4, 100)), np.zeros(4))
+    (told,) = since([row('backlash', left=4.0)], before, 300)
+    assert told.left_out == pytest.approx(1e-6 * np.sqrt(0.25 * 4.0 + 0.75 * 16.0))
+
+
+def test_of_one_structure_in_one_scope_the_nearest_fit_counts() -> None:
+    """Two searches may have refitted the same; the told one is that of its own scope."""
+    rows = [row('delay', left=9.0), row('delay', left=8.0), row('delay', left=7.0, scope='since')]
+    table = weighed(rows, MATERIAL, ('delay',), '')
+    assert [(r.scope, r.chosen) for r in table] == [('since', False), ('', True)]
+    assert table[1].left_out == 8e-6
+
+
+def test_a_learned_force_counts_beside_the_oil() -> None:
+    """Along the ridge of one stiffness forces grow with the oil: its coordinate stays."""
+    theta = np.array([134.0, 1.1e9, 2.5e5, 0.5])
+    offered = forms(Scale(2e-3, 0.05, 30.0, 0.005, 0.0, theta))
+    (friction,) = (e for e in offered if e.name == 'learned-force-friction')
+    model = Structure([friction])
+    low, high = (
+        np.array([getattr(p, end) for p in model.parameters]) for end in ('lower', 'upper')
+    )
+    high[4] = 1e6
+    ridge = Ridge([p.name for p in model.parameters], low, high, 0.0, 0.0, model.parameters)
+    small = np.array([[*theta, 300.0, 1e-3]])
+    large = small * np.array([1.0, 3.0, 3.0, 1.0, 3.0, 1.0])
+    a, b = ridge.forward(small)[0], ridge.forward(large)[0]
+    moved = np.abs(a - b) > 1e-9 * np.maximum(np.abs(a), 1e-12)
+    assert moved.tolist() == [False, False, True, False, False, False]
+    there, _ = ridge.inverse(b[None])
+    np.testing.assert_allclose(there, large, rtol=1e-6)
