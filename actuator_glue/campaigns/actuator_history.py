@@ -9,14 +9,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from scipy.stats import chi2
 
-from actuator_glue.api.pooled_prior import PooledPrior
-from actuator_glue.campaigns.change_points import ChangePoint, change_points
-from actuator_glue.campaigns.effect_spells import EffectHistory, effect_histories
+from actuator_glue.campaigns.change_points import change_points
+from actuator_glue.campaigns.effect_spells import effect_histories
+from actuator_glue.campaigns.history_data import HistoryData, Outlier
 from actuator_glue.campaigns.pooling import Pooled, pooled
 from actuator_glue.campaigns.rows import read_results
 from actuator_glue.campaigns.series import Series, series_of, tests_of
 from actuator_glue.diagnosis.held_out import COMPLETE
-from actuator_glue.json_value import json_value
 
 if TYPE_CHECKING:
     from pandas import DataFrame
@@ -26,113 +25,9 @@ _OUTLIERS = 0.05
 _MOST = 100.0  # logarithm: farther off is no number to be told
 
 
-@dataclass(frozen=True, slots=True)
-class Outlier:
-    """A test that stands out.
-
-    Attributes:
-        group: the test.
-        day: of it.
-        reason: why, for people.
-        report: its report below the campaign's folder; empty where there is none.
-    """
-
-    group: str
-    day: str
-    reason: str
-    report: str
-
-
 @dataclass(frozen=True, slots=True, eq=False)
-class ActuatorHistory:
-    """What the tests of one actuator tell together.
-
-    Attributes:
-        actuator: its name.
-        folder: of the campaign.
-        table: its rows with a day, in their order.
-        series: its days.
-        changes: when it was changed.
-        pooled: its level, its days, its next test.
-        effects: what came and went.
-        outliers: tests that stand out.
-    """
-
-    schema = 'actuator_glue.history/1'
-
-    actuator: str
-    folder: Path
-    table: DataFrame
-    series: Series
-    changes: tuple[ChangePoint, ...]
-    pooled: Pooled
-    effects: tuple[EffectHistory, ...]
-    outliers: tuple[Outlier, ...]
-
-    @property
-    def prior(self) -> PooledPrior:
-        """What is known of the next test, as `--prior` takes it."""
-        last = self.series.days[-1]
-        return PooledPrior(
-            names=self.pooled.names,
-            draws=self.pooled.next_draws,
-            source=f'{len(self.series.days)} days of {self.actuator} until {last}',
-        )
-
-    def change_sizes(self, change: ChangePoint) -> dict[str, tuple[float, float, float]]:
-        """Return by how much each parameter's level changed: ratio and its 95 % limits."""
-        k, p = change.place, self.pooled
-        step = p.level[k] - p.level[k - 1]
-        spread = 1.96 * np.hypot(p.level_stddev[k], p.level_stddev[k - 1])
-        return {
-            n: (float(np.exp(d)), float(np.exp(d - s)), float(np.exp(d + s)))
-            for n, d, s in zip(p.names, step, spread, strict=True)
-        }
-
-    def to_json(self) -> dict[str, Any]:
-        """Return the object of schema `actuator_glue.history/1`."""
-        low, high = self.pooled.next_interval()
-        middle = np.median(self.pooled.next_draws, axis=0)
-        value: dict[str, Any] = json_value(
-            {
-                'schema': self.schema,
-                'actuator': self.actuator,
-                'tests': len(self.table),
-                'days': list(self.series.days),
-                'left_out': self.series.left_out,
-                'changes': [
-                    {
-                        'day': c.day,
-                        'earliest': c.earliest,
-                        'latest': c.latest,
-                        'probability': c.probability,
-                        'parameters': c.parameters,
-                        'ratios': self.change_sizes(c),
-                    }
-                    for c in self.changes
-                ],
-                'effects': [
-                    {
-                        'name': e.name,
-                        'spells': [[s.begin, s.end, s.days] for s in e.spells],
-                        'sizes': {n: [m, lo, hi] for n, _, m, lo, hi in e.sizes},
-                        'probability_next': e.probability_next,
-                    }
-                    for e in self.effects
-                ],
-                'next_test': {
-                    n: {'median': middle[i], 'lower': low[i], 'upper': high[i]}
-                    for i, n in enumerate(self.pooled.names)
-                },
-                'days_ahead': self.pooled.ahead,
-                'scatter_of_days': dict(zip(self.pooled.names, self.pooled.offset, strict=True)),
-                'outliers': [
-                    {'group': o.group, 'day': o.day, 'reason': o.reason, 'report': o.report}
-                    for o in self.outliers
-                ],
-            }
-        )
-        return value
+class ActuatorHistory(HistoryData):
+    """What the tests of one actuator tell together, and its page."""
 
     def report(self, path: Path | str) -> Path:
         """Write the page of the actuator, one HTML file, and return its path.
@@ -140,7 +35,7 @@ class ActuatorHistory:
         Raises:
             InputError: the file cannot be written.
         """
-        from actuator_glue.campaigns.history_page import page
+        from actuator_glue.campaigns.history_page import page  # draws: slow to import
         from actuator_glue.report import html
 
         return html.write(Path(path), page(self, Path(path).resolve().parent))

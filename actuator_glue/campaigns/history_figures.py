@@ -3,23 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
+from actuator_glue.campaigns.history_data import HistoryData
 from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array
 from actuator_glue.report import style
-
-if TYPE_CHECKING:
-    from actuator_glue.campaigns.actuator_history import ActuatorHistory
 
 _DAY = 'datetime64[D]'
 
 
 @style.styled
-def levels(found: ActuatorHistory) -> Figure:
+def levels(found: HistoryData) -> Figure:
     """Draw each parameter of Eq. (2): tests with their intervals, level with its band, changes."""
     pooled, series = found.pooled, found.series
     units = {p.name: p.unit for p in BASE}
@@ -42,7 +40,7 @@ def levels(found: ActuatorHistory) -> Figure:
 
 
 @style.styled
-def numbers(found: ActuatorHistory, columns: Sequence[tuple[str, str, float]]) -> Figure:
+def numbers(found: HistoryData, columns: Sequence[tuple[str, str, float]]) -> Figure:
     """Draw numbers of the rows over the days, each with its interval where it has one.
 
     Args:
@@ -80,7 +78,7 @@ def _bars(axes: Any, days: Array, middle: Array, low: Array, high: Array) -> Non
     axes.plot(days, middle, '.', ms=3, color=style.MEASURED)
 
 
-def _marks(axes: Any, found: ActuatorHistory) -> None:
+def _marks(axes: Any, found: HistoryData) -> None:
     for change in found.changes:
         axes.axvline(np.datetime64(change.day), color=style.DETERMINISTIC, lw=1.2, ls='--')
 

@@ -6,7 +6,7 @@ import math
 import os
 from html import escape
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 from urllib.parse import quote
 
 import numpy as np
@@ -14,12 +14,10 @@ import numpy as np
 from actuator_glue.campaigns import history_figures as figures
 from actuator_glue.campaigns.change_points import A_YEAR
 from actuator_glue.campaigns.effect_spells import EffectHistory
+from actuator_glue.campaigns.history_data import HistoryData
 from actuator_glue.model.parameters import BASE
 from actuator_glue.report.html import Block, Note, Page, Picture, Section, Table, Text
 from actuator_glue.report.quantity import plain, said, said_in, spread, word
-
-if TYPE_CHECKING:
-    from actuator_glue.campaigns.actuator_history import ActuatorHistory
 
 # What stands behind a parameter that moved, for a mechanic.
 _LOOK_AT = {
@@ -38,7 +36,7 @@ _NUMBERS = (
 )
 
 
-def page(found: ActuatorHistory, folder: Path) -> Page:
+def page(found: HistoryData, folder: Path) -> Page:
     """Return the page.
 
     Args:
@@ -59,7 +57,7 @@ def page(found: ActuatorHistory, folder: Path) -> Page:
     )
 
 
-def lead(found: ActuatorHistory) -> str:
+def lead(found: HistoryData) -> str:
     """Return the history in a sentence or two."""
     series = found.series
     told = (
@@ -85,7 +83,7 @@ def lead(found: ActuatorHistory) -> str:
     return told + (f' Came and went: {", ".join(gone)}.' if gone else '')
 
 
-def _changed(found: ActuatorHistory) -> list[Block]:
+def _changed(found: HistoryData) -> list[Block]:
     rows = []
     for change in found.changes:
         sizes = found.change_sizes(change)
@@ -120,7 +118,7 @@ def _changed(found: ActuatorHistory) -> list[Block]:
     return blocks
 
 
-def _drift(found: ActuatorHistory) -> str:
+def _drift(found: HistoryData) -> str:
     """Return which levels moved since the last change, beyond their 95 % limits."""
     p, first = found.pooled, found.changes[-1].place if found.changes else 0
     told = []
@@ -150,7 +148,7 @@ def _effects(effects: tuple[EffectHistory, ...]) -> Table:
     )
 
 
-def _check(found: ActuatorHistory) -> list[Block]:
+def _check(found: HistoryData) -> list[Block]:
     blocks: list[Block] = []
     if found.changes:
         last = found.changes[-1]
@@ -181,7 +179,7 @@ def _check(found: ActuatorHistory) -> list[Block]:
     return blocks or [Text('Nothing beyond the usual.')]
 
 
-def _next(found: ActuatorHistory) -> list[Block]:
+def _next(found: HistoryData) -> list[Block]:
     low, high = found.pooled.next_interval()
     middle = np.median(found.pooled.next_draws, axis=0)
     rows = [
@@ -202,7 +200,7 @@ def _next(found: ActuatorHistory) -> list[Block]:
     return [table]
 
 
-def _months(found: ActuatorHistory) -> list[Block]:
+def _months(found: HistoryData) -> list[Block]:
     blocks: list[Block] = [
         Picture.of(
             figures.levels(found),
@@ -224,7 +222,7 @@ def _months(found: ActuatorHistory) -> list[Block]:
     return blocks
 
 
-def _look(found: ActuatorHistory, folder: Path) -> list[Block]:
+def _look(found: HistoryData, folder: Path) -> list[Block]:
     blocks: list[Block] = []
     if found.outliers:
         rows = [[o.group, o.reason, _link(found.folder, o.report, folder)] for o in found.outliers]
@@ -260,7 +258,7 @@ def _link(campaign: Path, report: str, folder: Path) -> _Link | str:
     return _Link(Path(os.path.relpath(campaign / report, folder)).as_posix()) if report else '-'
 
 
-def _words(found: ActuatorHistory) -> list[Block]:
+def _words(found: HistoryData) -> list[Block]:
     left = len(found.series.left_out)
     return [
         Text(
