@@ -215,6 +215,7 @@ def test_unknown_options_are_refused(record: ag.Record) -> None:
         ag.diagnose(record, seed=-1)
 
 
+@pytest.mark.usefixtures('undrawn')
 def test_the_script_of_the_readme_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -229,7 +229,7 @@ def test_results_do_not_depend_on_where_they_are_written(
     run, problem_r: Path, tmp_path: Path
 ) -> None:
     """The same seed gives the same numbers; the table is for people, the file for machines."""
-    options = ('calibrate', problem_r / 'r_2.csv', '--evaluations', 40000, '--seed', 3)
+    options = ('calibrate', problem_r / 'r_2.csv', '--evaluations', 20000, '--seed', 3)
     first = run(*options, '--json', tmp_path / 'deep' / 'c.json')
     assert first.code == 1, 'problem R holds a gain that Eq. (2) cannot have'
     assert 'beta_1' in first.out

@@ -62,6 +62,7 @@ def test_a_report_of_any_file_name(file: Path, tmp_path: Path) -> None:
     assert len(list((tmp_path / 'plots').iterdir())) == 1
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures('undrawn')  # `plot` draws the same pictures
 def test_calibrate_reports_any_file_name(file: Path, tmp_path: Path) -> None:
     """The draws as well; the records' names stand in both."""
