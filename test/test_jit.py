@@ -93,6 +93,7 @@ print(outer(0.0), sum(outer.stats.cache_hits.values()), STORE.folder)
 """
 
 
+@pytest.mark.slow
 def test_an_installation_that_cannot_be_written_is_no_obstacle(
     package: Path, read_only: Callable[..., list[str]]
 ) -> None:

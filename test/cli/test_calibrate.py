@@ -19,7 +19,7 @@ def test_problem_r_from_csv_files(run, problem_r: Path, tmp_path: Path, rng_seed
     """Both records jointly give the reference posterior with any seed.
 
     60 000 evaluations leave about 17 000 effective draws: the bounds are more than six standard
-    errors wide and R-hat stays below 1.01; it fails by chance less than once in a thousand runs.
+    errors wide, and of 300 seeds none had an R-hat above 1.002 (test_problem_r.py).
     """
     records = (problem_r / 'r_1.csv', problem_r / 'r_2.csv')
     done = run(

@@ -161,7 +161,7 @@ def test_a_live_page(tmp_path: Path) -> None:
 
 
 @browser
-@pytest.mark.parametrize('width', [390, 768, 1440])
+@pytest.mark.parametrize('width', [390, pytest.param(768, marks=pytest.mark.slow), 1440])
 def test_no_width_makes_the_chart_grow(width: int, tmp_path: Path) -> None:
     """A phone, a tablet, a desk: the chart keeps its size, all of it is seen, nothing is cut."""
     sizes = (
