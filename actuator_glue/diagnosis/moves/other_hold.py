@@ -59,12 +59,12 @@ def _linearly(first: Conclusion, asking: Asking) -> Conclusion | None:
     base = Search(other.fit, ()).base()
     before = first.found.base.mean_square + (first.line.rms**2 if first.line else 0.0)
     gains = _gains(first, other, base)
-    if max(gains) < asking.settings.nats:
+    if max(gains.values()) < asking.settings.nats:
         if before - base.rms**2 < first.found.material**2:
             return None
         described = any_learned(first.found.final.structure)
         named = first.decision.verdict == 'missing-effect' and not described
-        if named and gains[0] < 0.0:
+        if named and gains[''] < 0.0:
             return None
     asking.tell('other hold', 0.0)
     second = asking.conclude(other)
@@ -92,18 +92,24 @@ def _gained(first: Conclusion, second: Conclusion) -> float:
     return gained - len(b.theta) + len(a.theta)
 
 
-def _gains(first: Conclusion, other: Prepared, base: Fit) -> list[float]:
+def _gains(first: Conclusion, other: Prepared, base: Fit) -> dict[str, float]:
     """Return the nats by which structures explain more with the other hold than what was found.
 
-    What was found itself, first, then the best single effects; less their further parameters.
+    By the effect of the best single ones, and of what was found itself without a name; less their
+    further parameters. Beside misfit nats say little: there what leaves no less that matters does
+    not explain more.
     """
     found, scorer = first.found.final, first.scorer
     data = other.fit if first.line is None else hum.without(other.fit, first.line)
-    out, known = [], scorer.block_scores(found.fit)
-    for trial in (found, *first.found.singles[:_SINGLES]):
+    complete, known = first.decision.verdict == 'missing-effect', scorer.block_scores(found.fit)
+    tried = {t.added: t for t in first.found.singles[:_SINGLES]} | {'': found}
+    out = {}
+    for name, trial in tried.items():
         starts = np.stack([trial.fit.theta, trial.fit.theta])
         starts[1, : len(base.theta)] = base.theta
         again = first.effort.spent_on(fit(data, trial.model, starts))
         more = len(again.theta) - len(found.fit.theta)
-        out.append(evidence(scorer.block_scores(again), known) - more)
+        gain = evidence(scorer.block_scores(again), known) - more
+        matters = found.mean_square - again.rms**2 >= first.found.material**2
+        out[name] = gain if complete or matters else min(gain, 0.0)
     return out
