@@ -67,14 +67,12 @@ class Conclusion:
     def scope(self) -> str:
         """What the structure that is told holds for; empty for all records as they were given."""
         own = self.decision.final.own
-        alone = own.scope if isinstance(own, OneRecord) else ''
-        return ', '.join(filter(None, (self._around, alone)))
-
-    @property
-    def _around(self) -> str:
-        """What the search was about."""
-        hold = LINEAR if self.prepared.setup is not None else ''
-        return ', '.join(filter(None, (hold, self.appeared.scope if self.appeared else '')))
+        scopes = (
+            LINEAR if self.prepared.setup is not None else '',
+            self.appeared.scope if self.appeared is not None else '',
+            own.scope if isinstance(own, OneRecord) else '',
+        )
+        return ', '.join(filter(None, scopes))
 
     def rows(self) -> tuple[Row, ...]:
         """Return every structure that was refitted on the way here, without weights."""
@@ -83,12 +81,18 @@ class Conclusion:
 
     def in_scope(self, own: tuple[Row, ...]) -> tuple[Row, ...]:
         """Return rows of this answer's data as rows of all records as they were given."""
-        cost = math.log(2.0) if self.prepared.setup is not None else 0.0
-        if self.appeared is not None:
-            before = self.appeared.before.fit
-            own = table.since(own, before, self.data.target.size)
-            cost += len(before.theta) + 1.0  # parameters of its own, and when
-        return table.scoped(own, self._around, cost) if self._around else own
+        own = self.over_all_data(own)
+        linear = self.prepared.setup is not None
+        return table.scoped(own, LINEAR, math.log(2.0)) if linear else own
+
+    def over_all_data(self, own: tuple[Row, ...]) -> tuple[Row, ...]:
+        """Return rows of the data since something appeared, if it did, as rows of all data."""
+        if self.appeared is None:
+            return own
+        before = self.appeared.before.fit
+        cost = len(before.theta) + 1.0  # parameters of its own, and when
+        own = table.since(own, before, self.data.target.size)
+        return table.scoped(own, self.appeared.scope, cost)
 
     @property
     def effort(self) -> Effort:

@@ -103,7 +103,7 @@ def _since(
         if not moments.explains(sides, rivals, nats, found.material):
             return None
         later = replace(second, appeared=Appeared(first.data, moment, bare))
-        return replace(later, others=later.in_scope(second.others))
+        return replace(later, others=later.over_all_data(second.others))
 
     near = told(math.inf)
     if near is None or near.onset is None:
