@@ -89,7 +89,7 @@ class BeamSearch(Judge):
 
     def _rough(self, current: Trial, names: Sequence[str]) -> list[Trial]:
         """Refit a structure with each of some further effects; what may matter is finished."""
-        below = self.promised(current)
+        below = self.may_matter_below(current)
         return self.search.additions(current, names, valves=False, below=below)
 
     def run(self) -> Selection:

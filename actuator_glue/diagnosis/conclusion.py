@@ -79,20 +79,20 @@ class Conclusion:
         own = table.rows(self.selection.search, self.scorer)
         return (*self.in_scope(own), *self.others)
 
-    def in_scope(self, own: tuple[Row, ...]) -> tuple[Row, ...]:
+    def in_scope(self, some: tuple[Row, ...]) -> tuple[Row, ...]:
         """Return rows of this answer's data as rows of all records as they were given."""
-        own = self.over_all_data(own)
+        some = self.over_all_data(some)
         linear = self.prepared.setup is not None
-        return table.scoped(own, LINEAR, math.log(2.0)) if linear else own
+        return table.scoped(some, LINEAR, math.log(2.0)) if linear else some
 
-    def over_all_data(self, own: tuple[Row, ...]) -> tuple[Row, ...]:
+    def over_all_data(self, some: tuple[Row, ...]) -> tuple[Row, ...]:
         """Return rows of the data since something appeared, if it did, as rows of all data."""
         if self.appeared is None:
-            return own
+            return some
         before = self.appeared.before.fit
         cost = len(before.theta) + 1.0  # parameters of its own, and when
-        own = table.since(own, before, self.data.target.size)
-        return table.scoped(own, self.appeared.scope, cost)
+        some = table.since(some, before, self.data.target.size)
+        return table.scoped(some, self.appeared.scope, cost)
 
     @property
     def effort(self) -> Effort:
@@ -109,7 +109,7 @@ class Conclusion:
     def of(self, selection: BeamSearch, found: Selection) -> Conclusion:
         """Return what another selection of effects says about the same records."""
         other = concluded(self.prepared, selection, found, self.line)
-        return replace(other, appeared=self.appeared, others=self.others)
+        return replace(other, appeared=self.appeared)
 
     def complete(self, selection: BeamSearch, found: Selection | None) -> Conclusion | None:
         """Return another answer about the same records, if there is one and it is complete."""

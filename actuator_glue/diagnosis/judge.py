@@ -131,7 +131,7 @@ class Judge:
         behind = [*(self.behind(t, best, alike) for t in trials), self.behind(rest, best)]
         return [math.exp(-max(b, 0.0)) for b in behind]
 
-    def promised(self, current: Trial) -> float:
+    def may_matter_below(self, current: Trial) -> float:
         """Mean squared error that a rough refit leaves which may come to matter [m^2]."""
         return current.mean_square - (_ROUGHLY * self.material) ** 2
 

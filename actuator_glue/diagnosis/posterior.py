@@ -42,7 +42,8 @@ _MOVES_WITH = 0.9  # rank correlation
 _UNLIKELY = 10.0  # nats behind the first optimum: another one has next to no share
 _HALVINGS = 40  # bring any point of it inside the bounds of the prior
 # Samples that chains simulate, all evaluations together, and evaluations they have anyway. Ten
-# minutes of 10 kHz take 4 ms each: where 2600 did not do, 12 000 did not, as a ridge was left.
+# minutes of 10 kHz take 4 ms each: where 2600 did not do, 12 000 did not, as a ridge was left. Of
+# five shorter ones whose chains had not met after some 4000 one had after 12 000.
 _SIMULATED, _FEWEST = 200_000_000, 2_600
 
 

@@ -35,7 +35,7 @@ _DONE = 1e-5
 _FINISHED = 2  # iterations on all samples after those on stretches of them
 _PROMISING = 0.95  # of the error at most is left by friction that is looked at twice
 _POLISHED = 4
-_FAR = 1.5  # times another's squared error: too far behind for the last digits to matter
+FAR = 1.5  # times another's squared error: too far behind for the last digits to matter
 _LAST, _LEAST_GAIN = 60, 1e-6  # iterations at most of a structure that is told, and tolerance
 _FINER = 0.1  # of a usual finite-difference step
 _LONG = 5.0  # times its stretches: there they tell which minimum is the lowest
@@ -68,9 +68,9 @@ def _worth_finishing(row: Sequence[Trial], below: float) -> list[Trial]:
     far better.
     """
     error = row[0].mean_square if row else 0.0
-    tried = [t for i, t in enumerate(row[:_POLISHED]) if i < 2 or t.mean_square < _FAR * error]
+    tried = [t for i, t in enumerate(row[:_POLISHED]) if i < 2 or t.mean_square < FAR * error]
     least = sorted(row[_POLISHED:], key=lambda t: t.mean_square)[:2]
-    tried += [t for t in least if _FAR * t.mean_square < error]
+    tried += [t for t in least if FAR * t.mean_square < error]
     return [t for t in tried if t.mean_square < below]
 
 
@@ -360,7 +360,7 @@ class Search:
             starts[1, : len(BASE)] = self._tried[frozenset()].theta
             model, start = self.structure(*effects), self._lowest(starts, effects)
             again = self._fit(self.data, model, start, tolerance=_TOLERANCE)
-            if again.rms**2 < _FAR * current.mean_square:
+            if again.rms**2 < FAR * current.mean_square:
                 again = self._fit(self.data, model, again.theta)
             if key not in self._tried or again.rms < self._tried[key].rms:
                 self._tried[key] = again

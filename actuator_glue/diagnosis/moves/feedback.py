@@ -14,10 +14,10 @@ from actuator_glue.diagnosis.candidates import FAULTS, FEEDBACK
 from actuator_glue.diagnosis.conclusion import Conclusion
 from actuator_glue.diagnosis.moves import describe
 from actuator_glue.diagnosis.moves.move import Asking, after
+from actuator_glue.diagnosis.search import FAR
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
 
-_FAR = 1.5  # times the squared error so far: no last digits make that up with fewer parameters
 _OWN = 2  # parameters: of the least fault and of the share that is fed back
 
 
@@ -66,16 +66,20 @@ def in_the_loop(selection: BeamSearch, found: Selection) -> Selection | None:
         starts = [search.known((name,)), before if name in before.effects else None]
         tried += [search.add(s, FEEDBACK) for s in starts if s]
     cost = math.log(max(1, len(tried)))
-    fewer = [len(t.fit.theta) <= len(before.fit.theta) for t in tried]
-    below = [_FAR * before.mean_square if f else selection.promised(before) for f in fewer]
-    pairs = zip(tried, below, strict=True)
-    tried = [search.polish(t, valves=False) for t, most in pairs if t.mean_square < most]
+
+    def plainer(trial: Trial) -> bool:
+        return len(trial.fit.theta) <= len(before.fit.theta)
+
+    def may_be_better(trial: Trial) -> bool:
+        far = FAR * before.mean_square
+        return trial.mean_square < (far if plainer(trial) else selection.may_matter_below(before))
 
     def better(trial: Trial) -> bool:
-        least = 0.0 if len(trial.fit.theta) <= len(before.fit.theta) else selection.material
+        least = 0.0 if plainer(trial) else selection.material
         return selection.better(trial, before, least, cost)
 
-    worth = [t for t in tried if better(t)]
+    finished = [search.polish(t, valves=False) for t in tried if may_be_better(t)]
+    worth = [t for t in finished if better(t)]
     if not worth:
         return None
     best = max(worth, key=lambda t: float(t.scores.sum()) - len(t.fit.theta))

@@ -14,6 +14,7 @@ from actuator_glue.diagnosis.moves.move import Asking, after, beside, follow
 from actuator_glue.diagnosis.preparation import Prepared
 from actuator_glue.diagnosis.score import evidence
 from actuator_glue.diagnosis.search import Search
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.diagnosis.wrong_setup import WrongSetup
 from actuator_glue.inference.least_squares.fit import Fit, fit
 
@@ -58,13 +59,13 @@ def _linearly(first: Conclusion, asking: Asking) -> Conclusion | None:
     other = replace(prepared, fit=fitted, held=held)
     base = Search(other.fit, ()).base()
     before = first.found.base.mean_square + (first.line.rms**2 if first.line else 0.0)
-    gains = _gains(first, other, base)
-    if max(gains.values()) < asking.settings.nats:
+    found, singles = first.found.final, first.found.singles[:_SINGLES]
+    gain = _gain(first, other, base, found)
+    if max([gain, *(_gain(first, other, base, t) for t in singles)]) < asking.settings.nats:
         if before - base.rms**2 < first.found.material**2:
             return None
-        described = any_learned(first.found.final.structure)
-        named = first.decision.verdict == 'missing-effect' and not described
-        if named and gains[''] < 0.0:
+        named = first.decision.verdict == 'missing-effect' and not any_learned(found.structure)
+        if named and gain < 0.0:
             return None
     asking.tell('other hold', 0.0)
     second = asking.conclude(other)
@@ -92,24 +93,19 @@ def _gained(first: Conclusion, second: Conclusion) -> float:
     return gained - len(b.theta) + len(a.theta)
 
 
-def _gains(first: Conclusion, other: Prepared, base: Fit) -> dict[str, float]:
-    """Return the nats by which structures explain more with the other hold than what was found.
+def _gain(first: Conclusion, other: Prepared, base: Fit, trial: Trial) -> float:
+    """Return the nats by which a structure explains more with the other hold than what was found.
 
-    By the effect of the best single ones, and of what was found itself without a name; less their
-    further parameters. Beside misfit nats say little: there what leaves no less that matters does
-    not explain more.
+    Less its further parameters. Beside misfit nats say little: there what leaves no less that
+    matters does not explain more.
     """
     found, scorer = first.found.final, first.scorer
     data = other.fit if first.line is None else hum.without(other.fit, first.line)
-    complete, known = first.decision.verdict == 'missing-effect', scorer.block_scores(found.fit)
-    tried = {t.added: t for t in first.found.singles[:_SINGLES]} | {'': found}
-    out = {}
-    for name, trial in tried.items():
-        starts = np.stack([trial.fit.theta, trial.fit.theta])
-        starts[1, : len(base.theta)] = base.theta
-        again = first.effort.spent_on(fit(data, trial.model, starts))
-        more = len(again.theta) - len(found.fit.theta)
-        gain = evidence(scorer.block_scores(again), known) - more
-        matters = found.mean_square - again.rms**2 >= first.found.material**2
-        out[name] = gain if complete or matters else min(gain, 0.0)
-    return out
+    starts = np.stack([trial.fit.theta, trial.fit.theta])
+    starts[1, : len(base.theta)] = base.theta
+    again = first.effort.spent_on(fit(data, trial.model, starts))
+    nats = evidence(scorer.block_scores(again), scorer.block_scores(found.fit))
+    gain = nats - len(again.theta) + len(found.fit.theta)
+    complete = first.decision.verdict == 'missing-effect'
+    matters = found.mean_square - again.rms**2 >= first.found.material**2
+    return gain if complete or matters else min(gain, 0.0)

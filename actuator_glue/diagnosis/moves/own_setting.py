@@ -41,8 +41,10 @@ def own_setting(result: Conclusion, asking: Asking) -> Conclusion:
     asking.tell('one record', 0.0)
     limit, held = result.decision.limit, result.prepared.held.records
     found, rows = setting(result.selection, result.found, limit, held)
-    result = replace(result, others=(*result.others, *result.in_scope(rows)))
-    return result if found is None else result.of(result.selection, found)
+    rows = result.in_scope(rows)
+    if found is None:
+        return replace(result, others=(*result.others, *rows))
+    return replace(result.of(result.selection, found), others=rows)
 
 
 def _members(data: Data, held: Sequence[Record], index: int) -> tuple[Record, ...]:

@@ -31,7 +31,7 @@ def with_reserved(first: Conclusion, asking: Asking) -> Conclusion | None:
         ways.insert(0, (Search(prepared.fit, names, usual.each, effort=usual.effort), None))
 
     # Beside Eq. (2) alone, too, it must be better than what was found.
-    below = first.selection.promised(before)
+    below = first.selection.may_matter_below(before)
 
     def better(after: Trial, scorer: Scorer) -> bool:
         known = replace(before, scores=scorer.block_scores(before.fit))
