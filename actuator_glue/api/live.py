@@ -16,7 +16,7 @@ from actuator_glue.inference.prior_use import GivenPrior
 from actuator_glue.inference.transforms.inverse_response import Ridge
 from actuator_glue.online.knowledge import Known
 from actuator_glue.online.live_diagnosis import Concluded
-from actuator_glue.online.structures import LEAVES, MOST, Proposal, Proposed
+from actuator_glue.online.structures import BESIDE, LEAVES, MOST, Proposal, Proposed
 from actuator_glue.records import Array, Record
 
 # Of the usual effort of a diagnosis, at most: what takes a core more than half a minute comes too
@@ -84,7 +84,7 @@ def proposed(found: Diagnosis, records: Sequence[Record]) -> Proposal:
     main = Proposed(model, _weight(found), known)
     others = [Proposed(choose_model(names), odds * main.weight) for names, odds in _tied(found)]
     others = sorted(others, key=lambda one: -one.weight)[: MOST - 2]
-    others = [one for one in others if one.weight >= LEAVES]
+    others = [one for one in others if one.weight >= BESIDE]
     left = 1.0 - main.weight - sum(one.weight for one in others)
     plain = Proposed(choose_model(), max(left, _PLAIN))
     return Proposal((main, *others, plain), found.alarm.threshold)

@@ -36,8 +36,11 @@ MOST = 3
 MATERIAL = 0.5
 # No single forecast costs more than this many (error/m)^2: it may have diverged.
 _WORST = 1e3
-# Weight of what led before, beside what is carried in its place: forecasts may bring it back.
-BEFORE = 0.02
+# What is proposed beside another has at least this weight: less is not worth a share of the time.
+BESIDE = 0.05
+# Weight of what led before, beside what is carried in its place: a look at few data errs in one
+# name of ten, and forecasts may bring it back.
+BEFORE = 0.1
 # A structure that leads leaves after so many windows, and so long, of forecasts that were worse
 # than those of what was there before it.
 WORSE, WORSE_SECONDS = 3, 1.0

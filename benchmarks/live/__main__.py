@@ -1,4 +1,7 @@
-"""Run streams through the live loop and write what came of each, and of all."""
+"""Run streams through the live loop and write what came of each, and of all.
+
+A run that was stopped goes on where it was, with the same commit.
+"""
 
 from __future__ import annotations
 
@@ -83,9 +86,14 @@ def main(argv: Sequence[str] | None = None) -> int:
         cases = [case for case in cases if case.effects == wanted]
     cases = [cases[i] for i in np.random.default_rng(args.seed).permutation(len(cases))]
     folder.mkdir(parents=True, exist_ok=True)
-    rows, at = [], commit()
-    with file.open('w') as lines:
-        for row in ran(cases, args.jobs, args.minutes):
+    at = commit()
+    rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
+    others = {row['commit'] for row in rows} - {at}
+    if others:
+        parser.error(f'{file} has streams of {", ".join(sorted(others))}, and this is {at}')
+    had = {row['seed'] for row in rows}
+    with file.open('a') as lines:
+        for row in ran([case for case in cases if case.seed not in had], args.jobs, args.minutes):
             rows.append(row | {'commit': at})
             lines.write(json.dumps(rows[-1]) + '\n')
             lines.flush()
