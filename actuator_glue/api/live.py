@@ -14,6 +14,7 @@ from actuator_glue.inference.carried import FEWEST, Carried, Drift
 from actuator_glue.inference.choice import ModelChoice, choose_model
 from actuator_glue.inference.prior_use import GivenPrior
 from actuator_glue.inference.transforms.inverse_response import Ridge
+from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.online.knowledge import Known
 from actuator_glue.online.live_diagnosis import Concluded
 from actuator_glue.online.structures import BESIDE, LEAVES, MOST, Proposal, Proposed
@@ -29,6 +30,8 @@ _PLAIN = 0.02
 _OIL = 'alpha_2'
 # Weight of a structure with effects that have no probability: learned terms.
 _DESCRIBED = 0.9
+_OPEN = ('unexplained', 'undecided')
+_LEVEL = 'the level has moved, which every window takes out by itself (Eq. (4))'
 
 
 def given(known: tuple[Carried, Drift, float] | None) -> GivenPrior | None:
@@ -44,6 +47,18 @@ def given(known: tuple[Carried, Drift, float] | None) -> GivenPrior | None:
     return GivenPrior(carried, 'the estimator', drift.every, age)
 
 
+def carriable(effects: Sequence[str]) -> tuple[str, ...]:
+    """Return the effects that an estimator can carry.
+
+    A window's likelihood takes the mean out of the error (Eq. (4)): of what only moves the level
+    it says nothing.
+
+    Args:
+        effects: names.
+    """
+    return tuple(n for n in effects if n not in CATALOGUE or CATALOGUE[n].group != 'offset')
+
+
 def concluded(found: Diagnosis, records: Sequence[Record], apply: bool | None = None) -> Concluded:
     """Return what a diagnosis of a stream means for the live loop.
 
@@ -52,13 +67,16 @@ def concluded(found: Diagnosis, records: Sequence[Record], apply: bool | None = 
         records: what was diagnosed.
         apply: whether the estimator is to carry it; None for what the loop's settings say.
     """
-    left_open = found.verdict in ('unexplained', 'undecided') or any(
-        effect.alternatives for effect in found.effects
+    left_open = found.verdict in _OPEN or any(
+        effect.alternatives for effect in found.effects if carriable((effect.name,))
     )
     why_not = against(found.verdict, found.effects, found.structure, found.error)
     if found.verdict == 'none':
         return Concluded(Proposal.of(choose_model()), '', left_open, apply, frozenset())
     supported = frozenset(found.structure)
+    if found.structure and not carriable(found.structure):
+        # The level is settled, whichever of its names is the cause.
+        return Concluded(None, _LEVEL, found.verdict in _OPEN, apply, supported)
     learned = ', '.join(term.name for term in found.learned)
     if learned and not why_not:
         why_not = f'{learned} was learned from these records: no effect of the catalogue'
@@ -104,17 +122,14 @@ def _within_bounds(found: Diagnosis) -> tuple[ModelChoice, Array]:
 
     What a record leaves open may reach far beyond the box: that part of it cannot be.
     """
-    structure = found.model
-    names = tuple(p.name for p in structure.parameters)
-    columns = [found.names.index(name) for name in names]
-    draws = found.joint[:, columns]
-    lower = np.array([p.lower for p in structure.parameters])
-    upper = np.array([p.upper for p in structure.parameters])
+    model = choose_model(carriable(found.structure))
+    draws = found.joint[:, [found.names.index(name) for name in model.names]]
+    lower, upper = model.bounds
     inside = draws[((draws > lower) & (draws < upper)).all(axis=1)]
     if not len(inside):
-        return choose_model(found.structure), inside
-    start = dict(zip(names, np.median(inside, axis=0).tolist(), strict=True))
-    return choose_model(found.structure, start=start), inside
+        return model, inside
+    start = dict(zip(model.names, np.median(inside, axis=0).tolist(), strict=True))
+    return choose_model(model.effects, start=start), inside
 
 
 def _opened(
@@ -136,7 +151,8 @@ def _opened(
 
 def _weight(found: Diagnosis) -> float:
     """Return the probability of the structure that is told."""
-    each = [_probability(effect) for effect in found.effects if effect.name in found.structure]
+    told = carriable(found.structure)
+    each = [_probability(effect) for effect in found.effects if effect.name in told]
     return float(np.clip(np.prod(each), LEAVES, 1.0 - _PLAIN))
 
 
@@ -146,15 +162,14 @@ def _probability(effect: Finding) -> float:
 
 def _tied(found: Diagnosis) -> list[tuple[tuple[str, ...], float]]:
     """Return structures with a tied name for one that is told, and their odds against it."""
-    out = []
+    told, out = carriable(found.structure), dict[frozenset[str], tuple[tuple[str, ...], float]]()
     for effect in found.effects:
-        if effect.name not in found.structure:
+        if effect.name not in told:
             continue
-        rest = [name for name in found.structure if name != effect.name]
-        known = frozenset(found.structure)
+        rest = [name for name in told if name != effect.name]
         for rival in effect.rivals:
-            names = tuple(dict.fromkeys((*rest, *rival.effects)))
-            if rival.name != effect.name and rival.tied and frozenset(names) != known:
-                odds = rival.probability / max(_probability(effect), LEAVES)
-                out.append((names, min(odds, 1.0)))
-    return out
+            names = tuple(dict.fromkeys((*rest, *carriable(rival.effects))))
+            if rival.tied and names and frozenset(names) != frozenset(told):
+                odds = min(rival.probability / max(_probability(effect), LEAVES), 1.0)
+                out.setdefault(frozenset(names), (names, odds))
+    return list(out.values())

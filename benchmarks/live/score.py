@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from actuator_glue.api.live import carriable
 from actuator_glue.online.job import WindowResult
 from actuator_glue.online.structures import MATERIAL
 from benchmarks.live.cases import NOISE, RATE, Case, Streamed
@@ -24,8 +25,8 @@ def scored(case: Case, given: Streamed, ran: Chain) -> dict[str, Any]:
     errors: list[float] = []
     worse = longest = 0
     rate = case.drift / case.seconds + given.sizes.get('gain_drift', 0.0)
-    truth, proposed = frozenset(case.effects), False
-    first = ran.added if case.effects else 0.0
+    truth, proposed = frozenset(carriable(case.effects)), False
+    first = ran.added if truth else 0.0
     for result, material in zip(ran.results, ran.material, strict=True):
         worse = worse + 1 if made_worse(result, material) else 0
         longest = max(longest, worse)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from actuator_glue.api.live import carriable
 from benchmarks.live.cases import EFFECTS
 
 Row = dict[str, Any]
@@ -25,6 +26,7 @@ calibration to 1 %. Streams come in an order drawn by the seed, so that those th
 fair sample of all. Windows have all the time that they want: no clock cuts them short. The
 stream goes on while a diagnosis computes, for as long as that took of a processor.
 Streams that hide something are listed; what no stream of a commit could show is left out.
+An offset of the sensor is nothing to add: the likelihood of a window takes the level out, Eq. (4).
 
 Intervals are of the parameters of Eq. (2) that a window tells, not of those that the prior's
 bounds do (`prior_dominated`). Half of the streams know a calibration; what no window tells of its
@@ -55,7 +57,8 @@ def _of_one(rows: Sequence[Row], commit: str, cases: int) -> str:
 
 
 def _required(rows: Sequence[Row]) -> str:
-    hidden = [row for row in rows if row['effects']]
+    hidden = [row for row in rows if carriable(row['effects'])]
+    offset = [row for row in rows if row['effects'] and not carriable(row['effects'])]
     healthy = [row for row in rows if not row['effects'] and not row['drift']]
     drifting = [row for row in rows if not row['effects'] and row['drift']]
     clear = [row for row in hidden if row['ratio'] >= CLEAR]
@@ -104,6 +107,11 @@ def _required(rows: Sequence[Row]) -> str:
             'machines whose gain grows by 3 %, without an addition',
             '',
             _share([not np.isfinite(row['added']) for row in drifting]),
+        ),
+        (
+            'machines whose sensor has an offset, without an addition',
+            '',
+            _share([not np.isfinite(row['added']) for row in offset]),
         ),
         (
             'first addition after the coverage broke, median',

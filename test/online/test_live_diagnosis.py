@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from actuator_glue.api.live import proposed
+from actuator_glue.api.live import concluded, proposed
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.choice import choose_model
 from actuator_glue.model.parameters import NAMES
@@ -429,3 +429,29 @@ def test_what_one_stiffness_leaves_open_is_handed_over_as_open():
     found.prior = object()
     kept = proposed(found, [record]).structures[0].known.carried.draws
     assert kept[:, 2].std() == pytest.approx(3e5, rel=0.1)
+
+
+def test_an_offset_is_told_and_not_carried():
+    """A window's likelihood takes the level out: forecasts of either name mean nothing."""
+    command = np.sin(np.linspace(0.0, 60.0, 1000))
+    record = Record(1e-3 * command, 1e-3 * command, 0.005, 250e3)
+
+    def finding(name, *rivals):
+        told = [SimpleNamespace(name=n, effects=(n,), tied=True, probability=0.45) for n in rivals]
+        row = {'probability': 0.5, 'alternatives': rivals, 'rivals': tuple(told), 'records': ()}
+        return SimpleNamespace(name=name, **row)
+
+    found = found_play(1e6, 1e4)
+    offset = finding('bias', 'valve-null')
+    found.structure = ('backlash', 'bias')
+    found.effects, found.names = (*found.effects, offset), (*found.names, 'bias')
+    found.joint = np.column_stack([found.joint, np.full(len(found.joint), 1e-5)])
+    carried = proposed(found, [record]).structures
+    assert [one.model.effects for one in carried] == [('backlash',), ()]
+    assert carried[0].known.carried.names == (*NAMES, 'backlash') and carried[0].weight == 0.97
+
+    found.structure, found.effects = ('bias',), (offset,)
+    found.verdict, found.learned = 'missing-effect', ()
+    found.error = SimpleNamespace(removed_ci=(0.9, 1.0))
+    told = concluded(found, [record])
+    assert told.proposal is None and not told.left_open and 'level' in told.why_not
