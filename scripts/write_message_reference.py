@@ -1,19 +1,32 @@
-"""Write docs/messages_reference.md from the interface texts; `--check` only compares."""
+"""Write docs/fields_of_*.md from the interface texts; `--check` only compares."""
 
 import re
 import sys
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGE = ROOT / 'docs' / 'messages_reference.md'
-HEAD = """# Fields of messages, services and actions
+DOCS = ROOT / 'docs'
+HEAD = """# Fields: {title}
 
 What each field holds and in which unit; [messages](messages.md) says who publishes what, and how
-to publish samples.
+to publish samples. Other fields: {others}.
 
 <!-- Everything below is written by scripts/write_message_reference.py -->
 
 """
+# Page, and the interfaces on it: by what they are about, as one looks for them.
+PAGES = {
+    'samples': ('SampleBlock', 'TestSetup', 'CommandPreview', 'TrackingIndicators'),
+    'estimates': (
+        'PosteriorMoments',
+        'PosteriorDraws',
+        'PredictionBand',
+        'FrequencyResponseBand',
+        'EstimatorSetup',
+        'StabilityMargin',
+    ),
+    'diagnosis': ('Diagnosis', 'Effect', 'Candidate', 'Diagnose', 'ModelProposal', 'SetModel'),
+}
 PARTS = {'msg': [''], 'srv': ['Request', 'Response'], 'action': ['Goal', 'Result', 'Feedback']}
 
 
@@ -49,13 +62,24 @@ def section(path: Path) -> str:
     return '\n'.join(lines) + '\n'
 
 
-def page() -> str:
-    """Return the whole page."""
-    interfaces = [p for kind in PARTS for p in sorted((ROOT / 'msg_defs' / kind).glob('*'))]
-    return HEAD + '\n'.join(section(path) for path in interfaces)
+def page(title: str) -> str:
+    """Return one page."""
+    files = {p.stem: p for kind in PARTS for p in (ROOT / 'msg_defs' / kind).glob('*')}
+    missing = set(files) - {name for names in PAGES.values() for name in names}
+    if missing:
+        raise SystemExit(f'{", ".join(sorted(missing))}: on no page of PAGES in {__file__}')
+    others = ', '.join(f'[{name}](fields_of_{name}.md)' for name in PAGES if name != title)
+    sections = '\n'.join(section(files[name]) for name in PAGES[title])
+    return HEAD.format(title=title, others=others) + sections
+
+
+def file(title: str) -> Path:
+    """Return where a page is."""
+    return DOCS / f'fields_of_{title}.md'
 
 
 if __name__ == '__main__':
     if '--check' in sys.argv:
-        sys.exit(not PAGE.exists() or page() != PAGE.read_text(encoding='utf-8'))
-    PAGE.write_text(page(), encoding='utf-8')
+        sys.exit(any(file(t).read_text(encoding='utf-8') != page(t) for t in PAGES))
+    for name in PAGES:
+        file(name).write_text(page(name), encoding='utf-8')

@@ -155,7 +155,7 @@ def test_texts_parse_without_ros(path: Path) -> None:
 
 
 def test_message_reference_is_up_to_date() -> None:
-    """docs/messages_reference.md is what the texts say; `make docs` renews it."""
+    """docs/fields_of_*.md are what the texts say; `make docs` renews them."""
     script = str(ROOT / 'scripts' / 'write_message_reference.py')
     assert subprocess.run([sys.executable, script, '--check'], check=False).returncode == 0
 
