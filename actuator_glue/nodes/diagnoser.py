@@ -152,7 +152,9 @@ class DiagnoserNode(WorkingNode):
 
     def _band(self, message: Any) -> None:
         if message.scored and message.kind == message.NOISE:
-            self._take(live.Judged(message.widest_coverage, int(message.window)))
+            coverage, number = message.widest_coverage, int(message.window)
+            band = message.rms_error, message.widest_width, message.widest_level
+            self._take(live.Judged.of(coverage, number, *band))
 
     def _posterior(self, message: Any) -> None:
         self._explained.posterior(message)

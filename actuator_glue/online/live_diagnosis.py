@@ -1,6 +1,6 @@
 """When a stream is diagnosed, and what follows: a state and a step, without clock, ROS or data.
 
-A diagnosis is due when coverage breaks, when the estimator's prior is contradicted, and, while
+A diagnosis is due when bands break, when the estimator's prior is contradicted, and, while
 names are tied or structure remains, each time that twice as much has been received; while an
 alarm stands, each time that twice as much has been received since it began. It is of all data, or,
 of a machine that was sound until it changed, of those since: where there is a calibration, what
@@ -17,6 +17,7 @@ from dataclasses import dataclass, replace
 from typing import TypeAlias
 
 import numpy as np
+from scipy.special import ndtri
 
 from actuator_glue.inference.carried import Carried, Drift
 from actuator_glue.inference.choice import choose_model
@@ -34,6 +35,9 @@ _MORE = 0.3
 # Over so many times as many bands, half of what they may lack of their level is a break, too: an
 # error of the noise's own size that never goes.
 _LASTING, _LEVEL = 4, 0.95
+# Forecasts that are off by so many times what their bands hold are a break as well: what a limit
+# takes off a few peaks leaves coverage as it was. The worst band may be a glitch's.
+_OFF = 1.5
 # Where bands were good until now, so much of what has changed is waited for [s].
 _CHANGED = 5.0
 
@@ -74,10 +78,26 @@ class Judged:
     Attributes:
         coverage: share of the samples that it covers.
         number: window that made it.
+        error: rms of measured minus median, in standard deviations of what the band holds.
     """
 
     coverage: float
     number: int = 0
+    error: float = 1.0
+
+    @staticmethod
+    def of(coverage: float, number: int, rms_error: float, width: float, level: float) -> Judged:
+        """Return how a band was judged.
+
+        Args:
+            coverage: share of the samples that it covers.
+            number: window that made it.
+            rms_error: of measured minus median [m].
+            width: mean width of the interval [m].
+            level: probability of the interval.
+        """
+        deviation = width / (2.0 * ndtri(0.5 + 0.5 * level))
+        return Judged(coverage, number, rms_error / deviation if deviation > 0.0 else math.inf)
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,6 +206,7 @@ class LiveState:
         settings: when to diagnose.
         seconds: data received since the stream began [s].
         coverages: of the last bands.
+        errors: of the last bands, in standard deviations of what they hold.
         judged: data there were when each of them was judged [s].
         origin: data before those that looks are of [s]: until a machine that nothing was added to
             changed, suddenly or slowly.
@@ -205,6 +226,7 @@ class LiveState:
     settings: LiveSettings
     seconds: float = 0.0
     coverages: tuple[float, ...] = ()
+    errors: tuple[float, ...] = ()
     judged: tuple[float, ...] = ()
     origin: float = 0.0
     broken: bool = False
@@ -235,9 +257,24 @@ class LiveState:
         return full and float(np.mean(self.coverages)) < limit
 
     @property
+    def off(self) -> float:
+        """Rms error of the last bands but the worst, in standard deviations of what they hold.
+
+        Of four times as many as a mean coverage is of; NaN before there are enough.
+        """
+        full = len(self.errors) >= _LASTING * self.settings.coverage_windows
+        return float(np.sqrt(np.mean(np.square(sorted(self.errors)[:-1])))) if full else math.nan
+
+    @property
+    def wanting(self) -> bool:
+        """Whether bands say that the model lacks something."""
+        low = self.coverage < self.settings.coverage_limit
+        return low or self.lasting or self.off > _OFF
+
+    @property
     def trusted(self) -> bool:
         """Whether bands have been judged, and nothing speaks against what is known now."""
-        fair = self.coverage >= self.settings.coverage_limit and not self.lasting
+        fair = not math.isnan(self.coverage) and not self.wanting
         return fair and not self.contradicted
 
 
@@ -280,9 +317,10 @@ def _judged(state: LiveState, given: Judged) -> tuple[LiveState, tuple[Action, .
     state = replace(
         state,
         coverages=(*state.coverages, given.coverage)[-most:],
+        errors=(*state.errors, given.error)[-most:],
         judged=(*state.judged, state.seconds)[-most:],
     )
-    broken = state.coverage < state.settings.coverage_limit or state.lasting
+    broken = state.wanting
     sound = state.sound or state.coverage >= state.settings.coverage_limit
     if math.isnan(state.coverage) or broken == state.broken:
         return replace(state, sound=sound), ()
@@ -295,10 +333,10 @@ def _judged(state: LiveState, given: Judged) -> tuple[LiveState, tuple[Action, .
     if sudden and not (state.weights and state.weights[0][0]):
         state = replace(state, origin=_changed(state), left_open=False)
     covers = state.coverage if low else float(np.mean(state.coverages))
-    what = (
-        f'the band of parameters and sensor noise covers {covers:.0%} of the samples: '
-        'the model lacks something'
-    )
+    what = f'the band of parameters and sensor noise covers {covers:.0%} of the samples'
+    if not (low or state.lasting):
+        what += f', and forecasts are off by {state.off:.1f} times what it holds'
+    what += ': the model lacks something'
     return replace(state, broken=True, reason=what), (Say('coverage', what),)
 
 
@@ -337,7 +375,9 @@ def _received(state: LiveState, seconds: float) -> LiveState:
 
 def _began(state: LiveState) -> LiveState:
     """Let go of bands, which are of windows before."""
-    return replace(state, coverages=(), judged=(), broken=False, sound=False, alarm=math.nan)
+    return replace(
+        state, coverages=(), errors=(), judged=(), broken=False, sound=False, alarm=math.nan
+    )
 
 
 def _timed(state: LiveState) -> LiveState:

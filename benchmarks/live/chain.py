@@ -129,7 +129,9 @@ class _Loop:
         self.out.said += [(self._now, event.message) for event in told]
         for prediction in result.scored:
             if prediction.kind == 'noise' and prediction.coverage is not None:
-                self._take(live.Judged(float(prediction.coverage[-1]), prediction.number))
+                coverage, number = float(prediction.coverage[-1]), prediction.number
+                held = float(prediction.width[-1]), float(prediction.band.levels[-1])
+                self._take(live.Judged.of(coverage, number, prediction.rms_error, *held))
         weights = tuple((frozenset(m.effects), w) for m, w in self.estimator.weights)
         alarms = [event for event in told if isinstance(event, Contradicted)]
         self._contradiction.take(result, alarms)

@@ -455,3 +455,15 @@ def test_an_offset_is_told_and_not_carried():
     found.error = SimpleNamespace(removed_ci=(0.9, 1.0))
     told = concluded(found, [record])
     assert told.proposal is None and not told.left_open and 'level' in told.why_not
+
+
+def test_forecasts_that_are_far_off_where_few_samples_are_break_the_band():
+    """A limit that takes off a few peaks: 95 % are covered, and the others are off by much."""
+    judged = [live.Judged(0.95, error=3.0 if i % 3 == 0 else 1.0) for i in range(12)]
+    state, actions = run(live.init(SETTINGS), live.Received(30.0), *judged)
+    assert len(looks(actions)) == 1 and 'off by 1.8 times' in looks(actions)[0]
+    assert not state.trusted
+    glitch = [live.Judged(0.95, error=200.0 if i == 5 else 1.0) for i in range(12)]
+    state, actions = run(live.init(SETTINGS), live.Received(30.0), *glitch)
+    assert actions == [] and state.trusted
+    assert live.Judged.of(0.95, 7, 1e-5, 3.919928e-5, 0.95).error == pytest.approx(1.0, rel=1e-5)
