@@ -65,6 +65,7 @@ LIBRARIES = {
     'scoringrules': Names('scoringrules', None),
     'sklearn': Names('scikit-learn', 'python3-sklearn'),
     'statsmodels': Names('statsmodels', None),
+    'threadpoolctl': Names('threadpoolctl', None),
     'xarray': Names('xarray', 'python3-xarray'),
     'xdist': Names('pytest-xdist', 'python3-pytest-xdist'),
     'yaml': Names('pyyaml', 'python3-yaml'),

@@ -1,4 +1,4 @@
-"""The first page: who it is for, what to type, one picture; numbers that are counted."""
+"""The first page: who it is for, what to type, what comes of it; numbers that are counted."""
 
 import re
 from pathlib import Path
@@ -23,13 +23,19 @@ def test_number_of_effects_is_that_of_what_is_searched() -> None:
 
 
 def test_first_things_first() -> None:
-    """Laboratories in the first paragraph, two commands and the tutorial above the one picture."""
+    """Laboratories in the first paragraph; two commands and the tutorial above the pictures.
+
+    These are of one run: what was found, and how sure it was while the test went on.
+    """
     paragraph = TEXT.split('\n\n')[1]
     assert 'laboratories' in paragraph
     picture = TEXT.index('![')
     places = [TEXT.index(w) for w in ('calibrate free.csv', 'diagnose free.csv', 'tutorial.md')]
     assert places == sorted(places) and places[-1] < picture
-    assert TEXT.count('![') == 1
+    assert re.findall(r'!\[.*\]\(docs/images/(\w+)', TEXT) == [
+        'demo_diagnosis',
+        'demo_explanations',
+    ]
 
 
 def test_each_kind_of_reader_has_a_page() -> None:
