@@ -80,6 +80,6 @@ def file(title: str) -> Path:
 
 if __name__ == '__main__':
     if '--check' in sys.argv:
-        sys.exit(any(file(t).read_text(encoding='utf-8') != page(t) for t in PAGES))
+        sys.exit(any(not file(t).exists() or page(t) != file(t).read_text('utf-8') for t in PAGES))
     for name in PAGES:
         file(name).write_text(page(name), encoding='utf-8')

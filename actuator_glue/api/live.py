@@ -162,7 +162,8 @@ def _probability(effect: Finding) -> float:
 
 def _tied(found: Diagnosis) -> list[tuple[tuple[str, ...], float]]:
     """Return structures with a tied name for one that is told, and their odds against it."""
-    told, out = carriable(found.structure), dict[frozenset[str], tuple[tuple[str, ...], float]]()
+    told = carriable(found.structure)
+    out: dict[frozenset[str], tuple[tuple[str, ...], float]] = {}
     for effect in found.effects:
         if effect.name not in told:
             continue
