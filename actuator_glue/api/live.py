@@ -141,7 +141,8 @@ def _opened(
     the machine is: as a prior it would be believed.
     """
     stiffness = {record.known_stiffness() for record in records}
-    told = found.prior is not None or found.base[_OIL].identified
+    given = found.prior is not None and _OIL in found.prior.names
+    told = given or found.base[_OIL].identified
     if told or len(stiffness) > 1 or not len(draws):
         return draws
     return Ridge(model.names, *model.bounds, stiffness.pop()).opened(

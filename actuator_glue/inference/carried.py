@@ -76,6 +76,16 @@ class Carried:
             other.factor,
         )
 
+    def only(self, names: Sequence[str]) -> Carried:
+        """Return what is known of some of the parameters by themselves.
+
+        Args:
+            names: of them, in any order.
+        """
+        at = [self.names.index(name) for name in names]
+        spread = tuple(self.spread[i] for i in at)
+        return replace(self, names=tuple(names), draws=self.draws[:, at], spread=spread)
+
     def drifted(self, drift: Drift, seconds: float) -> Carried:
         """Return what is known so much later [s]: a random walk of each parameter's logarithm."""
         hours = max(seconds, 0.0) / 3600.0

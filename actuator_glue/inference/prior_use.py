@@ -25,6 +25,7 @@ class PriorUse:
         quality: energy coefficient between its draws and the mixture, 0 for equal.
         p_value: prior predictive p-value of the records (Evans and Moshonov 2006).
         doubt: structure over noise that the calibration left, where its intervals do not hold.
+        names: parameters that it knew.
     """
 
     source: str
@@ -34,6 +35,7 @@ class PriorUse:
     quality: float
     p_value: float
     doubt: str = ''
+    names: tuple[str, ...] = ()
 
     @property
     def contradicted(self) -> bool:
@@ -77,5 +79,12 @@ class GivenPrior:
     def used(self, components: int, quality: float, p_value: float) -> PriorUse:
         """Return how it was used."""
         return PriorUse(
-            self.source, self.drift, self.age_s, components, quality, p_value, self.doubt
+            self.source,
+            self.drift,
+            self.age_s,
+            components,
+            quality,
+            p_value,
+            self.doubt,
+            self.carried.names,
         )

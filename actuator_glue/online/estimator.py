@@ -211,6 +211,7 @@ class Estimator:
         self._judged_to: int | None = None
         self._pending: Proposal | None = None
         self._members: list[_Member] = []
+        self._log_prior = self._evidence = np.zeros(0)
         self._beside: _Beside | None = None
         self._begin(self.proposal)
         self._ahead = Ahead()
@@ -450,13 +451,14 @@ class Estimator:
     def _begin(self, proposal: Proposal) -> None:
         """Carry these structures from now on; what one of them has learned before goes on.
 
-        Where there are several, Eq. (2) among them and what led before are what they have to do
-        better than.
+        Where there are several, Eq. (2) among them and what was carried before are what they have
+        to do better than.
         """
         self._pending = self._beside = None
         led = self._members[0] if self._members else None
         began = None if led is None else led.knowledge.began_ns
         old = {frozenset(member.model.effects): member for member in self._members}
+        carried = [(frozenset(model.effects), share) for model, share in self.weights]
         self._members, told = [], []
         for one in proposal.structures:
             member = None if one.known is not None else old.get(frozenset(one.model.effects))
@@ -472,10 +474,14 @@ class Estimator:
             for member in self._members:
                 member.before = not member.model.effects
             names = {frozenset(member.model.effects) for member in self._members}
-            if led is not None and frozenset(led.model.effects) not in names:
-                led.before, led.worse = True, 0
-                self._members.append(led)
-                self._log_prior = np.append(self._log_prior, np.log(structures.BEFORE))
+            for effects, share in carried[: structures.MOST]:
+                if effects in names:
+                    continue
+                stays = old[effects]
+                stays.before, stays.worse = True, 0
+                weight = max(structures.BEFORE * share, structures.BESIDE)
+                self._members.append(stays)
+                self._log_prior = np.append(self._log_prior, np.log(weight))
         self._evidence = np.zeros(len(self._members))
         self._judged_to = None
 

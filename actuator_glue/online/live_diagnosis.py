@@ -21,6 +21,7 @@ from scipy.special import ndtri
 
 from actuator_glue.inference.carried import Carried, Drift
 from actuator_glue.inference.choice import choose_model
+from actuator_glue.inference.moments import moments
 from actuator_glue.online.collect import Collector
 from actuator_glue.online.knowledge import Known
 from actuator_glue.online.settings import EstimatorSettings
@@ -330,8 +331,11 @@ def _judged(state: LiveState, given: Judged) -> tuple[LiveState, tuple[Action, .
     low = state.coverage < state.settings.coverage_limit
     sudden = state.sound and low
     state = replace(state, ready=state.seconds + _CHANGED * sudden)
-    if sudden and not (state.weights and state.weights[0][0]):
-        state = replace(state, origin=_changed(state), left_open=False)
+    if state.sound and (low or state.off > _OFF) and not (state.weights and state.weights[0][0]):
+        state = replace(state, origin=_changed(state, low), left_open=False)
+        if not low:
+            # A few peaks: they take longer to show what is missing.
+            state = replace(state, ready=state.origin + state.settings.minimum)
     covers = state.coverage if low else float(np.mean(state.coverages))
     what = f'the band of parameters and sensor noise covers {covers:.0%} of the samples'
     if not (low or state.lasting):
@@ -340,12 +344,20 @@ def _judged(state: LiveState, given: Judged) -> tuple[LiveState, tuple[Action, .
     return replace(state, broken=True, reason=what), (Say('coverage', what),)
 
 
-def _changed(state: LiveState) -> float:
-    """Return how much data there were when the last band before the bad ones was judged [s]."""
-    count = state.settings.coverage_windows
-    lately = list(zip(state.coverages, state.judged, strict=True))[-count - 1 :]
-    bad = [i for i, (coverage, _) in enumerate(lately) if coverage < state.settings.coverage_limit]
-    return lately[bad[0] - 1][1] if bad and bad[0] > 0 else state.origin
+def _changed(state: LiveState, low: bool) -> float:
+    """Return how much data there were when the last band before the bad ones was judged [s].
+
+    Args:
+        state: with bands that say that something changed.
+        low: because coverage is low, not because forecasts are off.
+    """
+    bad = [coverage < state.settings.coverage_limit for coverage in state.coverages]
+    if low:
+        bad = bad[-state.settings.coverage_windows - 1 :]
+    else:
+        bad = [error > _OFF for error in state.errors]
+    first = bad.index(True) if any(bad) else 0
+    return state.judged[first - len(bad) - 1] if first > 0 else state.origin
 
 
 def _estimated(state: LiveState, given: Estimated) -> tuple[LiveState, tuple[Action, ...]]:
@@ -452,7 +464,7 @@ def _due(state: LiveState) -> str:
             return 'there are twice as many data as what was added was found in'
     # Before the first one there is nothing to look at again.
     again = max(state.alarm, state.looked) + max(settings.pause, state.looked - state.alarm)
-    if seconds >= again:
+    if seconds >= max(again, state.ready):
         return 'the alarm still stands, and there are more data since it began'
     return ''
 
@@ -460,11 +472,11 @@ def _due(state: LiveState) -> str:
 class Memory:
     """What an estimator knew of Eq. (2)'s parameters before some samples; bounded.
 
-    Nothing where it began without a calibration: along what no window tells its posterior is the
-    box, whose mean is a statement about the bounds. An effect that tells a little of it would be
-    found with the size that goes with that. Else each sample counts once: what is known before
-    records is the calibration that the estimator began with, or its posterior of windows that
-    ended before the records begin.
+    Each sample counts once: what is known before records is the calibration that the estimator
+    began with, or its posterior of windows that ended before the records begin. Where it began
+    without a calibration, that is of the parameters alone that windows tell: along what none does
+    its posterior is the box, whose mean is a statement about the bounds. An effect that tells a
+    little of it would be found with the size that goes with that.
 
     Attributes:
         settings: of the estimator; None before they are known.
@@ -504,7 +516,10 @@ class Memory:
             return
         if self._known and known.last_ns < self._known[-1].last_ns + 1_000_000_000:
             return
-        self._known.append(known)
+        told = known.carried.names if self._carried is not None else _told(known.carried)
+        if not told:
+            return
+        self._known.append(replace(known, carried=known.carried.only(told)))
         while first_ns is not None and len(self._known) > 1 and self._known[1].last_ns < first_ns:
             self._known.popleft()
 
@@ -515,7 +530,7 @@ class Memory:
             Draws that have drifted to that time, by how much they drift, and their age [s]; None
             where nothing was known.
         """
-        if self.settings is None or self._carried is None:
+        if self.settings is None:
             return None
         drift = self.settings.drifts()
         earlier = [one for one in self._known if one.last_ns < first_ns]
@@ -523,9 +538,19 @@ class Memory:
             known = earlier[-1]
             age = (first_ns - known.middle_ns) * 1e-9
             return known.carried.drifted(drift, age).later(age), drift, age
+        if self._carried is None:
+            return None
         since = 0 if self._began_ns is None else max(first_ns - self._began_ns, 0)
         age = self.settings.prior_age + since * 1e-9
         return self._carried.drifted(drift, age), drift, age
+
+
+def _told(carried: Carried) -> tuple[str, ...]:
+    """Return the parameters of Eq. (2) that draws tell by themselves, beside the usual bounds."""
+    plain = choose_model()
+    base = carried.only(plain.names)
+    wide = moments(base.draws, *plain.bounds).prior_dominated
+    return tuple(name for name, open_ in zip(plain.names, wide, strict=True) if not open_)
 
 
 def looked_at(

@@ -38,8 +38,8 @@ MATERIAL = 0.5
 _WORST = 1e3
 # What is proposed beside another has at least this weight: less is not worth a share of the time.
 BESIDE = 0.05
-# Weight of what led before, beside what is carried in its place: a look at few data errs in one
-# name of ten, and forecasts may bring it back.
+# Weight of what was carried before, all together, beside what is carried in its place (`BESIDE`
+# each at least): a look at few data errs in one name of ten, and forecasts may bring it back.
 BEFORE = 0.1
 # A structure that leads leaves after so many windows, and so long, of forecasts that were worse
 # than those of what was there before it.
@@ -193,7 +193,7 @@ def moved(
 def weights(log_prior: Array, evidence: Array) -> Array:
     """Return the weights (K,) of structures from what they came in with and their forecasts."""
     logs = log_prior + evidence
-    found = np.exp(logs - logs.max())
+    found = np.exp(logs - logs.max(initial=-np.inf))
     return np.asarray(found / found.sum())
 
 

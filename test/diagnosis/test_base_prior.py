@@ -48,8 +48,21 @@ def test_fit_and_posterior_have_one_prior() -> None:
     step = 1e-6 * np.eye(5)[:, :4]
     slopes = (prior.pull(np.log(THETA) + step) - prior.pull(np.log(THETA))) / 1e-6
     np.testing.assert_allclose(slopes[:4], prior.slopes(5)[:4], rtol=1e-6, atol=1e-9)
-    with pytest.raises(InputError, match='alpha_3'):
-        BasePrior(Carried(NAMES[:3], known(THETA, 0.05).draws[:, :3]), UPPER)
+
+
+def test_what_is_not_known_stays_open() -> None:
+    """A prior of beta_1 alone pulls and weighs beta_1 alone; one of nothing is an error."""
+    prior = BasePrior(known(THETA, 0.05).only(['beta_1']), UPPER)
+    moved = THETA * np.exp([0.0, 0.5, -0.5, 1.0])
+    assert prior.pull(np.log(moved)) == pytest.approx(prior.pull(np.log(THETA)))
+    assert prior.log_density(moved[None]) == pytest.approx(prior.log_density(THETA[None]))
+    assert prior.slopes(5).shape == (5, 1)
+    assert not prior.slopes(5)[1:].any()
+    start = prior.start(moved)
+    assert start[0] == pytest.approx(THETA[0], rel=0.01)
+    assert start[1:].tolist() == moved[1:].tolist()
+    with pytest.raises(InputError, match='none of them'):
+        BasePrior(Carried(('backlash',), np.ones((60, 1))), UPPER)
 
 
 def test_a_fit_ends_at_the_most_probable_parameters() -> None:

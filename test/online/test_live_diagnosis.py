@@ -339,12 +339,20 @@ def test_what_a_look_is_of_begins_where_the_estimator_knows_what_was_before():
     assert live.looked_at(Collector(9.0), memory, 0.0) == ([], None)
 
 
-def test_what_an_estimator_learned_without_a_calibration_is_not_handed_over():
+def test_of_what_is_learned_without_a_calibration_what_windows_tell_is_handed_over():
     """Where one stiffness leaves alpha_2 open its posterior is the box: 7 +- 1.5 MN/m, not 0.3."""
     memory = live.Memory()
     memory.setup(EstimatorSettings(prior='sequential'), None)
-    memory.learn(known(44.0), 0)
+    rng, (lower, upper) = np.random.default_rng(1), choose_model().bounds
+    draws = rng.uniform(lower, upper, (400, 4))
+    at = known(44.0)
+    memory.learn(replace(at, carried=Carried(NAMES, draws)), 0)
     assert memory.before(45_000_000_000) is None
+    draws[:, 0] = rng.normal(134.0, 0.3, 400)
+    memory.learn(replace(at, carried=Carried(NAMES, draws)), 0)
+    learned, _, _ = memory.before(45_000_000_000)
+    assert learned.names == ('beta_1',) and learned.draws.mean() == pytest.approx(134.0, rel=1e-3)
+    assert memory.before(44_000_000_000) is None
 
 
 def test_an_addition_that_a_look_does_not_support_is_carried_beside_eq_2():
@@ -426,9 +434,10 @@ def test_what_one_stiffness_leaves_open_is_handed_over_as_open():
     ends = np.quantile(before, [0.1, 0.9])
     assert np.quantile(ratio, [0.1, 0.9]) == pytest.approx(ends, rel=0.01)
     # A calibration tells where on the ridge the machine is.
-    found.prior = object()
-    kept = proposed(found, [record]).structures[0].known.carried.draws
-    assert kept[:, 2].std() == pytest.approx(3e5, rel=0.1)
+    for names, spread in ((NAMES, 3e5), (('beta_1',), draws[:, 2].std())):
+        found.prior = SimpleNamespace(names=names)
+        kept = proposed(found, [record]).structures[0].known.carried.draws
+        assert kept[:, 2].std() == pytest.approx(spread, rel=0.1)
 
 
 def test_an_offset_is_told_and_not_carried():
@@ -463,6 +472,14 @@ def test_forecasts_that_are_far_off_where_few_samples_are_break_the_band():
     state, actions = run(live.init(SETTINGS), live.Received(30.0), *judged)
     assert len(looks(actions)) == 1 and 'off by 1.8 times' in looks(actions)[0]
     assert not state.trusted
+    # In mid-stream it is looked at what came since the last good band, when there is enough of it.
+    _, state = watched(live.init(SETTINGS), 44.0, lambda now: 0.95)
+    actions = []
+    while not looks(actions):
+        peaks = live.Received(state.seconds + 1.0), live.Judged(0.95, error=4.0)
+        state, actions = run(state, *peaks)
+    assert 'off by' in looks(actions)[0] and state.seconds == 44.0 + SETTINGS.minimum
+    assert [action.since for action in actions if isinstance(action, live.Look)] == [44.0]
     glitch = [live.Judged(0.95, error=200.0 if i == 5 else 1.0) for i in range(12)]
     state, actions = run(live.init(SETTINGS), live.Received(30.0), *glitch)
     assert actions == [] and state.trusted

@@ -415,6 +415,27 @@ def test_what_forecasts_have_excluded_comes_back_where_the_addition_makes_them_w
     assert estimator.weights[0][0].effects == () and told[-1][0].worse
 
 
+def test_what_forecasts_have_not_excluded_stays_beside_what_is_proposed_next():
+    """Looks at few data err; each of them knows nothing of those before."""
+
+    def proposal(name, share):
+        models = Proposed(choose_model((name,)), share), Proposed(choose_model(), 1.0 - share)
+        return Proposal(models, 5e-6)
+
+    estimator, _ = weighing()
+    for name in ('coulomb-friction', 'delay'):
+        estimator._begin(proposal(name, 0.98))
+    shares = {model.effects: share for model, share in estimator.weights}
+    assert set(shares) == {('delay',), (), ('coulomb-friction',), ('backlash',)}
+    assert shares['coulomb-friction',] == pytest.approx(0.09 / 1.14, rel=0.02)
+    assert shares['backlash',] == pytest.approx(0.05 / 1.14, rel=0.02)
+    # Of those carried before as many as can be carried.
+    for name in ('valve-deadband', 'gain'):
+        estimator._begin(proposal(name, 0.98))
+    names = [model.effects for model, _ in estimator.weights]
+    assert names == [('gain',), (), ('valve-deadband',), ('delay',)]
+
+
 def test_without_rivals_that_were_there_before_nothing_is_taken_out():
     """Who asks for one structure has it, whatever it forecasts."""
     estimator = Estimator(SETTINGS, Proposal((Proposed(choose_model(('backlash',))),)))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from actuator_glue.errors import InputError
 from actuator_glue.inference.carried import Carried
 from actuator_glue.inference.informative_prior import informative_prior
 from actuator_glue.inference.mixture_density import covariance
@@ -14,7 +13,7 @@ from actuator_glue.records import Array
 
 
 class BasePrior:
-    """The mixture of a calibration in the logarithms of Eq. (2)'s parameters.
+    """The mixture of a calibration in the logarithms of the parameters of Eq. (2) that it knows.
 
     A posterior is drawn with the mixture itself; a fit takes the normal of its moments.
 
@@ -27,40 +26,45 @@ class BasePrior:
         quality: energy coefficient between the draws and the mixture, 0 for equal.
 
     Raises:
-        InputError: it does not know all four parameters.
+        InputError: it knows none of the four parameters.
     """
 
     def __init__(self, carried: Carried, upper: Array) -> None:
-        missing = [name for name in NAMES if name not in carried.names]
-        if missing:
-            raise InputError(f'the prior does not know {", ".join(missing)}')
         zero = (0.0,) * len(NAMES)
         self._known = informative_prior(carried, NAMES, zero, tuple(map(float, upper)), None)
+        self._columns = list(self._known.columns)
         mean, spread = covariance(self._known.mixture)
-        self._mean = mean + np.log(upper)
+        self._mean = mean + np.log(upper[self._columns])
         self._whiten = np.linalg.inv(np.linalg.cholesky(spread))
         self.components = len(self._known.mixture.log_weights)
         self.quality = self._known.quality()
 
     @property
-    def theta(self) -> Array:
-        """Its middle, physical units, (4,)."""
-        return np.asarray(np.exp(self._mean))
+    def names(self) -> tuple[str, ...]:
+        """The parameters of Eq. (2) that it knows."""
+        return self._known.names
+
+    def start(self, theta: Array) -> Array:
+        """Return parameters (4,) with its middle for those that it knows, physical units."""
+        out = np.array(theta, np.float64)
+        out[self._columns] = np.exp(self._mean)
+        return out
 
     def slopes(self, count: int) -> Array:
-        """Derivatives of `pull` to the working coordinates of a model of p parameters, (p, 4)."""
-        out = np.zeros((count, len(NAMES)))
-        out[: len(NAMES)] = self._whiten.T
+        """Derivatives of `pull` to the working coordinates of a model of p parameters, (p, q)."""
+        out = np.zeros((count, len(self._columns)))
+        out[self._columns] = self._whiten.T
         return out
 
     def pull(self, z: Array) -> Array:
-        """Distance of working coordinates (..., p) from its middle in standard units, (..., 4)."""
-        return np.asarray((z[..., : len(NAMES)] - self._mean) @ self._whiten.T)
+        """Distance of working coordinates (..., p) from its middle in standard units, (..., q)."""
+        return np.asarray((z[..., self._columns] - self._mean) @ self._whiten.T)
 
     def log_density(self, theta: Array) -> Array:
         """Log density (m,) at physical parameters (m, p), per volume of the logarithms."""
         base = np.ascontiguousarray(theta[:, : len(NAMES)])
-        return np.asarray(self._known.log_density(base) + np.log(base).sum(axis=1))
+        logs = np.log(base[:, self._columns]).sum(axis=1)
+        return np.asarray(self._known.log_density(base) + logs)
 
     def conflict(self, draws: Array) -> Conflict:
         """How far the records contradict it, from draws (m, p) of the posterior with it."""

@@ -272,7 +272,7 @@ def base_starts(data: Data) -> Array:
                 # d2 s^2 + ... + n0 with n0 = omega^2 d2
                 starts.append([beta, omega**2 * stiff, stiff, 0.3])
     if data.prior is not None:
-        starts.append(list(data.prior.theta))
+        starts.append(data.prior.start(np.array(starts[len(starts) // 2])).tolist())
     return np.array(starts)
 
 
