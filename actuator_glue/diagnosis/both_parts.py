@@ -17,6 +17,7 @@ from actuator_glue.diagnosis.held_out import COMPLETE, HeldOutError, Verdict
 from actuator_glue.diagnosis.held_out_look import Curves, verify
 from actuator_glue.diagnosis.learned.term import any_learned
 from actuator_glue.diagnosis.wrong_setup import WrongSetup
+from actuator_glue.inference.least_squares.each import Each
 from actuator_glue.records import Array
 
 
@@ -51,18 +52,20 @@ class BothParts:
     setup: WrongSetup | None
 
 
-def of(drawn: AnswerPosterior, other: WrongSetup | None, seed: int) -> BothParts:
+def of(drawn: AnswerPosterior, other: WrongSetup | None, seed: int, each: Each) -> BothParts:
     """Look at the held-out part once, and say what both parts come to.
 
     Args:
         drawn: the answer of the fitting part and its posterior.
         other: another set-up under which Eq. (2) explains the records far better, if there is one.
         seed: seed of the intervals and of the sham effect.
+        each: simulates records, several at a time if it can.
     """
     result, before, after = drawn.result, drawn.before, drawn.after
-    decision, found, held = result.decision, result.found, result.prepared.held
+    decision, found = result.decision, result.found
+    held, fitted = (replace(d, each=each) for d in (result.prepared.held, result.data))
     error, coverage, curves = verify(
-        result.data, held, before, after, decision.noise, seed, result.line, len(found.singles)
+        fitted, held, before, after, decision.noise, seed, result.line, len(found.singles)
     )
     error = held_out_reach.reached_by_both(
         error, found.material, result.scorer, held, before, after

@@ -17,6 +17,7 @@ from actuator_glue.diagnosis.measured.measurement import Measured
 from actuator_glue.diagnosis.one_record import OneRecord
 from actuator_glue.diagnosis.onset.onset import Appeared, Onset, dated
 from actuator_glue.diagnosis.preparation import Prepared
+from actuator_glue.diagnosis.ranking import removed
 from actuator_glue.diagnosis.regression import Surrogate
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.search import Search
@@ -112,9 +113,15 @@ class Conclusion:
         return replace(other, appeared=self.appeared)
 
     def complete(self, selection: BeamSearch, found: Selection | None) -> Conclusion | None:
-        """Return another answer about the same records, if there is one and it is complete."""
-        other = None if found is None else self.of(selection, found)
-        return None if other is None or other.decision.verdict == 'unexplained' else other
+        """Return another answer about the same records, if there is one and it is complete.
+
+        Or leaves materially less: what seemed noise beside this one was structure, then.
+        """
+        if found is None:
+            return None
+        other = self.of(selection, found)
+        more = removed(self.found.final, found.final) >= self.found.material
+        return other if more or other.decision.verdict != 'unexplained' else None
 
 
 def concluded(

@@ -73,7 +73,7 @@ def diagnose(
     result = search(ready, settings, each, tell, effort)
     drawn = sampled(result, settings, np.random.default_rng([seed, 1]), each, tell)
     tell('held-out', 0.0)
-    both = both_parts.of(drawn, other, seed)
+    both = both_parts.of(drawn, other, seed, each)
     used = None
     if prior is not None and known is not None:
         p_value = known.conflict(drawn.after.draws).p_value

@@ -100,4 +100,5 @@ def _together(a: Data, b: Data) -> Data:
         (*a.origins, *b.origins),
         a.prior,
         steps=(*a.steps, *b.steps),
+        each=b.each,
     )

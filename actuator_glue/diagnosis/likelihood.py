@@ -15,7 +15,7 @@ import numpy as np
 from actuator_glue.diagnosis.discrepancy import Discrepancy, ScaleMixture
 from actuator_glue.diagnosis.identifiable import Straight, Working, derivatives
 from actuator_glue.diagnosis.score import Scorer
-from actuator_glue.inference.least_squares.data import Data, chunks
+from actuator_glue.inference.least_squares.data import Data, lanes
 from actuator_glue.inference.least_squares.each import Each
 from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.inference.least_squares.fit import fit as fit_to
@@ -65,7 +65,7 @@ class Whitened(Data):
         pairs = zip(self.records, self.masks, strict=True)
         return self.scorer.whiten(np.concatenate([r.measured[mask] for r, mask in pairs]))
 
-    def simulate(self, model: Model, theta: Array, each: Each = map) -> Array:
+    def simulate(self, model: Model, theta: Array, each: Each | None = None) -> Array:
         """As `Data.simulate`, whitened."""
         return self.scorer.whiten(super().simulate(model, theta, each))
 
@@ -122,8 +122,8 @@ class Likelihood:
         It is uniform in the logarithms otherwise.
         """
         data = self.scorer.data
-        parts = chunks(len(theta), data.target.size)
-        found = np.concatenate(list(self.each(self._of_some, [theta[some] for some in parts])))
+        parts = [theta[some] for some in lanes(len(theta))]
+        found = np.concatenate(list(self.each(self._of_some, parts)))
         return found if data.prior is None else found + data.prior.log_density(theta)
 
     def _of_some(self, theta: Array) -> Array:

@@ -94,7 +94,8 @@ class Scorer:
     def left_out_error(self, fit: Fit) -> float:
         """Rms error of all blocks, each under least-squares parameters fitted without it [m].
 
-        What is compared in metres is fitted in metres, as the structures themselves are.
+        What is compared in metres is fitted in metres, as the structures themselves are. No less
+        than the fit itself leaves: short of its optimum a step promises what no fit has reached.
         """
         if fit not in self._errors:
             self._errors[fit] = self._left_out_error(fit)
@@ -106,7 +107,7 @@ class Scorer:
             e = fit.error[block]
             left = e - move @ fit.jacobian[:, block]
             total += min(float(left @ left), 4.0 * float(e @ e))
-        return float(np.sqrt(total / len(fit.error)))
+        return max(float(np.sqrt(total / len(fit.error))), fit.rms)
 
     def moves(self, fit: Fit, error: Array, jac: Array, blocks: Sequence[slice]) -> Array:
         """Return how far the optimum without each block is from a fit, (B, p), within the bounds.

@@ -474,8 +474,9 @@ class Estimator:
             for member in self._members:
                 member.before = not member.model.effects
             names = {frozenset(member.model.effects) for member in self._members}
+            most = structures.most_in_all(self.settings.window, self.settings.hop)
             for effects, share in carried[: structures.MOST]:
-                if effects in names:
+                if effects in names or len(self._members) == most:
                     continue
                 stays = old[effects]
                 stays.before, stays.worse = True, 0

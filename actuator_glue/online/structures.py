@@ -41,6 +41,9 @@ BESIDE = 0.05
 # Weight of what was carried before, all together, beside what is carried in its place (`BESIDE`
 # each at least): a look at few data errs in one name of ten, and forecasts may bring it back.
 BEFORE = 0.1
+# So many times a hop is the longest window that leaves time for forecasts of all of them: those of
+# one take 7 ms of a window of 10 s at 1 kHz.
+_LEISURE = 20.0
 # A structure that leads leaves after so many windows, and so long, of forecasts that were worse
 # than those of what was there before it.
 WORSE, WORSE_SECONDS = 3, 1.0
@@ -160,6 +163,16 @@ class Proposal:
         """Log probabilities (K,) that they come in with."""
         weights = np.array([one.weight for one in self.structures])
         return np.asarray(np.log(weights / weights.sum()))
+
+
+def most_in_all(window: float, hop: float) -> int:
+    """Return how many structures are carried at most, with those from before.
+
+    Args:
+        window: length of a window [s].
+        hop: time from one to the next [s].
+    """
+    return 2 * MOST if hop * _LEISURE >= window else MOST + 1
 
 
 def _number(value: Any) -> float:

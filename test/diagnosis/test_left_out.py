@@ -103,3 +103,12 @@ def test_misfit_is_weighed_about_least_squares(kind: str) -> None:
     scorer = replace(scorer, likely=False)
     nats = refitted(data, model, found.theta, scorer).sum()
     assert scorer.block_scores(found).sum() == pytest.approx(nats, abs=10.0)
+
+
+def test_a_fit_short_of_its_optimum_promises_no_less_than_it_leaves() -> None:
+    """A step from there promises what no fit has reached: it is worth what it leaves."""
+    data, model, found, scorer = fitted('ar1', 'valve-lag', 4)
+    assert scorer.left_out_error(found) > found.rms
+    near = fit(data, model, found.theta * [1.3, 1.1, 1.0, 1.0, 1.0], iterations=0)
+    assert near.rms > 1.2 * found.rms
+    assert scorer.left_out_error(near) >= near.rms

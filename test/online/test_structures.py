@@ -377,9 +377,9 @@ def test_what_nobody_waits_for_any_more_is_let_go_of():
     assert estimator.rival_job() is None
 
 
-def weighing(*errors):
+def weighing(*errors, settings=SETTINGS):
     """An estimator that carries play and Eq. (2), and the events of windows with such errors."""
-    estimator = Estimator(SETTINGS, choose_model())
+    estimator = Estimator(settings, choose_model())
     window = None
     for item in stream(lost_motion(4.0)):
         give(estimator, item)
@@ -434,6 +434,16 @@ def test_what_forecasts_have_not_excluded_stays_beside_what_is_proposed_next():
         estimator._begin(proposal(name, 0.98))
     names = [model.effects for model, _ in estimator.weights]
     assert names == [('gain',), (), ('valve-deadband',), ('delay',)]
+
+
+def test_windows_in_quick_succession_leave_no_time_for_more_than_one_from_before():
+    quick = replace(SETTINGS, hop=0.2, time_budget=0.2, window=4.0 + SETTINGS.settle)
+    estimator, _ = weighing(settings=quick)
+    for names in (('coulomb-friction', 'delay'), ('gain', 'valve-deadband')):
+        new = [Proposed(choose_model((name,)), 0.4) for name in names]
+        estimator._begin(Proposal((*new, Proposed(choose_model(), 0.2)), 5e-6))
+    carried = [model.effects for model, _ in estimator.weights]
+    assert carried == [('gain',), ('valve-deadband',), (), ('coulomb-friction',)]
 
 
 def test_without_rivals_that_were_there_before_nothing_is_taken_out():

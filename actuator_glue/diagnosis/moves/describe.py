@@ -121,7 +121,7 @@ def learned(selection: BeamSearch, found: Selection, complete: bool = False) -> 
     if best is found.final:
         return None
     singles = selection.rescored(found.singles)
-    return selection.checked(best, search.trial(()), singles)
+    return selection.checked(best, search.trial(()), singles, exchanged=not search.effort.over)
 
 
 def instead(selection: BeamSearch, found: Selection) -> Selection | None:

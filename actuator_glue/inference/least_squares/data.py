@@ -38,6 +38,12 @@ def chunks(rows: int, columns: int) -> Iterator[slice]:
         yield slice(begin, begin + size)
 
 
+def lanes(rows: int) -> Iterator[slice]:
+    """Yield slices of as many rows as the kernels work on at once."""
+    for begin in range(0, rows, LANES):
+        yield slice(begin, begin + LANES)
+
+
 def _times(whole: Record, period: float, most: int = 1) -> int:
     """Return how many simulated samples are averaged into one: the kernel's steps, or `most`."""
     count = round(period / whole.period)
@@ -71,6 +77,7 @@ class Data:
         finer: whether records are simulated as they were sampled, or nearly, and decimated then.
         steps: records of which the kernel's steps are samples, where it takes some for one; none
             for those that follow from `recorded`.
+        each: simulates the records, several at a time if it can.
     """
 
     records: tuple[Record, ...]
@@ -81,6 +88,7 @@ class Data:
     prior: BasePrior | None = None
     finer: bool = False
     steps: tuple[Record, ...] = ()
+    each: Each = map
 
     def __post_init__(self) -> None:
         if not self.steps:
@@ -175,18 +183,18 @@ class Data:
             )
         return tuple(out)
 
-    def simulate(self, model: Model, theta: Array, each: Each = map) -> Array:
+    def simulate(self, model: Model, theta: Array, each: Each | None = None) -> Array:
         """Simulate all records free-run and return the counted samples (m, N) [m].
 
         Args:
             model: what simulates them.
             theta: parameters, (m, p).
-            each: simulates the records, several at a time if it can.
+            each: simulates the records in place of `Data.each`.
         """
         table = np.atleast_2d(theta)
         out = np.empty((len(table), self.target.size))
         tests = self._repeats if isinstance(model, Structure) else self._singles
-        for _ in each(lambda same: self._simulate(model, table, same, out), tests):
+        for _ in (each or self.each)(lambda same: self._simulate(model, table, same, out), tests):
             pass
         return out
 
