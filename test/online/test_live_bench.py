@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from actuator_glue.model.structure import Structure
+from benchmarks.live.__main__ import ran
 from benchmarks.live.cases import NOISE, RATE, Case, all_cases, left, streamed
 from benchmarks.live.score import made_worse
 from benchmarks.live.table import page
@@ -118,3 +119,9 @@ def test_the_same_case_is_the_same_stream():
     case = Case(('backlash',), 4.0, seconds=6.0, seed=11)
     one, again = streamed(case), streamed(replace(case))
     assert one.record.measured.tobytes() == again.record.measured.tobytes()
+
+
+def test_a_machine_that_cannot_be_built_is_said_and_left_out(capsys):
+    impossible = Case(('delay',), 1e6, seconds=5.0)
+    assert list(ran([impossible], 1, 1.0)) == []
+    assert 'left out: ' in capsys.readouterr().err
