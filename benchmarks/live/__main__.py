@@ -35,6 +35,10 @@ def one(case: Case) -> dict[str, Any]:
     return row | {'seconds': time.perf_counter() - began, 'said': ran.said}
 
 
+def _rows(file: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in file.read_text().splitlines()]
+
+
 def commit() -> str:
     """Return the commit that is run; empty outside a repository."""
     command = ['git', 'describe', '--always', '--dirty', '--abbrev=10']
@@ -78,13 +82,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument(
         '--page', type=Path, metavar='FILE.md', help='write the page of rows in --out; run nothing'
     )
+    parser.add_argument(
+        '--before', type=Path, metavar='DIR', help='rows of an earlier commit, told beside'
+    )
     args = parser.parse_args(argv)
     folder = Path(args.out)
     file = folder / 'streams.jsonl'
     cases = few(args.seed, args.seconds) if args.few else all_cases(args.seed)
     if args.page is not None:
-        rows = [json.loads(line) for line in file.read_text().splitlines()]
-        args.page.write_text(page(rows, len(cases)))
+        before = [] if args.before is None else _rows(args.before / 'streams.jsonl')
+        args.page.write_text(page(_rows(file), len(cases), before))
         return 0
     if args.hidden is not None:
         wanted = () if args.hidden == 'nothing' else tuple(args.hidden.split('+'))
@@ -92,7 +99,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     cases = [cases[i] for i in np.random.default_rng(args.seed).permutation(len(cases))]
     folder.mkdir(parents=True, exist_ok=True)
     at = commit()
-    rows = [json.loads(line) for line in file.read_text().splitlines()] if file.exists() else []
+    rows = _rows(file) if file.exists() else []
     others = {row['commit'] for row in rows} - {at}
     if others:
         parser.error(f'{file} has streams of {", ".join(sorted(others))}, and this is {at}')

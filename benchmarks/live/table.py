@@ -15,6 +15,8 @@ Row = dict[str, Any]
 CLEAR = 4.0
 # The truth, once proposed, is to keep so much weight.
 KEPT = 0.05
+# What nothing was measured of.
+_NONE = 'none', '0 of 0'
 # Streams of `--few`.
 FEW = len(EFFECTS) + 2
 
@@ -39,15 +41,22 @@ window's prior is what those before it say: standard errors are of streams, as i
 """
 
 
-def page(rows: Sequence[Row], cases: int) -> str:
-    """Return the page of so many streams of `cases`, those of each commit by themselves."""
+def page(rows: Sequence[Row], cases: int, before: Sequence[Row] = ()) -> str:
+    """Return the page of so many streams of `cases`, those of each commit by themselves.
+
+    Args:
+        rows: one a stream.
+        cases: how many streams there are in all.
+        before: rows of an earlier commit, told beside.
+    """
     by_commit: dict[str, list[Row]] = {}
     for row in rows:
         by_commit.setdefault(str(row['commit']), []).append(row)
-    return HEAD + '\n'.join(_of_one(rows, at, cases) for at, rows in by_commit.items())
+    parts = (_of_one(rows, at, cases, before) for at, rows in by_commit.items())
+    return HEAD + '\n'.join(parts)
 
 
-def _of_one(rows: Sequence[Row], commit: str, cases: int) -> str:
+def _of_one(rows: Sequence[Row], commit: str, cases: int, before: Sequence[Row]) -> str:
     seeds = sorted(row['seed'] for row in rows)
     told = f'{len(rows)} of {cases} streams (seeds {seeds[0]} to {seeds[-1]}), commit {commit}.'
     if not any(row['effects'] for row in rows):
@@ -56,10 +65,31 @@ def _of_one(rows: Sequence[Row], commit: str, cases: int) -> str:
         told += ' Each effect once (`--few`).'
     elif 2 * sum(not row['effects'] for row in rows) > len(rows):
         told += ' Machines that hide no effect were run more often (`--hidden nothing`).'
-    return f'## Commit {commit}\n\n{told}\n\n{_required(rows)}\n{_streams(rows)}'
+    if before:
+        earlier = sorted(row['seed'] for row in before)
+        told += (
+            f' Before: {len(before)} streams (seeds {earlier[0]} to {earlier[-1]}), '
+            f'commit {before[0]["commit"]}.'
+        )
+    return f'## Commit {commit}\n\n{told}\n\n{_required(rows, before)}\n{_streams(rows)}'
 
 
-def _required(rows: Sequence[Row]) -> str:
+def _required(rows: Sequence[Row], before: Sequence[Row]) -> str:
+    """Return the table of what is required beside what was measured, and before."""
+    earlier = {what: found for what, _, found in _measured(before)} if before else {}
+    head = 'what', 'required', *(('before',) if before else ()), 'measured'
+    lines = ['| ' + ' | '.join(head) + ' |', '|' + '---|' * len(head)]
+    for what, wanted, found in _measured(rows):
+        if found in _NONE:
+            continue
+        old = earlier.get(what, '')
+        cells = what, wanted, *(('' if old in _NONE else old,) if before else ()), found
+        lines.append('| ' + ' | '.join(cells) + ' |')
+    return '\n'.join([*lines, ''])
+
+
+def _measured(rows: Sequence[Row]) -> list[tuple[str, str, str]]:
+    """Return what is asked for, what is required of it and what was measured."""
     hidden = [row for row in rows if carriable(row['effects'])]
     offset = [row for row in rows if row['effects'] and not carriable(row['effects'])]
     healthy = [row for row in rows if not row['effects'] and not row['drift']]
@@ -72,7 +102,7 @@ def _required(rows: Sequence[Row]) -> str:
     looks = [seconds for row in rows for seconds in row['looks'] if np.isfinite(seconds)]
     in_turn = [[row['looks'][i] for row in rows if len(row['looks']) > i] for i in range(4)]
     in_turn = [some for some in in_turn if some]
-    lines = [
+    return [
         (
             'windows after the first addition whose 95 % intervals hold the truth',
             '93 to 97 %',
@@ -144,9 +174,6 @@ def _required(rows: Sequence[Row]) -> str:
             ', '.join(f'{np.median(some):.0f} s of {len(some)}' for some in in_turn) or 'none',
         ),
     ]
-    lines = [line for line in lines if line[2] not in ('none', '0 of 0')]
-    table = ['| what | required | measured |', '|---|---|---|']
-    return '\n'.join([*table, *(f'| {" | ".join(line)} |' for line in lines), ''])
 
 
 def _inside(rows: Sequence[Row]) -> str:

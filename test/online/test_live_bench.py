@@ -62,6 +62,9 @@ def test_what_was_measured_stands_beside_what_is_required():
     assert 'were run more often' in page([*rows, *healthy], 300)
     both = page([*rows, {k: v for k, v in row(5, commit='old').items() if k != 'worse'}], 300)
     assert both.count('\n## Commit') == 2 and '| none | 1 of 4 |' in both
+    beside = page(rows, 300, [row(9, commit='old')])
+    assert 'Before: 1 streams (seeds 9 to 9), commit old.' in beside
+    assert '| all of 50 | 1 of 1 | 1 of 2 |' in beside and '| 90 % |  | 1 of 2 |' in beside
 
 
 def test_a_fair_part_of_300_streams_has_healthy_ones_pairs_and_both_sizes():
