@@ -79,6 +79,11 @@ def check(name: str, content: bytes, path: Path) -> None:
     assert time.process_time() - begin < SECONDS
 
 
+def test_damage_that_was_found_once(tmp_path: Path, good: dict[str, bytes]) -> None:
+    """A first column that is no time, below headings of too few entries."""
+    check('labview', damaged(good['labview'], 8996), tmp_path / 'file.lvm')
+
+
 @pytest.mark.parametrize('name', FORMATS)
 @settings(
     max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]

@@ -108,6 +108,14 @@ def test_units_stand_above_their_columns(tmp_path: Path) -> None:
         assert [column.unit for column in look(path).columns][1:] == [*unit]
 
 
+def test_a_first_column_that_is_no_time_has_no_heading(tmp_path: Path) -> None:
+    """Entries begin above the second column: the last one is not the first column's."""
+    for unit in (('mm', 'um'), ('', 'um'), ('',)):
+        path = labview(tmp_path / 'a.lvm', x='One', channels={'Y_Unit_Label': unit})
+        path.write_text(path.read_text('cp1252').replace('X_Value', 'X_Walue'), 'cp1252')
+        assert look(path).columns[0].unit == ''
+
+
 def test_where_time_begins(tmp_path: Path) -> None:
     """`X0` is later than the date; absolute times count from 1904; without a date from 0."""
     check(labview(tmp_path / 'a.lvm', channels={'X0': ('0.5', '0.5')}), START + 500_000_000)

@@ -246,7 +246,7 @@ def _heading(path: Path) -> _Heading:
 def _of_channels(said: _HeadedRows, name: str, shown: list[int]) -> list[str]:
     """Return what a heading says of each channel, in the columns `shown`.
 
-    An entry stands above its column; where channels have columns of times some writers leave none
+    An entry stands above its column, and none above the first; where channels have columns of times some writers leave none
     empty for these, which is seen where any line of the heading has an entry above one.
     """
     above = {at - 1 for at in shown}
@@ -258,7 +258,7 @@ def _of_channels(said: _HeadedRows, name: str, shown: list[int]) -> list[str]:
     )
     entries = said.channels.get(name, [])
     places = range(len(shown)) if beside else sorted(above)
-    return [entries[at] if at < len(entries) else '' for at in places]
+    return [entries[at] if 0 <= at < len(entries) else '' for at in places]
 
 
 def _common(path: Path, said: _HeadedRows, name: str, shown: list[int]) -> str:
