@@ -111,9 +111,14 @@ def test_units_stand_above_their_columns(tmp_path: Path) -> None:
 def test_a_first_column_that_is_no_time_has_no_heading(tmp_path: Path) -> None:
     """Entries begin above the second column: the last one is not the first column's."""
     for unit in (('mm', 'um'), ('', 'um'), ('',)):
-        path = labview(tmp_path / 'a.lvm', x='One', channels={'Y_Unit_Label': unit})
-        path.write_text(path.read_text('cp1252').replace('X_Value', 'X_Walue'), 'cp1252')
-        assert look(path).columns[0].unit == ''
+        path = labview(tmp_path / 'a.lvm', channels={'Y_Unit_Label': unit})
+        path.write_text(path.read_text('cp1252').replace('X_Value', 'Valve'), 'cp1252')
+        valve = next(column for column in look(path).columns if column.name == 'Valve')
+        assert valve.unit == ''
+    path = labview(tmp_path / 'a.lvm', x='One')
+    path.write_text(path.read_text('cp1252').replace('X_Value', 'Seconds'), 'cp1252')
+    with pytest.raises(InputError, match='no column is called X_Value'):
+        look(path)
 
 
 def test_where_time_begins(tmp_path: Path) -> None:

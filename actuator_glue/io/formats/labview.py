@@ -137,6 +137,11 @@ def _clock(
         period = _number(path, segment, 'Delta_X', shown)
         first = _number(path, segment, 'X0', shown)
         own = first + period * np.arange(segment.rows, dtype=np.float64)
+    elif not times:
+        raise InputError(
+            f'{path}: X_Columns is {said.file.get("X_Columns", "One")}, but no column is called '
+            f'{_TIMES}; name the column of times so, or save the file anew'
+        )
     else:
         own, *others = read_columns(path, head, times)
         if not all(np.array_equal(own, other) for other in others):
@@ -246,8 +251,9 @@ def _heading(path: Path) -> _Heading:
 def _of_channels(said: _HeadedRows, name: str, shown: list[int]) -> list[str]:
     """Return what a heading says of each channel, in the columns `shown`.
 
-    An entry stands above its column, and none above the first; where channels have columns of times some writers leave none
-    empty for these, which is seen where any line of the heading has an entry above one.
+    An entry stands above its column, and none above the first; where channels have columns of
+    times some writers leave none empty for these, which is seen where any line of the heading has
+    an entry above one.
     """
     above = {at - 1 for at in shown}
     beside = any(
