@@ -426,6 +426,11 @@ def _concluded(state: LiveState, given: Concluded) -> tuple[LiveState, tuple[Act
         # A look tells what is material in all data, forecasts what is lost without the rest.
         doubt = Say('in doubt', f'{", ".join(out)}: all data are explained as well without')
         return _began(state), (doubt, Carry(_without(leading, given.proposal)))
+    carried = {effects for effects, _ in state.weights}
+    if leading and not wanted and frozenset() not in carried:
+        # Forecasts have excluded Eq. (2): what few data show they may tell, once more.
+        doubt = Say('in doubt', f'{", ".join(out)}: Eq. (2) is enough for what was looked at')
+        return _began(state), (doubt, Carry(_evenly(leading)))
     told: tuple[Action, ...] = ()
     if out:
         told = (Say('taken out', f'{", ".join(out)}: later data contradict it'),)

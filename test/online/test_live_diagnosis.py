@@ -156,8 +156,8 @@ def test_what_is_immaterial_to_a_look_is_left_to_forecasts():
     tied = replace(less, structures=(*less.structures, Proposed(choose_model(sorted(both)), 0.1)))
     assert run(state, after, live.Concluded(tied))[1] == []
     # Where nothing of it is found any more, or forecasts doubt it, it is out.
-    for found, weight in ((proposal(), 0.95), (less, 0.4)):
-        doubted, _ = run(state, live.Estimated(False, ((both, weight), (PLAY, 1.0 - weight))))
+    for found, weight, beside in ((proposal(), 0.95, frozenset()), (less, 0.4, PLAY)):
+        doubted, _ = run(state, live.Estimated(False, ((both, weight), (beside, 1.0 - weight))))
         _, actions = run(doubted, live.Concluded(found))
         assert actions[-1].taken_out == tuple(
             sorted(both - set(found.structures[0].model.effects))
@@ -171,9 +171,19 @@ def test_what_later_data_contradict_is_taken_out_and_told():
     assert carries(actions) == [('backlash',)]
     (told,) = [a for a in actions if isinstance(a, live.Say)]
     assert told.kind == 'taken out' and 'coulomb-friction' in told.message
-    state, _ = run(state, live.Estimated(False, ((PLAY, 0.9),)))
+    state, _ = run(state, live.Estimated(False, ((PLAY, 0.9), (frozenset(), 0.1))))
     _, actions = run(state, live.Requested(), live.Concluded(proposal()))
     assert carries(actions) == [()]
+
+
+def test_what_forecasts_have_shown_is_not_taken_out_for_a_look_that_shows_nothing():
+    """Flow that saturates showed in none of the peaks of a look, and was gone."""
+    state, _ = run(broken(), live.Concluded(proposal('backlash')))
+    state, _ = run(state, live.Estimated(False, ((PLAY, 1.0),)), live.Requested())
+    _, (told, carry) = run(state, live.Concluded(proposal()))
+    assert told.kind == 'in doubt' and carry.taken_out == ()
+    both = [(one.model.effects, one.weight) for one in carry.proposal.structures]
+    assert both == [(('backlash',), 0.5), ((), 0.5)]
 
 
 def test_what_is_carried_already_is_not_handed_over_again_unless_it_is_in_doubt():
