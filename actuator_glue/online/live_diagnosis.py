@@ -351,9 +351,9 @@ def _changed(state: LiveState, low: bool) -> float:
         state: with bands that say that something changed.
         low: because coverage is low, not because forecasts are off.
     """
-    bad = [coverage < state.settings.coverage_limit for coverage in state.coverages]
     if low:
-        bad = bad[-state.settings.coverage_windows - 1 :]
+        lately = state.coverages[-state.settings.coverage_windows - 1 :]
+        bad = [coverage < state.settings.coverage_limit for coverage in lately]
     else:
         bad = [error > _OFF for error in state.errors]
     first = bad.index(True) if any(bad) else 0

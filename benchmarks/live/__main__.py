@@ -20,7 +20,7 @@ import numpy as np
 
 from actuator_glue.arguments import Folder
 from actuator_glue.online.live_diagnosis import LiveSettings
-from benchmarks.live.cases import Case, all_cases, few, streamed
+from benchmarks.live.cases import Case, NotBuiltError, all_cases, few, streamed
 from benchmarks.live.chain import chain
 from benchmarks.live.score import scored
 from benchmarks.live.table import page
@@ -58,7 +58,7 @@ def ran(cases: Sequence[Case], jobs: int, minutes: float) -> Iterator[dict[str, 
                 running.add(pool.submit(one, left.pop()))
             try:
                 yield done.result()
-            except ValueError as error:
+            except NotBuiltError as error:
                 # One whose effect cannot be as large as is wanted: said, and left out.
                 print(f'left out: {error}', file=sys.stderr)
 

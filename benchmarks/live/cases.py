@@ -39,6 +39,10 @@ START_NS = 10**18
 _TIMES, _INSIDE = np.geomspace(0.05, 200.0, 24), 0.8
 
 
+class NotBuiltError(ValueError):
+    """No size of the effects inside their bounds leaves as much as is wanted."""
+
+
 @dataclass(frozen=True)
 class Case:
     """One stream.
@@ -123,7 +127,7 @@ def _sized(case: Case, theta: Array, rest: Record) -> tuple[Structure, Array]:
     """Return effects of the smallest size of which a refitted Eq. (2) leaves the ratio wanted.
 
     Raises:
-        ValueError: none inside the bounds does.
+        NotBuiltError: none inside the bounds does.
     """
     structure, typical = sizes(case.effects, theta)
     neutral, wanted = structure.neutral(theta), case.ratio * NOISE
@@ -155,7 +159,7 @@ def _sized(case: Case, theta: Array, rest: Record) -> tuple[Structure, Array]:
                     low, high = (middle, high) if small else (low, middle)
                 return structure, scaled(direction * high)
             low = high
-    raise ValueError(f'{case}: no size inside the bounds leaves so much')
+    raise NotBuiltError(f'{case}: no size inside the bounds leaves so much')
 
 
 def left(clean: Array, theta: Array, part: Record) -> float:

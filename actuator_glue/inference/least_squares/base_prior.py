@@ -39,11 +39,6 @@ class BasePrior:
         self.components = len(self._known.mixture.log_weights)
         self.quality = self._known.quality()
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The parameters of Eq. (2) that it knows."""
-        return self._known.names
-
     def start(self, theta: Array) -> Array:
         """Return parameters (4,) with its middle for those that it knows, physical units."""
         out = np.array(theta, np.float64)

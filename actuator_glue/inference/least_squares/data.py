@@ -39,9 +39,8 @@ def chunks(rows: int, columns: int) -> Iterator[slice]:
 
 
 def lanes(rows: int) -> Iterator[slice]:
-    """Yield slices of as many rows as the kernels work on at once."""
-    for begin in range(0, rows, LANES):
-        yield slice(begin, begin + LANES)
+    """Return slices of as many rows as the kernels work on at once."""
+    return chunks(rows, _BLOCK)
 
 
 def _times(whole: Record, period: float, most: int = 1) -> int:
