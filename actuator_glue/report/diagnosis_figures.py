@@ -101,13 +101,15 @@ def residual_summary(found: DiagnosisData, *, narrow: bool = False) -> Figure:
             va='bottom',
             textcoords='offset points',
         )
-    right.axhspan(0.0, 1e6 * error.noise_floor, color=NOISE, lw=0, zorder=0.5)
+    noise, dark = 1e6 * error.noise_floor, {'color': MEASURED, 'ls': '--', 'lw': 0.9}
+    left.plot([], [], label='noise (rms)', **dark)
+    right.axhline(noise, **dark)
     right.set_xticks(range(len(bars)), [name.replace(', ', ',\n') for name, *_ in bars])
     right.set_xlim(-0.6, len(bars) - 0.4)
     right.margins(y=0.15)
     right.set_ylabel('rms error [um]')
     right.set_title('all held-out data')
-    _legend(figure, left, columns=2 if narrow else 3)
+    _legend(figure, left, columns=2)
     return figure
 
 

@@ -198,7 +198,7 @@ def first_page(found: DiagnosisData, hybrid: str = '', *, drawn: bool = True) ->
         picture = Picture.of(
             residual_summary(found),
             'What the model leaves of held-out data, where both models differ most, and its rms '
-            'error over all of them; grey is noise, which no model explains.',
+            'error over all of them. No model explains the noise: grey, and the dashed line.',
             residual_summary(found, narrow=True),
         )
     return FirstPage(
