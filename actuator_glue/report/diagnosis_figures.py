@@ -48,10 +48,10 @@ def _title(trace: Trace, width: float) -> str:
     return style.fit(source_name(trace.source), width, tail=tail)
 
 
-def _legend(figure: Figure, axes: Axes, scale: float = 1.0, columns: int = 3) -> None:
-    """Put the legend below the panels, where it covers nothing."""
-    handles, names = axes.get_legend_handles_labels()
-    figure.legend(handles, names, loc='outside lower center', ncols=columns, markerscale=scale)
+def _legend(figure: Figure, *panels: Axes, scale: float = 1.0, columns: int = 3) -> None:
+    """Put the legend of some panels below all of them, where it covers nothing."""
+    handles = [h for axes in panels for h in axes.get_legend_handles_labels()[0]]
+    figure.legend(handles=handles, loc='outside lower center', ncols=columns, markerscale=scale)
 
 
 def _lines(trace: Trace, *columns: Array) -> Array:
@@ -101,15 +101,13 @@ def residual_summary(found: DiagnosisData, *, narrow: bool = False) -> Figure:
             va='bottom',
             textcoords='offset points',
         )
-    noise, dark = 1e6 * error.noise_floor, {'color': MEASURED, 'ls': '--', 'lw': 0.9}
-    left.plot([], [], label='noise (rms)', **dark)
-    right.axhline(noise, **dark)
+    right.axhline(1e6 * error.noise_floor, color=MEASURED, ls='--', lw=0.9, label='noise (rms)')
     right.set_xticks(range(len(bars)), [name.replace(', ', ',\n') for name, *_ in bars])
     right.set_xlim(-0.6, len(bars) - 0.4)
     right.margins(y=0.15)
     right.set_ylabel('rms error [um]')
     right.set_title('all held-out data')
-    _legend(figure, left, columns=2)
+    _legend(figure, left, right, columns=2)
     return figure
 
 

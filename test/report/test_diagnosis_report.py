@@ -280,10 +280,12 @@ def test_the_first_picture_shows_residual_and_noise(overlapping_texts) -> None:
         found = diagnosis(play)
         figure = drawn('residual_summary', found)
         left, right = figure.axes
-        assert len(left.lines) == len(right.patches) - 1 == (2 if play else 1)
+        assert len(left.lines) == len(right.patches) == (2 if play else 1)
         rms = [1e6 * found.error.before, 1e6 * found.error.after][: len(left.lines)]
-        assert [p.get_height() for p in right.patches][:-1] == pytest.approx(rms)
+        assert [p.get_height() for p in right.patches] == pytest.approx(rms)
         heights = [p.get_height() for p in left.patches]
         assert heights == pytest.approx([4e6 * found.error.noise_floor])
-        assert any('noise' in t.get_text() for t in figure.legends[0].get_texts())
+        assert right.lines[-1].get_ydata() == pytest.approx([1e6 * found.error.noise_floor] * 2)
+        legend = [t.get_text() for t in figure.legends[0].get_texts()]
+        assert {'noise (2 standard deviations)', 'noise (rms)'} <= set(legend)
         assert overlapping_texts(figure) == []
