@@ -12,18 +12,9 @@ from typing import Any
 import numpy as np
 from reliability import answers, bins, coverage, named
 from reliability import table as reliability_table
-from score import scores, share
+from score import QUESTIONS, scores, share
 
 Json = dict[str, Any]
-_SAYS = {
-    'false_alarms': 'healthy machines given a name, or told as incomplete',
-    'clear_exact': 'single effects of twice the noise and more: the first name is right',
-    'clear_in_set': 'the same: the right name, or tied with the first',
-    'clear_wrong_confident': 'the same: a wrong name without an alternative',
-    'pair_both_clear': 'machines with several effects, each of the noise and more: all named',
-    'unknown_told_or_described': 'effects outside the catalogue: told as incomplete, or described '
-    'to within 1.2 of the noise',
-}
 
 
 def _told(of: Json) -> str:
@@ -61,8 +52,10 @@ def page(results: list[Json]) -> str:
         '| seeds | ' + ' | '.join(_seeds(rows) for rows in columns.values()) + ' |',
     ]
     counted = {name: scores(rows) for name, rows in columns.items()}
-    for key, text in _SAYS.items():
-        lines.append(f'| {text} | ' + ' | '.join(_told(c[key]) for c in counted.values()) + ' |')
+    for key, question in QUESTIONS.items():
+        lines.append(
+            f'| {question.text} | ' + ' | '.join(_told(c[key]) for c in counted.values()) + ' |'
+        )
     for text, which in (('sizes of right names', 0), ("Eq. (2)'s parameters", 1)):
         cells = [
             _told(share([held for _, held in coverage(rows)[which]])) for rows in columns.values()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -53,11 +55,84 @@ def _wrong(result: Json) -> bool:
     return any(len(names) == 1 and names[0] not in result['effects'] for names in _named(result))
 
 
+def _both(result: Json) -> bool:
+    sets = _named(result)
+    return all(any(e in names for names in sets) for e in result['effects'])
+
+
+@dataclass(frozen=True)
+class Question:
+    """A question that is answered by yes or no for each machine of some kind.
+
+    Attributes:
+        text: what `yes` means, for people.
+        of: whether it is asked of a machine.
+        yes: its answer.
+        wanted: whether yes is what is wanted.
+    """
+
+    text: str
+    of: Callable[[Json], bool]
+    yes: Callable[[Json], bool]
+    wanted: bool = True
+
+
+def _kind(kind: str) -> Callable[[Json], bool]:
+    return lambda result: bool(result['kind'] == kind)
+
+
+def _clear(result: Json) -> bool:
+    return bool(result['kind'] == 'single' and result['ratio'] >= _CLEAR)
+
+
+def _clear_pair(result: Json) -> bool:
+    return bool(result['kind'] == 'pair' and min(result['shares'].values()) >= 1.0)
+
+
+def _first(result: Json) -> list[str]:
+    """Return the first name and what is tied with it."""
+    return (_named(result) or [[]])[0]
+
+
+QUESTIONS: dict[str, Question] = {
+    'false_alarms': Question(
+        'healthy machines given a name, or told as incomplete',
+        _kind('none'),
+        lambda r: bool(r['diagnosis']['verdict'] != 'none'),
+        wanted=False,
+    ),
+    'clear_exact': Question(
+        'single effects of twice the noise and more: the first name is right',
+        _clear,
+        lambda r: bool(set(_first(r)[:1]) & set(r['effects'])),
+    ),
+    'clear_in_set': Question(
+        'the same: the right name, or tied with the first',
+        _clear,
+        lambda r: bool(set(_first(r)) & set(r['effects'])),
+    ),
+    'clear_wrong_confident': Question(
+        'the same: a wrong name without an alternative', _clear, _wrong, wanted=False
+    ),
+    'pair_both_clear': Question(
+        'machines with several effects, each of the noise and more: all named',
+        _clear_pair,
+        _both,
+    ),
+    'unknown_told_or_described': Question(
+        'effects outside the catalogue: told as incomplete, or described to within 1.2 of the '
+        'noise',
+        _kind('unknown'),
+        lambda r: _told(r) or _described(r),
+    ),
+}
+
+
 def scores(results: list[Json]) -> Json:
     """Score diagnosed cases."""
     by = {k: [r for r in results if r['kind'] == k] for k in ('none', 'single', 'pair', 'unknown')}
     clear = [r for r in by['single'] if r['ratio'] >= _CLEAR]
-    first = [(r, (_named(r) or [[]])[0]) for r in clear]
+    first = [(r, _first(r)) for r in clear]
     detection = {}
     for low, high in _BINS:
         inside = [r for r in by['single'] if low <= r['ratio'] < high]
@@ -71,34 +146,26 @@ def scores(results: list[Json]) -> Json:
         for r in known
     ]
     floors = [r['diagnosis']['error']['after'] / r['clean_floor'] for r in known]
-    clear_pairs = [r for r in by['pair'] if min(r['shares'].values()) >= 1.0]
     return {
         'schema': 'actuator_glue.blind/1',
         'cases': len(results),
-        'false_alarms': share([r['diagnosis']['verdict'] != 'none' for r in by['none']]),
+        **{
+            key: share([question.yes(r) for r in results if question.of(r)])
+            for key, question in QUESTIONS.items()
+        },
         'detection_by_ratio': detection,
-        'clear_exact': share([bool(n) and n[0] in r['effects'] for r, n in first]),
         'clear_group': share([bool(_groups(n[:1]) & _groups(r['effects'])) for r, n in first]),
-        'clear_in_set': share([bool(set(n) & set(r['effects'])) for r, n in first]),
         'clear_mean_set_size': float(np.mean([len(n) for _, n in first if n] or [0.0])),
-        'clear_wrong_confident': share([_wrong(r) for r in clear]),
         'all_wrong_confident': share([_wrong(r) for r in results]),
         'clear_extra_effects': share([len(_named(r)) > 1 for r in clear]),
         'unknown_told': share([_told(r) for r in by['unknown']]),
         'unknown_told_clear': share([_told(r) for r in by['unknown'] if r['ratio'] >= _CLEAR]),
         'unknown_described': share([_described(r) for r in by['unknown']]),
-        'unknown_told_or_described': share([_told(r) or _described(r) for r in by['unknown']]),
         'pair_both': share([_both(r) for r in by['pair']]),
-        'pair_both_clear': share([_both(r) for r in clear_pairs]),
         'after_over_true_structure': _quantiles(against),
         'after_over_noise': _quantiles(floors),
         'seconds_median': float(np.median([r['seconds'] for r in results])),
     }
-
-
-def _both(result: Json) -> bool:
-    sets = _named(result)
-    return all(any(e in names for names in sets) for e in result['effects'])
 
 
 def _quantiles(values: list[float]) -> Json:
