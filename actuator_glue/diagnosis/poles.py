@@ -21,6 +21,9 @@ _GROUPS: Final = ('lag', 'gain', 'inertia')
 _VALVES: Final = (1.0, 0.6, 1.6, 0.4, 2.5)
 # A lag of first order in series with the loop: its pole and the loop's are exchanged exactly.
 _IN_SERIES: Final = ('sensor-lag', 'command-lag')
+# What acts on the piston beside the specimen's spring: the loop, opened at the valve's error, has
+# further poles, of which each real one may be the valve's, exactly.
+_ON_PISTON: Final = ('viscous-damping', 'payload-inertia')
 
 
 def may_change(added: Effect) -> bool:
@@ -45,9 +48,10 @@ def starts(
 
 
 def exchanged(structure: Structure, name: str, theta: Array, stiffness: frozenset[float]) -> Array:
-    """Return parameters (m, p) with the pole of an effect in series exchanged with the loop's.
+    """Return parameters (m, p) with poles exchanged that an effect adds, the records alike.
 
-    None for other effects, nor where the loop's poles oscillate.
+    Of a lag in series with the loop's, where these do not oscillate; of what acts on the piston
+    with the valve's. None for other effects.
 
     Args:
         structure: with p parameters.
@@ -55,14 +59,47 @@ def exchanged(structure: Structure, name: str, theta: Array, stiffness: frozense
         theta: parameters (p,).
         stiffness: of the specimen in the records [N/m]; under each the exchange is another one.
     """
-    if name not in _IN_SERIES:
-        return np.empty((0, len(theta)))
-    column = structure.columns(name).start
-    rows = [row for k in sorted(stiffness) for row in _exchanged(theta, column, k)]
+    rows: list[Array] = []
+    for k in sorted(stiffness):
+        if name in _IN_SERIES:
+            rows += _in_series(theta, structure.columns(name).start, k)
+        elif name in _ON_PISTON:
+            rows += _on_piston(theta, structure.columns(name), k)
     return np.reshape(rows, (-1, len(theta)))
 
 
-def _exchanged(theta: Array, column: int, stiffness: float) -> list[Array]:
+def _on_piston(theta: Array, columns: slice, stiffness: float) -> list[Array]:
+    """Give the valve each other real pole of the loop opened at its error, under a stiffness.
+
+    With the force m s^2 + c s + k on the piston that loop has the poles of (s + beta_1) times
+    (s + alpha_3) (m s^2 + c s + k) + alpha_2 s: whichever is the valve's, the others are those of
+    an actuator with another leakage, oil column and, where there is a mass, damping.
+    """
+    mass = float(theta[columns.start]) if columns.stop - columns.start > 1 else 0.0
+    damping = float(theta[columns.stop - 1]) * (mass or 1.0)
+    lead = mass or damping
+    if not (stiffness > 0.0 and lead > 0.0):
+        return []
+    force = np.array([mass, damping, stiffness])[0 if mass > 0.0 else 1 :]
+    oil = np.polymul([1.0, theta[3]], force)
+    oil[-2] += theta[2]
+    opened = np.concatenate([[-theta[0]], np.roots(oil)])
+    out = []
+    for i, root in enumerate(opened[1:], 1):
+        if root.imag != 0.0 or not root.real < 0.0:
+            continue
+        row, rest = theta.copy(), lead * np.poly(np.delete(opened, i)).real
+        row[0], row[3] = -root.real, rest[-1] / stiffness
+        if mass > 0.0:
+            row[columns.stop - 1] = rest[1] / mass - row[3]
+            damping = mass * float(row[columns.stop - 1])
+        row[2] = rest[-2] - row[3] * damping - stiffness
+        if min(row[2], damping) > 0.0:
+            out.append(row)
+    return out
+
+
+def _in_series(theta: Array, column: int, stiffness: float) -> list[Array]:
     """Exchange the pole of a lag with each real one of the loop under a stiffness.
 
     Eq. (2a) with d2 = k + alpha_2, c = alpha_3 k/d2 and n = alpha_1 beta_0/d2 has the denominator
