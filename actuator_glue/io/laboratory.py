@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import cast
@@ -137,6 +137,7 @@ def channels_of(
         channels = read_channel_map(channels)
     if channels is not None:
         values, period, start_ns = _mapped(path, channels, needed)
+        _refuse_empty(path, values)
         return Channels(
             values,
             period,
@@ -147,6 +148,7 @@ def channels_of(
             channels.motion,
         )
     values, notes, period, start_ns, motion = _by_name(path, needed)
+    _refuse_empty(path, values)
     return Channels(
         values,
         period,
@@ -156,6 +158,15 @@ def channels_of(
         notes.get('actuator', 'actuator'),
         motion,
     )
+
+
+def _refuse_empty(path: Path, values: Mapping[str, Array]) -> None:
+    for name, column in values.items():
+        if not len(column):
+            raise InputError(
+                f'{path}: channel {name!r} holds no sample; was the file closed by what wrote it, '
+                'and copied whole?'
+            )
 
 
 def _noted_stiffness(notes: dict[str, str], path: Path) -> float | None:

@@ -225,7 +225,7 @@ def _heading(path: Path) -> _Heading:
                 break
             key, *entries = [entry.strip() for entry in line.split(delimiter)]
             if inside == 'file' and (key == 'Separator' or re.match(r'Separator[,; ]', key)):
-                name = re.split(r'[\t,; ]', line)[1].strip()
+                name = ''.join(re.split(r'[\t,; ]', line)[1:2]).strip()
                 delimiter = _SEPARATORS.get(name.lower(), delimiter)
             special = (special or key == _SPECIAL[0]) and key != _SPECIAL[1]
             if key == _END:

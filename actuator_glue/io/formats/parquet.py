@@ -24,7 +24,15 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
         schema, content = file.schema_arrow, file.metadata
         rows = content.num_rows
         # Pages are unpacked whole: what they claim counts as well as what is made of them.
-        groups = [content.row_group(i).total_byte_size for i in range(content.num_row_groups)]
+        groups = [content.row_group(i) for i in range(content.num_row_groups)]
+        claimed = max((group.total_byte_size for group in groups), default=0)
+        told = [group.num_rows for group in groups]
+    if sum(told) != rows or min(told, default=0) < 0:
+        # Pyarrow makes room for what a group claims, terabytes if need be.
+        raise InputError(
+            f'{path}: {rows} rows in all, but its row groups hold {", ".join(map(str, told))}: '
+            'this Parquet file is damaged; copy it again from where it was written'
+        )
     notes = {
         name.decode('utf-8', 'replace'): value.decode('utf-8', 'replace')
         for name, value in (schema.metadata or {}).items()
@@ -35,7 +43,7 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
 
     def values(wanted: list[int]) -> list[Array]:
         names = [fields[at].name for at in wanted]
-        check_size(max(8 * rows * len(names), *groups, 0), path)
+        check_size(max(8 * rows * len(names), claimed), path)
         with reading(path, _NAME), parquet.ParquetFile(path) as file:
             table = file.read(columns=names, use_threads=False)
             return [_numbers(table.column(name)) for name in names]
