@@ -82,7 +82,8 @@ def check(name: str, content: bytes, path: Path) -> None:
 def test_damage_that_was_found_once(tmp_path: Path, good: dict[str, bytes]) -> None:
     """A first column that is no time, below headings of too few entries; an empty channel.
 
-    A heading that ends after `Separator`. A row group that claims 395 136 991 204 rows: the computer ran out of memory.
+    A heading that ends after `Separator`. A row group that claims 395 136 991 204 rows: the
+    computer ran out of memory.
     """
     for seed in (8996, 2002547):
         check('labview', damaged(good['labview'], seed), tmp_path / 'file.lvm')
