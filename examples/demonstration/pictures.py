@@ -57,7 +57,7 @@ def live(content: Content, path: Path) -> Path:
             color=style.TRUTH,
             va='top',
         )
-    figure.suptitle(style.fit(_came_to(content, hops), style.WIDTH, size=10))
+    figure.suptitle(_came_to(content, hops))
     return style.save(figure, path)
 
 
@@ -75,7 +75,9 @@ def _came_to(content: Content, hops: Sequence[Any]) -> str:
     if not changes:
         return f'{text}, which was not changed'
     start, name = changes[-1]
-    return f'{text}, {middle(start, np.inf)} with {name}'
+    # A long name is cut, its number never.
+    after = f'{middle(start, np.inf)} with '
+    return f'{text},\n{style.fit(after + name, style.WIDTH, size=10)}'
 
 
 @style.styled
@@ -114,8 +116,8 @@ def explanations(content: Content, path: Path, hidden: Sequence[str]) -> Path:
     axes.set(ylabel='weight of the\nexplanation [%]')
     figure.legend(*axes.get_legend_handles_labels(), loc='outside lower center', ncols=2)
     last = max(told[-1], key=lambda name: told[-1][name])
-    title = f'Explanations over time; at the end {last}, {told[-1][last]:.0%}'
-    figure.suptitle(style.fit(title, style.WIDTH, size=10))
+    title, weight = f'Explanations over time; at the end {last}', f', {told[-1][last]:.0%}'
+    figure.suptitle(style.fit(title, style.WIDTH, tail=weight, size=10))
     return style.save(figure, path)
 
 

@@ -54,8 +54,8 @@ BETTER = [30e-6, 31e-6, 32e-6, 9e-6, 8e-6, 7e-6]
 @pytest.mark.parametrize(
     ('errors', 'changed', 'title'),
     [
-        (BETTER, 2, '31.0 um with the first model, 8.0 um with Eq. (2) + backlash'),
-        (BETTER[::-1], 2, '8.0 um with the first model, 31.0 um with Eq. (2) + backlash'),
+        (BETTER, 2, '31.0 um with the first model,\n8.0 um with Eq. (2) + backlash'),
+        (BETTER[::-1], 2, '8.0 um with the first model,\n31.0 um with Eq. (2) + backlash'),
         (BETTER[:3], None, '31.0 um with the first model, which was not changed'),
     ],
 )
@@ -65,6 +65,18 @@ def test_forecasts_are_said_as_they_were(
     """Better, worse, or with the model that it began with."""
     pictures.live(run(errors, changed), Path('live.png'))  # type: ignore[arg-type] # no whole run
     assert drawn[0].get_suptitle() == f'Forecasts, median rms error: {title}'
+
+
+def test_a_long_name_costs_no_number(drawn: list[Figure]) -> None:
+    """The middle of the name is left out, both errors stand."""
+    content = run(BETTER, 2)
+    for posterior in content.posteriors[2:]:
+        posterior.effects = ['backlash', 'gain-drift', 'coulomb-friction', 'flow-asymmetry'] * 2
+    pictures.live(content, Path('live.png'))  # type: ignore[arg-type] # no whole run
+    first, second = drawn[0].get_suptitle().splitlines()
+    assert first.endswith('31.0 um with the first model,')
+    assert second.startswith('8.0 um with Eq. (2)')
+    assert '...' in second
 
 
 def test_the_share_inside_a_band_is_counted(drawn: list[Figure]) -> None:
