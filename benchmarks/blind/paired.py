@@ -110,11 +110,16 @@ def page(found: list[Pair]) -> tuple[str, bool]:
     seeds = [a['seed'] for _, a in found]
     before, after = found[0]
     head = (
-        f'{len(found)} machines ({counts}; seeds {min(seeds)} to {max(seeds)}), each diagnosed by '
-        f'commit {before["commit"]} and by commit {after["commit"]}. `by chance`: how probable it '
-        'is that the machines that changed are as uneven (McNemar 1947, exact).'
+        f'Written by `benchmarks/blind/paired.py` from {len(found)} machines ({counts}; seeds '
+        f'{min(seeds)} to {max(seeds)}), each diagnosed by commit {before["commit"]} and by '
+        f'commit {after["commit"]}. `by chance`: how probable it is that those which changed are '
+        'as uneven (McNemar 1947, exact). What the generators are is in '
+        '[what was measured](scores.md).'
     )
-    return '\n'.join([head, '', *lines, '', held_out(found), seconds(found), '']), worse
+    title = '# Diagnosis: two commits about the same machines'
+    return '\n'.join(
+        [title, '', head, '', *lines, '', held_out(found), '', seconds(found), '']
+    ), worse
 
 
 def main() -> int:
