@@ -44,8 +44,9 @@ def page(results: list[Json]) -> str:
         '# Diagnosis: scores',
         '',
         f'Written by `make scores` from {len(results)} machines diagnosed by commit {commits[0]}; '
-        'brackets are 95 % Clopper-Pearson intervals. [Beside an earlier commit](scores_paired.md); '
-        'what the generators are, and what was measured before: [what was measured](scores.md).',
+        'brackets are 95 % Clopper-Pearson intervals. '
+        '[Beside an earlier commit](scores_paired.md); what the generators are, and what was '
+        'measured before: [what was measured](scores.md).',
         '',
         f'| what | {" | ".join(columns)} |',
         f'|---|{"---|" * len(columns)}',
