@@ -24,6 +24,7 @@ _IN_SERIES: Final = ('sensor-lag', 'command-lag')
 # What acts on the piston beside the specimen's spring: the loop, opened at the valve's error, has
 # further poles, of which each real one may be the valve's, exactly.
 _ON_PISTON: Final = ('viscous-damping', 'payload-inertia')
+_LEAST: Final = 1e-9  # kg or N s/m: of less the poles that it adds are beyond all numbers
 
 
 def may_change(added: Effect) -> bool:
@@ -75,12 +76,13 @@ def _on_piston(theta: Array, columns: slice, stiffness: float) -> list[Array]:
     (s + alpha_3) (m s^2 + c s + k) + alpha_2 s: whichever is the valve's, the others are those of
     an actuator with another leakage, oil column and, where there is a mass, damping.
     """
-    mass = float(theta[columns.start]) if columns.stop - columns.start > 1 else 0.0
-    damping = float(theta[columns.stop - 1]) * (mass or 1.0)
-    lead = mass or damping
-    if not (stiffness > 0.0 and lead > 0.0):
+    heavy = columns.stop - columns.start > 1
+    mass = float(theta[columns.start]) if heavy else 0.0
+    damping = float(theta[columns.stop - 1]) * (mass if heavy else 1.0)
+    lead = mass if heavy else damping
+    if not (stiffness > 0.0 and lead > _LEAST):
         return []
-    force = np.array([mass, damping, stiffness])[0 if mass > 0.0 else 1 :]
+    force = np.array([mass, damping, stiffness])[0 if heavy else 1 :]
     oil = np.polymul([1.0, theta[3]], force)
     oil[-2] += theta[2]
     opened = np.concatenate([[-theta[0]], np.roots(oil)])
@@ -90,7 +92,7 @@ def _on_piston(theta: Array, columns: slice, stiffness: float) -> list[Array]:
             continue
         row, rest = theta.copy(), lead * np.poly(np.delete(opened, i)).real
         row[0], row[3] = -root.real, rest[-1] / stiffness
-        if mass > 0.0:
+        if heavy:
             row[columns.stop - 1] = rest[1] / mass - row[3]
             damping = mass * float(row[columns.stop - 1])
         row[2] = rest[-2] - row[3] * damping - stiffness

@@ -73,6 +73,9 @@ def test_any_real_pole_of_the_opened_loop_may_be_the_valve(
     for valve in valves:
         assert min(abs(one / valve - 1.0) for one in found) < 0.1
     assert len(poles.exchanged(model, name, theta, frozenset([0.0]))) == 0
+    for none in (0.0, 1e-300):
+        theta[4] = none
+        assert len(poles.exchanged(model, name, theta, frozenset([250e3]))) == 0
 
 
 def test_only_real_poles_are_exchanged() -> None:

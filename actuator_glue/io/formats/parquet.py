@@ -30,8 +30,8 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
     if sum(told) != rows or min(told, default=0) < 0:
         # Pyarrow makes room for what a group claims, terabytes if need be.
         raise InputError(
-            f'{path}: {rows} rows in all, but its row groups hold {", ".join(map(str, told))}: '
-            'this Parquet file is damaged; copy it again from where it was written'
+            f'{path}: {rows} rows in all, but its {len(told)} row groups hold {sum(told)}: this '
+            'Parquet file is damaged; copy it again from where it was written'
         )
     notes = {
         name.decode('utf-8', 'replace'): value.decode('utf-8', 'replace')
