@@ -47,12 +47,12 @@ def live(content: Content, path: Path) -> Path:
     lower.axhline(100 * float(hops[-1].widest_level), ls=':', color=style.COMMAND)
     lower.set(ylabel='samples in the band of\nparameters and noise [%]', ylim=(0, 103))
     lower.set_xlabel('time [s]')
-    for start, name in _changes(content):
+    for i, (start, name) in enumerate(_changes(content)):
         for axes in (upper, lower):
             axes.axvline((start - first) * period, ls='--', color=style.TRUTH)
         upper.annotate(
             f' {name}',
-            ((start - first) * period, 0.97),
+            ((start - first) * period, 0.97 - 0.13 * (i % 2)),  # names are long
             xycoords=('data', 'axes fraction'),
             color=style.TRUTH,
             va='top',
