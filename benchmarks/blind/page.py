@@ -12,16 +12,9 @@ from typing import Any
 import numpy as np
 from reliability import answers, bins, coverage, named
 from reliability import table as reliability_table
-from score import QUESTIONS, scores, share
+from score import QUESTIONS, scores, share, told
 
 Json = dict[str, Any]
-
-
-def _told(of: Json) -> str:
-    if not of['n']:
-        return '-'
-    low, high = of['ci']
-    return f'{round(of["share"] * of["n"])} of {of["n"]} ({100 * low:.0f} to {100 * high:.0f} %)'
 
 
 def page(results: list[Json]) -> str:
@@ -43,8 +36,8 @@ def page(results: list[Json]) -> str:
     lines = [
         '# Diagnosis: scores',
         '',
-        f'Written by `make scores` from {len(results)} machines diagnosed by commit {commits[0]}; '
-        'brackets are 95 % Clopper-Pearson intervals. '
+        f'Written by `benchmarks/blind/page.py` (`make scores`) from {len(results)} machines '
+        f'diagnosed by commit {commits[0]}; brackets are 95 % Clopper-Pearson intervals. '
         '[Beside an earlier commit](scores_paired.md); what the generators are, and what was '
         'measured before: [what was measured](scores.md).',
         '',
@@ -55,11 +48,11 @@ def page(results: list[Json]) -> str:
     counted = {name: scores(rows) for name, rows in columns.items()}
     for key, question in QUESTIONS.items():
         lines.append(
-            f'| {question.text} | ' + ' | '.join(_told(c[key]) for c in counted.values()) + ' |'
+            f'| {question.text} | ' + ' | '.join(told(c[key]) for c in counted.values()) + ' |'
         )
     for text, which in (('sizes of right names', 0), ("Eq. (2)'s parameters", 1)):
         cells = [
-            _told(share([held for _, held in coverage(rows)[which]])) for rows in columns.values()
+            told(share([held for _, held in coverage(rows)[which]])) for rows in columns.values()
         ]
         lines.append(f'| 95 % intervals of {text} that hold the truth | {" | ".join(cells)} |')
     ratio = [c['after_over_true_structure'] for c in counted.values()]

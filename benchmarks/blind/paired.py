@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from reliability import answers, coverage
 from scipy.stats import binomtest
-from score import QUESTIONS, share
+from score import QUESTIONS, share, told
 
 Json = dict[str, Any]
 Pair = tuple[Json, Json]
@@ -40,7 +40,12 @@ def pairs(before: list[Json], after: list[Json]) -> list[Pair]:
 
 
 def by_chance(lost: int, won: int) -> float:
-    """Return how probable it is that so few or less, of those that changed, changed one way."""
+    """Return the probability that chance alone changes answers as unevenly, either way.
+
+    Args:
+        lost: machines whose answer was right before and is wrong now.
+        won: machines whose answer was wrong before and is right now.
+    """
     changed = lost + won
     return float(binomtest(min(lost, won), changed).pvalue) if changed else 1.0
 
@@ -59,23 +64,15 @@ def table(found: list[Pair]) -> tuple[list[str], bool]:
         won = sum(a and not b for b, a in good)
         chance = by_chance(lost, won)
         worse |= lost > won and chance < _CHANCE
-        sides = [_told([side[i] for side in asked]) for i in (0, 1)]
+        sides = [told(share([side[i] for side in asked])) for i in (0, 1)]
         lines.append(f'| {question.text} | {" | ".join(sides)} | {lost}, {won} | {chance:.2f} |')
     for i, text in enumerate(('sizes of right names', "Eq. (2)'s parameters")):
         sides = [
-            _told([hit for _, hit in coverage([pair[side] for pair in found])[i]])
+            told(share([hit for _, hit in coverage([pair[side] for pair in found])[i]]))
             for side in (0, 1)
         ]
         lines.append(f'| 95 % intervals of {text} that hold the truth | {" | ".join(sides)} | | |')
     return lines, worse
-
-
-def _told(hits: list[bool]) -> str:
-    of = share(hits)
-    if not of['n']:
-        return '-'
-    low, high = of['ci']
-    return f'{sum(hits)} of {len(hits)} ({100 * low:.0f} to {100 * high:.0f} %)'
 
 
 def held_out(found: list[Pair]) -> str:

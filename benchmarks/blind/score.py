@@ -26,6 +26,14 @@ def share(hits: list[bool]) -> Json:
     return {'n': n, 'share': k / n, 'ci': [float(np.nan_to_num(low)), float(high)]}
 
 
+def told(of: Json) -> str:
+    """Say a share and its interval as a cell of a table."""
+    if not of['n']:
+        return '-'
+    low, high = of['ci']
+    return f'{round(of["share"] * of["n"])} of {of["n"]} ({100 * low:.0f} to {100 * high:.0f} %)'
+
+
 def _named(result: Json) -> list[list[str]]:
     """Names of causes, which learned terms are not, unless they are another shape of one."""
     d = result['diagnosis']
@@ -131,7 +139,7 @@ QUESTIONS: dict[str, Question] = {
 def scores(results: list[Json]) -> Json:
     """Score diagnosed cases."""
     by = {k: [r for r in results if r['kind'] == k] for k in ('none', 'single', 'pair', 'unknown')}
-    clear = [r for r in by['single'] if r['ratio'] >= _CLEAR]
+    clear = [r for r in results if _clear(r)]
     first = [(r, _first(r)) for r in clear]
     detection = {}
     for low, high in _BINS:
