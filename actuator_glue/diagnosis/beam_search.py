@@ -94,18 +94,58 @@ class BeamSearch(Judge):
 
     def run(self) -> Selection:
         """Add effects while each is worth it, then check each against its rivals."""
-        s = self.settings
         self.renoise()
         base = self.search.trial(())
         singles = self.search.additions(base, None, lambda d: self.progress('effect 1', d))
         self.renoise(self._nearest(singles))
         base, singles = self.search.trial(()), self.rescored(singles)
-        self.nats = false_alarms.threshold(*self.search.signatures(), s.false_alarms)
-        current, ranked, threshold = base, list(singles), self.material
-        steps, described = [SearchStep.to(base, 'Eq. (2) alone')], False
-        for stage in range(1, s.most + 1):
+        self._set_nats()
+        return self._grown(base, singles, singles, (SearchStep.to(base, 'Eq. (2) alone'),))
+
+    def resumed(self, before: Search, found: Selection) -> Selection:
+        """Go on from what another search of the same samples found, cleaned otherwise since then.
+
+        Its structures are refitted from where they ended; so this costs what has changed, and
+        where the effort is spent the answer is still that one.
+
+        Args:
+            before: the other search.
+            found: what it ended with.
+        """
+        own = found.final.added if found.final.own is not None else ''
+        common = before.trial(tuple(n for n in found.final.effects if n != own))
+        self.renoise()
+        self.search.take_over(before, common, found.singles)
+        current = self._at_its_optimum(self.search.trial(common.effects))
+        self._set_nats()
+        return self._grown(current, self.rescored(found.singles), (), ())
+
+    def _set_nats(self) -> None:
+        found = self.search.signatures()
+        self.nats = false_alarms.threshold(*found, self.settings.false_alarms)
+
+    def _grown(
+        self,
+        current: Trial,
+        singles: Sequence[Trial],
+        ranked: Sequence[Trial],
+        begun: tuple[SearchStep, ...],
+    ) -> Selection:
+        """Add effects to a structure while each is worth it, then hold each against its rivals.
+
+        Args:
+            current: the structure.
+            singles: every single effect.
+            ranked: structures with one more, best first; none for those that promise most.
+            begun: steps that led here; none from what another search ended with.
+        """
+        s, steps, described = self.settings, list(begun), False
+        current, threshold = self.search.trial(current.effects, current.added), self.material
+        base, singles = self.search.trial(()), list(singles)
+        for stage in range(len(current.effects) + 1, s.most + 1):
             best = self._first_worth(ranked, current, threshold)
-            if best is None and self.left(current) >= self.material:
+            open_ = self.left(current) >= self.material and not self.search.effort.over
+            if best is None and open_:
                 ranked = self.overlooked(current)
                 best = self._first_worth(ranked, current, threshold)
             if best is None:
@@ -127,7 +167,9 @@ class BeamSearch(Judge):
                 self.renoise(self._nearest(ranked))
                 ranked = self.rescored(ranked)
             current = self.search.trial(current.effects, current.added)
-        found = self.checked(current, base, singles, exchanged=not described)
+        # What another search ended with was held against its rivals there.
+        spared = described or (not begun and self.search.effort.over)
+        found = self.checked(current, base, singles, exchanged=not spared)
         if set(found.final.effects) != set(current.effects):
             steps.append(
                 SearchStep.to(found.final, 'each held against its absence and its rivals')

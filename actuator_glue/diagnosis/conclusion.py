@@ -155,6 +155,7 @@ def searched(
     settings: Thresholds,
     tell: Progress,
     explains_rest: Callable[[BeamSearch, Trial], bool],
+    earlier: Conclusion | None = None,
 ) -> Conclusion:
     """Search for what the model lacks, one effect at a time, and say what that comes to.
 
@@ -165,9 +166,14 @@ def searched(
         settings: thresholds.
         tell: takes progress.
         explains_rest: whether a description explains all that some names leave.
+        earlier: what was found in the same samples, cleaned otherwise, to go on from.
     """
     selection = BeamSearch(search, settings, tell, explains_rest)
-    named = selection.run()
+    if earlier is None or not earlier.found.final.effects:
+        named = selection.run()
+    else:
+        named = selection.resumed(earlier.selection.search, earlier.found)
+        named = replace(named, steps=(*earlier.history, *named.steps))
     if settings.use_force:
         before = named.final
         named, told = force_ranking.decided(search, named, settings)

@@ -59,7 +59,7 @@ def _within(
 
     What friction leaves to chance does not count, unless the samples that count are fixed. Where
     impulses that could have swayed it show beside what was found, or what was taken for some shows
-    to be none, they are taken out, or restored, and all is done again.
+    to be none, they are taken out, or restored, and the search goes on from there.
     """
     asking.tell('base fit', 0.0)
     begun = _begun(prepared, asking.settings, each, effort, fixed)
@@ -71,7 +71,8 @@ def _within(
     taken = prepared.fit.target - clean.fit.target
     if not final_impulses.swayed(final.fit, first.scorer, taken):
         return first
-    return _moved(*_begun(clean, asking.settings, each, effort, fixed=True), asking)
+    again = _begun(clean, asking.settings, each, effort, fixed=True)
+    return _moved(*again, asking, first)
 
 
 def _begun(
@@ -85,15 +86,21 @@ def _begun(
     return *undetermined_motion.without(prepared, search, settings, fixed), line
 
 
-def _moved(prepared: Prepared, search: Search, line: Line | None, asking: Asking) -> Conclusion:
+def _moved(
+    prepared: Prepared,
+    search: Search,
+    line: Line | None,
+    asking: Asking,
+    before: Conclusion | None = None,
+) -> Conclusion:
     settings, tell = asking.settings, asking.tell
-    result = searched(prepared, search, line, settings, tell, explains_rest)
+    result = searched(prepared, search, line, settings, tell, explains_rest, before)
     if line is not None and result.found.final.effects:
         left = _line_left(prepared.fit, result.found.final)
         if left is None or not left.same_as(line):
             data = prepared.fit if left is None else hum.without(prepared.fit, left)
             search = Search(data, search.names, search.each, effort=search.effort)
-            result = searched(prepared, search, left, settings, tell, explains_rest)
+            result = searched(prepared, search, left, settings, tell, explains_rest, result)
     return follow(result, WITHIN, asking)
 
 

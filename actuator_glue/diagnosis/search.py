@@ -144,6 +144,32 @@ class Search:
         own = {f.name: copy(getattr(self, f.name)) for f in fields(self) if f.name[0] == '_'}
         return replace(self, names=(*self.names, *names), **own)
 
+    def take_over(self, other: Search, final: Trial, singles: Sequence[Trial]) -> None:
+        """Refit what another search of nearly the same target knows, from where it ended.
+
+        Args:
+            other: the search; its names and learned terms go on to this one.
+            final: what it ended with: what leaves about as little, or has one effect less, is
+                refitted, too.
+            singles: every single effect; those far behind are taken as they are.
+        """
+        self.names, self.entries = other.names, dict(other.entries)
+        self.described = other.described
+        least = FAR * final.mean_square
+        near = {key for key, known in other._tried.items() if known.rms**2 < least}
+        near |= {frozenset(final.effects) - {n} for n in final.effects} & other._tried.keys()
+        far = {frozenset(t.effects) for t in singles} - near
+        self._polished |= {key: other._polished[key] for key in near & other._polished.keys()}
+
+        def again(key: frozenset[str]) -> Fit:
+            start, most = other._tried[key].theta, 0 if key in far else _COARSE
+            return self._fit(self.data, self.structure(*key), start, iterations=most)
+
+        asked = sorted(near | far, key=sorted)
+        for key, found in zip(asked, self.each(again, asked), strict=True):
+            if key not in self._tried or found.rms < self._tried[key].rms:
+                self._keep(key, found)
+
     def left_at_most(self, mean_square: float) -> list[tuple[Structure, Fit]]:
         """Return all refitted structures that leave no more than a mean squared error [m^2]."""
         found = [(key, fit) for key, fit in self._tried.items() if fit.rms**2 <= mean_square]
