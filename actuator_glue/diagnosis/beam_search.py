@@ -64,7 +64,8 @@ class BeamSearch(Judge):
             for names in [self.search.others(current)]
         ]
         found: dict[tuple[str, ...], Trial] = {}
-        for row in self.search.additions_to(asked, partial(self.progress, label), valves=False):
+        told = partial(self.progress, label)
+        for row in self.search.additions_to(asked, told, valves=False, together=True):
             for trial in row:
                 found.setdefault(trial.effects, trial)
         return sorted(found.values(), key=by_score)

@@ -341,8 +341,12 @@ class Search:
         progress: Callable[[float], None] = lambda share: None,
         *,
         valves: bool = True,
+        together: bool = False,
     ) -> list[list[Trial]]:
-        """Refit several structures as `additions` does, all of their refits at the same time."""
+        """Refit several structures as `additions` does, all of their refits at the same time.
+
+        What is finished is near the best of its row, or of all rows `together`.
+        """
         wanted = [[(a.current, n) for n in a.names if n not in a.current.effects] for a in asked]
         # Two structures may lead to the same one: it is refitted from the first.
         first: dict[frozenset[str], tuple[Trial, str]] = {}
@@ -352,6 +356,10 @@ class Search:
             progress((i + 1) / len(first))
         rows = [sorted((self.add(*pair) for pair in row), key=by_score) for row in wanted]
         worth = [_worth_finishing(row, a.below) for row, a in zip(rows, asked, strict=True)]
+        if together:
+            every = {frozenset(t.effects): t for t in itertools.chain(*rows)}
+            best = sorted(every.values(), key=by_score)
+            worth = [_worth_finishing(best, max((a.below for a in asked), default=np.inf))]
         last = {frozenset(t.effects): t for t in itertools.chain(*worth)}
         polished = self.each(lambda trial: self.polish(trial, valves), last.values())
         done = dict(zip(last, polished, strict=True))

@@ -32,7 +32,9 @@ _LATE: Final = {
     'valve': ('valve', 'e', '-'),
     'flow': ('flow', 'q', '-'),
 }
-_LOST: Final = ('command', 'feedback')  # of the valve it is in the catalogue
+_LOST: Final = ('command', 'feedback')
+# What each is where all that moves turns over late: of the valve that is in the catalogue.
+_ALL_LATE: Final = {**{word: f'learned-{word}-play' for word in _LOST}, 'valve': 'valve-hysteresis'}
 # Places whose gain may change, and the signal that is changed by a share of something.
 _SETTLING: Final = (('flow', 'q'), ('specimen', 'k*x'), ('sensor', 'y'))
 _SHARE = (-1.0, 2.0)  # at -1 nothing is left
@@ -88,7 +90,8 @@ def _hysteresis(word: str, sizes: Mapping[str, float]) -> Effect:
         ),
         source=LEARNED,
     )
-    return replace(effect, holds=(f'learned-{word}-play', name, 1.0)) if word in _LOST else effect
+    late = _ALL_LATE.get(word)
+    return effect if late is None else replace(effect, holds=(late, name, 1.0))
 
 
 def _settling(place: str, of: str, duration: float) -> Effect:
