@@ -34,7 +34,10 @@ _LATE: Final = {
 }
 _LOST: Final = ('command', 'feedback')
 # What each is where all that moves turns over late: of the valve that is in the catalogue.
-_ALL_LATE: Final = {**{word: f'learned-{word}-play' for word in _LOST}, 'valve': 'valve-hysteresis'}
+_ALL_LATE: Final = {
+    **{word: f'learned-{word}-play' for word in _LOST},
+    'valve': 'valve-hysteresis',
+}
 # Places whose gain may change, and the signal that is changed by a share of something.
 _SETTLING: Final = (('flow', 'q'), ('specimen', 'k*x'), ('sensor', 'y'))
 _SHARE = (-1.0, 2.0)  # at -1 nothing is left
