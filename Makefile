@@ -110,6 +110,7 @@ audit: $(SAFETY_STAMP) ## known vulnerabilities of every pinned dependency; asks
 docs: .venv/docs ## renew generated tables; guides, API, executed notebooks as a site in out/docs
 	@$(BIN)/python scripts/write_message_reference.py
 	@$(BIN)/python scripts/write_effect_table.py
+	@$(BIN)/python scripts/write_house_map.py
 	@$(BIN)/python -m sphinx -W --keep-going -q -b html docs out/docs
 	@echo 'docs: out/docs/index.html'
 

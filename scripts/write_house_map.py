@@ -1,0 +1,109 @@
+"""Renew docs/house.md, the map of the package: rooms, files and what each holds (`make docs`)."""
+
+from __future__ import annotations
+
+import ast
+import tokenize
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGE, PAGE = ROOT / 'actuator_glue', ROOT / 'docs' / 'house.md'
+# Data go down this list.
+ROOMS = (
+    'io',
+    'streams',
+    'hygiene',
+    'model',
+    'inference',
+    'online',
+    'diagnosis',
+    'hybrid',
+    'campaigns',
+    'workers',
+    'report',
+    'view',
+    'api',
+    'nodes',
+    'cli',
+)
+# What strangers ask for, and the file that answers.
+QUESTIONS = (
+    ('swapped channels, a wrong sign or unit are refused', 'hygiene/checks.py'),
+    ('impulses are removed before a fit', 'hygiene/despike.py'),
+    ('impulses are judged against the final model', 'diagnosis/final_impulses.py'),
+    ('the hold of the command is chosen', 'diagnosis/moves/other_hold.py'),
+    ('an effect is found that began during a test', 'diagnosis/moves/since_onset.py'),
+    ('a structure is weighed', 'diagnosis/weights.py'),
+    ('all structures stand that were refitted', 'diagnosis/table.py'),
+    ('a tie is told', 'diagnosis/ties.py'),
+    ('the verdict is reached', 'diagnosis/verdict.py'),
+    ('the headline is written', 'diagnosis/headline.py'),
+    ('a window becomes a posterior', 'online/sampling.py'),
+    ('records, model and likelihood become a posterior', 'inference/posterior.py'),
+    ('one effect is defined, all of it', 'model/effects/catalogue/backlash.py'),
+)
+HEAD = """# The house
+
+Where things are. `make docs` writes this page from the files themselves; who may import whom is
+held by `test/test_architecture.py`, how to add an effect, a format or a command is told in
+`CONTRIBUTING.md`.
+"""
+_CODE = tokenize.NAME, tokenize.OP, tokenize.NUMBER
+
+
+def first_sentence(path: Path) -> str:
+    """Return what a file says of itself before anything else, on one line."""
+    text = ast.get_docstring(ast.parse(path.read_text(encoding='utf-8'))) or ''
+    return text.partition('\n\n')[0].replace('\n', ' ').replace('|', '\\|')
+
+
+def sizes(path: Path) -> tuple[int, int]:
+    """Return the lines of a file: all, and those without docstrings, comments and blanks."""
+    with tokenize.open(path) as file:
+        tokens = list(tokenize.generate_tokens(file.readline))
+    code = {token.start[0] for token in tokens if token.type in _CODE}
+    return tokens[-1].start[0] - 1, len(code)
+
+
+def _rooms() -> Iterator[str]:
+    yield '| room | what it holds | files | lines | of them code |'
+    yield '|---|---|---:|---:|---:|'
+    rows = []
+    for name in ('', *ROOMS):
+        folder = PACKAGE / name
+        files = list(folder.rglob('*.py') if name else folder.glob('*.py'))
+        lines, code = map(sum, zip(*map(sizes, files), strict=True))
+        says = first_sentence(folder / '__init__.py') if name else 'What all rooms share.'
+        rows.append((len(files), lines, code))
+        cells = (f'`{name}/`' if name else '`*.py`', says, *map(str, rows[-1]))
+        yield '| ' + ' | '.join(cells) + ' |'
+    yield '| all | | ' + ' | '.join(str(sum(row)) for row in zip(*rows, strict=True)) + ' |'
+
+
+def _files(folder: Path) -> Iterator[str]:
+    yield '| file | what it holds | lines |'
+    yield '|---|---|---:|'
+    for path in sorted(folder.rglob('*.py'), key=lambda p: (p.parent != folder, p)):
+        if path.name != '__init__.py':
+            name = path.relative_to(folder).as_posix()
+            yield f'| `{name}` | {first_sentence(path)} | {sizes(path)[0]} |'
+
+
+def page() -> str:
+    """Return the page."""
+    asked = ['| where | file |', '|---|---|', *(f'| {q} | `{f}` |' for q, f in QUESTIONS)]
+    parts = (
+        HEAD,
+        '## Rooms\n',
+        *_rooms(),
+        '\n## Where to look\n',
+        *asked,
+        '\n## The diagnosis, file by file\n',
+        *_files(PACKAGE / 'diagnosis'),
+    )
+    return '\n'.join(parts) + '\n'
+
+
+if __name__ == '__main__':
+    PAGE.write_text(page(), encoding='utf-8')
