@@ -116,7 +116,7 @@ class BeamSearch(Judge):
         own = found.final.added if found.final.own is not None else ''
         common = before.trial(tuple(n for n in found.final.effects if n != own))
         self.renoise()
-        self.search.take_over(before, common, found.singles)
+        self.search.take_over(before, common, found.singles, found.material)
         current = self._at_its_optimum(self.search.trial(common.effects))
         self._set_nats()
         return self._grown(current, self.rescored(found.singles), (), ())

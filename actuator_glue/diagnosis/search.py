@@ -144,26 +144,29 @@ class Search:
         own = {f.name: copy(getattr(self, f.name)) for f in fields(self) if f.name[0] == '_'}
         return replace(self, names=(*self.names, *names), **own)
 
-    def take_over(self, other: Search, final: Trial, singles: Sequence[Trial]) -> None:
+    def take_over(
+        self, other: Search, final: Trial, singles: Sequence[Trial], matters: float
+    ) -> None:
         """Refit what another search of nearly the same target knows, from where it ended.
 
         Args:
             other: the search; its names and learned terms go on to this one.
-            final: what it ended with: what leaves about as little, or has one effect less, is
-                refitted, too.
-            singles: every single effect; those far behind are taken as they are.
+            final: what it ended with: what leaves no more that matters, or has one effect less,
+                is refitted, too.
+            singles: every single effect; those that leave more are taken as they are.
+            matters: least rms error that matters [m].
         """
         self.names, self.entries = other.names, dict(other.entries)
         self.described = other.described
-        least = FAR * final.mean_square
-        near = {key for key, known in other._tried.items() if known.rms**2 < least}
+        most = final.mean_square + matters**2
+        near = {key for key, known in other._tried.items() if known.rms**2 < most}
         near |= {frozenset(final.effects) - {n} for n in final.effects} & other._tried.keys()
         far = {frozenset(t.effects) for t in singles} - near
         self._polished |= {key: other._polished[key] for key in near & other._polished.keys()}
 
         def again(key: frozenset[str]) -> Fit:
-            start, most = other._tried[key].theta, 0 if key in far else _COARSE
-            return self._fit(self.data, self.structure(*key), start, iterations=most)
+            start, steps = other._tried[key].theta, 0 if key in far else _COARSE
+            return self._fit(self.data, self.structure(*key), start, iterations=steps)
 
         asked = sorted(near | far, key=sorted)
         for key, found in zip(asked, self.each(again, asked), strict=True):
