@@ -222,8 +222,8 @@ class BeamSearch(Judge):
         if exchanged:
             for name in current.effects:
                 current = self.search.polish(replace(current, added=name))
-            open_ = self.left(current) >= self.material
-            current, rivals = self.settle(self.search.finished(current, finely=open_))
+            rest = self.left(current) >= self.settings.beaten_noise * self.noise
+            current, rivals = self.settle(self.search.finished(current, finely=rest))
         else:
             rivals = self._known_rivals(current)
         gains, nats = worth(self.search, current)

@@ -20,6 +20,7 @@ from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.each import Each
 from actuator_glue.inference.least_squares.fit import Fit, base_fit, fit, rms
+from actuator_glue.inference.least_squares.scatter import scattered
 from actuator_glue.inference.least_squares.space import Space, sum_of_squares
 from actuator_glue.inference.least_squares.stretches import Part, stretches
 from actuator_glue.model.effects import CATALOGUE, Effect, Scale, scale
@@ -224,8 +225,8 @@ class Search:
     def finished(self, trial: Trial, finely: bool = False) -> Trial:
         """Go on with a refit until it gains nothing: a pole beside a zero creeps.
 
-        With small steps, too, where something remains (`finely`): over kinks as close as those of
-        friction that sticks and slips differences do not point down.
+        With small steps, too, and from points around it, where something remains (`finely`): over
+        kinks as close as those of friction that sticks and slips differences do not point down.
         """
         key, model = frozenset(trial.effects), trial.structure
         last: dict[str, Any] = {'iterations': _LAST, 'tolerance': _LEAST_GAIN}
@@ -235,6 +236,7 @@ class Search:
             lower = self._fit(self.data, model, found.theta, space=space, **last)
             if lower.rms < found.rms:
                 found = self._fit(self.data, model, lower.theta, iterations=_FINISHED)
+            found = self.effort.spent_on(scattered(self.data, model, found, _DONE))
         self._keep(key, found)
         return self.trial(trial.effects, trial.added)
 
