@@ -25,7 +25,7 @@ def data(model: Structure, theta: Array) -> Data:
 
 
 def test_a_lower_minimum_is_reached() -> None:
-    """A gap beside a valve's play: of ten starts four end above the noise, three of them not then."""
+    """A gap beside a valve's play: of ten starts four end above the noise, and one then."""
     model = Structure(('valve-null', 'specimen-gap', 'valve-hysteresis'))
     truth = np.array([*THETA, 3e-5, 2.8e-4, 4e-5])
     some = data(model, truth)
