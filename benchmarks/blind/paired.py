@@ -1,5 +1,7 @@
 """Hold the answers of one commit against another's: `paired.py BEFORE AFTER [--out FILE]`.
 
+`--looked-at mixed:95004` leaves out a machine that something was mended on: it does not judge.
+
 Both folders are `--out` of campaigns over the same generators and seeds. Only machines that both
 have are compared, each with itself: what differs is told by the machines that changed (McNemar
 1947, exact), not by two intervals that overlap. Exit code 1: something is worse beyond chance.
@@ -8,6 +10,7 @@ have are compared, each with itself: what differs is told by the machines that c
 from __future__ import annotations
 
 import argparse
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +25,13 @@ _CHANCE = 0.05  # what is less probable than this by chance is no chance
 _FAR = 1.05  # held-out errors that differ by this factor are not the same answer
 
 
-def pairs(before: list[Json], after: list[Json]) -> list[Pair]:
+def pairs(before: list[Json], after: list[Json], looked_at: Collection[str] = ()) -> list[Pair]:
     """Return the answers of both commits about each machine that both have.
+
+    Args:
+        before: of one commit.
+        after: of another.
+        looked_at: machines left out, each `generator:seed`.
 
     Raises:
         SystemExit: none, or answers of several commits on a side.
@@ -33,7 +41,11 @@ def pairs(before: list[Json], after: list[Json]) -> list[Pair]:
         if len(commits) > 1:
             raise SystemExit(f'{name} has answers of several commits: {", ".join(commits)}')
     known = {(r['generator'], r['seed']): r for r in before}
-    found = [(known[key], r) for r in after if (key := (r['generator'], r['seed'])) in known]
+    found = [
+        (known[key], r)
+        for r in after
+        if (key := (r['generator'], r['seed'])) in known and f'{key[0]}:{key[1]}' not in looked_at
+    ]
     if not found:
         raise SystemExit('no machine is in both folders')
     return found
@@ -97,7 +109,7 @@ def seconds(found: list[Pair]) -> str:
     )
 
 
-def page(found: list[Pair]) -> tuple[str, bool]:
+def page(found: list[Pair], looked_at: Collection[str] = ()) -> tuple[str, bool]:
     """Return the page, and whether something is worse beyond chance."""
     lines, worse = table(found)
     counts = ', '.join(
@@ -113,6 +125,8 @@ def page(found: list[Pair]) -> tuple[str, bool]:
         'as uneven (McNemar 1947, exact). What the generators are is in '
         '[what was measured](scores.md).'
     )
+    if looked_at:
+        head += f' Left out, because something was mended on them: {", ".join(sorted(looked_at))}.'
     title = '# Diagnosis: two commits about the same machines'
     return '\n'.join(
         [title, '', head, '', *lines, '', held_out(found), '', seconds(found), '']
@@ -125,8 +139,12 @@ def main() -> int:
     parser.add_argument('before', type=Path, help='OUT of campaigns of one commit')
     parser.add_argument('after', type=Path, help="OUT of the same machines' campaigns of another")
     parser.add_argument('--out', type=Path, help='Markdown file to write')
+    parser.add_argument(
+        '--looked-at', nargs='*', default=[], help='machines left out, each GENERATOR:SEED'
+    )
     args = parser.parse_args()
-    text, worse = page(pairs(answers([args.before]), answers([args.after])))
+    out = frozenset(args.looked_at)
+    text, worse = page(pairs(answers([args.before]), answers([args.after]), out), out)
     print(text)
     if args.out:
         args.out.write_text(text)

@@ -73,6 +73,9 @@ def test_only_the_same_machines_are_compared(paired: ModuleType) -> None:
     """By generator and seed; answers of several commits have no side."""
     before, after = side('aaaaaaa', 4, 4), side('bbbbbbb', 4, 6)[2:]
     assert [b['seed'] for b, _ in paired.pairs(before, after)] == [2, 3]
+    left = paired.pairs(before, after, ['cases:2'])
+    assert [b['seed'] for b, _ in left] == [3]
+    assert 'mended on them: cases:2.' in paired.page(left, ['cases:2'])[0]
     other = copy.deepcopy(after)
     for one in other:
         one['generator'] = 'far'
