@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from reliability import answers, coverage
 from scipy.stats import binomtest
-from score import QUESTIONS, share, told
+from score import QUESTIONS, judging, share, told, without
 
 Json = dict[str, Any]
 Pair = tuple[Json, Json]
@@ -41,11 +41,8 @@ def pairs(before: list[Json], after: list[Json], looked_at: Collection[str] = ()
         if len(commits) > 1:
             raise SystemExit(f'{name} has answers of several commits: {", ".join(commits)}')
     known = {(r['generator'], r['seed']): r for r in before}
-    found = [
-        (known[key], r)
-        for r in after
-        if (key := (r['generator'], r['seed'])) in known and f'{key[0]}:{key[1]}' not in looked_at
-    ]
+    asked = judging(after, looked_at)
+    found = [(known[key], r) for r in asked if (key := (r['generator'], r['seed'])) in known]
     if not found:
         raise SystemExit('no machine is in both folders')
     return found
@@ -123,10 +120,8 @@ def page(found: list[Pair], looked_at: Collection[str] = ()) -> tuple[str, bool]
         f'{min(seeds)} to {max(seeds)}), each diagnosed by commit {before["commit"]} and by '
         f'commit {after["commit"]}. `by chance`: how probable it is that those which changed are '
         'as uneven (McNemar 1947, exact). What the generators are is in '
-        '[what was measured](scores.md).'
+        f'[scores](scores.md).{without(looked_at)}'
     )
-    if looked_at:
-        head += f' Left out, because something was mended on them: {", ".join(sorted(looked_at))}.'
     title = '# Diagnosis: two commits about the same machines'
     return '\n'.join(
         [title, '', head, '', *lines, '', held_out(found), '', seconds(found), '']
@@ -143,8 +138,8 @@ def main() -> int:
         '--looked-at', nargs='*', default=[], help='machines left out, each GENERATOR:SEED'
     )
     args = parser.parse_args()
-    out = frozenset(args.looked_at)
-    text, worse = page(pairs(answers([args.before]), answers([args.after]), out), out)
+    found = pairs(answers([args.before]), answers([args.after]), args.looked_at)
+    text, worse = page(found, args.looked_at)
     print(text)
     if args.out:
         args.out.write_text(text)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,6 +32,22 @@ def told(of: Json) -> str:
         return '-'
     low, high = of['ci']
     return f'{round(of["share"] * of["n"])} of {of["n"]} ({100 * low:.0f} to {100 * high:.0f} %)'
+
+
+def judging(results: list[Json], looked_at: Collection[str]) -> list[Json]:
+    """Return the answers about machines that nothing was mended on.
+
+    Args:
+        results: answers.
+        looked_at: the other machines, each `generator:seed`.
+    """
+    return [r for r in results if f'{r["generator"]}:{r["seed"]}' not in looked_at]
+
+
+def without(looked_at: Collection[str]) -> str:
+    """Say which machines were left out; nothing for none."""
+    names = ', '.join(sorted(looked_at))
+    return f' Left out, because something was mended on them: {names}.' if names else ''
 
 
 def _named(result: Json) -> list[list[str]]:
