@@ -36,8 +36,8 @@ GENERATORS = {
 MACHINES = (
     '## Machines',
     '',
-    'Four generators of simulated machines (modules of `benchmarks/blind/`), the first three with no '
-    "code of the model; where an equation of theirs is the catalogue's, both agree to 0.06 um "
+    'Four generators of simulated machines (modules of `benchmarks/blind/`), the first three with '
+    "no code of the model; where an equation of theirs is the catalogue's, both agree to 0.06 um "
     '(`test/diagnosis/test_blind_generator.py`).',
     '',
     '| generator | machines |',
