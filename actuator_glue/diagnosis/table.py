@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.search import Search
-from actuator_glue.diagnosis.weights import TELLING, log_weight, price
+from actuator_glue.diagnosis.weights import log_weights, price
 from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.inference.least_squares.free_run import Model
 from actuator_glue.json_value import JsonObject
@@ -121,12 +121,11 @@ def weighed(
     for r in sorted(some, key=lambda r: r.left_out):
         best.setdefault((r.scope, frozenset(r.effects)), r)
     told = scope, frozenset(effects)
+    left_out, costs = zip(*((r.left_out, r.price) for r in best.values()), strict=True)
+    kinds = [(where, len(names)) for where, names in best]
+    weights = log_weights(left_out, costs, kinds, material)
     found = [
-        replace(
-            r, chosen=key == told, log_weight=log_weight(r.left_out, TELLING * material, r.price)
-        )
-        for key, r in best.items()
+        replace(r, chosen=key == told, log_weight=float(weight))
+        for (key, r), weight in zip(best.items(), weights, strict=True)
     ]
-    most = max(r.log_weight for r in found)
-    beside = (replace(r, log_weight=r.log_weight - most) for r in found)
-    return tuple(sorted(beside, key=lambda r: -r.log_weight))
+    return tuple(sorted(found, key=lambda r: -r.log_weight))

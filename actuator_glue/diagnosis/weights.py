@@ -1,5 +1,7 @@
 """One weight for every structure: what it leaves in units of what matters, and what it costs.
 
+Which effect, of structures of as many:
+
     log w = -e^2 / s^2 - p - log(structures of its kind that could have been tried)
 
 e is the rms error of blocks left out, p the number of parameters, s a twentieth of what matters: a
@@ -7,20 +9,29 @@ coarsened posterior (Miller & Dunson 2019, J. Am. Stat. Assoc. 114:1113). With m
 nats of independent noise tell any two equations apart, and neither of them is the machine's:
 differences count in units of what matters. Nats answer one question only: is it there beyond
 chance.
+
+Whether there is another effect, or another scope, is asked of the best structure of each kind with
+s = m / 2, m what matters: one that takes just that away gains four nats. What matters less would
+otherwise be told as surely as it is there.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping, Sequence
+
+import numpy as np
 
 from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.model.effects import Effect
 from actuator_glue.model.structure import Structure
+from actuator_glue.records import Array
 
 # Error that costs a nat, of what matters: a tenth of that costs four. With twice of it friction's
 # shape was lost, and with ten times a delay was not told from a lag.
 TELLING = 0.05
+# The same for another effect or another scope: four nats for what just matters.
+MATTERING = 0.5
 
 
 def log_weight(left_out: float, tells: float, cost: float) -> float:
@@ -32,6 +43,34 @@ def log_weight(left_out: float, tells: float, cost: float) -> float:
         cost: its price [nats].
     """
     return -((left_out / tells) ** 2) - cost
+
+
+def log_weights(
+    left_out: Sequence[float],
+    costs: Sequence[float],
+    kinds: Sequence[Hashable],
+    material: float,
+    telling: float = TELLING,
+) -> Array:
+    """Return the logarithms of the weights of all structures of a table (K,), the greatest 0.
+
+    Args:
+        left_out: rms error of blocks left out, of each [m].
+        costs: price of each [nats].
+        kinds: how many effects each has, and in which scope.
+        material: least rms error that matters [m].
+        telling: of that, the error that costs a nat between structures of one kind.
+    """
+    pairs = list(zip(left_out, costs, strict=True))
+    named = np.array([log_weight(e, telling * material, cost) for e, cost in pairs])
+    there = np.array([log_weight(e, MATTERING * material, cost) for e, cost in pairs])
+    out = np.full(len(pairs), -np.inf)
+    for kind in set(kinds):
+        own = np.array([other == kind for other in kinds]) & np.isfinite(named)
+        if own.any():
+            best = np.argmax(np.where(own, named, -np.inf))
+            out[own] = there[best] + named[own] - np.logaddexp.reduce(named[own])
+    return np.asarray(out - out.max())
 
 
 def price(structure: Structure, entries: Mapping[str, Effect], named: int) -> float:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from statsmodels.stats.proportion import proportion_confint
 
+from actuator_glue.diagnosis.weights import log_weights
 from actuator_glue.model.effects import CATALOGUE
 
 Json = dict[str, Any]
@@ -118,6 +119,19 @@ def _first(result: Json) -> list[str]:
     return (_named(result) or [[]])[0]
 
 
+def _behind(result: Json) -> float:
+    """Nats by which the weight of the structure that is told is below the greatest."""
+    rows = [r for r in result['diagnosis']['structures'] if r['left_out'] is not None]
+    weights = log_weights(
+        [r['left_out'] for r in rows],
+        [r['price'] for r in rows],
+        [(r['scope'], len(r['effects'])) for r in rows],
+        result['diagnosis']['alarm']['threshold'],
+    )
+    told = (-float(w) for w, r in zip(weights, rows, strict=True) if r['chosen'])
+    return next(told, np.inf)
+
+
 QUESTIONS: dict[str, Question] = {
     'false_alarms': Question(
         'healthy machines given a name, or told as incomplete',
@@ -142,6 +156,11 @@ QUESTIONS: dict[str, Question] = {
         'machines with several effects, each of the noise and more: all named',
         _clear_pair,
         _both,
+    ),
+    'greatest_weight': Question(
+        'the structure that is told has the greatest weight, or within a nat of it',
+        lambda r: any('price' in row for row in r['diagnosis'].get('structures', ())),
+        lambda r: _behind(r) < 1.0,
     ),
     'unknown_told_or_described': Question(
         'effects outside the catalogue: told as incomplete, or described to within 1.2 of the '

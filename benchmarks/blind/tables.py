@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 import json
 import math
-from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -24,28 +23,13 @@ from reliability import answers
 from score import share
 
 from actuator_glue.diagnosis.candidates import mean_effects
-from actuator_glue.diagnosis.weights import TELLING, price
+from actuator_glue.diagnosis.weights import TELLING, log_weights
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.structure import Structure
-from actuator_glue.records import Array, Record
+from actuator_glue.records import Record
 
 Json = dict[str, Any]
-
-
-def weights(rows: Sequence[Json], tells: float, searched: int) -> Array:
-    """Return the weight of every row of a table (K,); they sum to one.
-
-    Args:
-        rows: structures with `effects` and `left_out` [m].
-        tells: error that costs a nat [m].
-        searched: how many effects there are to choose from.
-    """
-    left = np.array([math.inf if r['left_out'] is None else r['left_out'] for r in rows])
-    cost = [price(Structure(r['effects']), CATALOGUE, searched) for r in rows]
-    log_w = -((left**2 - np.min(left) ** 2) / tells**2) - np.array(cost)
-    w = np.exp(log_w - log_w.max())
-    return np.asarray(w / w.sum())
 
 
 def held_out(case: Case, row: Json) -> float:
@@ -65,8 +49,14 @@ def replay(result: Json, generator: str, telling: float) -> Json | None:
     told = next((r for r in rows if r['chosen']), None)
     if told is None or not rows:
         return None
-    w = weights(rows, telling * found['alarm']['threshold'], len(mean_effects()))
-    chosen = rows[int(np.argmax(w))]
+    weights = log_weights(
+        [math.inf if r['left_out'] is None else r['left_out'] for r in rows],
+        [r['price'] for r in rows],
+        [(r['scope'], len(r['effects'])) for r in rows],
+        found['alarm']['threshold'],
+        telling,
+    )
+    chosen = rows[int(np.argmax(weights))]
     truth = {catalogued(n) for n in result['effects']}
     moved = truth & {*mean_effects(), *mean_effects(reserved=True)}
     case = import_module(generator).build(result['seed'])
@@ -76,7 +66,7 @@ def replay(result: Json, generator: str, telling: float) -> Json | None:
         'rules_true': set(told['effects']) == moved,
         'weight_true': set(chosen['effects']) == moved,
         'ratio': held_out(case, chosen) / max(held_out(case, told), 1e-12),
-        'weight': float(w.max()),
+        'behind': -float(weights[rows.index(told)]),
         'told': told['effects'],
         'chosen': chosen['effects'],
         'truth': sorted(truth),

@@ -29,6 +29,28 @@ def test_a_scope_costs_its_choice() -> None:
     assert table[1].log_weight == pytest.approx(-np.log(2.0))
 
 
+def test_what_matters_less_has_less_weight_than_nothing() -> None:
+    """Half of what matters is there beyond chance, but no addition; twice of it is."""
+    for left, greatest in ((np.hypot(10.0, 2.5), ()), (np.hypot(10.0, 10.0), ('gain',))):
+        rows = [row(left=left, price=4.0), row('gain', left=10.0, price=8.0)]
+        assert weighed(rows, MATERIAL, (), '')[0].effects == greatest
+
+
+def test_which_effect_it_is_is_told_more_sharply() -> None:
+    """A fifth of what matters tells two names apart; both share the weight of their kind."""
+    rows = [
+        row(left=20.0, price=4.0),
+        row('gain', left=10.0),
+        row('delay', left=np.hypot(10.0, 1.0)),
+    ]
+    table = weighed(rows, MATERIAL, ('gain',), '')
+    assert [r.effects for r in table] == [('gain',), ('delay',), ()]
+    assert table[1].log_weight == pytest.approx(-((1.0 / 0.25) ** 2))
+    alone = weighed(rows[:2], MATERIAL, ('gain',), '')
+    shared = np.logaddexp(table[0].log_weight, table[1].log_weight) - table[2].log_weight
+    assert shared == pytest.approx(alone[0].log_weight - alone[1].log_weight)
+
+
 def test_scopes_of_scopes_are_told_together() -> None:
     inner = row('gain', left=1.0, scope='gain in b only')
     (told,) = scoped([inner], 'since 3.0 s of a', 5.0)
