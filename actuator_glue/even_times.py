@@ -14,10 +14,10 @@ Array: TypeAlias = NDArray[np.float64]
 _DAY = 86_400.0  # s
 # A sample may lie this far off the uniform grid, in periods: rounded time stamps do.
 _TOLERANCE = 0.25
-# Share of the steps that differ so far from their median where a clock is uneven throughout: a
-# few that do are gaps.
+# Share of the steps that far off their median above which a clock is uneven throughout: a few
+# such steps are gaps.
 _THROUGHOUT = 0.1
-_DECIMALS = 6  # digits behind the point to which stamps are looked at for having been rounded
+_DECIMALS = 6  # most digits behind the point to which stamps may have been rounded
 
 
 def uniform_period(time: Array, where: str) -> float:
@@ -130,7 +130,7 @@ def rounding(time: Array) -> float:
 
 
 def near_whole_rate(period: float, samples: int, rounding: float = 0.0) -> float:
-    """Return the period of a whole number of Hz where so many samples do not tell it from it.
+    """Return the period of a whole number of Hz if the samples cannot tell it from `period`.
 
     Args:
         period: mean step of the times [s].

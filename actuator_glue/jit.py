@@ -93,7 +93,7 @@ def _store() -> Store:
         return Store(str(beside), True)
     if beside.is_dir():  # as in the image of a container that was warmed up when it was made
         return Store(str(beside), False)
-    with suppress(RuntimeError):  # nobody's home is known
+    with suppress(RuntimeError):  # no home folder is known
         caches = os.environ.get('XDG_CACHE_HOME') or Path('~/.cache').expanduser()
         folder = Path(caches, 'actuator_glue', name)
         if folder.is_absolute() and _writable(folder):
@@ -121,8 +121,8 @@ class ReadOnlyLocator(UserProvidedCacheLocator):
 # A function that another one calls is inlined, whatever its size: the process that compiles would
 # otherwise link the callee's own code, every later one the copy in the caller's cached object, and
 # the two may add up in another order. A replay must repeat a live run to the bit.
-# What may take a tenth of a millisecond or more says nogil=True, and others run meanwhile; short
-# functions would pay more for giving the lock back and fighting for it anew than it frees.
+# Functions that may take a tenth of a millisecond or more say nogil=True, and other threads run
+# meanwhile; short ones would pay more for giving the lock back and regaining it than they free.
 _compile: Any = partial(
     numba.njit,
     forceinline=True,

@@ -7,11 +7,11 @@ from numpy.typing import ArrayLike
 
 # Further apart than this is no drift of a clock but another rate [1].
 APART = 0.01
-# Rates are compared over so long at least [s]: of less a clock's jitter is told, not its rate.
+# Shortest time over which rates are compared [s]: less shows a clock's jitter, not its rate.
 LEAST_SECONDS = 2.0
 _LEAST_POINTS = 8
 _LEAST_STEPS = 64
-# More points tell no more, and a day of samples has many.
+# More points add no information, and a day of samples has many.
 _MOST_POINTS = 4096
 
 

@@ -13,8 +13,8 @@ from actuator_glue.motion import METRES
 from actuator_glue.records import Hold, check_motion, check_stiffness
 
 MAX_INDEX = 2**62
-# What a stiffness is in a message in which nobody fills it [N/m]: a message's default can be any
-# number but NaN, and 0 would be a free actuator.
+# Stiffness in a message that leaves it unfilled [N/m]: a message's default can be any number but
+# NaN, and 0 would be a free actuator.
 UNFILLED = -1.0
 # Nobody streams into hundreds of announced set-ups; a publisher gone wild must not fill memory.
 _MOST = 16

@@ -41,7 +41,7 @@ def _level(values: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _likeness(one: NDArray[np.float64], other: NDArray[np.float64], latest: int) -> float:
-    """Return the greatest correlation of either sign at which the second is up to so much late."""
+    """Return the greatest correlation of either sign at lags up to `latest` either way."""
     norm = float(np.linalg.norm(one) * np.linalg.norm(other))
     if norm == 0.0:
         return 0.0

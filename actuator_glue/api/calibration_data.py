@@ -29,7 +29,7 @@ class CalibrationData:
         log_density: log likelihood of each draw, shape (steps, chains).
         best: draw of the highest likelihood, shape (p,).
         error: free-run error of the best draw.
-        structure: what is left of the records beside noise; None where they are too short to tell,
+        structure: what the residual holds beside noise; None where records are too short to tell,
             and in files of earlier versions.
         at_bound: parameters that a bound of the prior holds.
         problems: why the posterior must not be used as it stands; empty where it may.

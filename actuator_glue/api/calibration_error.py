@@ -36,7 +36,7 @@ def fit_error(
 def left_over(
     model: ModelChoice, best: Array, records: list[Record], initial: Initial, settle: float
 ) -> ResidualModel | None:
-    """Return the residual of the best draw as a model of noise; None of too few samples."""
+    """Return the residual of the best draw as a model of noise; None for too few samples."""
     structure = Structure(model.effects)
     counts = [round(settle / r.period) for r in records]
     count = len(structure.names)

@@ -47,7 +47,7 @@ def sampled(
         progress: called with the evaluations made so far in a run.
 
     Raises:
-        InputError: settle too long, a residual without spread, or a run that cannot be.
+        InputError: settle too long, a residual without spread, or an impossible run.
     """
     ask = options.likelihood == 'glue' and options.shaping_factor == 'auto'
     problem = automatic(problem, near, options.use_force) if ask else _given(problem, options)

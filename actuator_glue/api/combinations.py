@@ -35,8 +35,8 @@ if TYPE_CHECKING:
     from actuator_glue.report import html
     from actuator_glue.report.first_page import FirstPage
 
-# A stiffness that stands for the one nobody knows [N/m]: whatever that is, some parameters inside
-# the box of Table 3 move as the actuator does. Nothing that is told depends on it.
+# A stiffness that stands for the unknown one [N/m]: whatever that is, some parameters inside the
+# box of Table 3 move as the actuator does. Nothing that is reported depends on it.
 _STAND_IN = 250e3
 _DIAGNOSE = 'with the stiffness, `actuator-glue diagnose` tells what is missing'
 COST = (
@@ -48,7 +48,7 @@ COST = (
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Combinations(Result, CombinationsData):
-    """What is known of an actuator under a specimen of a stiffness that is not.
+    """What is known of an actuator under a specimen of unknown stiffness.
 
     Its numbers are those of `CombinationsData`: `combinations` by name, `draws`, `problems`, ...
     """
@@ -219,7 +219,7 @@ def combinations(
 
 
 def _residuals(found: Calibration) -> tuple[Array, ...]:
-    """Return what the best draw leaves of each record [m]."""
+    """Return the best draw's residual in each record [m]."""
     structure = Structure(found.effects)
     initial: Initial = 'rest' if found.initial == 'rest' else 'measured'
     out = []
@@ -279,7 +279,7 @@ def _marginals(
 
 
 def _pushed(records: list[Record]) -> tuple[float | None, list[str]]:
-    """Return what the recorded forces say of the stiffness [N/m], and that for people."""
+    """Return the stiffness that the recorded forces suggest [N/m], and that in words."""
     seen, told = [], []
     for number, record in enumerate(records, start=1):
         found = pull(record)

@@ -19,7 +19,7 @@ COMBINATIONS = {
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class CombinationsData:
-    """What is known of an actuator under a specimen of a stiffness that is not.
+    """What is known of an actuator under a specimen of unknown stiffness.
 
     Attributes:
         combinations: posterior of each combination by name: those of the transfer function
@@ -35,11 +35,11 @@ class CombinationsData:
         tracking: how the actuator follows the command of each record.
         evaluations: likelihood evaluations.
         seconds: how long it took.
-        structure: what is left of the records beside noise; None where they are too short to tell,
+        structure: what the residual holds beside noise; None where records are too short to tell,
             and in files of earlier versions.
         residuals: measured less the best draw, of each record whose start was let decay [m];
             empty after `load`.
-        pull: force over displacement [N/m], which the stiffness may be; None where no force says.
+        pull: force over displacement [N/m], which may be the stiffness; None where no force shows.
     """
 
     combinations: dict[str, Marginal]

@@ -107,7 +107,7 @@ def _some(part: Trace) -> slice:
 
 
 def _seconds(part: Trace) -> np.ndarray:
-    """Return where each second of a part begins, those that it has."""
+    """Return the start of each second that a part has."""
     label = np.floor((part.time - part.time[0]) / BLOCK + 1e-9)
     return np.flatnonzero(np.diff(label, prepend=-1.0))
 

@@ -1,4 +1,4 @@
-"""Why a diagnosis that nothing is left in does not stand: what its own numbers say against it."""
+"""Doubts about a diagnosis that explained everything: what its own numbers say against it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from actuator_glue.diagnosis.verdict import excused
 from actuator_glue.hygiene.unlike_rest import unlike_rest
 from actuator_glue.records import Record
 
-# Share of what was held out in the 95 % band below which that is no 95 % band: a noise that is
+# Share of the held-out samples in the 95 % band below which that is no 95 % band: a noise that is
 # twice as large there still leaves 67 to 80 %.
 COVERED = 0.8
 

@@ -27,8 +27,8 @@ def effect_costs(
     """Return how much of the delay margin each effect of the model costs [s].
 
     The margin of each draw with this effect at its neutral value less that with all of them, under
-    the same compensator; negative where the effect makes room. Without an effect that draws need
-    to stay limited there is no number. A nonlinear effect is taken for the gain and the delay of
+    the same compensator; negative where the effect makes room. An effect has no number if a draw
+    has no limit with or without it. A nonlinear effect is replaced by the gain and the delay of
     its describing function where the loop has its margin.
 
     Args:

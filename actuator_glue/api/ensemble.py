@@ -59,7 +59,7 @@ def simulated(
 
 
 def residual_of(parts: Sequence[Array], parameters: int) -> ResidualModel | None:
-    """Return what a model leaves, measured less simulated [m]; None of too few samples.
+    """Return the residual of a model, measured less simulated [m]; None for too few samples.
 
     Args:
         parts: one residual for each stretch without a gap, (n,) each.

@@ -206,7 +206,7 @@ def measured_response(record: Record) -> MeasuredResponse:
         coherence = np.abs(response) ** 2 * power / answer
         middle = within(hertz * np.abs(u) ** 2) / power
         density = power / count
-    # One line agrees with itself, whatever it is.
+    # A single line is always coherent.
     used = (count >= 2) & (coherence >= _COHERENT) & (density >= _EXCITED * np.nanmax(density))
     if used.sum() < 2:
         raise InputError(

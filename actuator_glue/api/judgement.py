@@ -1,4 +1,4 @@
-"""What a calibration must be told with: what forbids its use first, then what limits it."""
+"""Remarks that a calibration comes with: first those that forbid its use, then its limits."""
 
 from __future__ import annotations
 
@@ -67,7 +67,7 @@ def problems(
         )
     structure = None if left is None else left.problem()
     if structure is not None and left is not None:
-        # Where the set-up is another one the rest follows from it.
+        # If the set-up is wrong, the other problems follow from it.
         told.insert(0 if left.setup else len(told), structure)
     told += unlike
     if prior is not None and prior.contradicted:

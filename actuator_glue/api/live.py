@@ -20,13 +20,13 @@ from actuator_glue.online.live_diagnosis import Concluded
 from actuator_glue.online.structures import BESIDE, LEAVES, MOST, Proposal, Proposed
 from actuator_glue.records import Array, Record
 
-# Of the usual effort of a diagnosis, at most: what takes a core more than half a minute comes too
-# late for the samples that it is about, and the next look has more of them.
+# Largest share of a diagnosis' usual effort: one that takes a core more than half a minute comes
+# too late for its samples, and the next diagnosis has more of them.
 EFFORT = 0.6
 # Eq. (2) alone is carried beside every addition, at least with this weight, until its forecasts
 # exclude it: what a diagnosis is sure of, it is sure of for the data that it has seen.
 _PLAIN = 0.02
-# What one stiffness leaves open.
+# Parameter that tests under a single stiffness leave open.
 _OIL = 'alpha_2'
 # Weight of a structure with effects that have no probability: learned terms.
 _DESCRIBED = 0.9
@@ -50,8 +50,8 @@ def given(known: tuple[Carried, Drift, float] | None) -> GivenPrior | None:
 def carriable(effects: Sequence[str]) -> tuple[str, ...]:
     """Return the effects that an estimator can carry.
 
-    A window's likelihood takes the mean out of the error (Eq. (4)): of what only moves the level
-    it says nothing.
+    A window's likelihood takes the mean out of the error (Eq. (4)): it says nothing of effects
+    that only move the level.
 
     Args:
         effects: names.
@@ -88,9 +88,9 @@ def concluded(found: Diagnosis, records: Sequence[Record], apply: bool | None = 
 def proposed(found: Diagnosis, records: Sequence[Record]) -> Proposal:
     """Return the structures that a diagnosis leaves possible, with what it knows of their sizes.
 
-    The one it tells comes with its posterior, which stands for the middle of the data that it is
-    of, and leaves open what they do; those that are tied with it come without, and Eq. (2) alone
-    beside them.
+    The diagnosed structure comes with its posterior, which is dated to the middle of its data and
+    leaves open what they leave open; structures tied with it come without a posterior, and so does
+    Eq. (2) alone.
     """
     start, end = _since(found, records), records[-1].stamp_ns(len(records[-1]) - 1)
     model, draws = _within_bounds(found)
@@ -109,7 +109,7 @@ def proposed(found: Diagnosis, records: Sequence[Record]) -> Proposal:
 
 
 def _since(found: Diagnosis, records: Sequence[Record]) -> int:
-    """Return when the data begin that the sizes found are of [ns]."""
+    """Return the start of the data from which the sizes were found [ns]."""
     if found.onset is not None:
         for record in records:
             if record.source == found.onset.source:
@@ -120,7 +120,7 @@ def _since(found: Diagnosis, records: Sequence[Record]) -> int:
 def _within_bounds(found: Diagnosis) -> tuple[ModelChoice, Array]:
     """Return the augmented model, where to start with it, and its draws (m, p) inside its box.
 
-    What a record leaves open may reach far beyond the box: that part of it cannot be.
+    Draws of what a record leaves open may reach far beyond the box, where they are impossible.
     """
     model = choose_model(carriable(found.structure))
     draws = found.joint[:, [found.names.index(name) for name in model.names]]
@@ -137,8 +137,8 @@ def _opened(
 ) -> Array:
     """Return draws (m, p) as wide as one stiffness leaves them inside the box.
 
-    Along that ridge a diagnosis draws from around its fit only, which says nothing of where on it
-    the machine is: as a prior it would be believed.
+    A diagnosis draws only around its fit along that ridge, which says nothing of the machine's
+    place on it: as a prior it would be believed.
     """
     stiffness = {record.known_stiffness() for record in records}
     given = found.prior is not None and _OIL in found.prior.names
@@ -151,7 +151,7 @@ def _opened(
 
 
 def _weight(found: Diagnosis) -> float:
-    """Return the probability of the structure that is told."""
+    """Return the probability of the diagnosed structure."""
     told = carriable(found.structure)
     each = [_probability(effect) for effect in found.effects if effect.name in told]
     return float(np.clip(np.prod(each), LEAVES, 1.0 - _PLAIN))
@@ -162,7 +162,7 @@ def _probability(effect: Finding) -> float:
 
 
 def _tied(found: Diagnosis) -> list[tuple[tuple[str, ...], float]]:
-    """Return structures with a tied name for one that is told, and their odds against it."""
+    """Return structures with a tied name in place of a reported one, and their odds against it."""
     told = carriable(found.structure)
     out: dict[frozenset[str], tuple[tuple[str, ...], float]] = {}
     for effect in found.effects:

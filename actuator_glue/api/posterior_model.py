@@ -98,7 +98,7 @@ class PosteriorModel(Result):
             frequencies: shape (f,) [Hz]; None for 0.1 to 30 Hz.
 
         Raises:
-            InputError: a stiffness or frequencies that cannot be.
+            InputError: an impossible stiffness or impossible frequencies.
         """
         of = self.drawn()
         k = check_stiffness(stiffness)
@@ -223,7 +223,7 @@ class PosteriorModel(Result):
             stiffness: of specimens [N/m]; None for those of the records.
 
         Raises:
-            InputError: the file cannot be written, or a stiffness that is none.
+            InputError: the file cannot be written, or an impossible stiffness.
         """
         of = self.drawn()
         several = of.stiffness if stiffness is None else np.ravel(np.asarray(stiffness))

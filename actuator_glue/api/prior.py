@@ -18,10 +18,10 @@ from actuator_glue.inference.prior_use import GivenPrior
 
 
 def check_prior(drift: float, age: timedelta | float) -> float:
-    """Return an age in seconds; refuse a drift [h^-1/2] or an age that is none.
+    """Return an age in seconds; refuse a drift [h^-1/2] or an age that cannot be used.
 
     Raises:
-        InputError: one of them.
+        InputError: either cannot be used.
     """
     since = seconds(age, 'prior_age')
     if not 0.0 <= since < np.inf:
@@ -33,11 +33,11 @@ def check_prior(drift: float, age: timedelta | float) -> float:
 def given_prior(
     earlier: Calibration | GivenPrior | Path | str | None, drift: float, age: timedelta | float
 ) -> GivenPrior | None:
-    """Return what an earlier calibration, or the file it was saved to, lets one know now.
+    """Return the prior that an earlier calibration, or the file it was saved to, gives now.
 
     Args:
-        earlier: None for nothing; what is known now already stays as it is. A file may also hold
-            what `history` made of many tests, a `PooledPrior`.
+        earlier: None for no prior; a `GivenPrior` stays as it is. A file may also hold what
+            `history` made of many tests, a `PooledPrior`.
         drift: standard deviation by which the logarithm of each parameter may have moved in an
             hour since (random walk) [h^-1/2].
         age: time since, a `timedelta` or a number of seconds.

@@ -88,7 +88,7 @@ class WindowEstimate:
 
 @dataclass(frozen=True, slots=True)
 class Compared:
-    """Replayed numbers held against those published live.
+    """Replayed numbers compared with those published live.
 
     Attributes:
         posteriors: how many were compared.

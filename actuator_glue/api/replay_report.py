@@ -120,7 +120,7 @@ def _names(found: ReplayData) -> list[str]:
 
 
 def _windows(found: ReplayData) -> list[WindowEstimate]:
-    """Return the windows of the last one's model: the parameters of others are others."""
+    """Return the windows with the last window's model: other models have other parameters."""
     names = _names(found)
     return [w for w in found.windows if list(w.parameters) == names]
 

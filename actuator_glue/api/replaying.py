@@ -255,7 +255,7 @@ def _estimate(out: _Run, settings: EstimatorSettings, done: Progress) -> ReplayC
             else:
                 out.events.append(getattr(told, 'message', str(told)))
 
-    # Without a live run to hold them against, nobody sees the limits of bands.
+    # Without a live run to compare with, the limits of bands are not needed.
     with Reports(limits=live is not None) as reports:
         found = results(reports)
         comparison = None if live is None else compare(found, live, out.missing)

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 FREQUENCIES = (1.0, 5.0, 10.0)  # Hz
 _DRAWS = 100  # that are simulated over the record
-# That are asked for delay and amplitude: 2.5 % of fewer are too few for the end of an interval.
+# Draws for delay and amplitude: 2.5 % of fewer are too few for the end of an interval.
 _ANSWERS = 400
 _WINDOW_DRAWS = 40  # of a window, which has little time
 HEADER = ('number', 'unit', 'measured', 'median', '2.5 %', '97.5 %')
@@ -95,11 +95,11 @@ def ready(records: Sequence[Record]) -> list[Record]:
 def records_tracking(
     draws: Array, names: Sequence[str], structure: Structure, records: Sequence[Record]
 ) -> tuple[RecordTracking, ...]:
-    """Return how the actuator follows the command of each record, whoever asks.
+    """Return how the actuator follows the command of each record, for every kind of result alike.
 
-    Numbers of one record are those of one set of samples: at the rate it was sampled with, without
-    impulses, and without what lets a state that is not known be forgotten. Delay and amplitude of
-    a model that is not linear are those of sines as large as the tests had them.
+    All numbers of a record are of one set of samples: at the rate it was sampled with, without
+    impulses, and without the start in which an unknown initial state decays. Delay and amplitude
+    of a nonlinear model are those of sines as large as the tests had them.
 
     Args:
         draws: shape (m, p), SI units.
@@ -179,9 +179,9 @@ def _some(draws: Array, names: Sequence[str], structure: Structure, most: int) -
 def _sines(
     draws: Array, names: Sequence[str], structure: Structure, sizes: Scale, stiffness: float
 ) -> dict[str, Spread]:
-    """Return delay and amplitude of a model that is not linear, of sines as large as the tests'.
+    """Return delay and amplitude of a nonlinear model, of sines as large as the tests'.
 
-    Those of a diagnosis are as large.
+    A diagnosis uses sines of the same size.
     """
     if structure.linear:
         return {}

@@ -30,7 +30,7 @@ def chosen_draw(of: Drawn, draw: str | int) -> Array:
     raise InputError(f"draw {draw!r}: use 'mean', 'best', or a number below {len(draws)}")
 
 
-_DUST = 1e-9  # of the largest term of a polynomial at its own frequency: arithmetic, no term
+_DUST = 1e-9  # of a polynomial's largest term at its own frequency: less is rounding error
 
 
 def transfer_function(of: Drawn, stiffness: float, draw: str | int) -> Any:

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from pandas import DataFrame
 
 ANALYSIS = 'actuator_glue.campaigns.analysis:analysed'
-# Tasks given to the scheduler for each thread, again when half of them have ended: the next are
-# there when one ends, it never knows of many, and it is asked seldom (it keeps a note each time).
+# Tasks given to the scheduler for each thread, again when half of them have ended: a thread always
+# finds its next task, and the scheduler never holds many and is asked seldom (it keeps notes).
 _AHEAD = 8
 # How often the number of workers is asked for [s].
 _RECOUNT = 5.0
@@ -112,7 +112,7 @@ def campaign(
 
 
 def _untold(progress: Progress) -> None:
-    """Tell nobody."""
+    """Report nothing: the default for `progress`."""
 
 
 def _write_provenance(
@@ -232,7 +232,7 @@ class _CampaignRun:
         return client.gather(finished, errors='skip') if finished else {}
 
     def _check(self, future: Any) -> None:
-        """See that a task has no result because no worker outlived it.
+        """Check that a task without a result is one that no worker outlived.
 
         Raises:
             InputError: the scheduler has gone, or a worker cannot write to the folder.

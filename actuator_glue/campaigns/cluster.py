@@ -17,8 +17,9 @@ from actuator_glue.errors import InputError
 if TYPE_CHECKING:
     from distributed import Client
 
-# Of dask: it watches every thread 100 times a second and keeps long logs, all for a dashboard that
-# a campaign has not. Schedulers and workers that others start take them from their environment.
+# Settings of dask, which watches every thread 100 times a second and keeps long logs, all for a
+# dashboard that a campaign does not have. Schedulers and workers that others start take them from
+# their environment.
 SETTINGS = {
     'distributed.worker.profile.enabled': False,
     'distributed.admin.low-level-log-length': 100,
@@ -95,7 +96,7 @@ def _serve(workers: int) -> None:
     from distributed.utils import dask
 
     dask.config.set(SETTINGS)
-    # A record's memory and threads are held to by the process it is computed in.
+    # The process in which a record is computed enforces its limits of memory and threads.
     ended = threading.Event()
     with LocalCluster(
         n_workers=workers,

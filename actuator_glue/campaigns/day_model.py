@@ -21,11 +21,11 @@ from actuator_glue.records import Array
 DIFFUSE = 10.0
 # Of what a repair or a fault does to the logarithm of a parameter.
 JUMP = 0.3
-# Walk per root of a day, and offset of a day: log-uniform between what does not matter and what
-# no machine does.
+# Walk per root of a day, and offset of a day: log-uniform from values that do not matter to values
+# that no machine has.
 _WALKS = np.geomspace(1e-5, 0.03, 12)
 _OFFSETS = np.geomspace(1e-4, 0.5, 20)
-# Values of each in a finer grid, and logarithm of what does not count beside the likeliest pair.
+# Values of each in a finer grid, and log likelihood below the likeliest pair's that is negligible.
 _FINE = 24
 _NEGLIGIBLE = 7.0
 
@@ -49,7 +49,7 @@ class Grid:
         return cls(walk.ravel(), offset.ravel())
 
     def around(self, log_likelihood: Array) -> Grid:
-        """Return a finer grid of where the posterior is: many days tell more than this one holds.
+        """Return a finer grid around the posterior, which many days make narrower than this grid.
 
         Args:
             log_likelihood: of each pair, (g,).
@@ -89,7 +89,7 @@ def log_likelihoods(
     grid = grid or Grid.usual()
     shape = (1 + len(also), len(grid.walk))
     m, p, total = np.zeros(shape), np.full(shape, DIFFUSE**2), np.zeros(shape)
-    begun = 1  # until its place a hypothesis is as the first row
+    begun = 1  # before its place a hypothesis is as the first row
     for t in range(len(y)):
         if t:
             p[:begun] += grid.walk**2 * (times[t] - times[t - 1]) + JUMP**2 * (t in jumps)

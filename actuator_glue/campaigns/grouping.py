@@ -94,7 +94,7 @@ class Task:
 
 
 def _unsaid(line: str) -> None:
-    """Take a remark on a file that is no reason not to use it."""
+    """Drop a remark on a file that can still be used."""
 
 
 def files_below(given: Sequence[Path | str], rules: Sequence[FileRule]) -> Iterator[Member]:
@@ -235,7 +235,7 @@ def _dated(said: dict[str, str]) -> dict[str, str]:
     """Return what is said with times in ISO 8601, and the day of the start.
 
     Raises:
-        InputError: a time that is none.
+        InputError: a time that cannot be read.
     """
     for key in ('started', 'day'):
         if key in said:

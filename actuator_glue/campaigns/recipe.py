@@ -98,7 +98,7 @@ def read_recipe(path: Path | str) -> Recipe:
     """Return the recipe of a YAML file; paths in it count from its folder.
 
     Raises:
-        InputError: it cannot be read, an entry that is not known, or a value that is none.
+        InputError: it cannot be read, an unknown entry, or a value that cannot be used.
     """
     path = Path(path)
     text = read_text(path, 'recipe', 'a recipe is a page of text', 'recipes')

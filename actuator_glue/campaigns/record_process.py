@@ -78,7 +78,7 @@ class RecordProcess:
             return {'failure': self._end(process)}
         row: Row = json.loads(answer)
         if row.pop('out_of_memory', False):
-            self.close()  # what it had taken may lie anywhere
+            self.close()  # the memory it had taken may still be held
         return row
 
     def close(self) -> None:

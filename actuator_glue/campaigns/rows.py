@@ -27,7 +27,7 @@ Row = dict[str, Any]
 
 
 def fingerprint(task: Task) -> str:
-    """Return what tells that a task is the same without reading its files: sizes and times."""
+    """Return a mark by which a task is known without reading its files: their sizes and times."""
     stats: list[Any] = []
     for member in task.members:
         for path in _files(member):

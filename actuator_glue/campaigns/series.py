@@ -45,7 +45,7 @@ class Series:
     left_out: dict[str, str]
 
     def until(self, count: int) -> Series:
-        """Return the first so many days."""
+        """Return the first `count` days."""
         return Series(
             self.actuator,
             self.days[:count],

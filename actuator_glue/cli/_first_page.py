@@ -43,11 +43,11 @@ def show_first(page: FirstPage, args: argparse.Namespace) -> str:
 
 
 def _as_asked(command: str, args: argparse.Namespace) -> str:
-    """Return a command with what was asked for with this one, where it has that option."""
+    """Return a command with this command's options added, where it has them too."""
     words = shlex.split(command)
     kept = getattr(args, 'save', None)
     if kept is not None and kept.lower().endswith('.npz') and '--save' in words:
-        # The draws are there: they are looked at.
+        # The draws have been saved: the next command plots them.
         tests = words[2 : min(words.index(w) for w in ('--effect', '--save') if w in words)]
         words = ['actuator-glue', 'plot', *tests, '--draws', kept]
     for option, texts in _given(words[1], args):

@@ -54,7 +54,7 @@ def run(args: argparse.Namespace) -> int:
     rows = [_row(column, found) for column in found.columns]
     title = f'{args.file}: {found.what}, {len(found.columns)} columns of numbers'
     table(title, ('column', 'unit', 'samples', 'least', 'greatest', 'remark'), rows, args)
-    # What we recorded says itself what its channels are; no other topic of it is one.
+    # A bag that we recorded says what its channels are; no other topic of it is a channel.
     ours = plain and found.what == 'bag'
     text = map_text(found, proposal) if proposal.complete and not ours else ''
     refused = _fault(args.file, text) if text else '' if ours else _missing(found, proposal)

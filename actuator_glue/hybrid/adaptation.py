@@ -1,7 +1,7 @@
 """The adaptive time series: coefficients that follow the measured displacement, compiled.
 
 Chae, Kazemibidokhti and Ricles 2013: over a moving window the command is regressed on the measured
-displacement, its rate and its acceleration; what the command was made of then makes the target
+displacement, its rate and its acceleration; the same coefficients on the target then make it
 arrive. Both pass one low-pass, whose states are the derivatives, so that neither lags the other.
 """
 

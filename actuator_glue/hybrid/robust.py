@@ -11,7 +11,7 @@ from actuator_glue.records import Array
 PERCENTILE = 95.0
 DRAWS = 200  # of the posterior
 _LINES = 800  # frequencies
-_POWER = 0.9995  # of the target, up to the highest of them
+_POWER = 0.9995  # share of the target's power up to the highest frequency
 _TRIALS = 400
 _STEP = np.array([5e-3, 5e-4, 5e-6])  # of the coefficients [-, s, s^2]
 

@@ -1,8 +1,8 @@
 """Records out of any topics of a bag, through a channel map.
 
-A sample is what the command says: where its messages lie on a uniform clock, they are taken one
-by one; where they do not, it is read at uniform times as its hold says. What is measured by
-messages of other times is interpolated there. A message that is missing is a gap.
+The command defines the samples: where its messages lie on a uniform clock, each is a sample;
+elsewhere the command is read at uniform times as its hold says. Measurements of other times are
+interpolated to the samples. A message that is missing is a gap.
 """
 
 from __future__ import annotations
@@ -19,9 +19,9 @@ from actuator_glue.io.channel_map import ChannelMap
 from actuator_glue.io.laboratory import in_si
 from actuator_glue.records import Array, Hold, Record
 
-# A step of so many periods is a gap, whatever the clock does after it.
+# A step of this many periods is a gap, whatever the clock does after it.
 _GAP = 2.5
-# A step of so many is one where the clock lags by half a period afterwards: a message is missing.
+# A step of this many is a gap if the clock lags by half a period afterwards: a message is missing.
 _STEP, _LAG, _NEAR = 1.5, 0.5, 10
 
 
@@ -45,7 +45,7 @@ def read_mapped(
 
     Raises:
         InputError: no bag, damage, a topic that is not there or cannot be decoded, topics that
-            do not overlap in time, gaps and nobody to be told.
+            do not overlap in time, or gaps without `gap`.
     """
     wanted = {role: str(channel.column) for role, channel in channels.roles().items()}
     series = topic_series(path, set(wanted.values()), note)
@@ -167,7 +167,7 @@ def _sampled(
     if len(times) < 2 or len(measured) < 2:
         return {'command': times[:0]}, 0.0, 1.0
     own, other = (_period(stamps) for stamps in (times, measured))
-    # A command that comes less often than what is measured is held between.
+    # A command that comes less often than measurements is held between its messages.
     period = 1.0 / rate if rate is not None else own if own < 1.5 * other else other
     index = np.arange(len(times))
     first = float(np.mean(times - period * index))

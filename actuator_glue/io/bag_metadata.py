@@ -95,7 +95,7 @@ class BagTopic:
 
     @property
     def key(self) -> tuple[str, str, str]:
-        """What tells it from others: one name may stand for several types."""
+        """Key of the topic: one name may stand for several types."""
         return self.name, self.type, self.encoding
 
 

@@ -18,7 +18,7 @@ from actuator_glue.io.messages import deserialize, full_name
 
 Note = Callable[[str], None]
 TEST_SETUP = full_name('TestSetup')
-# As many sample blocks may wait on their topic while a recorder takes them before their set-up.
+# Messages held back for a set-up recorded late: as many as sample blocks may wait on their topic.
 WAITING = 2000
 
 
@@ -57,12 +57,12 @@ class Summary:
 
 
 def refuse(message: str) -> NoReturn:
-    """Raise what was noted: how damage is met where nobody asked to pass over it."""
+    """Raise a note: the default for damage, unless the caller passes over it."""
     raise InputError(message)
 
 
 def warn_caller(message: str) -> None:
-    """Warn of what was noted: how a thing is met that is left out where the rest can be used."""
+    """Warn of a note: the default for parts left out of an otherwise usable whole."""
     warnings.warn(message, stacklevel=3)
 
 
@@ -147,7 +147,7 @@ def messages(
         summary: filled while reading, whatever the filters.
 
     Raises:
-        InputError: no bag, or damage and nobody to note it.
+        InputError: no bag, or damage without `note`.
     """
     for file in bag_files(path, note):
         scan = Scan(file, note)
@@ -255,7 +255,7 @@ def decoded(
         note: as in `messages`.
 
     Raises:
-        InputError: no bag, damage and nobody to note it, or bytes that are no such message.
+        InputError: no bag, damage without `note`, or bytes that are no such message.
     """
     types = {full_name(name) for name in names}
     for found in as_published(messages(path, types=types, topics=topics, note=note)):

@@ -141,8 +141,8 @@ def read_records(
             warning.
 
     Raises:
-        InputError: no bag, no samples, damage, NaN or absurd samples, a gap or clock jump and
-            nobody to be told.
+        InputError: no bag, no samples, NaN or absurd samples; damage without `note`, or a gap or
+            clock jump without `gap`.
     """
     every, setups = _setups(path, note, warn)
     open_segments: dict[str, _Segment] = {}
@@ -194,7 +194,7 @@ def without_samples(path: Path | str) -> str:
 def _governed(
     path: Path | str, every: Iterable[BagMessage], setups: list[tuple[int, BagSetup]]
 ) -> Iterator[tuple[BagBlock, StreamSetup | None]]:
-    """Yield all samples in their order, each block or part of one with what governs it."""
+    """Yield all samples in their order, each block or part of a block with its set-up."""
     governing: dict[str, _Governing] = {}
     for place, raw in enumerate(every):
         if raw.type == SAMPLE_BLOCK:
@@ -208,10 +208,10 @@ def _governed(
 def check_order(path: Path | str) -> None:
     """Refuse a bag whose file holds messages in another order than that of their times.
 
-    Records are put in order (`read_records`); what repeats a live run takes messages as they came.
+    `read_records` puts records in order; a replay of a live run takes messages as they came.
 
     Raises:
-        InputError: with what to do.
+        InputError: the order differs; the message says what to do.
     """
     order = _Order(path)
     for _ in order.seen(messages(path, types=TYPES, note=lambda _: None)):
@@ -271,7 +271,7 @@ def _usable(
 class _Order:
     """Whether a file may hold the blocks of a topic in another order than that of their times.
 
-    Where a clock is set back, times are earlier, too: but the samples count on, or anew.
+    Times also go back where a clock is set back, but sample indices then count on, or anew.
     """
 
     def __init__(self, path: Path | str) -> None:
@@ -294,14 +294,14 @@ class _Order:
 class _Governing:
     """The set-ups of one topic of samples, in the order of their publication.
 
-    Each holds from the sample it names (`Setups`). Topics have no order among each other: one
-    that is recorded after samples for which its stamp says it holds is taken before them.
+    Each holds from the sample it names (`Setups`). Topics have no order among each other: a set-up
+    recorded after samples for which it holds by its stamp is taken before them.
     """
 
     def __init__(self, topic: str, setups: list[tuple[int, BagSetup]]) -> None:
         namespace = topic.rpartition('/')[0]
         near = [s for s in setups if s[1].topic.rpartition('/')[0] == namespace] or setups
-        # What comes before any set-up is of the first one.
+        # Samples before any set-up belong to the first one.
         self._current = near[0][1].setup if near else None
         self._left = deque(near)
         self._setups = Setups()
@@ -309,7 +309,7 @@ class _Governing:
         self._next: int | None = None
 
     def parts(self, block: Block, place: int) -> Iterator[tuple[Block, StreamSetup | None]]:
-        """Yield the parts of a block, at some place among the messages, with what governs them."""
+        """Yield the parts of a block, at a place among the messages, each with its set-up."""
         last = block.stamp_ns + round((len(block) - 0.5) * block.period * 1e9)
         while self._left and (
             self._left[0][0] < place or self._stamp_ns < self._left[0][1].stamp_ns <= last

@@ -65,7 +65,7 @@ def setup(found: BagMessage, path: Path | str) -> BagSetup:
     """Return a TestSetup of a bag.
 
     Raises:
-        InputError: bytes that are no such message, or a stiffness, rate or hold that cannot be.
+        InputError: bytes that are no such message, or an impossible stiffness, rate or hold.
     """
     where = f'{path}: topic {found.topic}'
     content = _content(found, where)

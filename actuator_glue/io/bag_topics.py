@@ -31,8 +31,8 @@ _STEP = re.compile(r'(\w+)(?:\[([^\]]+)\])?\.?')
 # Fields that hold a list of names: `name` of a JointState, `joint_names`, `labels`.
 _NAMES = re.compile(r'(^|_)(names?|labels?|ids?)$')
 _DEEPEST = 8  # messages in messages
-# A step into a message: field, element by number or name, and of the latter how many levels above
-# the list of names is, and its field.
+# A step into a message: field; element by number or name; for a name, how many levels up the list
+# of names is, and its field.
 _Step = tuple[str, int | str | None, int, str]
 
 
@@ -55,8 +55,8 @@ class TopicSeries:
     columns: dict[str, array[float]] = field(default_factory=dict)
     _asked: bool = False
     _steps: dict[str, list[_Step]] = field(default_factory=dict)
-    # Of elements that are asked for by their number: their names in the first message, and the
-    # path by those.
+    # For elements that are asked for by number: their names in the first message, and the path by
+    # these names.
     _called: dict[str, tuple[list[str], str]] = field(default_factory=dict)
 
     def names(self) -> list[str]:

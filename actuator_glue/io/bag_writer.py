@@ -36,8 +36,8 @@ MAX_FILE_FLUSHES = 1500
 class BagWriter:
     """Writer of one bag; use as a context manager, and from any thread.
 
-    A message that the disk does not take is kept and written first when one of the next calls
-    finds that it does.
+    A message that the disk does not take is kept, and written first as soon as a later call finds
+    that the disk takes messages again.
 
     Log times are made strictly increasing (by 1 ns steps where they are not), because the order
     of equal stamps is not defined when a bag is played; header stamps stay as they are.
@@ -238,7 +238,7 @@ class BagWriter:
             if self._closed:
                 return
             failure = ''
-            for _ in range(2):  # what a file that cannot be finished did not take: into another
+            for _ in range(2):  # messages of a file that cannot be finished go into another
                 try:
                     self._hand_over()
                 except DiskError as error:
@@ -266,8 +266,8 @@ class BagWriter:
         return self
 
     def __exit__(self, kind: object, error: object, trace: object) -> None:
-        # What was recorded before an error is worth as much as what comes after none; a full
-        # disk has already been told.
+        # A recording that ends with an error is finished, too; a full disk has been reported
+        # before.
         try:
             self.close()
         except InputError:
@@ -305,7 +305,7 @@ class BagWriter:
             if file.part.count:
                 self._cut.append(file.path)
         if not file.part.count and (failure or len(self.metadata.parts) > 1):
-            # Nothing of it is worth to be kept.
+            # The file holds nothing worth keeping.
             self.metadata.parts.remove(file.part)
             with suppress(OSError):
                 file.path.unlink()

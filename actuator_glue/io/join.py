@@ -39,8 +39,8 @@ _ENDS = 3  # terms of what moves at both ends
 _STARTS = ((10.0, 30.0), (30.0, 30.0), (10.0, 100.0), (30.0, 100.0))
 # What beta_1 of servo-valves is [1/s], and the standard deviation of its logarithm.
 _VALVE, _VALVE_SPREAD = 100.0, 0.9
-_ROUNDS = 5  # of laying one beside the other again
-_SAME = 2e-3  # s: by less they are not moved again
+_ROUNDS = 5  # most rounds of aligning the two channels
+_SAME = 2e-3  # s: a shift below this ends the rounds
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,7 +50,7 @@ class _Late:
     Attributes:
         seconds: [s].
         deviation: standard deviation of it [s]; infinite where only one frequency is excited.
-        explained: share of the second that the first explains by it [1].
+        explained: share of the second channel that the first explains with this delay [1].
     """
 
     seconds: float
@@ -263,7 +263,7 @@ def _milli(seconds: float) -> str:
 
 
 def _on(part: Channels, role: str, rate: float) -> Array:
-    """Return a channel at so many samples per second, from its first sample on, less its mean."""
+    """Return a channel at `rate` samples per second, from its first sample on, less its mean."""
     time = part.values['time'] - part.values['time'][0]
     grid = np.arange(0.0, float(time[-1]), 1.0 / rate)
     values = np.interp(grid, time, part.values[role])
@@ -328,17 +328,17 @@ def _late(
         one: role of the first channel.
         other: role of the second channel.
         between: when the second file begins on the clock of the first [s after its first].
-        same: the channels are of one quantity; else what leads from one to the other is a second
-            order, and a time.
+        same: the channels are of one quantity; else a second order and a time lead from the first
+            to the second.
     """
     rate = min(_rate(command), _rate(response))
     a, b = _on(command, one, rate), _on(response, other, rate)
     late = noise = deviation = cost = 0.0
     spectra: _Spectra | None = None
-    # Laid beside each other by what is alike, a response begins before what moves it.
+    # Aligned by likeness alone, a response begins before the command that moves it.
     for turn in range(_ROUNDS):
         shift = round((between - late) * rate)
-        left = between - late - shift / rate  # what no whole sample takes
+        left = between - late - shift / rate  # remainder beyond whole samples
         first, second = a[max(shift, 0) :], b[max(-shift, 0) :]
         count = min(len(first), len(second), _MOST)
         spectra = None if count < _SHORTEST else _spectra(first[:count], second[:count], rate)
@@ -378,14 +378,14 @@ def _fitted(
 ) -> tuple[float, float, float, float]:
     """Return the time between two spectra [s], its deviation, the sum of squares, and the noise.
 
-    The first coefficient below is the valve's beta_1 (Eq. (2a) with little leakage), of which a
-    slow test tells nothing: then it is what valves have, and as uncertain.
+    The denominator's first coefficient is the valve's beta_1 (Eq. (2a) with little leakage), about
+    which a slow test says nothing: then it has the usual value and spread of servo-valves.
 
-    What moves when the spectra begin and end is a polynomial over the same poles, and estimated
-    along (Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, 2.6.3).
+    Transients at both ends of the spectra are a polynomial over the same poles, estimated too
+    (Pintelon and Schoukens, *System Identification: A Frequency Domain Approach*, 2.6.3).
 
     Args:
-        spectra: of both.
+        spectra: spectra of both channels.
         poles: of a second order, where the search begins [rad/s]; None for a factor alone.
         noise: of the second as an earlier fit left it, over its norm; 0 where it is not known.
     """

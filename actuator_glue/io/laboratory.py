@@ -95,7 +95,7 @@ def read(
         raise InputError(f'{path}: no column of times is used, so there is nothing to resample')
     for column in values.values():
         column.flags.writeable = False  # nobody else has them: the record need not copy them
-    # Record refuses another.
+    # Record refuses any other value.
     chosen = cast('Hold', hold or said_hold or 'zoh')
     return Record(
         command=values['command'],
@@ -122,7 +122,7 @@ def channels_of(
     Args:
         path: a file of any format.
         channels: channel map; None where the names of the columns say what they are.
-        needed: roles that must be there; of a file that is only a part of a test fewer.
+        needed: roles that must be there; fewer for a file that is only a part of a test.
 
     Raises:
         InputError: the file cannot be used; the message says what, where and what to do.
@@ -192,7 +192,7 @@ def _by_name(
     raw = table.values([at for at, _ in columns.values()])
     _check_numbers(raw, {role: at for role, (at, _) in columns.items()}, table, path)
     scales = [scale for _, scale in columns.values()]
-    with np.errstate(all='ignore'):  # what is not finite is told with its place later
+    with np.errstate(all='ignore'):  # values that are not finite are reported later
         values = {
             r: c if s == 1.0 else c * s for r, c, s in zip(columns, raw, scales, strict=True)
         }
@@ -221,10 +221,10 @@ def _mapped(
 
 
 def _parts(channels: ChannelMap, needed: tuple[str, ...], table: FileTable) -> dict[str, Channel]:
-    """Return the channels of a map that a file has, which is only a part of a test.
+    """Return the channels of a map that a file has which is only a part of a test.
 
-    A number of a column says nothing of the file it is meant for: it is of what is needed there,
-    and a force is beside what is measured.
+    A column's number does not say which file it is meant for: it counts for the roles needed
+    there, and a force's for the file of the measured displacement.
     """
     names = {name for column in table.columns for name in (column.name, column.label)}
     own = {*needed, 'force'} if 'measured' in needed else set(needed)

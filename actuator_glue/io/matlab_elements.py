@@ -24,7 +24,7 @@ _MATRIX, _COMPRESSED = 14, 15
 # MAT-File Format (The MathWorks), table 1-1: types of data; 8, 10 and 11 are reserved.
 _NUMBERS = {1, 2, 3, 4, 5, 6, 7, 9, 12, 13}
 _TYPES = {*_NUMBERS, _MATRIX, 16, 17, 18}
-# Table 1-3: classes of arrays, and two that MATLAB writes and its document does not tell.
+# Table 1-3: classes of arrays, and two that MATLAB writes but its document does not list.
 _CELL, _STRUCT, _OBJECT, _CHAR, _SPARSE, _FUNCTION, _OPAQUE = 1, 2, 3, 4, 5, 16, 17
 _NUMERIC = range(_SPARSE, _FUNCTION)
 _SMALL = 256  # bytes of heads, which are kept
@@ -60,11 +60,11 @@ def check_elements(path: Path) -> None:
     """Walk through a file and refuse it where an element is not as the format has it.
 
     Args:
-        path: the file, of version 4 to 7; of version 4, which has no such elements, nothing is
-            looked at.
+        path: the file, of version 4 to 7; a file of version 4, which has no such elements, is not
+            checked.
 
     Raises:
-        InputError: cut off, an element of an unknown type, longer than what it is in, nested too
+        InputError: cut off, an element of an unknown type, longer than its parent, nested too
             deep, too many of them, or more inflated bytes than are read.
         zlib.error: damage in a compressed variable.
         OSError: the file cannot be read.

@@ -110,7 +110,7 @@ def _clocks(found: list[ObjectColumn]) -> list[ObjectColumn]:
 def _walk(
     name: str, value: Any, called: str, found: list[ObjectColumn], depth: int, path: Path
 ) -> None:
-    """Take the columns of what lies under a name; `called` is what an object around it says."""
+    """Take the columns under a name; `called` is the name that an enclosing object gives."""
     if depth > _DEEPEST:
         raise InputError(f'{path}: objects in objects, {depth} deep; save them one by one')
     properties = getattr(value, 'properties', None)
@@ -151,7 +151,7 @@ def _walk_object(
 def _timeseries(
     name: str, properties: dict[str, Any], data: Any, called: str, path: Path
 ) -> list[ObjectColumn]:
-    """Return the columns of a timeseries; times that are even may be told, and not kept."""
+    """Return the columns of a timeseries; even times may be given by start and step alone."""
     info = getattr(properties['TimeInfo'], 'properties', {})
     scale = _SECONDS.get(_text(_first(info, 'Units')) or 'seconds')
     if scale is None:

@@ -25,9 +25,9 @@ from actuator_glue.io.disk_room import reserve
 CHUNK_BYTES = 64 * 1024
 # Room on the disk is reserved in such steps [B], always for the end of the file, too.
 STEP_BYTES = 256 * 1024
-# Of that end: what is the same for each file, each chunk and each topic in a chunk [B].
+# Parts of that end: per file, per chunk, and per topic in a chunk [B].
 END_BYTES, CHUNK_END_BYTES, TOPIC_END_BYTES = 64 * 1024, 200, 16
-# Of a message beside its data [B], and what a chunk has per byte beside its messages.
+# Overhead of a message beyond its data [B], and size of a chunk over that of its messages.
 MESSAGE_BYTES, CHUNK_SHARE = 64, 1.02
 
 
@@ -81,7 +81,7 @@ class McapFile:
         self._raw: io.FileIO | None = None
         self._schemas: dict[tuple[str, str, bytes], int] = {}
         self._channels: dict[tuple[str, str, str], int] = {}
-        # Where what was written ends at most, what follows it, and how far room is reserved [B].
+        # Upper bound of the bytes written, room for the file's end, and bytes reserved [B].
         self._bound, self._end, self._reserved = 0, END_BYTES + spare, 0
         try:
             self._begin()
@@ -126,7 +126,7 @@ class McapFile:
         Raises:
             DiskError: disk full.
         """
-        # It is said where it begins and again at the end.
+        # The declaration is written where the topic begins and again at the end.
         told = sum(len(k.encode()) + len(v.encode()) for k, v in metadata.items())
         said = 1024 + len(topic.name) + told + len(schema.data)
         self._end += said + TOPIC_END_BYTES
@@ -197,7 +197,7 @@ class McapFile:
         self.flushes += 1
 
     def sync(self) -> None:
-        """Wait until the disk has what was flushed: neither power nor disk takes it then.
+        """Wait until the disk has what was flushed: a power cut cannot take it then.
 
         Another thread may call this while the file is written.
 
@@ -207,11 +207,11 @@ class McapFile:
         try:
             if self._raw is not None:
                 os.fdatasync(self._raw.fileno())
-        except ValueError:  # closed meanwhile, and waited for by whoever closed it
+        except ValueError:  # closed meanwhile by a call that waited for the disk itself
             return
         except OSError as error:
             if error.errno != errno.EBADF:
-                # What was handed to the system may be what the disk has not taken.
+                # The disk may not have taken what was handed to the system.
                 raise disk_error(self._bag, error, kept=False) from error
 
     def finish(self, serialized_metadata: str) -> None:
@@ -247,7 +247,7 @@ class McapFile:
         self._bound += more
 
     def _sure(self) -> None:
-        """All messages are in the file."""
+        """Note that all messages so far are in the file."""
         self.unsure.clear()
         self._kept_part = replace(self.part)
 

@@ -28,7 +28,7 @@ _MAGIC = b'\x89MCAP0\r\n'
 _HEAD = struct.Struct('<BQ')
 _MESSAGE = struct.Struct('<HIQQ')  # channel, sequence, log time, publish time; then the data
 _MAX_CHUNK = 1 << 29  # bytes; a chunk that claims more is damaged or hostile
-# The channel says so where what it carries has no schema, as JSON and plain bytes may.
+# Schema of a channel whose messages have none, as JSON and plain bytes may.
 NO_SCHEMA = Schema(id=0, data=b'', encoding='', name='')
 _ZSTD = b'(\xb5/\xfd'
 UNREADABLE = (McapError, struct.error, ValueError, RuntimeError, OverflowError, MemoryError)
@@ -216,7 +216,7 @@ def _chunk_data(body: bytes, whole: bool) -> bytes:
 def plain(channel: Channel, message: Message) -> bytes:
     """Return the data of a message, unpacked where rosbag2 has compressed it.
 
-    CDR begins with a zero byte, so that what begins as zstd does is nothing else.
+    CDR begins with a zero byte, so that data beginning like zstd are zstd.
 
     Raises:
         ValueError: it is compressed, but not whole.

@@ -187,7 +187,7 @@ def deserialize(name: str, data: bytes, definition: str = '') -> Any:
 
 
 def as_current(name: str, data: bytes, definition: str) -> bytes:
-    """Return CDR bytes as `deserialize` understands them, of the version of the type that we have.
+    """Return CDR bytes of any version of a type as those of our version.
 
     Raises:
         InputError: as `deserialize`.
@@ -213,7 +213,7 @@ def trimmed(name: str, data: bytes) -> bytes:
 def _other_version(name: str, definition: str) -> Any:
     """Return the type store of another version of one of our types, None for the one we have.
 
-    A text that cannot be read is no version: what it was kept with is taken as ours.
+    A text that cannot be read is ignored: the messages are taken to be of our version.
     """
     if not definition or not name.startswith(f'{PACKAGE}/'):
         return None
@@ -256,14 +256,14 @@ def _as_ours(name: str, old: Any, version: Any) -> Any:
 
 
 def _message_of(kind: Any) -> str | None:
-    """Return which of our types a field holds, one or an array of it; None for none of ours."""
+    """Return the type of ours that a field holds, single or as an array; None for others."""
     inner = kind if kind[0] == Nodetype.NAME else kind[1][0]
     used = inner[1] if inner[0] == Nodetype.NAME else ''
     return str(used) if used.startswith(f'{PACKAGE}/') else None
 
 
 def _not_known(kind: Any) -> Any:
-    """Return what stands for a field that a message lacks; ours hold no arrays of fixed length."""
+    """Return the value of a field that a message lacks; our types have no fixed-length arrays."""
     if kind[0] == Nodetype.NAME:
         ours = typestore()
         fields = ours.fielddefs[kind[1]][1]

@@ -64,7 +64,7 @@ def parse_partition(content: object, name: str = 'partition') -> Partition:
     Args:
         content: `numerical` or `reference`, `experimental`, `rate`, and where wanted `name`,
             `interface`, `computation_delay`, `influence`, `noise`.
-        name: where it says none.
+        name: name of a partition that gives none.
 
     Raises:
         InputError: unknown or missing entries, wrong values.

@@ -25,7 +25,7 @@ _WORDS = {
     'force': r'force|load|kraft|\bcell\b|fuerza|effort|torque|moment|belastung|forza|荷重|载荷|'
     r'^f[xyz]?\d?$|\blc\d?\b|^([kM] ?)?N$',
 }
-# What has a word of these is no displacement, whatever else it is called.
+# A column with one of these words in its name is no displacement, whatever else it is called.
 _NO_LENGTH = re.compile(
     r'err(or)?\b|deviation|\bdiff|abweichung|veloc|\bvel\b|speed|accel|\bacc\b|press|druck|temp|strain|'
     r'valve|ventil|spool|servo ?current|flow',
@@ -174,7 +174,7 @@ def _rate(found: FileLook, rest: list[ColumnLook], clock: Guess | None) -> float
 
 
 def _counts_days(column: ColumnLook) -> bool:
-    """Whether a clock counts days since 1900 or year 0: as seconds no recorder is as fast."""
+    """Whether a clock counts days since 1900 or year 0: read as seconds it is absurdly fast."""
     if column.steps is None or column.unit not in ('', 'd', 'day', 'days'):
         return False
     first, step = float(column.values[0]), float(column.steps.mean())

@@ -144,7 +144,7 @@ def _rewrite(file: Path, bag: Path, summary: Summary, own: Metadata) -> None:
 
 
 def _copy_beside(new: McapFile, opcode: int, body: bytes) -> None:
-    """Copy an attachment or what others say of a file; what rosbag2 says is written anew."""
+    """Copy an attachment or others' metadata of a file; that of rosbag2 is written anew."""
     with suppress(*UNREADABLE):
         if opcode != Opcode.METADATA or b'rosbag2' not in body[:16]:
             new.add_beside(opcode, body)

@@ -1,4 +1,4 @@
-"""From a jittered clock to even samples, on request; what that costs and stamps are worth."""
+"""Resampling from a jittered clock to even times, on request; its cost, and faults of stamps."""
 
 from __future__ import annotations
 
@@ -24,16 +24,17 @@ _Interpolate: TypeAlias = Callable[[Array, Array, float], Array]
 # finer ones are the same; a finer command is one that is not cut at its samples.
 _LEAST: dict[By, float] = {'band-limited': 0.1, 'lines': 0.8}
 _MOST: dict[By, float] = {'band-limited': 10.0, 'lines': 2.0}
-# Of the command's spread: more that straight lines between its even samples miss is told.
+# Share of the command's spread beyond which an error of straight lines between even samples is
+# reported.
 _STRAIGHT = 2e-3
 _LONGEST_STEP = 5.0  # median steps without a sample: beyond it is a gap, not jitter
-_KEPT = 0.95  # share of its amplitude that a sine keeps in the band that is told
-# Stamps that stay within so many steps of an even clock may be those of a log, and the samples
-# even; they are where that leaves less than this share of what is unlike between neighbours.
+_KEPT = 0.95  # share of its amplitude that a sine keeps in the reported band
+# Stamps that stay within this many steps of an even clock may be a log's, the samples being even;
+# they are if that clock lowers the misfit between neighbours to less than this share.
 _BESIDE = 5.0
 _BETTER = 0.7
-# Times are told to be off where that makes this share of what is unlike between neighbours, and
-# they are off by more than this share of a step.
+# Times are reported to be off if that causes this share of the misfit between neighbours, and they
+# are off by more than this share of a step.
 _FELT, _EXACT = 0.1, 1e-3
 _LOOK = 20_000  # samples from which band and noise are told
 _WINDOW = ('kaiser', 8.0)  # a ripple of 2e-4; scipy's own has 1e-3
@@ -61,10 +62,11 @@ class Resampled:
         late: root mean square by which stamps were off an even clock, where that was taken in
             place of them [s]; 0 where the stamps were taken.
         jitter: root mean square by which the times that were taken may still be off [s].
-        moved: what that is by the velocity of the measured displacement, root mean square [m].
-        cut: root mean square of what the command leaves beside straight lines between its even
+        moved: error from that jitter at the velocities of the measured displacement, root mean
+            square [m].
+        cut: root mean square deviation of the command from straight lines between its even
             samples, where that matters [m]; else 0.
-        finer: samples per second at which it would not [Hz]; 0 where there is no such rate.
+        finer: samples per second at which it would not matter [Hz]; 0 without such a rate.
     """
 
     values: dict[str, Array]
@@ -126,8 +128,8 @@ def resample_evenly(
     """Return channels at even times.
 
     Band-limited is a cubic spline through the samples, and a low-pass without phase where fewer
-    samples are wanted than there are: both channels go through the same, so that what leads from
-    one to the other stays. Straight lines make no overshoot at steps.
+    samples are wanted than there are: both channels go through the same filter, so that their
+    transfer function stays. Straight lines make no overshoot at steps.
 
     Args:
         values: channels by role, each of shape (n,), with `time` [s].
@@ -204,9 +206,9 @@ def _band_limited(time: Array, column: Array, rate: float) -> Array:
 
 
 def _cut(time: Array, command: Array, rate: float) -> tuple[float, float]:
-    """Return what straight lines between even samples miss of a command, and a rate at which not.
+    """Return the error of straight lines between a command's even samples, and a sufficient rate.
 
-    It falls with the square of the rate. Both are zero where it does not matter.
+    The error falls with the square of the rate. Both are zero where it does not matter.
     """
     curve = scipy.interpolate.CubicSpline(time, command)
     at = _even_times(time, rate)
@@ -248,9 +250,9 @@ def _noise(interpolate: Callable[[Array, float], Array], count: int, rate: float
 
 
 def _unlike(time: Array, column: Array) -> tuple[Array, Array]:
-    """Return what each sample is off the cubic through its four neighbours, and the velocity.
+    """Return each sample's deviation from the cubic through its four neighbours, and the velocity.
 
-    The first in units of one sample's noise: it is divided by the noise that the cubic has.
+    The deviation is scaled to the noise of one sample: the cubic's own noise is divided out.
     """
     near = [time[k : len(time) - 4 + k] - time[2:-2] for k in (0, 1, 3, 4)]
     weights = []
@@ -266,15 +268,15 @@ def _unlike(time: Array, column: Array) -> tuple[Array, Array]:
 def _even_clock(time: Array, channels: dict[str, Array], rate: float) -> Array:
     """Return even times where the samples are even and only their stamps are not; else nothing.
 
-    Such stamps stay beside an even clock, and by it the command is smoother than by them.
+    Such stamps stay near an even clock, and on that clock the command is smoother.
     """
     if len(time) < 16 or not np.isfinite(time).all() or np.diff(time).min() < 0.0:
         return np.empty(0)
     index = np.arange(len(time))
     period, first = np.polyfit(index, time - time[0], 1)
     off = time - time[0] - first - period * index
-    # A walk of steps by chance goes away from any clock, a log comes back to its own; whole
-    # seconds are beside theirs by a second at most.
+    # A random walk of steps departs from any clock, a log returns to its own; stamps in whole
+    # seconds are off theirs by a second at most.
     rounded = rounding(time)
     if period <= 0.0 or float(np.abs(off).max()) > max(_BESIDE * period, 1.1 * rounded):
         return np.empty(0)
@@ -297,7 +299,7 @@ def _smooth(time: Array, column: Array) -> float:
 
 
 def _jitter(time: Array, column: Array) -> float:
-    """Return how far times may be off [s, root mean square]: more is unlike where more moves."""
+    """Return how far times may be off [s, root mean square], from misfits that grow with speed."""
     left, velocity = _unlike(time, column)
     basis = np.column_stack([np.ones(len(left)), velocity**2])
     scale = basis.max(axis=0)

@@ -86,7 +86,7 @@ def refuse_foreign(path: Path, wanted: str) -> bytes:
     """Return the first bytes of a file that is not known to be something else.
 
     Raises:
-        InputError: the file cannot be read, or is of a format that is not read; named by it.
+        InputError: the file cannot be read, or is of another format, which the message names.
     """
     start = beginning(path)
     what, remedy = _known(start)
@@ -113,7 +113,7 @@ def text_encoding(path: Path) -> str:
     try:
         codecs.getincrementaldecoder('utf-8')().decode(start)
     except UnicodeDecodeError:
-        return 'cp1252'  # of which a few bytes are no character: those are told where they are
+        return 'cp1252'  # a few bytes are no characters in it: reported at their places
     return 'utf-8-sig'
 
 

@@ -71,9 +71,9 @@ def text_layout(path: Path) -> TextLayout:
 
 
 def _blocks(path: Path, like: _Rows) -> tuple[list[SampleRows], bool]:
-    """Return the blocks of rows as the first ones are, and whether anything follows one.
+    """Return the blocks of rows shaped like the first ones, and whether anything follows a block.
 
-    A line of units above a block counts as one of its rows: it is found by itself.
+    A line of units above a block belongs to it: the reader finds such a line by itself.
     """
     found: list[SampleRows] = []
     above: list[list[str]] = []
@@ -104,7 +104,7 @@ def _blocks(path: Path, like: _Rows) -> tuple[list[SampleRows], bool]:
 
 
 def _is_row(entries: list[str], numbers: list[int]) -> bool:
-    """Whether half of what is a number elsewhere is one: the rest may be `NA`, or left out."""
+    """Whether at least half of the columns of numbers hold one: others may be `NA`, or empty."""
     filled = [entries[i] for i in numbers if i < len(entries)]
     found = sum(is_number(entry) or is_stamp(entry) for entry in filled)
     return found >= max(1, len(filled) / 2) and len(filled) == len(numbers)

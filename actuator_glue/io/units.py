@@ -23,11 +23,11 @@ ROLES: dict[str, dict[str, float]] = {
 FLOAT32_COUNTS = 1 << 24
 EXAMPLE = 'time_s,command_mm,measured_mm,force_N'
 ANGLES = frozenset(unit for unit, (motion, _) in MOTIONS.items() if motion == 'deg')
-# Units of other quantities, so that one which is written is known to be a unit.
+# Units of other quantities, so that they are recognised as units.
 _RAW = frozenset(('V', 'mV', 'volt', 'volts', 'mA', '%', 'count', 'counts', 'cnt', 'inc'))
 _OTHERS = frozenset(('bar', 'mbar', 'Pa', 'kPa', 'MPa', 'psi', 'Nm', 'kNm', 'l/min', '°C', 'degC'))
 _OTHERS |= {'m/s', 'mm/s', 'deg/s', 'rad/s', 'rpm', 'g', 'm/s2', 'm/s^2', 'm/s²', 'mm/s2', 'Hz'}
-# Of what no scale makes a length.
+# Units that no scale converts to a length.
 OF_NO_LENGTH = _OTHERS.union(FORCE, _TIME)
 _QUANTITY = {
     'time': 'time',
@@ -86,10 +86,10 @@ def factor(role: str, unit: str | None, where: str) -> float:
 
 
 def of_file(role: str, unit: str | None, where: str) -> float:
-    """Return the factor from a unit of a file to SI, or to what stands for it in a record.
+    """Return the factor from a unit of a file to SI, or to the unit used for it in a record.
 
     Raises:
-        InputError: as `factor`; what a motion or a torque is measured in is taken.
+        InputError: as `factor`; units of another motion or of a torque are accepted.
     """
     if role in _MOVING and unit in MOTIONS:
         return MOTIONS[unit][1]
@@ -99,7 +99,7 @@ def of_file(role: str, unit: str | None, where: str) -> float:
 
 
 def common_motion(units: dict[str, str], where: str) -> str:
-    """Return what command and measured are in: metres, or another motion that both are.
+    """Return the motion of command and measured: metres, or another that both share.
 
     Args:
         units: by role, as `of_file` takes them.
@@ -138,7 +138,7 @@ def recognise(name: str) -> tuple[str, str] | None:
 
 
 def bare(name: str) -> str:
-    """Return what a column is by its name, without the unit; the name where it is no role."""
+    """Return the role that a column's name gives, without the unit; the name if it gives none."""
     recognised = recognise(name)
     return recognised[0] if recognised else name
 
@@ -165,7 +165,7 @@ def written_unit(name: str) -> str:
 def units_line(entries: list[str]) -> list[str]:
     """Return the units that a line below the names holds; nothing where it is no such line.
 
-    Each entry is a unit, in brackets or not, empty, or a dash; one is known here at least.
+    Each entry is a unit, in brackets or not, empty, or a dash; at least one unit is known here.
     """
     known = ANGLES.union(*ROLES.values())
     units = [entry.strip().strip('[]()').strip() for entry in entries]
@@ -209,7 +209,7 @@ def choose(
         found[role] = (position, of_file(role, written[role], place))
     for role in needed:
         if role not in found:
-            # One of both moves here: the other may be in a file of its own.
+            # Only command or measured is here: the other may be in a file of its own.
             half = len({'command', 'measured'} & set(found)) == 1 and role in _MOVING
             join = ', or join it with the file that has it (`convert --join`)' if half else ''
             raise InputError(

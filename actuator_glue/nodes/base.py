@@ -28,7 +28,7 @@ COMMON = (
 )
 SUCCESS, FAILURE = TransitionCallbackReturn.SUCCESS, TransitionCallbackReturn.FAILURE
 ERROR = TransitionCallbackReturn.ERROR
-# How long a node that ends waits for who listens [s]: one that hangs never takes what is sent.
+# How long an ending node waits for its listeners [s]: one that hangs never takes its messages.
 LAST_WORDS = 1.0
 
 
@@ -43,7 +43,7 @@ class SuiteNode(LifecycleNode):
         specs: parameters besides the common ones.
 
     Attributes:
-        carries: it carries samples or records: without it a test is over.
+        carries: the node carries samples or records: without it a test is over.
         active: it is active.
         finished: it has ended, by itself or by a service.
         exit_code: of its process, once it has ended.
@@ -57,7 +57,7 @@ class SuiteNode(LifecycleNode):
         self.health = health.Health(self.get_fully_qualified_name())
         self.active = False
         self.finished = False
-        # Work for nobody, so that an executor that waits returns to its loop.
+        # An event without work, which returns a waiting executor to its loop.
         self.wake: Callable[[], None] = self.create_guard_condition(lambda: None).trigger
         self._steady = Clock(clock_type=ClockType.STEADY_TIME)
         self._subscriptions_made: list[Any] = []
@@ -282,7 +282,7 @@ class SuiteNode(LifecycleNode):
             self._subscriptions_made.clear()
 
     def at_cleanup(self, undo: Callable[[], object]) -> None:
-        """Have this let go of what do_configure made, if it was made; the last one goes first."""
+        """Have cleanup call this to undo a part of do_configure; the last part goes first."""
         self._undone.append(undo)
 
     def _clean(self) -> None:
@@ -292,9 +292,9 @@ class SuiteNode(LifecycleNode):
             self._undone.pop()()
 
     def until_heard(self) -> None:
-        """Wait until who listens has what was said last, `LAST_WORDS` at most.
+        """Wait until listeners have the last messages, `LAST_WORDS` at most.
 
-        What a publisher that goes has not handed over is lost, however reliable it was.
+        Messages that a publisher has not handed over when it goes are lost, however reliable.
         """
         end = time.monotonic() + LAST_WORDS
         for made in (*self._made, self._diagnostics):
@@ -317,7 +317,7 @@ class SuiteNode(LifecycleNode):
         self._diagnostics.publish(message)
 
     def _check_partners(self) -> None:
-        """Tell of partners to whom DDS will never hand a message, or from whom."""
+        """Report partners with which DDS will never exchange a message."""
         listening = (partners.unheard(self, made) for made in self._subscriptions_made)
         sending = (partners.unreached(self, made) for made in self._made)
         for kind, text in chain(*listening, *sending):

@@ -95,8 +95,8 @@ def carried(values: Mapping[str, Any]) -> Carried | None:
     """Return the draws that priors begin with; None where they begin with the box.
 
     Raises:
-        InputError: no calibration where one is needed or one that is not used, or a file that
-            holds none, or draws outside the bounds.
+        InputError: a calibration that is missing or is not used, a file that holds none, or draws
+            outside the bounds.
     """
     mode, path = values['prior'], values['calibration']
     if not path:

@@ -169,7 +169,7 @@ class DiagnoserNode(WorkingNode):
                 self.memory.learn(known, self.collector.first_ns)
 
     def _take(self, given: live.Input) -> None:
-        """Have the loop take something, and do what follows."""
+        """Give the live loop an input, and carry out its actions."""
         self.loop, actions = live.step(self.loop, given)
         for action in actions:
             if isinstance(action, live.Look):

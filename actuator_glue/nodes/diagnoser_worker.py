@@ -60,7 +60,7 @@ class Request:
         apply: the estimator is to go on with the augmented model.
         known: what the estimator knew before the records: draws, drift and age [s].
         reason: why the stream is diagnosed; empty where it was asked for.
-        remembered: what the look at the stream before left.
+        remembered: what the previous diagnosis of the stream left.
     """
 
     records: tuple[Record, ...] = ()
@@ -77,10 +77,10 @@ class Request:
 
 @dataclass(slots=True)
 class Outcome:
-    """What came of it; `diagnosis` is None where `message` says why not.
+    """What came of a request; `diagnosis` is None where `message` says why not.
 
     `concluded` is what it means for the estimator, `reason` why the stream was diagnosed,
-    `remembered` what the next look begins with.
+    `remembered` what the next diagnosis begins with.
     """
 
     diagnosis: Diagnosis | None = None

@@ -51,9 +51,9 @@ from actuator_glue.online.windows import WrongRate
 from actuator_glue.setups import from_message
 from actuator_glue.workers.worker import DIED, DONE, FAILED, PROGRESS, Answer, Worker
 
-# Windows of which most have to converge.
+# Number of last windows of which most have to converge.
 JUDGED = 10
-# What is sampled beside the likeliest structure may wait.
+# Niceness of the process that samples less likely structures, which may wait.
 NICE = 10
 
 
@@ -255,7 +255,7 @@ class EstimatorNode(WorkingNode):
         if job is None:
             return
         if self._beside is None:
-            # Only who carries several structures has one.
+            # Only an estimator that carries several structures has this process.
             self._beside = self.colleague(self._sampled_beside, nice=NICE)
         self._beside.submit(compute_beside, job)
 
@@ -353,7 +353,7 @@ class EstimatorNode(WorkingNode):
         self.health.values.update(values)
 
     def _doubt(self, now: float) -> None:
-        """Say for as long as it lasts what speaks against the posteriors, or that none come."""
+        """Report, while it lasts, what speaks against the posteriors, or that none come."""
         if not self.compiling:
             self.silence.tell(self, topics.SAMPLES.name, now)
         self.health.values['converged windows'] = f'{sum(self.judged)} of {len(self.judged)}'

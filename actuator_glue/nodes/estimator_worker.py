@@ -23,8 +23,8 @@ SLACK = 0.08
 class _Lately:
     """How long something took lately, one stall or two among the last times left out.
 
-    At most twice the median of the last times: a computer that stalls once makes a window late,
-    and those after it have their time for sampling.
+    At most twice the median of the last times: a computer that stalls once makes one window late,
+    and later windows keep their time for sampling.
     """
 
     def __init__(self) -> None:
@@ -51,18 +51,18 @@ class _Lately:
         self._times.clear()
 
 
-# What follows a window's sampling, and its tracking numbers alone; they live in the worker.
+# Times of what follows a window's sampling, and of its tracking numbers alone; per worker.
 _REPORT, _TRACKING = _Lately(), _Lately()
 
 
 class Tracked(NamedTuple):
-    """Tracking numbers of a window, which went ahead.
+    """Tracking numbers of a window whose result went ahead.
 
     Attributes:
         window: its running number.
         stamp_ns: acquisition time of its last sample [ns since 1970].
         actuator: name of the actuator.
-        numbers: how that followed its command.
+        numbers: how the actuator followed its command.
     """
 
     window: int
@@ -74,7 +74,7 @@ class Tracked(NamedTuple):
 def compute(
     job: Job, deadline: float, frequencies: tuple[float, ...], tell: Tell
 ) -> Tracked | None:
-    """Compute a job in the worker and tell its WindowResult by a monotonic time [s].
+    """Compute a job in the worker and send its WindowResult before a monotonic time [s].
 
     Sampling ends early enough for what follows it, as long as that took lately. Tracking numbers,
     delay and amplitude at the frequencies [Hz], come afterwards where the deadline leaves time for
@@ -115,7 +115,7 @@ def compute_beside(job: Job, tell: Tell) -> WindowFit:
 def warm_up() -> None:
     """Compile and import what windows need, and learn how long they take once that is done.
 
-    However long that takes: a window that is cut short has not called all that is called live.
+    Without a time limit: a window that is cut short does not call all functions that run live.
     """
 
     def compute_whole(job: Job) -> WindowResult:

@@ -1,4 +1,4 @@
-"""What explains the stream, for /diagnostics: which, how sure, since when, the sizes if true."""
+"""The explanations of a stream, for /diagnostics: name, how sure, since when, sizes if true."""
 
 from __future__ import annotations
 

@@ -17,7 +17,7 @@ def unnamed(kind: str, suffix: str = '') -> Path:
         suffix: end of its name.
 
     Raises:
-        InputError: nobody knows of a home folder.
+        InputError: no home folder is known.
     """
     try:
         home = Path(os.environ.get('ROS_HOME') or '~/.ros').expanduser()

@@ -12,7 +12,7 @@ OK, WARN, ERROR = DiagnosticStatus.OK, DiagnosticStatus.WARN, DiagnosticStatus.E
 
 # A fault stays visible this long after its last occurrence, so that people see it.
 REMEMBER = 10.0  # s
-# What comes again within this time has lasted [s]; reports are up to a second apart.
+# A fault that comes again within this time has lasted [s]; reports are up to a second apart.
 LASTING = 1.5
 # A stream of a thousand bad blocks a second must not fill the log; /diagnostics counts them all.
 LOGGED_PER_SECOND = 5

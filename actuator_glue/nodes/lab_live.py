@@ -42,7 +42,7 @@ FAULTS = {
     'socket errors': 'errors of the socket',
     'site unreachable': "times the site behind the shadow didn't answer",
 }
-# Nothing for so long is told [s].
+# Silence of this length is reported [s].
 SILENT = 1.0
 # Longest pause between two looks at the socket [s].
 LOOK = 0.02
@@ -110,7 +110,7 @@ class LiveSource:
         self._reception = self._fresh()
         self._announce()
         self._node.introduce()
-        # What came while nobody was ready is of the time before the stream.
+        # Samples that came while nobody was ready belong to the time before the stream.
         last = time.monotonic()
         while self._listener.receive(0.0) and time.monotonic() - last < SILENT:
             pass
@@ -152,7 +152,7 @@ class LiveSource:
         self._listener.close()
 
     def clock_jumped(self) -> None:
-        """Arrivals show it to the map of the sender's clock."""
+        """Do nothing: arrivals show the jump to the map of the sender's clock."""
 
     def _announce(self) -> None:
         now = self._node.get_clock().now().nanoseconds

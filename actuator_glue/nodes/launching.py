@@ -1,4 +1,4 @@
-"""What the launch files share: nodes with the suite's parameters, and what follows their ends."""
+"""What the launch files share: nodes with the suite's parameters, and the rule for their ends."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ Given = Mapping[str, str]
 
 
 def truth(text: str) -> bool:
-    """Return what `true` or `false` of a launch argument says."""
+    """Return the truth value of a launch argument, `true` or `false`."""
     return text.strip().lower() in ('true', '1', 'yes')
 
 
@@ -75,9 +75,9 @@ def node(given: Given, name: str, parameters: Mapping[str, Any], namespace: str 
 def ends(streams: int, linger: float, simulated: bool) -> Callable[[Any, Any], Any]:
     """Return the rule for a node's end.
 
-    That of the last stream ends all, any other of what carries samples or records is a failure.
-    The other nodes are started again, which /diagnostics tells; only parameters that such a node
-    refuses when it is first started are a failure, too: streams still wait for it then.
+    The end of the last stream ends all; that of any other node that carries samples or records is
+    a failure. The other nodes are started again, which /diagnostics tells; only if such a node
+    refuses its parameters at its first start, that is a failure, too: streams still wait for it.
 
     Args:
         streams: how many nodes stream.

@@ -64,7 +64,7 @@ class MarginNode(base.SuiteNode):
         super().__init__('margin', SPECS)
 
     def check(self, values: Mapping[str, Any]) -> None:
-        """Refuse what no watch can be made of."""
+        """Refuse parameters from which no watch can be made."""
         if values['partition']:
             _watch(values)
 
@@ -93,7 +93,7 @@ class MarginNode(base.SuiteNode):
         timer = self.every(0.1, look)
 
     def _compile(self) -> None:
-        """Look at draws once that nobody has sent: compiling takes seconds, cold a minute."""
+        """Take made-up draws once, to compile: that takes seconds, cold a minute."""
         draws = np.array([134.0, 1.1e9, 2.5e5, 0.5]) * np.linspace(0.98, 1.02, 64)[:, np.newaxis]
         _watch(self.parameters.values()).take(draws, list(NAMES), [], 64.0)
 

@@ -127,7 +127,7 @@ class RecorderNode(base.SuiteNode):
         self._lost += writer.waiting
         found = f'{writer.path}: {writer.count} messages'
         if self._lost:
-            # Of what a test leaves behind nobody may think that it is all.
+            # Nobody may take an incomplete bag for a whole one.
             self.exit_code = 1
             self.complain('lost', f'{found}, {self._lost} more are lost', ERROR)
         else:
@@ -245,7 +245,7 @@ class RecorderNode(base.SuiteNode):
         self._queue.put(item)
 
     def _release_early(self, last: bool = False) -> None:
-        """Record what came before the first /clock, at the time that this says.
+        """Record what came before the first /clock, with the time that this gives.
 
         Args:
             last: the clock is waited for no longer: where it has not begun, the time of each
@@ -284,7 +284,7 @@ class RecorderNode(base.SuiteNode):
                     writer.flush_if_due()
             except DiskError as error:
                 self._wait_for_disk(writer, error)
-            except Exception as error:  # the thread outlives whatever messages are like
+            except Exception as error:  # the thread outlives any message
                 self._lost += 1
                 text = f'a message of {item.topic} cannot be recorded: {error or type(error)}'
                 self.complain('message', text, ERROR)

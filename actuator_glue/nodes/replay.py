@@ -1,4 +1,4 @@
-"""The samples of a bag, published again byte for byte where messages are what they were."""
+"""The samples of a bag, published again, byte for byte where message types are unchanged."""
 
 from __future__ import annotations
 

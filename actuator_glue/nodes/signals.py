@@ -10,7 +10,7 @@ import threading
 import time
 from collections.abc import Callable
 
-# Within this time repeats are one and the same [s]: `timeout -s INT`, a launch without a
+# Signals within this time count as one [s]: `timeout -s INT`, a launch without a
 # terminal and Ctrl-C in a shell's group reach a node twice.
 REPEATS_SECONDS = 1.0
 

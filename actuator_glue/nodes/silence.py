@@ -5,7 +5,7 @@ from __future__ import annotations
 from actuator_glue.nodes.base import SuiteNode
 from actuator_glue.nodes.health import ERROR
 
-# Nothing for so long is told, and is an error [s]; what has never come is waited for.
+# Silence that is a warning, and one that is an error [s]; a stream that never came is waited for.
 SILENT, LOST = 10.0, 30.0
 
 

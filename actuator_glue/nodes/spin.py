@@ -18,7 +18,7 @@ from actuator_glue.nodes.base import ERROR, SUCCESS, SuiteNode
 from actuator_glue.nodes.executor import Executor
 from actuator_glue.nodes.signals import Stop
 
-# How long the others go on when a stream of the same process has ended [s]: the last windows.
+# How long other nodes of a process go on after its stream has ended, for the last windows [s].
 LINGER = 5.0
 
 
@@ -54,7 +54,7 @@ def together(makes: Sequence[Callable[[], SuiteNode]], args: Sequence[str] | Non
     code = 0 if all(_begin(node, stop) for node in nodes) else 2
     if code:
         stop.set()
-    # What is there now stays: the garbage collector need not go through it while samples wait.
+    # The objects that exist now stay: the garbage collector need not scan them while samples wait.
     gc.collect()
     gc.freeze()
     _spin(executor, nodes, stop)
@@ -70,7 +70,7 @@ def together(makes: Sequence[Callable[[], SuiteNode]], args: Sequence[str] | Non
 def _begin(node: SuiteNode, stop: Stop) -> bool:
     """Start a node that is to start by itself; return whether the others may go on.
 
-    What a node refuses ends all before a test begins. An exception that nobody foresaw is logged,
+    A node's refusal ends all before a test begins. An exception that nobody foresaw is logged,
     and ends the others only where they need the node.
     """
     if stop.is_set() or not node.parameters['autostart']:

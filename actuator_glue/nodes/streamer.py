@@ -77,7 +77,7 @@ class Streamer(base.SuiteNode):
 
     @property
     def simulated_time(self) -> bool:
-        """Whether /clock paces the stream; what may publish it itself cannot wait for it."""
+        """Whether /clock paces the stream; a node that may publish /clock cannot wait for it."""
         return self.stamps_now and bool(self.get_parameter('use_sim_time').value)
 
     def _simulated(self) -> float:
@@ -85,7 +85,7 @@ class Streamer(base.SuiteNode):
 
     @property
     def subscribers(self) -> int:
-        """How many our publisher has met: others on the topic would not get the first samples."""
+        """Number of subscribers our publisher has met: others would miss the first samples."""
         return int(self._samples_out.get_subscription_count())
 
     def ready(self) -> bool:
@@ -116,7 +116,7 @@ class Streamer(base.SuiteNode):
         if self.parameters['wait_for']:
             self._wait_until_taken(self._setup_out)
         if not self._introduced:
-            # Not before: whoever waits for this line sends at once.
+            # Not before: a program that waits for this line sends at once.
             self.get_logger().info('the stream begins')
         self._introduced = True
 
@@ -152,7 +152,7 @@ class Streamer(base.SuiteNode):
     def _ended(self, failure: BaseException | None) -> None:
         if failure is not None:
             self.complain_of_bug(failure)
-        # What subscribers lack would go with its publisher.
+        # Messages that subscribers still lack would be lost with their publisher.
         self._wait_until_taken(*self._made)
         self.get_logger().info(f'stream ended after {self.samples.count} samples')
         if self.parameters['exit_at_end']:

@@ -19,14 +19,14 @@ def answered(
     possible: Callable[[], Iterable[tuple[Any, ...]]],
     refused: Callable[[str], None],
 ) -> Callable[[Any, Any], Any]:
-    """Return the callback of a change_state service that answers and tells what is impossible.
+    """Return the callback of a change_state service that answers and reports impossible requests.
 
     rclpy refuses an impossible label without a word and leaves an impossible number unanswered.
 
     Args:
         change: rclpy's callback.
-        possible: number and label, first, of each transition that the node's state has.
-        refused: told which transition it has not.
+        possible: returns each transition from the node's state, number and label first.
+        refused: called with the name of an impossible transition.
     """
 
     def call(request: Any, response: Any) -> Any:

@@ -33,7 +33,7 @@ class Collector:
 
     @property
     def received(self) -> float:
-        """Usable data since the stream began, what is not kept any more included [s]."""
+        """Usable data since the stream began, including data no longer kept [s]."""
         return self._pieces * PIECE
 
     @property
@@ -64,7 +64,7 @@ class Collector:
 
         Args:
             shortest: stretches shorter than this are left out [s].
-            since: so much of what has been received is left out, too [s].
+            since: data at the stream's start that are left out, too [s].
         """
         stretches: dict[int, list[Record]] = {}
         wanted = max(0, self._pieces - round(since / PIECE))

@@ -29,8 +29,8 @@ from actuator_glue.sample_block import stamp_ns
 Fields = dict[str, Any]
 Weights: TypeAlias = tuple[tuple[frozenset[str], float], ...]
 _NAN = float('nan')
-# Of a window's posterior, in a message: those that the next window begins with, so that a replay
-# can go on where samples are missing.
+# Draws of a window's posterior in a message: those that the next window begins with, so that a
+# replay can continue after missing samples.
 DRAWS = ARCHIVE
 
 
@@ -121,7 +121,7 @@ def estimator_setup(
         index: running index of that window's first sample.
         carried: draws that the priors begin with, where there are any.
     """
-    # What is no part of the package goes along: the bag alone is enough for a replay.
+    # Definitions of the user's own effects go along: the bag alone is enough for a replay.
     proposed = Proposal.of(model)
     model = proposed.structures[0].model
     names = dict.fromkeys(n for one in proposed.structures for n in one.model.effects)
@@ -195,7 +195,7 @@ def posterior(result: WindowResult, seconds: float) -> tuple[Head, Fields]:
 
 
 def _if_true(result: WindowResult) -> Fields:
-    """Return the fields that tell each structure's own posterior; empty for one that has none."""
+    """Return the fields of each structure's own posterior; empty for a structure without one."""
     parts = [part for part in result.parts if part is not None]
     empty = np.empty(0)
     return {
@@ -238,7 +238,7 @@ def weights(message: Any) -> Weights:
 
 
 def weighed(found: Weights) -> str:
-    """Return structures and their weights for people."""
+    """Return structures and their weights as text."""
     return ', '.join(f'{structure_name(sorted(name))} {weight:.0%}' for name, weight in found)
 
 
@@ -248,7 +248,7 @@ def known(message: Any, settings: EstimatorSettings) -> Known | None:
     None for a window that was cut so short that its draws say nothing.
 
     Raises:
-        InputError: draws that are none.
+        InputError: the draws cannot be used.
     """
     names = tuple(message.parameter_names)
     draws = _array(message.values).reshape(-1, max(len(names), 1))
@@ -268,7 +268,7 @@ def prediction(result: WindowPrediction, actuator: str) -> tuple[Head, Fields]:
         'index': result.index,
         'period': result.period,
         'kind': result.kind,
-        # Parameters are always frozen before the samples they are held against.
+        # Parameters are always frozen before the samples they are compared with.
         'forecast': True,
         'scored': scored,
         'levels': band.levels,

@@ -39,10 +39,10 @@ from actuator_glue.setups import StreamSetup
 MAX_FROZEN = 8
 # After a stall of the whole computer several hops arrive at once.
 MAX_WAITING = 4
-# What remains of the patience with each window that has a posterior.
+# Factor on the patience after each window that has a posterior.
 _CALMER = 0.8
-# A structure beside the likeliest one is sampled anew after so much of a window's length: until
-# then hardly any other samples have come.
+# A less likely structure is sampled anew after this share of a window's length: sooner, hardly any
+# samples are new.
 NEWS = 0.1
 
 
@@ -63,17 +63,17 @@ class Begun:
 
 @dataclass(slots=True)
 class ReplayPosition:
-    """Whether a replay is where the live run was, window after window.
+    """Whether a replay is in the live run's state, window after window.
 
     Attributes:
-        exact: it is, to the bit.
+        exact: it is in that state, to the bit.
     """
 
     exact: bool = True
     _last: int | None = None
 
     def resumes(self, begun: Begun | None) -> bool:
-        """Return whether a window begins with points that were kept, not where the replay is."""
+        """Return whether a window must start from recorded points, not from the replay's own."""
         if begun is None or (self.exact and begun.number == self._last):
             return False
         resumes = begun.archive is not None
@@ -105,17 +105,17 @@ class Schedule:
 
 @dataclass(slots=True, eq=False)
 class _Member:
-    """A structure that is carried, and what is kept from its last result.
+    """A structure that is carried, and what it keeps of its last result.
 
     Attributes:
         model: the structure.
         knowledge: what earlier samples say of its parameters.
         archive: points that its next window starts from.
-        epoch: actuator that they are of.
+        epoch: actuator of these points.
         frozen: its last posterior, with which it forecasts while it is not sampled.
-        waited: windows since that was taken.
-        before: it was there before those that are carried now: they have to do better.
-        worse: successive windows whose forecasts were worse than of one that was there before.
+        waited: windows since its last result.
+        before: it is a reference that new structures must beat: Eq. (2), or carried before them.
+        worse: successive windows in which its forecasts were worse than a reference's.
     """
 
     model: ModelChoice
@@ -133,11 +133,11 @@ class _Beside:
     """A structure that is sampled beside the likeliest one.
 
     Attributes:
-        member: it.
-        job: the window that it is sampled with.
-        handed: whoever computes it has it.
-        result: what came of it; None before it has come.
-        joins: the running job takes it in.
+        member: the structure.
+        job: the job of sampling it.
+        handed: the job was handed out.
+        result: result of the job; None before it has come.
+        joins: the running job uses the result.
     """
 
     member: _Member
@@ -157,10 +157,10 @@ class _Before:
 
 
 def _patience(before: float, result: WindowResult | WindowFit) -> float:
-    """Return how many times the budget the next window may take.
+    """Return the next window's time limit, in budgets.
 
-    Twice as many after one that ended without a posterior for want of time: else the next one
-    begins, and ends, where that did. Fewer again after each that has one.
+    Doubled after a window that ran out of time before it had a posterior: the next one would
+    otherwise begin, and end, where that did. Lowered again after each window with a posterior.
     """
     if result.starved:
         return min(2.0 * before, MOST_PATIENCE)
@@ -171,11 +171,11 @@ class Estimator:
     """Windows, warm start and forecasts; knows no clock, no process and no ROS.
 
     `push` what arrives, ask `next_job`, compute it wherever you like with `job.run`, hand the
-    result to `finish`. One job is out at a time. Where several structures are carried, a job is
-    of the likeliest; ask `rival_job` after each `finish`, compute it beside with `job.renew`, and
-    hand what comes of it to `finish_rival`, whenever: the next job takes it in. The results depend
-    on the samples, the settings, which windows were dropped or stopped early, and which took in
-    what came from beside: a `Schedule` repeats those.
+    result to `finish`. One job is out at a time. Where several structures are carried, a job
+    samples the likeliest; ask `rival_job` after each `finish`, compute it in parallel with
+    `job.renew`, and hand its result to `finish_rival` at any time: the next job uses it. The
+    results depend on the samples, the settings, which windows were dropped or stopped early, and
+    which used a rival's result: a `Schedule` repeats those.
 
     Args:
         settings: settings; they do not change.
@@ -203,7 +203,7 @@ class Estimator:
         self._windows = SlidingWindows(settings)
         self._waiting: list[Window] = []
         self._carried = carried
-        self._applied = 0  # of the schedule's models
+        self._applied = 0  # number of the schedule's models in use so far
         self._course = ReplayPosition()
         self._before: _Before | None = None
         self._patience = 1.0
@@ -277,7 +277,7 @@ class Estimator:
         self._pending = Proposal.of(model)
 
     def drop(self, late: Callable[[Window], bool]) -> list[Event]:
-        """Drop windows that wait and for which it is too late; the newest is always wanted."""
+        """Drop waiting windows that are too late; the newest is always kept."""
         events: list[Event] = []
         while len(self._waiting) > 1 and late(self._waiting[0]):
             events.append(self._drop())
@@ -312,7 +312,7 @@ class Estimator:
         return self.running
 
     def rival_job(self) -> Job | None:
-        """Return, once, what is to be sampled beside with `job.renew`; None where nothing is."""
+        """Return, once, the job for `job.renew` of a less likely structure; None without one."""
         beside = self._beside
         if beside is None or beside.handed:
             return None
@@ -320,7 +320,7 @@ class Estimator:
         return beside.job
 
     def finish_rival(self, result: WindowFit) -> None:
-        """Take what came of a rival's job; what nobody waits for any more is let go of."""
+        """Take the result of a rival's job; one that is no longer wanted is dropped."""
         beside = self._beside
         if beside is None or beside.result is not None:
             return
@@ -329,14 +329,14 @@ class Estimator:
             beside.result = result
 
     def abandon_rival(self) -> None:
-        """Have `rival_job` return the same once more: its process has died."""
+        """Have `rival_job` return the same job once more: its process has died."""
         if self._beside is not None and self._beside.result is None:
             self._beside.handed = False
 
     def _take_in(self, window: Window, stops: Sequence[int | None]) -> None:
-        """Decide whether a window takes in what came from beside.
+        """Decide whether a window uses the result of a rival's job.
 
-        Live what has come by now; in a replay what the window took in.
+        Live if it has come by now; in a replay if the live window used it.
         """
         beside = self._beside
         if beside is None:
@@ -352,7 +352,7 @@ class Estimator:
         beside.joins = beside.result is not None and stop != 0
 
     def _rival(self, member: _Member, window: Window, weight: float) -> Job:
-        """Return a structure that is sampled beside, as it forecasts from a window on."""
+        """Return the job of a less likely structure, which only forecasts from a window on."""
         standing = member.frozen if member.epoch == window.epoch else None
         beside, renewed = self._beside, 0
         if beside is not None and beside.joins and beside.member is member:
@@ -368,7 +368,7 @@ class Estimator:
         )
 
     def _resume(self, window: Window, begun: Begun | None) -> None:
-        """Begin where the live run did, where the window before could not be computed again."""
+        """Start from the live run's points if the window before could not be recomputed."""
         if self._course.resumes(begun) and begun is not None and begun.archive is not None:
             leading = self._members[0]
             if begun.archive.shape[1] == len(leading.model.names):
@@ -376,7 +376,7 @@ class Estimator:
         self._course.done(window.number)
 
     def _job(self, member: _Member, window: Window, stop: int | None) -> Job:
-        """Return what one structure has to do for a window."""
+        """Return the job of sampling one structure in a window."""
         model, record = member.model, window.record
         prior, before = member.knowledge.prior(window), self._before
         archive, afresh = None, True
@@ -386,7 +386,7 @@ class Estimator:
             seed = (self.settings.seed, record.first_index, 2)
             known, points = before.model.names, before.archive
             if prior is not None:
-                # Where another model ended is further away than what was known before either.
+                # The prior is closer than the points where another model ended.
                 known = prior.names
                 points = prior.points(len(points), np.random.default_rng((*seed, 1)))
             archive = starting_points(model, known, points, seed)
@@ -402,12 +402,12 @@ class Estimator:
         )
 
     def finish(self, result: WindowResult | WindowFit) -> list[Event]:
-        """Take the result of the running job, or its first part, all that the next one needs."""
+        """Take the running job's result; its first part, which the next job needs, is enough."""
         self.running = None
         window = result.window
         self._patience = _patience(self._patience, result)
         if result.failure:
-            # A replay leaves such windows out: nothing but their time may depend on them.
+            # A replay leaves such windows out: nothing but time limits may depend on them.
             return [Failed(window.number, window.record.first_index, result.failure)]
         self._frozen = [
             f for f in self._frozen if f.segment == window.segment and f.stop > window.end
@@ -420,7 +420,7 @@ class Estimator:
         events: list[Event] = list(_learned(self._members[0], result))
         if self._beside is not None and self._beside.joins:
             assert self._beside.result is not None
-            # What a less likely structure contradicts is its own affair.
+            # That a window contradicts the prior of a less likely structure is not reported.
             _learned(self._beside.member, self._beside.result)
             self._beside = None
         leading = self._members[0]
@@ -431,9 +431,9 @@ class Estimator:
         return events
 
     def _sample_beside(self, window: Window) -> None:
-        """Begin to sample the structure that has waited longest, where nobody is sampled beside.
+        """Choose the less likely structure that has waited longest, if none is being sampled.
 
-        After a window that is published: a replay has that, too.
+        Only after a window that is published, which a replay has, too.
         """
         rivals = self._members[1:]
         if self._beside is not None and not any(self._beside.member is one for one in rivals):
@@ -449,10 +449,10 @@ class Estimator:
             self._beside = _Beside(longest, self._job(longest, window, None))
 
     def _begin(self, proposal: Proposal) -> None:
-        """Carry these structures from now on; what one of them has learned before goes on.
+        """Carry these structures from now on; a structure carried before keeps its knowledge.
 
-        Where there are several, Eq. (2) among them and what was carried before are what they have
-        to do better than.
+        Where there are several, Eq. (2) and the structures carried before are the references
+        that the others have to beat.
         """
         self._pending = self._beside = None
         led = self._members[0] if self._members else None
@@ -487,11 +487,11 @@ class Estimator:
         self._judged_to = None
 
     def _shares(self) -> Array:
-        """Return the weights (K,) of all members; 0 of what is only compared with any more."""
+        """Return the weights (K,) of all members; 0 for one kept only as a reference."""
         return structures.weights(self._log_prior, self._evidence)
 
     def _weigh(self, result: WindowResult | WindowFit) -> list[Event]:
-        """Move weights by the forecasts that a window has judged; what has none left leaves."""
+        """Update weights by the forecasts a window judged; drop structures of little weight."""
         if len(self._members) < 2 or not result.errors:
             return []
         settings, window = self.settings, result.window
@@ -512,7 +512,7 @@ class Estimator:
         out = [i for i in order if shares[i] < structures.LEAVES]
         left = [self._members[i].model for i in out if carried[i]]
         left = [before, *left] if worse else left
-        # Eq. (2) takes no time and goes on beside others: what they bring is held against it.
+        # Eq. (2) takes no time and stays as a reference for what the others add.
         self._log_prior[out] = -np.inf
         kept = [i for i in order if i not in out or self._compared(i)]
         self._members = [self._members[i] for i in kept]
@@ -537,15 +537,15 @@ class Estimator:
         ]
 
     def _compared(self, i: int) -> bool:
-        """Whether a structure goes on without weight, for others to be held against."""
+        """Whether a structure stays without weight, as a reference for the others."""
         member = self._members[i]
         return member.before and not member.model.effects
 
     def _outdone(self, errors: Sequence[float], material: float) -> bool:
-        """Have the leading structure leave where it makes forecasts worse; return whether it does.
+        """Drop the leading structure if it makes forecasts worse; return whether it was dropped.
 
-        It does where they were worse than those of what was there before it, by more than what
-        matters, in so many successive windows; that takes its place.
+        That is if they were worse than those of the best reference, by more than what matters, in
+        enough successive windows; the reference takes its place.
         """
         leading = self._members[0]
         rivals = [
@@ -581,7 +581,7 @@ class Estimator:
     def _judged(self, window: Window) -> tuple[FrozenPosterior, ...]:
         """Return the earlier posteriors whose forecasts a window's samples judge."""
         first = window.recent.first_index
-        # All commands since their windows' ends are known.
+        # Those for which all commands since their windows' ends are known.
         return tuple(
             f
             for f in self._frozen
@@ -596,7 +596,7 @@ class Estimator:
         return None if done is None else replace(window, number=done[0])
 
     def _proposed(self, window: Window) -> Proposal | None:
-        """Return what is to be carried from a window on, where that is new."""
+        """Return the proposal to carry from a window on; None where it is not new."""
         if self.schedule is None:
             return self._pending
         due = [model for number, model in self.schedule.models if number <= window.number]
@@ -607,7 +607,7 @@ class Estimator:
 
 
 def _learned(member: _Member, found: WindowResult | WindowFit) -> list[Contradicted]:
-    """Keep what a structure's window gave; return what it contradicts."""
+    """Keep the results of a structure's window; return alarms that it contradicts its prior."""
     member.waited = 0
     if found.failure:
         return []

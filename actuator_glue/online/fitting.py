@@ -1,4 +1,4 @@
-"""The model behind a window: its simulated responses, where to start, what it can tell."""
+"""The model of a window: simulated responses, starting points, identifiability."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def simulate(model: ModelChoice, theta: Array, record: Record, first: int = 0) -
 
 
 def batch(wanted: int) -> int:
-    """Return how many parameter sets, `wanted` or more, a model with effects simulates at once."""
+    """Return the number of parameter sets in full simulation batches, `wanted` or more."""
     return -(-wanted // LANES) * LANES
 
 

@@ -24,7 +24,7 @@ TINY = 1e-12  # m; a residual is never exactly nothing
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FrozenPosterior:
-    """A posterior as it stood when its window closed, kept to be held against later samples.
+    """A posterior as it stood when its window closed, kept until later samples judge it.
 
     Attributes:
         number: number of the window.
@@ -33,12 +33,12 @@ class FrozenPosterior:
         stop: running index one past the last.
         model: model of the draws.
         draws: posterior draws, shape (m, p).
-        residual: what the best draw left over in its window [m].
+        residual: residual of the best draw in its window [m].
         noise: standard deviation of the sensor noise [m].
-        past: last samples of its window, from which its responses run on: nothing measured after
-            the window's end enters a forecast, whenever it is computed.
+        past: last samples of its window, from which its responses continue: nothing measured
+            after the window's end enters a forecast, whenever it is computed.
         weight: weight of the model among those that are carried, when the window closed.
-        beside: posteriors of the others.
+        beside: posteriors of the other structures carried.
     """
 
     number: int

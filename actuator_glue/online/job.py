@@ -27,7 +27,7 @@ from actuator_glue.records import Array
 
 # Whether the time budget is spent.
 Expired: TypeAlias = Callable[[], bool]
-# Draws whose mean response is the forecast that a structure's weight is judged by.
+# Draws whose mean response is the forecast by which a structure's weight is judged.
 _FEW = 32
 # Generations that R-hat and ESS are computed from.
 DIAGNOSED = 150
@@ -56,21 +56,20 @@ class WindowResult:
         response: frequency-response band.
         scored: bands of earlier posteriors over samples of this window, with their coverage.
         forecast: bands over samples to come, where their command is known.
-        frozen: the posterior, to be held against later samples.
+        frozen: the posterior, whose forecast later samples will judge.
         archive: points for the next window to start from.
         learned: the posterior, for the priors of later windows.
         conflict: how far the window contradicts its prior.
         failure: why there is no posterior; empty where there is one.
         starved: the sampling ended before it had reached the posterior.
-        rivals: the other structures that are carried: what they forecast with.
+        rivals: fits of the other structures carried: the posteriors they forecast with.
         errors: as in `WindowFit`.
         structures: effects of each structure that the numbers above are a mixture of, the
             likeliest first, which is `model`.
         weights: their weights, fixed before the window.
-        spent: likelihood evaluations of the likeliest; of each other's posterior where that has
-            come since the window before, else 0; then of Eq. (2) where they are only held against
-            it.
-        parts: model and posterior of each by itself; None for one that has none yet.
+        spent: likelihood evaluations of the likeliest; of each other structure if a result of it
+            is new since the window before, else 0; then of Eq. (2) if it is only a reference.
+        parts: model and moments of each structure by itself; None for one without a posterior yet.
         draws: some draws of the mixture, shape (m, p): where one structure is carried, those that
             the next window starts from.
     """
@@ -111,8 +110,8 @@ class WindowResult:
 def run(job: Job, expired: Expired | None = None) -> WindowResult:
     """Estimate one window.
 
-    The result depends on the job alone, but where `expired` ends the sampling; the result then
-    says so and how many evaluations were done, and a job with that `stop_at` repeats it.
+    The result depends on the job alone, unless `expired` ends the sampling; the result then says
+    so and how many evaluations were done, and a job with that `stop_at` repeats it.
 
     Args:
         job: what to compute.
@@ -153,8 +152,8 @@ def fit(job: Job, expired: Expired | None = None) -> WindowFit:
 def renew(job: Job) -> WindowFit:
     """Sample a window with one of the other structures, beside the likeliest one.
 
-    No clock ends it: what comes of it is the same whenever it comes. Chains that have not arrived
-    at their posterior forecast nothing.
+    No clock ends it: the result is the same whenever it comes. Chains that have not reached their
+    posterior make no forecast.
     """
     fitted = _fit(job, None)
     chains = fitted.chains
@@ -179,7 +178,7 @@ def _fit(job: Job, expired: Expired | None) -> WindowFit:
 def _errors(job: Job) -> tuple[float, ...]:
     """Return the mean square error of each structure's forecasts over a window's samples [m^2].
 
-    NaN for one that made none; nothing where no two have.
+    NaN for a structure that made none; empty where there was no forecast.
     """
     record, models = job.window.recent, [one.model for one in (job, *job.rivals)]
     squares = np.full((len(job.frozen), len(models)), np.nan)
@@ -192,7 +191,7 @@ def _errors(job: Job) -> tuple[float, ...]:
             few = replace(part, draws=part.draws[sampling.spread(len(part.draws), _FEW)])
             middle = _respond(few, record.command[end:stop]).mean(axis=0)
             row[j] = np.mean((record.measured[start:stop] - middle) ** 2)
-    # Of the same samples only: a forecast that others did not make compares with nothing.
+    # Of one forecast only, the latest: errors of the same samples can be compared.
     whole = squares[~np.isnan(squares).all(axis=1)]
     if not len(whole):
         return ()
@@ -215,7 +214,7 @@ def report(job: Job, fitted: WindowFit, limits: bool = True) -> WindowResult:
 
 
 def _failed(job: Job, fitted: WindowFit, reason: str) -> WindowResult:
-    """Return what is left of a window, for later ones."""
+    """Return the result of a failed window, with what later windows need."""
     return WindowResult(
         job.window,
         job.settings,
@@ -282,7 +281,7 @@ def _report(job: Job, fitted: WindowFit, limits: bool) -> WindowResult:
 
 
 def _each(job: Job, fitted: WindowFit, chains: Chains) -> list[tuple[Job, Array | None]]:
-    """Return each structure that has a weight, with draws (m, p); None before it has any."""
+    """Return each structure of positive weight, with draws (m, p); None before it has any."""
     found: list[tuple[Job, Array | None]] = [(job, chains.posterior())]
     for rival, one in zip(job.rivals, fitted.rivals, strict=True):
         if rival.weight == 0.0:
@@ -292,14 +291,14 @@ def _each(job: Job, fitted: WindowFit, chains: Chains) -> list[tuple[Job, Array 
 
 
 def _mixed(job: Job, each: Sequence[tuple[Job, Array | None]]) -> Array:
-    """Return draws (m, p) of all structures, each with its weight."""
+    """Return draws (m, p) of all structures, mixed by their weights."""
     parts = [(one.weight, one.model.names, draws) for one, draws in each if draws is not None]
     rng = np.random.default_rng((job.settings.seed, job.window.record.first_index, 3))
     return pooled(job.model.names, parts, rng)
 
 
 def _score(job: Job, old: FrozenPosterior) -> list[WindowPrediction]:
-    """Hold an earlier posterior against the samples of its forecast, as this window holds them."""
+    """Compare an earlier posterior's forecast with its samples, which this window holds."""
     record = job.window.recent
     end, start, stop = (i - record.first_index for i in (old.end, old.start, old.stop))
     return predictions(

@@ -1,4 +1,4 @@
-"""What earlier samples say before a window is looked at: the prior of each window."""
+"""The prior of each window, from earlier samples."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from actuator_glue.inference.prior_conflict import Conflict, SequentialTest
 from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.stream import Contradicted, Window
 
-# Overlapping windows whose posteriors are waited with, whatever the settings.
+# Most posteriors kept until windows no longer overlap theirs, whatever the settings.
 _MOST = 1000
 
 
@@ -19,7 +19,7 @@ _MOST = 1000
 class Known:
     """A posterior, and the time of its middle and of its last sample [ns].
 
-    Where a gain drifts, it stands for a record that begins in its middle.
+    If a gain drifts, the posterior is that of a record which begins at the middle.
     """
 
     carried: Carried
@@ -51,13 +51,13 @@ class Knowledge:
     A window's samples are counted from `settle` on. Its sequential prior is the posterior of the
     newest window that ended before that, drifted by the time between their middles: each
     sample is counted once along the chain of windows that led there. It belongs to one model:
-    what was learned with another was learned with a model that was found wanting.
+    posteriors of another model come from a model that was found wanting.
 
     Args:
         settings: of the estimator; `prior` says which prior is wanted.
         carried: draws of the calibration, where there is one.
-        handed: what whoever proposed the model knows of its parameters: the prior of windows
-            whose samples it has not seen.
+        handed: posterior that came with the model's proposal: the prior of windows whose samples
+            it has not seen.
         began_ns: acquisition time of the stream's first counted sample [ns], where it has begun.
     """
 
@@ -74,7 +74,7 @@ class Knowledge:
         self._drift = settings.drifts()
         self.began_ns = began_ns
         self._learned: list[Known] = [] if handed is None else [handed]
-        # Windows that share samples with what was handed over do not know of it.
+        # Windows that share samples with the handed posterior do not begin with it.
         self._from_ns = 0 if handed is None else handed.last_ns + 1
         self._epoch: int | None = None
         self._tested_ns: int | None = None
@@ -87,7 +87,7 @@ class Knowledge:
             self.began_ns = self._times(window)[0]
 
     def prior(self, window: Window) -> Carried | None:
-        """Return what is known before a window; None where it is no more than the box."""
+        """Return the prior of a window; None for the box alone."""
         if self._settings.prior == 'box':
             return None
         if self._epoch != window.epoch:

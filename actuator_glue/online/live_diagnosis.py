@@ -1,12 +1,12 @@
 """When a stream is diagnosed, and what follows: a state and a step, without clock, ROS or data.
 
-A diagnosis is due when bands break, when the estimator's prior is contradicted, and, while
-names are tied or structure remains, each time that twice as much has been received; while an
-alarm stands, each time that twice as much has been received since it began. It is of all data, or,
-of a machine that was sound until it changed, of those since: where there is a calibration, what
-the estimator learned before is its prior, and stands for the others. What it says replaces
-what was added before: an addition that later data contradict is taken out, one that they do not
-support any more is carried beside Eq. (2) until forecasts tell.
+A diagnosis is due when bands break and when the estimator's prior is contradicted; also, while
+names are tied or structure remains, each time that the data received have doubled, and, while an
+alarm stands, each time that the data since it began have doubled. It uses all data or, if a sound
+machine has changed, the data since then: where there is a calibration, the estimator's earlier
+posterior is its prior and stands for the other data. Its result replaces earlier additions: an
+effect that later data contradict is taken out; one that they no longer support is carried beside
+Eq. (2) until forecasts decide.
 """
 
 from __future__ import annotations
@@ -28,18 +28,18 @@ from actuator_glue.online.settings import EstimatorSettings
 from actuator_glue.online.structures import MOST, Proposal, Proposed
 from actuator_glue.records import Record
 
-# The likeliest structure is proposed again where it has less weight than this by now.
+# A diagnosed structure that leads already is proposed anew if its weight is below this.
 _DOUBTED = 0.5
-# Weight of what leads, beside a part of it that explains all data as well: forecasts whose mean
-# square is better by a fifth of that of what matters have it lead again.
+# Weight of the leading structure beside a part of it that explains all data as well: it leads
+# again once its mean square forecast error is lower by a fifth of the material error squared.
 _MORE = 0.3
-# Over so many times as many bands, half of what they may lack of their level is a break, too: an
-# error of the noise's own size that never goes.
+# Over this many times as many bands, half the tolerated lack of coverage is a break, too: an
+# error of the noise's own size that never goes. Then the bands' level.
 _LASTING, _LEVEL = 4, 0.95
-# Forecasts that are off by so many times what their bands hold are a break as well: what a limit
-# takes off a few peaks leaves coverage as it was. The worst band may be a glitch's.
+# Forecasts that are off by this many standard deviations of their bands are a break as well: peaks
+# cut off by a limit hardly change coverage. The worst band is left out: it may hold a glitch.
 _OFF = 1.5
-# Where bands were good until now, so much of what has changed is waited for [s].
+# Data of the changed machine to wait for before a diagnosis, if bands were good until now [s].
 _CHANGED = 5.0
 
 
@@ -49,12 +49,12 @@ class LiveSettings:
 
     Attributes:
         automatic: diagnose without being asked.
-        apply: have the estimator carry what was found.
-        coverage_limit: mean coverage of the noise band below which it has broken; half as far
-            below 95 % where it lasts four times as long.
+        apply: have the estimator carry the structures found.
+        coverage_limit: mean coverage below which the noise band has broken; half as far below
+            95 % where it lasts four times as long.
         coverage_windows: successive bands the mean is taken over.
         minimum: data needed before a diagnosis [s].
-        pause: data that must have come since the diagnosis before began [s].
+        pause: data that must have come since the previous diagnosis began [s].
     """
 
     automatic: bool = True
@@ -67,19 +67,19 @@ class LiveSettings:
 
 @dataclass(frozen=True, slots=True)
 class Received:
-    """So much usable data has come since the stream began [s]."""
+    """Usable data received since the stream began [s]."""
 
     seconds: float
 
 
 @dataclass(frozen=True, slots=True)
 class Judged:
-    """A band of parameters and sensor noise was held against its samples.
+    """A band of parameters and sensor noise was compared with its samples.
 
     Attributes:
         coverage: share of the samples that it covers.
         number: window that made it.
-        error: rms of measured minus median, in standard deviations of what the band holds.
+        error: rms of measured minus median, in standard deviations of the band.
     """
 
     coverage: float
@@ -103,7 +103,7 @@ class Judged:
 
 @dataclass(frozen=True, slots=True)
 class Carries:
-    """The estimator carries other structures from a window on; earlier bands are of others."""
+    """The estimator carries other structures from a window on; earlier bands do not count."""
 
     number: int
 
@@ -115,7 +115,7 @@ class Estimated:
     Attributes:
         contradicted: the alarm of the check of the prior stands.
         weights: effects and weight of each structure that is carried, the likeliest first.
-        contradicts: data since the first that contradict [s]; NaN where none do.
+        contradicts: data since the first sample that contradicts [s]; NaN where none does.
     """
 
     contradicted: bool
@@ -133,7 +133,7 @@ class Requested:
     """Somebody has asked for a diagnosis, which begins now.
 
     Attributes:
-        streamed: of what has been received, not of other records.
+        streamed: it is of the data received, not of other records.
     """
 
     streamed: bool = True
@@ -148,8 +148,8 @@ class Concluded:
         why_not: why there is no proposal, for people.
         left_open: names are tied, or structure remains.
         apply: the estimator is to carry it; None for what the settings say.
-        supported: effects that the data support, whether they may be carried or not; None where
-            nothing was learned of that.
+        supported: effects that the data support, whether they may be carried or not; None if
+            unknown.
     """
 
     proposal: Proposal | None = None
@@ -164,11 +164,11 @@ Input: TypeAlias = Received | Judged | Carries | Estimated | Began | Requested |
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """Diagnose what has been received, for a reason.
+    """Diagnose the data received, for a reason.
 
     Attributes:
         reason: why, for people.
-        since: data before those that it is of [s]; what they say is known (`looked_at`).
+        since: earlier data to leave out [s]; they enter through the prior (`looked_at`).
     """
 
     reason: str
@@ -180,8 +180,8 @@ class Carry:
     """Have the estimator carry other structures.
 
     Attributes:
-        proposal: what to carry.
-        taken_out: effects that were carried and are not any more.
+        proposal: structures to carry.
+        taken_out: effects that are no longer carried.
     """
 
     proposal: Proposal
@@ -207,21 +207,21 @@ class LiveState:
         settings: when to diagnose.
         seconds: data received since the stream began [s].
         coverages: of the last bands.
-        errors: of the last bands, in standard deviations of what they hold.
-        judged: data there were when each of them was judged [s].
-        origin: data before those that looks are of [s]: until a machine that nothing was added to
-            changed, suddenly or slowly.
-        broken: their mean is below the limit.
+        errors: of the last bands, in standard deviations of each band.
+        judged: data received when each of these bands was judged [s].
+        origin: data that diagnoses leave out [s]: those before a machine to which nothing was
+            added changed, suddenly or slowly.
+        broken: bands say that the model lacks something.
         contradicted: the alarm of the check of the prior stands.
-        since: window that the structures are carried from.
+        since: first window with the structures carried now.
         weights: structures that are carried, the likeliest first.
         reason: why a diagnosis is due; empty for none.
         running: a diagnosis is under way.
-        looked: data there were when the last one began [s]; NaN before the first.
-        left_open: the last one left names tied, or structure.
-        sound: bands of what is carried now have been good.
-        alarm: data there were when the alarm that stands began [s]; NaN where none does.
-        ready: data there have to be for a diagnosis because of it [s].
+        looked: data received when the last diagnosis began [s]; NaN before the first.
+        left_open: the last diagnosis left names tied, or structure in the residual.
+        sound: bands of the structures carried now have been good.
+        alarm: data received when the standing alarm began [s]; NaN without an alarm.
+        ready: data required before a diagnosis for that alarm [s].
     """
 
     settings: LiveSettings
@@ -252,16 +252,16 @@ class LiveState:
 
     @property
     def lasting(self) -> bool:
-        """Whether coverage has been low for long, though not as low."""
+        """Whether coverage has been moderately low for long."""
         limit = 0.5 * (self.settings.coverage_limit + _LEVEL)
         full = len(self.coverages) >= _LASTING * self.settings.coverage_windows
         return full and float(np.mean(self.coverages)) < limit
 
     @property
     def off(self) -> float:
-        """Rms error of the last bands but the worst, in standard deviations of what they hold.
+        """Rms error of the last bands except the worst, in standard deviations of the bands.
 
-        Of four times as many as a mean coverage is of; NaN before there are enough.
+        Over four times as many bands as the mean coverage; NaN before there are enough.
         """
         full = len(self.errors) >= _LASTING * self.settings.coverage_windows
         return float(np.sqrt(np.mean(np.square(sorted(self.errors)[:-1])))) if full else math.nan
@@ -274,7 +274,7 @@ class LiveState:
 
     @property
     def trusted(self) -> bool:
-        """Whether bands have been judged, and nothing speaks against what is known now."""
+        """Whether bands have been judged, and neither they nor the prior's check alarm."""
         fair = not math.isnan(self.coverage) and not self.wanting
         return fair and not self.contradicted
 
@@ -327,14 +327,14 @@ def _judged(state: LiveState, given: Judged) -> tuple[LiveState, tuple[Action, .
         return replace(state, sound=sound), ()
     if not broken:
         return replace(state, broken=False, sound=True), ()
-    # Few bands that are bad enough bring the mean of many down, too.
+    # A few very bad bands lower the mean of many, too.
     low = state.coverage < state.settings.coverage_limit
     sudden = state.sound and low
     state = replace(state, ready=state.seconds + _CHANGED * sudden)
     if state.sound and (low or state.off > _OFF) and not (state.weights and state.weights[0][0]):
         state = replace(state, origin=_changed(state, low), left_open=False)
         if not low:
-            # A few peaks: they take longer to show what is missing.
+            # Only a few peaks are off: it takes more data to show what is missing.
             state = replace(state, ready=state.origin + state.settings.minimum)
     covers = state.coverage if low else float(np.mean(state.coverages))
     what = f'the band of parameters and sensor noise covers {covers:.0%} of the samples'
@@ -345,11 +345,11 @@ def _judged(state: LiveState, given: Judged) -> tuple[LiveState, tuple[Action, .
 
 
 def _changed(state: LiveState, low: bool) -> float:
-    """Return how much data there were when the last band before the bad ones was judged [s].
+    """Return the data received when the last band before the bad ones was judged [s].
 
     Args:
-        state: with bands that say that something changed.
-        low: because coverage is low, not because forecasts are off.
+        state: state whose bands show a change.
+        low: the change shows as low coverage, not as large forecast errors.
     """
     if low:
         lately = state.coverages[-state.settings.coverage_windows - 1 :]
@@ -370,15 +370,15 @@ def _estimated(state: LiveState, given: Estimated) -> tuple[LiveState, tuple[Act
     began = max(state.seconds - given.contradicts, 0.0)
     sound = state.sound and not state.broken and not (state.weights and state.weights[0][0])
     if sound and state.origin == 0.0 and math.isfinite(began):
-        # A slow change, which windows follow: with all data it would be judged by those before it.
-        # A later alarm is of the same one.
+        # A slow change, which windows follow: among all data, those before it would prevail.
+        # A later alarm is of the same change.
         ready = max(state.ready, began + state.settings.minimum)
         state = replace(state, origin=began, left_open=False, ready=ready)
     return state, ()
 
 
 def _received(state: LiveState, seconds: float) -> LiveState:
-    """Take how much has come; less than before is another actuator's."""
+    """Take the amount of data received; less than before means another actuator."""
     if seconds >= state.seconds:
         return replace(state, seconds=seconds)
     fresh = LiveState(state.settings, running=state.running)
@@ -386,21 +386,21 @@ def _received(state: LiveState, seconds: float) -> LiveState:
 
 
 def _began(state: LiveState) -> LiveState:
-    """Let go of bands, which are of windows before."""
+    """Drop the bands, which are of earlier windows."""
     return replace(
         state, coverages=(), errors=(), judged=(), broken=False, sound=False, alarm=math.nan
     )
 
 
 def _timed(state: LiveState) -> LiveState:
-    """Note since when an alarm stands."""
+    """Note when an alarm began."""
     if not (state.broken or state.contradicted):
         return replace(state, alarm=math.nan)
     return replace(state, alarm=state.seconds) if math.isnan(state.alarm) else state
 
 
 def _concluded(state: LiveState, given: Concluded) -> tuple[LiveState, tuple[Action, ...]]:
-    # An alarm of meanwhile is of samples that it has mostly seen, or of what is replaced now.
+    # An alarm raised meanwhile is of samples mostly diagnosed, or of structures replaced now.
     state = replace(state, running=False, left_open=given.left_open, reason='')
     apply = state.settings.apply if given.apply is None else given.apply
     if not apply:
@@ -416,19 +416,19 @@ def _concluded(state: LiveState, given: Concluded) -> tuple[LiveState, tuple[Act
     wanted = frozenset(given.proposal.structures[0].model.effects)
     out = tuple(sorted(leading - wanted))
     if wanted == leading and weight >= _DOUBTED:
-        # What was in doubt, and neither forecasts nor another look have found since, is out.
+        # Effects in doubt that neither forecasts nor this diagnosis have confirmed are taken out.
         asked = {frozenset(one.model.effects) for one in given.proposal.structures}
         more = [effects for effects, _ in state.weights if effects > wanted]
         out = tuple(sorted({name for one in more if one not in asked for name in one - wanted}))
         if not out:
             return state, ()
     if wanted and wanted < leading and weight >= _DOUBTED:
-        # A look tells what is material in all data, forecasts what is lost without the rest.
+        # A diagnosis says what is material in all data; forecasts, what the other effects add.
         doubt = Say('in doubt', f'{", ".join(out)}: all data are explained as well without')
         return _began(state), (doubt, Carry(_without(leading, given.proposal)))
     carried = {effects for effects, _ in state.weights}
     if leading and not wanted and frozenset() not in carried:
-        # Forecasts have excluded Eq. (2): what few data show they may tell, once more.
+        # Forecasts have excluded Eq. (2), a diagnosis of few data has not: they decide once more.
         doubt = Say('in doubt', f'{", ".join(out)}: Eq. (2) is enough for what was looked at')
         return _began(state), (doubt, Carry(_evenly(leading)))
     told: tuple[Action, ...] = ()
@@ -438,13 +438,13 @@ def _concluded(state: LiveState, given: Concluded) -> tuple[LiveState, tuple[Act
 
 
 def _evenly(effects: frozenset[str]) -> Proposal:
-    """Return effects and Eq. (2) alone, as likely as each other: forecasts tell which."""
+    """Return Eq. (2) with and without effects, equally likely: forecasts decide."""
     both = tuple(sorted(effects)), ()
     return Proposal(tuple(Proposed(choose_model(names), 0.5) for names in both))
 
 
 def _without(effects: frozenset[str], fewer: Proposal) -> Proposal:
-    """Return a proposal of fewer effects than lead, and these beside it: forecasts tell which."""
+    """Return the smaller proposal with the leading effects beside it: forecasts decide."""
     ours = fewer.structures[: MOST - 1]
     total = sum(one.weight for one in ours)
     less = [replace(one, weight=(1.0 - _MORE) * one.weight / total) for one in ours]
@@ -465,9 +465,9 @@ def _due(state: LiveState) -> str:
         if state.left_open:
             return 'names are tied or structure remains, and there are twice as many data'
         if state.weights and state.weights[0][0] and data >= 2.0 * settings.minimum:
-            # What grows with time is small at first, and windows follow a slow change.
+            # An effect that grows with time is small at first; windows follow a slow change.
             return 'there are twice as many data as what was added was found in'
-    # Before the first one there is nothing to look at again.
+    # NaN without an alarm: there is nothing to diagnose again.
     again = max(state.alarm, state.looked) + max(settings.pause, state.looked - state.alarm)
     if seconds >= max(again, state.ready):
         return 'the alarm still stands, and there are more data since it began'
@@ -475,13 +475,13 @@ def _due(state: LiveState) -> str:
 
 
 class Memory:
-    """What an estimator knew of Eq. (2)'s parameters before some samples; bounded.
+    """Prior knowledge of Eq. (2)'s parameters for records, from an estimator; bounded.
 
-    Each sample counts once: what is known before records is the calibration that the estimator
-    began with, or its posterior of windows that ended before the records begin. Where it began
-    without a calibration, that is of the parameters alone that windows tell: along what none does
-    its posterior is the box, whose mean is a statement about the bounds. An effect that tells a
-    little of it would be found with the size that goes with that.
+    Each sample counts once: the prior of records is the calibration that the estimator began
+    with, or its posterior of windows that ended before the records begin. Without a calibration,
+    only parameters that windows inform are kept: along the others the posterior is the box, whose
+    mean is a statement about the bounds. An effect that informs such a parameter a little would be
+    found with the size that goes with that mean.
 
     Attributes:
         settings: of the estimator; None before they are known.
@@ -500,7 +500,7 @@ class Memory:
         self.settings, self._carried = settings, carried
 
     def forget(self) -> None:
-        """Let go of posteriors: they are of another actuator."""
+        """Drop the posteriors: they are of another actuator."""
         self._known.clear()
         self._began_ns = None
 
@@ -514,8 +514,8 @@ class Memory:
 
         Args:
             known: the posterior.
-            first_ns: when the records that are kept begin [ns]: of older posteriors only the
-                newest can still be asked for.
+            first_ns: when the records that are kept begin [ns]: of posteriors before that, only
+                the newest can still be needed.
         """
         if self.settings is None or self.settings.prior != 'sequential':
             return
@@ -529,7 +529,7 @@ class Memory:
             self._known.popleft()
 
     def before(self, first_ns: int) -> tuple[Carried, Drift, float] | None:
-        """Return what was known before records that begin at a time [ns].
+        """Return the prior of records that begin at a time [ns].
 
         Returns:
             Draws that have drifted to that time, by how much they drift, and their age [s]; None
@@ -551,7 +551,7 @@ class Memory:
 
 
 def _told(carried: Carried) -> tuple[str, ...]:
-    """Return the parameters of Eq. (2) that draws tell by themselves, beside the usual bounds."""
+    """Return the parameters of Eq. (2) that draws fix more narrowly than the usual bounds do."""
     plain = choose_model()
     base = carried.only(plain.names)
     wide = moments(base.draws, *plain.bounds).prior_dominated
@@ -561,9 +561,9 @@ def _told(carried: Carried) -> tuple[str, ...]:
 def looked_at(
     collector: Collector, memory: Memory, since: float
 ) -> tuple[list[Record], tuple[Carried, Drift, float] | None]:
-    """Return what a look is of, and what was known before, as `Memory.before`.
+    """Return the records to diagnose, and their prior as `Memory.before`.
 
-    That is what has come since so many seconds of data; all where that is too short.
+    The records are those after `since` seconds of data; all where these are too short.
     """
     records = collector.records(since=since) or collector.records()
     return records, memory.before(records[0].start_ns) if records else None

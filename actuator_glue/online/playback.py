@@ -26,7 +26,7 @@ Sampled: TypeAlias = tuple[Job, WindowFit]
 
 
 def at_once(found: Iterable[Event | Sampled]) -> Iterator[WindowResult | Event]:
-    """Yield events as they are, and of each window that was sampled its report."""
+    """Yield events as they are, and the report of each sampled window."""
     for thing in found:
         yield told(report(*thing)) if isinstance(thing, tuple) else thing
 
@@ -61,7 +61,7 @@ def replay(
 
 
 def _sampled(items: Iterable[Item], estimator: Estimator) -> Iterator[Event | Sampled]:
-    """Run the estimator as far as windows depend on one another."""
+    """Run the part of the estimator in which windows depend on one another."""
     for item in items:
         yield from give(estimator, item)
         while (job := estimator.next_job()) is not None:
@@ -73,14 +73,14 @@ def _sampled(items: Iterable[Item], estimator: Estimator) -> Iterator[Event | Sa
 
 
 def sample_beside(estimator: Estimator) -> None:
-    """Compute here and now what a live estimator has computed beside."""
+    """Sample a less likely structure at once, which a live estimator does in parallel."""
     job = estimator.rival_job()
     if job is not None:
         estimator.finish_rival(renew(job))
 
 
 def give(estimator: Estimator, item: Item) -> list[Event]:
-    """Give an estimator what was streamed; return what it has to tell of it."""
+    """Give an estimator one streamed item; return its events."""
     if isinstance(item, StreamSetup):
         return estimator.setup(item)
     if isinstance(item, Preview):

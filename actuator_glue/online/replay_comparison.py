@@ -1,4 +1,4 @@
-"""What a live estimator put into a bag, and replayed numbers held against it, bit by bit."""
+"""Results that a live estimator put into a bag, compared with replayed ones, bit by bit."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ class Published:
         carried: draws that its priors began with; None where they began from the box.
         posteriors: PosteriorMoments by window number.
         draws: points that each window ended with, by its number, with their names.
-        scored: scored PredictionBands by window number, index and kind, as `_brief` leaves
-            them: a long bag's bands do not fit into memory.
+        scored: scored PredictionBands by window number, index and kind, shortened by `_brief`: a
+            long bag's bands do not fit into memory.
     """
 
     settings: EstimatorSettings | None = None
@@ -64,18 +64,18 @@ class Published:
         first = self.posteriors[numbers[0]] if numbers else None
         usual = self.settings.evaluations if self.settings is not None else 0
         if first is not None and first.window > 0 and first.evaluations <= usual:
-            # It did not begin from nothing: the one before it was not recorded.
+            # It had points to start from: the window before it was not recorded.
             found[numbers[0]] = Begun(int(first.window) - 1, None, False)
         for before, number in pairwise(numbers):
             ended, begins = self.posteriors[before], self.posteriors[number]
             if ended.header.frame_id != begins.header.frame_id:
                 continue  # a posterior of one actuator says nothing about the next
             names, archive = self.draws.get(before, ((), None))
-            # Few of them are all that the window gave, but where an older version thinned them.
+            # All points that the window gave, unless an older version thinned them.
             whole = archive is not None and len(archive) != _THINNED
             older = found.get(before)
             if archive is not None and len(archive) < ARCHIVE and older is not None:
-                # A window that was cut short hands on points of the one before it, too.
+                # A window that was cut short hands on points of the window before it, too.
                 whole = whole and older.whole
                 archive = archive if older.archive is None else joined(archive, older.archive)
             if len(spent := _spent(begins)) > 1 or tuple(begins.parameter_names) != names:
@@ -84,7 +84,7 @@ class Published:
                 )
                 archive = archive if len(spent) == 1 else None
             if getattr(self.settings, 'prior', 'box') != 'box':
-                whole = False  # what was known before it is not kept either
+                whole = False  # the window's prior is not kept either
             found[number] = Begun(before, archive, whole)
         return found
 
@@ -93,7 +93,7 @@ def published(messages: Iterable[tuple[str, Any]]) -> Published:
     """Collect what a live estimator published from (type name, message) pairs.
 
     Raises:
-        InputError: settings, a model or a posterior that cannot be.
+        InputError: impossible settings, model or posterior.
     """
     found = Published()
     for name, message in messages:
@@ -124,13 +124,13 @@ def _spent(message: Any) -> tuple[int, ...]:
 
 @dataclass(slots=True)
 class ReplayComparison:
-    """Replayed numbers held against the published ones, bit by bit.
+    """Replayed numbers compared with the published ones, bit by bit.
 
     Attributes:
         windows: posteriors compared.
         bands: scored bands compared.
         differing: one line per window or band that differs or is missing.
-        unrepeatable: one line per window that the bag has not all of what it was computed from.
+        unrepeatable: one line per window whose inputs are not all in the bag.
     """
 
     windows: int = 0
@@ -140,7 +140,7 @@ class ReplayComparison:
 
     @property
     def identical(self) -> bool | None:
-        """Whether all that can be repeated is equal; None where nothing of it can be."""
+        """Whether all repeatable windows are equal; None where no window is repeatable."""
         if not self.windows and self.unrepeatable and not self.differing:
             return None
         return self.windows > 0 and not self.differing
@@ -151,13 +151,13 @@ def compare(
     live: Published,
     held: Callable[[int, int], str] = lambda first, stop: '',
 ) -> ReplayComparison:
-    """Hold replayed results against what was published live.
+    """Compare replayed results with those published live.
 
     Args:
         results: of the replay, in order.
         live: what was published.
-        held: says what is missing of the samples from one index up to another; empty for nothing.
-            Asked when all results have come.
+        held: describes the samples missing from one index up to another; empty for none. Called
+            when all results have come.
     """
     found = ReplayComparison()
     begun, course, seen = live.begun(), ReplayPosition(), set[int]()
@@ -187,7 +187,7 @@ def compare(
 
 
 def _hold(result: WindowResult, message: Any, live: Published, found: ReplayComparison) -> None:
-    """Hold one result against what was published of it."""
+    """Compare one result with what was published of it."""
     number = result.window.number
     found.windows += 1
     names = differences(conversion.posterior(result, float('nan'))[1], message)
@@ -218,7 +218,7 @@ def _digest(values: Any) -> _Digest:
 
 
 def _brief(band: Any) -> Any:
-    """Return a PredictionBand whose limits are digests: what `differences` needs, and small."""
+    """Return a small PredictionBand, its limits replaced by digests for `differences`."""
     small = copy(band)
     for name in ('lower', 'median', 'upper'):
         setattr(small, name, _digest(getattr(band, name)))
@@ -226,7 +226,7 @@ def _brief(band: Any) -> Any:
 
 
 def differences(fields: Mapping[str, Any], message: Any) -> list[str]:
-    """Return the names of the fields that a message holds otherwise, to the last bit.
+    """Return the names of the fields that differ from a message's in any bit.
 
     `seconds` is not compared: it is how long the computer took.
     """

@@ -33,15 +33,15 @@ from actuator_glue.records import Array, Record
 
 # A command that moves less than this many noise standard deviations calibrates nothing.
 EXCITATION = 3.0
-# Steps in which a sampler that starts from the last posterior adapts.
+# Adaptation steps of a sampler that starts from the last posterior.
 ADAPT = 20
 # Time a model's first window may take [s], whatever the budget: before there is a posterior
-# nothing is late, and a window that is cut short leaves the next one where it began itself.
+# nothing is late, and the window after one that is cut short would start where that did.
 FIRST = 1.0
-# Times the budget that a window may take at most: after others that ended without a posterior.
+# Largest time limit of a window, in budgets, after windows that ended without a posterior.
 MOST_PATIENCE = 8.0
-# Share of the last posterior's points, spread, that must be alive in the next: so few that mostly
-# one temperature leads there.
+# Effective share of the last posterior's points to keep at the next temperature: small enough
+# that one temperature mostly suffices.
 SURVIVORS = 0.35
 # Points that a window hands to the next, about as many as its draws are worth.
 ARCHIVE = 400
@@ -60,14 +60,14 @@ class Job:
         stop_at: evaluations after which a live run was stopped; a replay repeats it.
         ahead: commands from the window's end to the forecast's, shape (na,) [m], where known.
         frozen: earlier posteriors whose forecasts this window's samples judge.
-        prior: what is known before the window; None for no more than the box.
-        rivals: the other structures that are carried, as they forecast from this window on.
-        weight: weight of the model among them, before the window.
-        proposal: what is carried from this window on, where that is new.
-        standing: last posterior of a structure that is sampled beside; it forecasts with that.
-        renewed: likelihood evaluations of it, where it has come since the window before; else 0.
-        patience: times the budget that it may take, for want of time left those before it without
-            a posterior.
+        prior: prior from earlier samples; None for the box alone.
+        rivals: jobs of the other structures carried, which only forecast from this window on.
+        weight: weight of the model among the structures carried, before the window.
+        proposal: proposal that is carried from this window on, if it is new.
+        standing: last posterior of a structure not sampled here; its forecasts use it.
+        renewed: likelihood evaluations of a rival's result new since the window before; else 0.
+        patience: time limit in budgets, raised after windows that ran out of time before they
+            had a posterior.
     """
 
     window: Window
@@ -88,7 +88,7 @@ class Job:
 
     @property
     def evaluations(self) -> int:
-        """Likelihood evaluations the window is allowed; of chains that fill a batch up, too."""
+        """Likelihood evaluations allowed, those of chains that only fill a batch included."""
         steps = self.settings.evaluations // self.settings.chains
         usual = max(self.settings.evaluations, steps * self.chains)
         return max(self.settings.start_evaluations, usual) if self.afresh else usual
@@ -109,14 +109,14 @@ class Job:
 
     @property
     def chains(self) -> int:
-        """Markov chains; effects are simulated in batches, which are filled up."""
+        """Number of Markov chains; effects are simulated in batches, which chains fill up."""
         wanted = self.settings.chains
         return fitting.batch(wanted) if self.model.effects else wanted
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class WindowFit:
-    """One window's posterior: all that the next window needs of it, and what is to be told.
+    """One window's posterior: all that the next window and the report need.
 
     Attributes:
         window: the samples.
@@ -125,19 +125,19 @@ class WindowFit:
         rms_error: rms of measured minus best simulated displacement, mean removed [m].
         nrmse: rms_error over the standard deviation of the measured displacement.
         shaping_factor: G of Eq. (4); NaN for a formal likelihood.
-        frozen: the posterior, to be held against later samples.
+        frozen: the posterior, whose forecast later samples will judge.
         archive: points to start from, shape (m, p).
         learned: the posterior, for the priors of later windows; None where none is wanted, or the
             window was cut so short that it says nothing.
         conflict: how far the window contradicts its prior; None where that is the box.
         complete: the sampling was not ended early.
-        failure: why there is nothing of all this; empty where there is.
-        starved: there is nothing because the sampling ended before it had reached the posterior.
-        evaluations: likelihood evaluations, of a structure that is sampled beside: at least 1,
-            also where it failed; 0 where nothing has come since the window before.
-        rivals: the other structures that are carried: what they forecast with.
-        errors: mean square error of the forecasts that the window has judged, of each structure,
-            the likeliest first [m^2]; empty where only one is carried or there were none.
+        failure: why there is no posterior; empty where there is one.
+        starved: there is no posterior because the sampling ended before it had reached it.
+        evaluations: likelihood evaluations of a rival structure: at least 1 for a new result, even
+            a failed one; 0 without a new result since the window before.
+        rivals: fits of the other structures carried: the posteriors they forecast with.
+        errors: mean square error of each structure's forecast of the window's samples, the
+            likeliest structure first [m^2]; empty without rivals or forecasts.
     """
 
     window: Window
@@ -203,10 +203,10 @@ def fit(job: Job, expired: Callable[[], bool] | None = None) -> WindowFit:
 
 
 def _learned(job: Job, chains: Chains, posterior: Array) -> Carried | None:
-    """Return what later windows begin with, without the scatter of draws (m, p).
+    """Return the posterior for later windows' priors, without the scatter of draws (m, p).
 
-    As a normal density in the coordinates in which it is their prior: what no window tells goes
-    through as it was.
+    It becomes a normal density in the coordinates of the prior: along directions that no window
+    informs, the prior passes through unchanged.
     """
     model = job.model
     wanted = job.settings.prior == 'sequential' and chains.annealed
@@ -223,7 +223,7 @@ def _learned(job: Job, chains: Chains, posterior: Array) -> Carried | None:
 
 
 def _frozen(job: Job, draws: Array, residual: ResidualModel, noise: float) -> FrozenPosterior:
-    """Return draws (m, p) as they forecast from the end of a job's window on."""
+    """Return draws (m, p), frozen with all that a forecast from a job's window needs."""
     start, stop = job.forecast
     return FrozenPosterior(
         number=job.window.number,
@@ -240,9 +240,9 @@ def _frozen(job: Job, draws: Array, residual: ResidualModel, noise: float) -> Fr
 
 
 def stands(job: Job) -> FrozenPosterior | None:
-    """Return what a structure forecasts with that is not sampled in a window: its last posterior.
+    """Return the last posterior of a structure not sampled in this window, to forecast with.
 
-    None where it has none yet. A gain that drifts has gone on.
+    None where it has none yet. A drifting gain is advanced to the window.
     """
     old = job.standing
     if old is None:
@@ -253,12 +253,12 @@ def stands(job: Job) -> FrozenPosterior | None:
 
 
 def _past(job: Job, start: int) -> Record:
-    """Return the last samples of a window, as many as a forecast from `start` on runs up with.
+    """Return the last samples of a window, from which a forecast from `start` on runs up.
 
-    Twice the settling time before the forecast, and never less than gives the initial state.
+    Twice the settling time before the forecast, and always enough for the initial state.
     """
     record, settle = job.window.record, round(job.settings.settle / job.window.record.period)
-    # Eq. (2) forgets; an effect may remember the whole window (yield, drift).
+    # The state of Eq. (2) decays; an effect's may depend on the whole window (yield, drift).
     if job.model.effects or settle == 0:
         return record
     known = len(record) - linear.initial_samples(record)
@@ -277,7 +277,7 @@ def _shaping(job: Job, settle: int, near: Array | None) -> float:
 
 
 def _target(job: Job, shaping: float, near: Array | None) -> Target:
-    """Return what is sampled."""
+    """Return the target density of the sampler."""
     settings, model, record = job.settings, job.model, job.window.record
     return Problem(
         records=(record,),
@@ -288,14 +288,14 @@ def _target(job: Job, shaping: float, near: Array | None) -> Target:
         settle=settings.settle,
         first_index=record.first_index,
         near=near,
-        # What another model has shown says nothing about this one's bends.
+        # Points of another model say nothing about the curvature of this one's posterior.
         shown=None if job.afresh else job.archive,
         prior=job.prior,
     ).target()
 
 
 def _sample(job: Job, target: Target, expired: Callable[[], bool] | None) -> tuple[Chains, bool]:
-    """Return chains of physical parameters, and whether they are all that was wanted."""
+    """Return chains of physical parameters, and whether the sampling is complete."""
     settings, record = job.settings, job.window.record
     archive = job.archive
     if archive is not None and target.transform is not None:
@@ -323,7 +323,7 @@ def _sample(job: Job, target: Target, expired: Callable[[], bool] | None) -> tup
 
 
 def _stop(job: Job, expired: Callable[[], bool] | None) -> Callable[[State], bool] | None:
-    """What ends the sampling early: the evaluations of the run that is repeated, or the clock."""
+    """Return the rule that ends sampling early: evaluations of a repeated run, or the clock."""
     if job.stop_at is not None:
         at = job.stop_at
         return lambda state: state.evaluations >= at
@@ -346,7 +346,7 @@ def _sampler(job: Job) -> SamplerSettings:
 
 
 def joined(new: Array, old: Array | None) -> Array:
-    """Points for the next window; few of them, of a window cut short, are joined by older ones."""
+    """Return points for the next window; if a window cut short has few, older ones are added."""
     if old is None or len(new) >= ARCHIVE:
         return new
     return np.concatenate([new, old[spread(len(old), ARCHIVE - len(new))]])
@@ -366,7 +366,7 @@ def _check_excited(record: Record, settle: int, noise: float) -> float:
 
 @lru_cache(maxsize=64)
 def spread(count: int, wanted: int) -> NDArray[np.intp]:
-    """Return the indices of at most so many of `count` things, spread evenly."""
+    """Return at most `wanted` of the indices of `count` items, spread evenly."""
     indices = np.linspace(0, count - 1, min(count, wanted)).astype(np.intp)
     indices.flags.writeable = False
     return indices

@@ -9,10 +9,10 @@ from actuator_glue.records import Array
 
 _DIFFERENCE_GAIN = 70.0  # variance of the 4th difference of white noise of unit variance
 _TAIL = 1e-4  # share of the command's power above its bandwidth
-# Frequencies from which one density is taken: it then scatters by a tenth, an rms by half of it.
+# Frequencies from which one density is estimated: it scatters by a tenth, an rms by half of that.
 _BINS = 32
-# Ratio to white noise from which on the noise is filtered: less may be harmonics of what the model
-# lacks, beside noise that is white, and the alarm would not hear them.
+# Ratio to white noise from which on the noise counts as filtered: less may be harmonics of what
+# the model lacks, on top of white noise, which must not be hidden from the alarm.
 _FILTERED = 3.0
 
 
@@ -34,8 +34,8 @@ def sensor_noise(residual: Array, command: Array, white: float) -> float:
 
     What a model lacks follows the command, so noise is looked for above twice the command's
     bandwidth only, in the residual, which has no motion to leak. The density of each octave is
-    its median (by ln 2, for Gaussian noise): lines, as of hum and of harmonics, do not count.
-    Below, it is taken to be that of the lowest octave.
+    its median (over ln 2, for Gaussian noise): lines, as of hum and of harmonics, do not count.
+    Below these frequencies, the density of the lowest octave is assumed.
 
     Args:
         residual: measured less simulated displacement, shape (n,) [m].

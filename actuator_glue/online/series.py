@@ -15,8 +15,8 @@ from actuator_glue.records import Array
 
 # Newton squares its relative error: a last step of 0.5 % leaves 0.005 % of a standard deviation.
 STEPS, PRECISION = 60, 5e-3
-MOST = 24  # terms of the series; where they do not do, components are summed one by one
-SIZE = MOST + 3  # of their coefficients, which are computed by threes
+MOST = 24  # terms of the series; where these are too few, components are summed one by one
+SIZE = MOST + 3  # number of coefficients, which are computed by threes
 _NEAR = 0.02  # standard deviations from the normal's quantile within which one step is enough
 
 # Factors of the recursion of the bounds b_k: sqrt(k)/(k + 1) and sqrt(k (k - 1))/(k + 1).
@@ -27,7 +27,7 @@ _SPREAD = np.sqrt(_ORDER * np.maximum(_ORDER - 1.0, 1.0)) / (_ORDER + 1.0)
 
 @njit
 def terms_needed(offset: float, excess: float, wanted: float) -> int:
-    """How many terms leave less than `wanted` of sum_k b_k; 0 where even MOST do not.
+    """Return how many terms leave a remainder of sum_k b_k below `wanted`; 0 if MOST do not.
 
     b_k bounds the k-th term at the largest offset and variance excess of any component.
     """
@@ -57,7 +57,7 @@ def coefficients(
         scale: common standard deviation.
         terms: how many are wanted.
         spare: scratch, (2, m).
-        a: receives them, (SIZE,).
+        a: receives the coefficients, (SIZE,).
     """
     m = len(offset)
     before, last = spare[0], spare[1]
@@ -139,8 +139,8 @@ def solve(a: Array, terms: int, normal: float, he: Array, spare: Array) -> float
 def largest_modulus(values: Array) -> Any:
     """Return the largest modulus of finite values (m,).
 
-    As integers, in whose order moduli are, too: vector units compare those, not numbers that might
-    be NaN.
+    Bit patterns are compared as integers, which have the same order: vector units can do that, but
+    not compare numbers that might be NaN.
     """
     bits = values.view(np.int64)
     largest = np.int64(0)

@@ -1,4 +1,4 @@
-"""What the online estimator is told: window, sampler, bands."""
+"""Settings of the online estimator: window, sampler, bands."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from actuator_glue.inference.carried import Drift
 Likelihood: TypeAlias = Literal['glue', 'gaussian']
 PriorMode: TypeAlias = Literal['box', 'calibration', 'sequential']
 Contradiction: TypeAlias = Literal['widen', 'restart', 'alarm']
-# Shaping factor that each window takes from its own residual.
+# Value of `shaping_factor` for which each window computes G from its own residual.
 AUTOMATIC = 0.0
 
 CHOICES: dict[str, tuple[str, ...]] = {
@@ -146,7 +146,7 @@ class EstimatorSettings:
             )
 
     def drifts(self) -> Drift:
-        """Return how far the parameters wander.
+        """Return the drift rates of the parameters.
 
         Raises:
             InputError: a word of `drift_of` that is not NAME=RATE.
@@ -205,7 +205,7 @@ class EstimatorSettings:
             raise InputError(f'{source}: estimator settings are no JSON ({error})') from error
         if not isinstance(values, dict):
             raise InputError(f'{source}: estimator settings are no JSON object')
-        # They belong to the model and the prior.
+        # Keys that belong to the model and the prior.
         for name in ('start', 'definitions', 'carried', 'structures'):
             values.pop(name, None)
         return EstimatorSettings.from_mapping(values, source)

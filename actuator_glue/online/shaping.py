@@ -11,17 +11,17 @@ from actuator_glue.inference.effective_size import effective_size
 from actuator_glue.online import fitting
 from actuator_glue.records import Array, Record
 
-# Trial points of the box, where no earlier window says where to look.
+# Trial points in the box, where no earlier window gives a starting point.
 _TRIALS = 64
 _ITERATIONS = 12
 # Finite differences, as shares of the box.
 _STEP = 1e-4
-# What diverges is this far out: as bad as any other.
+# Displacement to which diverging responses are clipped, so that all are equally bad.
 _ABSURD = 1.0  # m
 
 
 def automatic(record: Record, model: ModelChoice, settle: int, near: Array | None) -> float:
-    """Return half of the independent samples that the residual of the best fit is worth.
+    """Return half the number of independent samples that the best fit's residual is worth.
 
     The fit is by least squares, from an earlier window's posterior where there is one. The same
     samples and the same start give the same factor, as a replay needs.

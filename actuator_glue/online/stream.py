@@ -1,4 +1,4 @@
-"""What arrives beside samples and set-ups, commands ahead; and what is told about it."""
+"""Previewed commands, windows of samples, and the events that an estimator reports."""
 
 from __future__ import annotations
 
@@ -27,11 +27,11 @@ class Window:
 
     Attributes:
         number: running number, dropped windows counted.
-        record: the samples, those that only let the state be forgotten included.
+        record: the samples, those in which the initial state decays included.
         epoch: counts the actuators; a posterior of one says nothing about the next.
         segment: counts the restarts; samples of one segment are contiguous.
-        recent: the samples of the last two hops at least, where so many have come, and those of
-            the record: all that judge the forecast of the window two hops before.
+        recent: the record, preceded by earlier samples of the last two hops if it is shorter: all
+            samples that judge the forecast of the window two hops before.
     """
 
     number: int
@@ -120,12 +120,12 @@ class Reweighed:
 
 
 def structure_name(effects: Sequence[str]) -> str:
-    """Return what a structure is called by its effects."""
+    """Return the name of a structure, made of its effects."""
     return _BESIDE.join(effects) or _PLAIN
 
 
 def structure_effects(name: str) -> tuple[str, ...]:
-    """Return the effects of a structure that is called so."""
+    """Return the effects in a structure's name."""
     return () if name == _PLAIN else tuple(name.split(_BESIDE))
 
 

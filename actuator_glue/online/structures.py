@@ -4,8 +4,8 @@
 
 p_S is the weight that S came in with, e_S,n the rms error of a forecast that was fixed before its
 data, m what matters: dynamic model averaging (Raftery, Karny & Ettler 2010) whose log score is
-coarsened (Miller & Dunson 2019), so that an error nobody would mend decides nothing, however many
-samples say so. Forecasts are forgotten, not p_S: that is what all earlier data say together.
+coarsened (Miller & Dunson 2019), so that an immaterial error decides nothing, however many samples
+show it. Forecasts are forgotten, not p_S, which sums up all earlier data.
 """
 
 from __future__ import annotations
@@ -24,28 +24,28 @@ from actuator_glue.json_value import json_value
 from actuator_glue.online.knowledge import Known
 from actuator_glue.records import Array
 
-# c: an error of one m beyond the best, forecast after forecast, costs so many nats, as offline.
+# c: nats that an error of m beyond the best costs if it lasts, as offline.
 COARSE = 4.0
-# Windows after whose time a forecast counts 1/e.
+# Window lengths after which a forecast counts 1/e.
 MEMORY = 2.0
 # A structure with less weight leaves.
 LEAVES = 0.01
 # Structures carried at most: all of them have to be sampled within one time budget.
 MOST = 3
-# What matters, in standard deviations of the sensor noise, where nobody has said.
+# Default of m, in standard deviations of the sensor noise.
 MATERIAL = 0.5
 # No single forecast costs more than this many (error/m)^2: it may have diverged.
 _WORST = 1e3
-# What is proposed beside another has at least this weight: less is not worth a share of the time.
+# Least weight of a structure proposed beside another: less is not worth a share of the time.
 BESIDE = 0.05
-# Weight of what was carried before, all together, beside what is carried in its place (`BESIDE`
-# each at least): a look at few data errs in one name of ten, and forecasts may bring it back.
+# Weight of all structures carried before (`BESIDE` each at least), beside those in their place: a
+# diagnosis of few data errs in one name of ten, and forecasts may bring an earlier one back.
 BEFORE = 0.1
-# So many times a hop is the longest window that leaves time for forecasts of all of them: those of
-# one take 7 ms of a window of 10 s at 1 kHz.
+# Longest window, in hops, that leaves time for forecasts of all structures: those of one take 7 ms
+# for a window of 10 s at 1 kHz.
 _LEISURE = 20.0
-# A structure that leads leaves after so many windows, and so long, of forecasts that were worse
-# than those of what was there before it.
+# The leading structure leaves after this many windows, and this long [s], of forecasts worse than
+# those of what was there before it.
 WORSE, WORSE_SECONDS = 3, 1.0
 
 
@@ -56,7 +56,7 @@ class Proposed:
     Attributes:
         model: Eq. (2) with its effects, and the prior's box.
         weight: its probability among those proposed with it.
-        known: what earlier samples say of its parameters; None for no more than the box.
+        known: what earlier samples say of its parameters; None for the box alone.
     """
 
     model: ModelChoice
@@ -73,8 +73,8 @@ class Proposal:
         material: smallest forecast error that matters [m]; NaN for half of the sensor noise.
 
     Raises:
-        InputError: none or too many of them, one twice, weights that are none, or knowledge
-            that a structure's bounds contradict.
+        InputError: no or too many structures, one twice, a weight that is not positive, or
+            knowledge that a structure's bounds contradict.
     """
 
     structures: tuple[Proposed, ...]
@@ -95,7 +95,7 @@ class Proposal:
 
     @staticmethod
     def of(model: ModelChoice | Proposal) -> Proposal:
-        """Return a model as the only one that is carried."""
+        """Return a model as a proposal of one structure; a proposal as it is."""
         return model if isinstance(model, Proposal) else Proposal((Proposed(model),))
 
     def described(self) -> str:
@@ -166,11 +166,11 @@ class Proposal:
 
 
 def most_in_all(window: float, hop: float) -> int:
-    """Return how many structures are carried at most, with those from before.
+    """Return the largest number of structures carried, those from before included.
 
     Args:
         window: length of a window [s].
-        hop: time from one to the next [s].
+        hop: time from one window to the next [s].
     """
     return 2 * MOST if hop * _LEISURE >= window else MOST + 1
 
@@ -204,7 +204,7 @@ def moved(
 
 
 def weights(log_prior: Array, evidence: Array) -> Array:
-    """Return the weights (K,) of structures from what they came in with and their forecasts."""
+    """Return the weights (K,) of structures from log priors and the evidence of forecasts."""
     logs = log_prior + evidence
     found = np.exp(logs - logs.max(initial=-np.inf))
     return np.asarray(found / found.sum())
@@ -217,7 +217,7 @@ def pooled(
 ) -> Array:
     """Return draws (m, p) of a mixture of posteriors, as many as the first one has.
 
-    A parameter that a structure lacks is, in its rows, what it is where the first one is true.
+    In the rows of a structure, a parameter that it lacks keeps its draw from the first part.
 
     Args:
         names: the p parameters wanted, those of the first part.

@@ -32,8 +32,8 @@ def natural_frequency(result: WindowResult) -> float:
 def sampled_too_slowly(result: WindowResult) -> bool:
     """Return whether the loop's natural frequency is above half of the sample rate.
 
-    It has then answered before it is looked at again: whatever answers within a sample fits, and
-    which of these a sampler finds says nothing of the parameters, their intervals nothing either.
+    The loop then responds within one sample, and any response that fast fits: neither the
+    parameters that a sampler finds nor their intervals mean anything.
     """
     return natural_frequency(result) * result.window.record.period > 0.5
 
@@ -42,7 +42,7 @@ class Contradiction:
     """The alarm that samples contradict what was known, for as long as it stands.
 
     It stands until a window that shares no sample with the one that raised it agrees with its
-    prior, or has none any more.
+    prior, or no longer has a prior.
 
     Attributes:
         since_ns: acquisition time of the first sample that contradicts [ns]; None without alarm.
@@ -53,7 +53,7 @@ class Contradiction:
         self._last_ns = 0
 
     def take(self, result: WindowResult, events: list[Contradicted]) -> None:
-        """Take a window that has been finished, and the alarms that it raised."""
+        """Take a finished window, and the alarms that it raised."""
         record, found = result.window.record, result.conflict
         for event in events:
             if self.since_ns is None:

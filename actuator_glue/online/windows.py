@@ -20,7 +20,7 @@ from actuator_glue.records import Array, Record
 from actuator_glue.sample_block import Block, check_block
 from actuator_glue.setups import Setups, StreamSetup
 
-# Stamps are held against index and period over so long a stretch at most [s].
+# Longest stretch over which stamps are compared with index and period [s].
 _RATE_SECONDS = 3.0
 
 
@@ -139,7 +139,7 @@ class SlidingWindows:
         return events, windows
 
     def _step_over(self, block: Block) -> None:
-        """Count the samples of an unusable block as seen: the next block is no gap as well."""
+        """Count an unusable block's samples as seen, so that no gap is reported as well."""
         if block.index == self._next:
             count = max(len(block.command), len(block.measured))
             known = self.current.period if self.current is not None else 0.0
@@ -158,15 +158,15 @@ class SlidingWindows:
             )
 
     def _check_rate(self, block: Block) -> None:
-        """Hold the stamps against index and period: a factor of two would pass as a slow actuator.
+        """Compare stamps with index and period: a factor of two would look like a slow actuator.
 
         Raises:
-            WrongRateError: they have told another rate over the last seconds.
+            WrongRateError: the stamps of the last seconds show another rate.
         """
         rate = 1.0 / block.period
         if abs(rate / self._rate - 1.0) > 1e-4:
             self._rate = rate
-            # Told before the first window, where that is so long that a clock can tell anything.
+            # Decided before the first window, if that is long enough for a clock's precision.
             seconds = max(LEAST_SECONDS, min(0.75 * self.settings.window, _RATE_SECONDS))
             self._watch = RateWatch(rate, seconds=seconds)
         elif self._next is not None and block.index < self._next:
@@ -180,7 +180,7 @@ class SlidingWindows:
             )
 
     def _follow(self, block: Block) -> list[Event]:
-        """Compare a block with where the stream stood."""
+        """Compare a block's index and stamp with those expected; a mismatch restarts windows."""
         if self._next is None:
             return []
         if block.index < self._next:

@@ -39,9 +39,9 @@ def usual_frequency(found: DiagnosisData) -> float:
 def curve(found: DiagnosisData, term: LearnedTerm) -> tuple[str, Array, Array]:
     """Return what a term adds along a motion over the range that was excited.
 
-    That is the last of some cycles of a sine of the usual frequency, so that what remembers has
-    forgotten its start; what changes with time is followed over the test, where the signal is
-    largest.
+    The motion is the last of some cycles of a sine of the usual frequency, so that a term with
+    memory no longer depends on its start; a term that changes with time is followed over the
+    test, where the signal is largest.
 
     Returns:
         The symbol that it is drawn over ('t', or the term's signal), its values (n,), and the

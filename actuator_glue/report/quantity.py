@@ -50,7 +50,7 @@ def percents(shares: Sequence[float]) -> list[int]:
 
 
 def said_in(unit: str, *values: ArrayLike) -> tuple[float, str]:
-    """Return how many are one SI unit, and the unit that sizes as these are said in.
+    """Return the factor from the SI unit to the unit in which sizes as these are said, and that.
 
     Args:
         unit: SI unit, as parameters have it.
@@ -85,7 +85,7 @@ def plain(value: float, digits: int = 3) -> str:
 def spread(mean: float, lower: float, upper: float, unit: str, digits: int = 4) -> str:
     """Return a size with its interval as people say it: '41 um (40.2 to 41.9)'.
 
-    Where so many digits leave nothing of a narrow interval there are more: two of its width.
+    Where `digits` are too few for a narrow interval there are more: two of its width.
     """
     width = upper - lower
     if math.isfinite(mean) and 0.0 < width < abs(mean):

@@ -119,7 +119,7 @@ class Drawing(Figure):
     motion: str
 
     def draw(self, renderer: RendererBase) -> None:
-        """Draw it, whoever asks."""
+        """Draw the figure in the units of its motion."""
         _speak(self)
         super().draw(renderer)
 

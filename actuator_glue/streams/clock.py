@@ -1,9 +1,9 @@
 """The sender's clock in the receiver's time: offset and skew from the least delayed messages.
 
-A message arrives when it was sent plus a delay that is never negative, so that of the differences
-of both clocks the smallest of each second tells most; a straight line through those of the last
-two minutes has the offset as its height and the skew as its slope (as NTP's clock filter and Moon,
-Skelly, Towsley 1999 have it).
+The delay of a message is never negative, so that the smallest difference of both clocks in each
+second is the most accurate; a straight line through these minima of the last two minutes has the
+offset as its height and the skew as its slope (as NTP's clock filter and Moon, Skelly, Towsley
+1999 have it).
 """
 
 from __future__ import annotations
@@ -15,19 +15,19 @@ import numpy as np
 # Length of a stretch that gives one difference [s], and how many are kept.
 STRETCH = 1.0
 KEPT = 120
-# Fewer tell no slope.
+# Fewest differences that give a slope.
 LEAST = 5
 # A difference this far off the line is another setting of a clock [s].
 STEP = 0.05
 # Stamps run this much faster or slower than the sender's clock at most, while the map improves.
 SLEW = 1e-3
 FIRST_SLEW = 0.05
-# So much earlier than its first samples tell, a stream has a clock that was set; what is less was
-# held up at its beginning [s].
+# Stamps that prove off by more than this after a stream's first samples mean that a clock was set;
+# by less, that the first samples were held up [s].
 HELD_UP = 1.0
-# Of the time since the last sample that was stamped, stamps give way by so much at most.
+# Share of the time since the last stamped sample by which stamps may be set back at most.
 GIVE_WAY = 0.5
-# Held up this often in a row, messages are no longer waited for: the clock has been set.
+# Late stretches in a row after which messages count as punctual again: the clock has been set.
 _PATIENCE = 2
 
 
@@ -77,12 +77,12 @@ class ClockMap:
     def stamp_ns(self, sender: float, until: float | None = None) -> int:
         """Return the receiver's time of a sample [ns]; ask in order.
 
-        Stamps never go back, but where a clock was set.
+        Stamps never go back, except where a clock was set.
 
         Args:
             sender: its time by the sender's clock [s].
-            until: that of the last sample whose stamp follows from this one, as in a block that
-                has but one; None where each sample is asked for.
+            until: time of the last sample whose stamp follows from this one, as in a block with a
+                single stamp; None where each sample is asked for.
         """
         assert self._origin is not None
         time = sender - self._origin[0]
@@ -132,7 +132,7 @@ class ClockMap:
             off = delay - height - slope * (time - at)
             if abs(off) > STEP:
                 self._odd += 1
-                # Earlier than can be is another clock at once; later may be a delay.
+                # Impossibly early means another clock setting at once; late may be a delay.
                 if off > 0.0 and self._odd < _PATIENCE:
                     return
                 self.steps += 1

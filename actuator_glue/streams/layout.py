@@ -180,8 +180,8 @@ class Layout:
     ) -> tuple[Rows, Counter[str]]:
         """Return samples in SI units, and how many are left out, by the reason.
 
-        Reasons: `malformed`, counter or time is no number; `coarse`, what tells their order is a
-        float32 that can tell one sample from the next no more.
+        Reasons: `malformed`, counter or time is no number; `coarse`, counter or time is a float32
+        that no longer tells one sample from the next.
 
         Args:
             values: by field, as sent, each of shape (n,).

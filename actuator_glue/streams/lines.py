@@ -77,8 +77,8 @@ class Lines:
     def decoded(self, lines: Sequence[bytes]) -> tuple[dict[str, NDArray[Any]], int]:
         """Return the values by field, as sent, and how many lines cannot be read.
 
-        A line with more or fewer entries than the others is none of them: a decimal comma, or a
-        column that nobody has told of, would put one value in another's place.
+        A line with more or fewer entries than the others counts as unreadable: a decimal comma, or
+        an undeclared column, would put one value in another's place.
         """
         bad = 0
         rows: list[list[float]] = []

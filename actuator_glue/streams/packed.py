@@ -46,7 +46,7 @@ class Packed:
         for name, at in self._heads.items():
             head = packets[at]
             if name == 'counter':
-                # A float stays one: whoever reads it looks whether it is a number.
+                # A float stays a float: `Layout.rows` checks whether it is a number.
                 wide = head.astype(np.float64 if head.dtype.kind == 'f' else np.int64)
                 step = many if self._layout.counts == 'packets' else 1
                 with np.errstate(all='ignore'):

@@ -21,7 +21,7 @@ from actuator_glue.streams.sequence import Run, Sequence
 Order: TypeAlias = Literal['counter', 'time', 'arrival']
 # Arrival in order: times further apart than this are a gap, not jitter [s].
 _JITTER = 0.1
-# Arrivals are held up and caught up: so long stretches, and two of them, tell their rate [s].
+# Arrivals bunch up: their rate is taken over stretches this long [s], and two of them.
 _ARRIVAL_SECONDS, _ARRIVAL_STRETCHES = 5.0, 2
 # Times whose steps are looked at together where they alone tell the order, and over how long [s].
 _STEPS, _STEP_SECONDS = 2048, 3.0
@@ -91,7 +91,7 @@ class Reception:
         self._last_arrival = 0.0
 
     def warnings(self, modulus: int | None) -> list[str]:
-        """Return what cannot be seen in such a stream, for people."""
+        """Return warnings of faults that cannot be seen in such a stream."""
         if self.order == 'arrival':
             return ['the layout has neither counter nor time: lost samples cannot be seen']
         if self._float32:
@@ -107,7 +107,7 @@ class Reception:
 
     @property
     def rate_fault(self) -> str:
-        """What is said where sender's time or arrivals tell another sample rate, else empty."""
+        """Message if the sender's time or arrivals show another sample rate, else empty."""
         return self._rates.fault
 
     def push(self, rows: Rows, now: float) -> list[Samples]:
@@ -198,13 +198,13 @@ class Reception:
 
 
 class _Rates:
-    """The declared rate of a stream, held against the sender's time and against arrivals."""
+    """Compares the declared rate of a stream with the sender's time and with arrivals."""
 
     def __init__(self, rate: float, layout: Layout, order: Order) -> None:
         self._rate = rate
         self._by_time = order == 'time'
         time = layout.fields.get('time')
-        # Within a packet that has one time the others are made of the declared rate.
+        # In a packet with a single time the other times are computed by the declared rate.
         self._every = layout.samples if time in layout.packet else 1
         self._times: list[float] = []
         self._found: float | None = None

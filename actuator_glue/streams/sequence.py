@@ -212,7 +212,7 @@ class Sequence:
             self._jump(now, out)
 
     def _jump(self, now: float, out: _Out) -> None:
-        """Count what is missing before the first that waits as lost, and go on with that."""
+        """Count samples missing before the first waiting one as lost, and go on with that."""
         assert self._next is not None
         first = min(self._held)
         self.counts['lost'] += first - self._next
@@ -261,7 +261,7 @@ class _Out:
         self._began = False
 
     def begin(self) -> None:
-        """What follows is of a new numbering."""
+        """Note that the samples which follow have a new numbering."""
         self._began = True
 
     def put(self, index: int, row: Array) -> None:

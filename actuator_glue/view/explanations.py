@@ -56,7 +56,7 @@ def said(name: str, unit: str, mean: float, sd: float) -> dict[str, Any]:
 def explanations(posterior: Any) -> list[Explanation]:
     """Return the structures of a PosteriorMoments, the likeliest first.
 
-    Older messages know of one, and none of what each by itself says of the parameters.
+    Older messages hold one structure only, and no parameters of each structure by itself.
     """
     weights = named(posterior)
     sizes = list(getattr(posterior, 'structure_sizes', ())) or [0] * len(weights)
@@ -114,7 +114,7 @@ def _effect(effect: Any, whole: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _if_true(rival: str, told: str, whole: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Return the sizes that an effect has in the place of the one that is told."""
+    """Return the sizes that an effect has in place of the reported one."""
     chosen = [name for name in _list(whole, 'structure') if name != told]
     wanted = {*chosen, *structure_effects(rival)}
     row: dict[str, Any] = {}

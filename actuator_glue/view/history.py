@@ -19,7 +19,7 @@ Samples = NDArray[np.float32]
 _KEPT = ('command', 'measured', 'force', 'lower', 'median', 'upper')
 _SCALE = {'command': 1e3, 'measured': 1e3, 'force': 1e-3}
 _BAND = slice(_KEPT.index('lower'), _KEPT.index('upper') + 1)
-# What follows from it: command minus measured [mm], and about the band's median [um].
+# The same and what is derived: command minus measured [mm], differences to the median [um].
 ROWS = (*_KEPT, 'error', 'residual', 'residual_lower', 'residual_upper')
 _EVENTS = 2000  # of a kind that are kept of a live system
 
@@ -110,7 +110,7 @@ class History:
             index: of the first sample.
             rows: what is taken.
             place: at which it was known.
-            again: told before, and now with its score: what was fixed first stays.
+            again: it came before, and comes now with its score: the first limits stay.
         """
         if self.period and abs(index + self._shift - self.measured_to) < self.capacity:
             limits = np.array([rows[name] for name in _KEPT[_BAND]], dtype=np.float64)

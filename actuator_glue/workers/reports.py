@@ -17,8 +17,8 @@ from actuator_glue.online.stream import Event
 from actuator_glue.workers.warm import warm_windows
 from actuator_glue.workers.worker import DIED, DONE, Answer, Tell, Worker
 
-# Samples of the windows that are handed over together: to wake a process, and the thread that
-# takes its answer, costs a tenth of a short window's work. And windows and events at most.
+# Samples of the windows that are handed over together, and windows and events at most: to wake a
+# process, and the thread that takes its answer, costs a tenth of a short window's work.
 _SAMPLES, _MOST = 20_000, 16
 # Such portions that may be out while the next windows are sampled.
 _OUT = 2
@@ -130,7 +130,7 @@ def _warm() -> None:
 
 
 def _known(job: Job, fitted: WindowFit) -> dict[str, Any]:
-    """Return the fields of a result that whoever asks for it has."""
+    """Return the fields of a result that the asking process has already."""
     return {
         'window': job.window,
         'settings': job.settings,

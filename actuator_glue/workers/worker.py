@@ -110,7 +110,7 @@ class Worker:
             threading.Thread(target=target, args=args, daemon=True, name=name).start()
 
     def _end(self, patience: float) -> None:
-        # Whoever hears of its end knows that it was asked for.
+        # The thread that sees its end then knows that it was asked for.
         process, self._process = self._process, None
         self._tasks.put(None)
         if process is None:
@@ -135,7 +135,7 @@ class Worker:
             except (EOFError, OSError):
                 break
             if process is not self._process:
-                break  # what an ended process still said is nobody's answer
+                break  # late answers of an ended process are dropped
             if answer is None:
                 self.ready.set()
             else:
@@ -147,7 +147,7 @@ class Worker:
 
 
 def serve(pipe: Connection) -> None:
-    """Do what is asked for through a pipe until it closes; first of all warm up, more nicely."""
+    """Do what is asked for through a pipe until it closes; first warm up, at lower priority."""
     # Ctrl-C reaches the whole group: the node decides when its worker ends.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -157,7 +157,7 @@ def serve(pipe: Connection) -> None:
     def tell(payload: Any) -> None:
         pipe.send((PROGRESS, payload, time.monotonic() - started))
 
-    # Whoever asked has gone: nothing is left to answer.
+    # The asking process has gone: nothing is left to answer.
     with suppress(EOFError, BrokenPipeError, ConnectionResetError):
         warm, nice = pipe.recv()
         if nice:
@@ -166,7 +166,7 @@ def serve(pipe: Connection) -> None:
                 os.sched_setscheduler(0, os.SCHED_OTHER, os.sched_param(0))
         if warm is not None:
             warm()
-        # What is there now stays: going through it for garbage takes 100 ms, two deadlines.
+        # The objects that exist now stay: scanning them for garbage takes 100 ms, two deadlines.
         gc.collect()
         gc.freeze()
         pipe.send(None)

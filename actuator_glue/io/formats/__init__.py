@@ -104,7 +104,7 @@ def format_of(path: Path) -> Format:
     """Return the format of a file: by its first bytes, by its suffix, or else delimited text."""
     named = formats().get(path.suffix.lower())
     start = beginning(path) if path.is_file() else b''
-    # What begins as another does is that, whatever it is called; a .mat may be an HDF5 file.
+    # The first bytes decide, whatever the suffix: a .mat may be an HDF5 file.
     found = [
         f
         for f in _formats()
@@ -155,8 +155,8 @@ def check_size(size: int, path: Path) -> None:
 def matrix_columns(name: str, shape: tuple[int, ...], unit: str = '') -> list[Column]:
     """Return the columns of a vector or matrix, as MATLAB calls them: `NAME(:,2)`, from 1.
 
-    The longer side of a matrix is time; sides of one are none, as of 1x1xN. Of anything else, and
-    of what is empty, nothing is returned.
+    The longer side of a matrix is time; sides of length one do not count, as of 1x1xN. For any
+    other shape, and for empty arrays, nothing is returned.
     """
     label = name.replace('/', '.').rpartition('.')[2]
     sides = _sides(shape)

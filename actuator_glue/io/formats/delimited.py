@@ -47,7 +47,7 @@ _QUOTED_FIRST = re.compile(r'\s*"[^"]*"\s*[;,\s]\s*[^"\s]')
 _SPREADSHEET = re.compile(r'"?sep=(.)"?', re.IGNORECASE)  # a first line that says the delimiter
 # What begins a comment: `#` as numpy writes it, `%` as MATLAB does.
 _COMMENT = re.compile(r'\s*(?:#[#\s]*|%+\s+)')
-# Names of columns that go up by themselves: a running number below one may be its own.
+# Names of columns that go up by themselves: a running number below one may be its values.
 _GOES_UP = re.compile(
     r'time|zeit|sample|index|count|number|row|step|^(nr|no|id|t|i|n|#)\b', re.IGNORECASE
 )
@@ -138,7 +138,7 @@ def read_head(
     least = _least_width(aligned, table, width)
     if aligned and not aligned[0] and len(units) == width - 1:
         units = ['', *units]
-    if any(units[width:]):  # of which column each is nobody knows
+    if any(units[width:]):  # it is unknown which column each belongs to
         units = []
     units = [*units, *[''] * (width - len(units))][:width]
     sign = decimal or _decimal([entry for row in table for entry in row])
@@ -151,7 +151,7 @@ def read_head(
 def _find_names(path: Path, top: list[str], first: int) -> tuple[int, str, dict[str, str]]:
     """Return the lines before samples or a line of units, the line of names, and the notes.
 
-    Of names in comments the line before the last one is told, too: the last may be units.
+    If the names are in comments, the last two lines are returned: the last may be units.
     """
     notes: dict[str, str] = {}
     comments, at = [''], first
@@ -209,7 +209,7 @@ def _best_delimiter(names: str, row: str) -> str | None:
 
 def _names(line: str, delimiter: str | None, widths: set[int]) -> list[str]:
     names = fields_of(line, delimiter)
-    # What numpy.savetxt is told to write behind its `#` need not be parted as its rows are.
+    # The names that numpy.savetxt writes behind its `#` may have another delimiter than the rows.
     own = fields_of(line, next((d for d in DELIMITERS if d in line), None))
     names = own if len(own) in widths else names
     if len(names) > max(widths) and delimiter is not None and '"' not in line:
@@ -222,10 +222,10 @@ def _names(line: str, delimiter: str | None, widths: set[int]) -> list[str]:
 
 
 def _aligned(names: list[str], table: list[list[str]], rows: list[str]) -> list[str]:
-    """Return one name for each entry of a row, of which there is one more; nothing if unclear.
+    """Return a name for each entry of rows with one entry more than names; nothing if unclear.
 
-    That one is a running number without a name in front, as R and pandas write it, or it is
-    nothing behind a delimiter that ends each row.
+    The extra entry is a running number without a name in front, as R and pandas write it, or an
+    empty entry behind a delimiter that ends each row.
     """
     if not names or any(len(row) != len(names) + 1 for row in table):
         return []
@@ -445,10 +445,10 @@ def _check_widths(
 def _numbers(entries: list[str], decimal: Decimal) -> Array:
     """Return numbers, NaN for what is none."""
     text = '\n'.join(entries)
-    if decimal == ',':  # a point is nothing there: least of all is it left out
+    if decimal == ',':  # a point makes the entry no number: dropping it would change the value
         text = text.replace('.', '?').replace(',', '.')
     entries = text.split('\n')
-    if text.isascii() and '_' not in text:  # `float` takes more than files mean
+    if text.isascii() and '_' not in text:  # `float` accepts more than files mean
         try:
             return np.array(list(map(float, entries)))
         except ValueError:

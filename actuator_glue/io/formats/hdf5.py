@@ -25,7 +25,7 @@ from actuator_glue.io.formats import (
 from actuator_glue.records import Array
 
 _MAGIC = b'\x89HDF\r\n\x1a\n'
-_PACKED = 1100  # bytes out of one that deflate makes at most (1032), nearly
+_PACKED = 1100  # bytes into which deflate expands one byte at most, rounded up from 1032
 _CLASS, _EMPTY, _OBJECT = 'MATLAB_class', 'MATLAB_empty', 'MATLAB_object_decode'
 _DEEPEST, _MOST_STRUCTS = 64, 10_000  # structs in structs, and in all
 # Fields of a struct that hold samples, and those beside them that hold their name.
@@ -92,11 +92,11 @@ def has_objects(path: Path) -> bool:
 
 
 class _Tree:
-    """What a file holds, as its datasets are come by.
+    """Content of a file, collected as its datasets are visited.
 
     Attributes:
         columns: names of the columns of numbers.
-        places: of each, its dataset and which column or field of that.
+        places: dataset of each column, and which column or field of that.
         notes: what the file says besides.
         texts: small texts by their names in full.
     """
@@ -232,7 +232,7 @@ def _unpacked(values: Any, attributes: Any) -> Array:
 
 
 def _valid(attributes: Any, kind: np.dtype[Any]) -> tuple[float, float]:
-    """Return the least and the greatest packed value that is no missing one."""
+    """Return the least and the greatest packed value that is not missing."""
     least, most = -np.inf, np.inf
     if 'valid_range' in attributes:
         least, most = (float(v) for v in np.asarray(attributes['valid_range']).astype(kind))

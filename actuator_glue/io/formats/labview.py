@@ -251,9 +251,9 @@ def _heading(path: Path) -> _Heading:
 def _of_channels(said: _HeadedRows, name: str, shown: list[int]) -> list[str]:
     """Return what a heading says of each channel, in the columns `shown`.
 
-    An entry stands above its column, and none above the first; where channels have columns of
-    times some writers leave none empty for these, which is seen where any line of the heading has
-    an entry above one.
+    An entry stands above its column, and none above the first. Where channels have columns of
+    times, some writers leave no empty entries above these; any line of the heading with an entry
+    above a column of times shows it.
     """
     above = {at - 1 for at in shown}
     beside = any(

@@ -106,7 +106,7 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
 def _with_objects(path: Path, table: FileTable) -> FileTable:
     found = read_objects(path)
     count = len(table.columns)
-    # What lies beside the objects says what it is; a second time, say, is one of an object.
+    # Columns outside the objects keep their labels; a second time, say, has its name in full.
     taken = {bare(column.label) for column in table.columns}
     labelled = [
         replace(e.column, label=e.column.name) if bare(e.column.label) in taken else e.column

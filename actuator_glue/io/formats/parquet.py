@@ -23,7 +23,7 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
     with reading(path, _NAME), parquet.ParquetFile(path) as file:
         schema, content = file.schema_arrow, file.metadata
         rows = content.num_rows
-        # Pages are unpacked whole: what they claim counts as well as what is made of them.
+        # Pages are unpacked whole: their claimed size counts as well as that of the numbers.
         groups = [content.row_group(i) for i in range(content.num_row_groups)]
         claimed = max((group.total_byte_size for group in groups), default=0)
         told = [group.num_rows for group in groups]

@@ -16,9 +16,9 @@ from actuator_glue.io.units import bare, recognise
 from actuator_glue.records import Array
 
 _NAME = 'a LabVIEW TDMS file'
-# Starts that differ by a whole number of samples but for this share of one are one clock's.
+# Starts that differ by whole samples, up to this share of a sample, are of one clock.
 _SAME = 0.02
-# LabVIEW's time zero, of a waveform that nobody has given a start.
+# LabVIEW's time zero: the start of a waveform that was given none.
 _UNKNOWN = np.datetime64('1904-01-01T00:00:00', 'us')
 
 
@@ -48,7 +48,7 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
             for channel in group.channels():
                 if channel.data_type is None or not _is_number(channel):
                     continue
-                # A value takes a byte of the file at least: whoever says more is damaged.
+                # A value takes at least a byte of the file: a channel claiming more is damaged.
                 if len(channel) > size:
                     raise InputError(
                         f'{path}: damaged: {channel.path} claims {len(channel)} values'
@@ -66,7 +66,7 @@ def _read(path: Path, channels: ChannelMap | None) -> FileTable:
     asked = _asked(columns, channels)
     cuts, period, start_ns = _common(clocks, asked, path)
     if any(i in stamps for i in asked):
-        start_ns = 0  # such times count from no other
+        start_ns = 0  # times of such a column are absolute
 
     def values(wanted: list[int]) -> list[Array]:
         with reading(path, _NAME), tdms.open(path) as file:
@@ -114,7 +114,7 @@ def _common(
     waveforms = [i for i, clock in enumerate(clocks) if clock.period]
     group = [i for i in asked if i in waveforms]
     if not group:
-        # Nobody has said which are wanted: those that most have in common.
+        # No waveforms are asked for: take those of the most common period.
         periods = [clocks[i].period for i in waveforms]
         usual = max(set(periods), key=periods.count, default=0.0)
         group = [i for i in waveforms if clocks[i].period == usual]

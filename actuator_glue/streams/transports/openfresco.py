@@ -27,7 +27,7 @@ from actuator_glue.streams.transports import AT_ONCE, Terms, Transport, no_seal
 
 SET_TRIAL, GET_DAQ, ANSWERED, END = 3, 6, range(6, 16), 99
 KINDS = ('disp', 'vel', 'accel', 'force', 'time')
-# Where a field is that names no column.
+# Column of a field that names none.
 USUAL = {
     'command': 'ctrl_disp_1',
     'measured': 'daq_disp_1',
@@ -49,7 +49,7 @@ _UNANSWERED = 64
 
 
 class Copy:
-    """What passes between client and site, read; whatever passes, it raises nothing.
+    """Reads what passes between client and site; raises nothing, whatever passes.
 
     Attributes:
         lost: the bytes made no sense, and are no longer read until another client begins.

@@ -41,7 +41,7 @@ class UdpListener:
         now = time.monotonic()
         for _ in range(AT_ONCE):
             try:
-                # One byte more than fits: what is longer is seen to be.
+                # One byte more than fits, so that a longer datagram is noticed.
                 message, sender = self._socket.recvfrom(self._size + 1)
             except BlockingIOError:
                 break
