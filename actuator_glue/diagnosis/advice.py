@@ -22,11 +22,11 @@ from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.records import source_name
 
-_TELLING = 4.0  # nats, as where names count as tied
+_TELLING = 4.0  # nats, as the limit below which names count as tied
 
 
 def _where(row: Json) -> str:
-    """Say where the rest of one record sits: frequency, amplitude and time."""
+    """Say where one record's unexplained residual lies: frequency, amplitude and time."""
     f, x, t = row['frequency_hz'], row['displacement'], row['time_s']
     band = f'{f[0]:g} to {f[1]:g} Hz' if f else 'no one frequency'
     return (
@@ -37,7 +37,7 @@ def _where(row: Json) -> str:
 
 
 def ended(effort: Effort) -> tuple[str, ...]:
-    """Say that a search ended before it had tried all that it promised itself something of."""
+    """Say that a search ended at its effort, before it had tried all that was promising."""
     if not effort.over:
         return ()
     return (
@@ -113,7 +113,7 @@ def of(
 
 
 def _neutral(richer: str) -> float:
-    """Value at which a richer form is the effect it holds."""
+    """Parameter value at which a richer form reduces to the simpler effect."""
     holds = CATALOGUE[richer].holds
     return holds[2] if holds else 0.0
 
@@ -164,7 +164,7 @@ def unidentified(data: Data, estimates: dict[str, Estimate]) -> tuple[str, ...]:
 
 
 def unconverged(rhat: float) -> tuple[str, ...]:
-    """Say so where the chains of the posterior have not met; NaN says nothing."""
+    """Warn where the chains of the posterior have not converged; NaN gives no warning."""
     if not rhat > RHAT:
         return ()
     return (
@@ -175,7 +175,7 @@ def unconverged(rhat: float) -> tuple[str, ...]:
 
 
 def contradicted(error: HeldOutError, material: float) -> tuple[str, ...]:
-    """Say so where the held-out part shows materially more than noise, and what it may be."""
+    """Warn where the held-out part shows materially more than noise; say what it may be."""
     if not misses(error, material, error.after):
         return ()
     found = excuse(error, material)
@@ -188,7 +188,7 @@ def contradicted(error: HeldOutError, material: float) -> tuple[str, ...]:
 
 
 def zeros(error: HeldOutError, material: float) -> tuple[str, ...]:
-    """Say which held-out records have a zero of their own that matters."""
+    """Name the held-out records whose own zero (offset and drift) matters."""
     return tuple(
         f'{source_name(source)}: {1e6 * after:.1f} um are left, {1e6 * left:.1f} um without the '
         'offset and the drift of its own zero, which no other record tells'
@@ -198,7 +198,7 @@ def zeros(error: HeldOutError, material: float) -> tuple[str, ...]:
 
 
 def at_bound(found: Sequence[Pressed], estimates: dict[str, Estimate]) -> tuple[str, ...]:
-    """Say which parameters a bound holds: their mean and spread are those of the bound."""
+    """Name the parameters pressed against a bound, which sets their mean and spread."""
     return tuple(
         f'{p.name} is pressed against the {p.side} bound {p.bound:g} '
         f'{estimates[p.name].unit} of its range: its size is that of the bound, and the records '

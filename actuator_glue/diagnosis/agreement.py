@@ -27,7 +27,7 @@ class Homogeneity:
     Attributes:
         values: leading parameter per stretch, in the order of time and records [its unit].
         stddev: their standard errors, inflated for coloured residuals.
-        p_value: of equal sizes (NaN with fewer than two stretches).
+        p_value: of the hypothesis of equal sizes (NaN with fewer than two stretches).
         agree: False where p < 0.01 and the values spread by more than a quarter of the size;
             None where fewer than two stretches fix the size.
     """
@@ -42,11 +42,11 @@ class _Step(NamedTuple):
     """One Gauss-Newton step of scaled parameters; the first `own` are those of stretches.
 
     Attributes:
-        rows: derivatives of unit length, of parameters that move anything (p, N).
-        scale: length that they had (p,).
-        inverse: of their normal matrix (p, p).
+        rows: derivatives scaled to unit length, of parameters with any effect (p, N).
+        scale: their lengths before (p,).
+        inverse: inverse of their normal matrix (p, p).
         shift: the step (p,).
-        own: how many stretches are among them.
+        own: number of the stretches' parameters.
     """
 
     rows: Array
@@ -57,7 +57,7 @@ class _Step(NamedTuple):
 
     @classmethod
     def of(cls, rows: Array, error: Array, count: int) -> _Step:
-        """Solve for a step that takes an error (N,) away along rows (p, N)."""
+        """Solve for the step along rows (p, N) that best removes an error (N,)."""
         scale = np.sqrt(np.einsum('pn,pn->p', rows, rows))
         known = scale > 0.0
         rows, scale = rows[known] / scale[known, None], scale[known]
@@ -93,11 +93,11 @@ def agreement(trial: Trial, scorer: Scorer) -> dict[str, Homogeneity]:
 
 
 def between(trial: Trial, scorer: Scorer) -> Array:
-    """Standard deviation of each parameter between stretches, beyond what noise makes of it (p,).
+    """Standard deviation of each parameter between stretches, beyond that due to noise (p,).
 
-    In working coordinates; 0 where fewer than two stretches tell it. Equations that are not the
-    machine's are pulled elsewhere by each frequency and amplitude (a random effect: DerSimonian
-    and Laird 1986).
+    In working coordinates; 0 where fewer than two stretches determine it. Wrong equations fit
+    other parameters at each frequency and amplitude (a random effect: DerSimonian and Laird
+    1986).
     """
     error, jac = scorer.whiten(trial.fit.error), scorer.whiten(trial.fit.jacobian)
     edges, out = _halves(scorer), np.zeros(len(trial.fit.theta))
@@ -113,7 +113,7 @@ def between(trial: Trial, scorer: Scorer) -> Array:
 
 
 def _reaches(trial: Trial) -> Array:
-    """Sizes of the parameters (p,): a factor of e of Eq. (2)'s, else off what does nothing."""
+    """Sizes of the parameters (p,): a factor of e for Eq. (2)'s, else the distance to neutral."""
     neutral = np.array([p.neutral or 0.0 for p in trial.model.parameters])
     reach = np.abs(trial.fit.theta - neutral)
     reach[: len(BASE)] = 1.0
@@ -147,7 +147,7 @@ def _compare(
     """Solve for the stretches' shifts (the first `count` rows) and test that they are equal."""
     step = _Step.of(rows, error, count)
     rows, scale, inverse, shift, count = step
-    if not count:  # its size moves nothing where the fit stands
+    if not count:  # at the fit its size has no effect
         return Homogeneity((), (), float('nan'), None)
     left = error - shift @ rows
     pulls = np.stack([rows[:, b] @ left[b] for b in blocks])

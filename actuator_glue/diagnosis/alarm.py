@@ -1,4 +1,4 @@
-"""Whether the model of Eq. (2) is enough by its own residual, and by which numbers."""
+"""The alarm: whether the residual of Eq. (2) shows that it is not enough, and the numbers."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ class Alarm(JsonObject):
         noise: rms of the rest [m].
         p_value: of the structure under the fitted base model with its own coloured noise.
         false_alarms: probability of any addition on a healthy machine, as asked for.
-        nats: evidence that an addition must have for it.
+        nats: evidence that an addition must have at this level.
         tests: further statistics shown to people (whiteness, harmonics, drift, ...).
     """
 

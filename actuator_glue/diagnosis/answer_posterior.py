@@ -1,8 +1,8 @@
-"""The posterior of an answer: draws over all structures that may be the machine's.
+"""The posterior of an answer: draws over all plausible structures.
 
-Draws are of the told structure, of structures with a tied effect in the place of a told one, and
-of those with companions too small to be told; each knows the structure that it is of. What is
-told, saved, drawn and exported are these draws.
+The draws are of the reported structure, of structures with a tied effect in place of a reported
+one, and of those with companions too small to report; each draw knows its structure. What is
+reported, saved, plotted and exported are these draws.
 """
 
 from __future__ import annotations
@@ -39,13 +39,13 @@ class AnswerPosterior:
     Attributes:
         result: the answer of the fitting part.
         before: Eq. (2) refitted, and draws.
-        after: the structure that is told, and draws under it alone.
-        alone: these draws, with how they were drawn.
-        told: draws of its parameters with companions beside it, with how they were drawn.
+        after: the reported structure, and draws under it alone.
+        alone: the same draws, with how they were drawn.
+        told: draws of its parameters with companions included, with how they were drawn.
         mixture: draws of its parameters over all structures.
-        larger: the structure with its companions.
-        rivals: structures with a tied effect in the place of a told one, with their odds.
-        rng: random numbers for what is drawn further.
+        larger: the reported structure with its companions.
+        rivals: structures with a tied effect in place of a reported one, with their odds.
+        rng: random numbers for further draws.
     """
 
     result: Conclusion
@@ -60,20 +60,20 @@ class AnswerPosterior:
 
     @cached_property
     def space(self) -> Space:
-        """Working coordinates of the structure that is told."""
+        """Working coordinates of the reported structure."""
         return Space(self.after.model, self.result.data.duration)
 
     @cached_property
     def ridge(self) -> Array:
-        """Parameters along which one stiffness leaves it open (n, p)."""
+        """Parameters along the ridge that one stiffness leaves open (n, p)."""
         return ridge.left_open(self.space, self.after.model, self.result.scorer, self.after.theta)
 
     def spread(self, complete: bool) -> tuple[Array, NDArray[np.bool_]]:
-        """Return draws (m, p) as far as records leave each open; which of them they fix (p,).
+        """Return draws (m, p) widened as far as each parameter is open; which are fixed (p,).
 
         Args:
-            complete: whether nothing material is left; where something is, the equations are not
-                the machine's, and what that leaves open counts.
+            complete: whether nothing material is left; else the equations are wrong, and the
+                spread that this causes is added.
         """
         draws, decision = self.mixture.points, self.result.decision
         if not complete:
@@ -95,7 +95,7 @@ class AnswerPosterior:
         return estimates(space, model, *drawn)
 
     def pressed(self) -> tuple[Pressed, ...]:
-        """Return parameters that a bound holds, in physical units."""
+        """Return parameters pressed against a bound, in physical units."""
         space = self.space
         names = tuple(p.name for p in self.after.model.parameters)
         lower, upper = space.theta(space.lower), space.theta(space.upper)
@@ -103,7 +103,7 @@ class AnswerPosterior:
         for p in pressed(space.z(self.after.draws), names, space.lower, space.upper):
             i = names.index(p.name)
             bound = float((lower if p.side == 'lower' else upper)[i])
-            # Eq. (2)'s parameters are positive: the least their logarithms reach stands for zero.
+            # Eq. (2)'s parameters are positive: the lower bound of their logarithms means zero.
             physical = p.physical or (i < len(BASE) and p.side == 'lower')
             out.append(replace(p, bound=bound, physical=physical))
         return tuple(out)
@@ -123,7 +123,7 @@ def sampled(
     """
     found, decision, scorer = result.found, result.decision, result.scorer
     final, search = decision.final, result.selection.search
-    # One record's own setting is told from a common one by size alone: no common one beside it.
+    # One record's own setting differs from a common effect in size only: no small effects then.
     size = max(found.material, decision.left)
     small = {} if final.own is not None else discrepancy.responses(search, size)
 
@@ -146,7 +146,7 @@ def sampled(
     told = sample(found.base, stage='posterior before')
     before = after = Side(found.base.model, found.base.fit.theta, told.points)
     if final.effects:
-        # Where something is left the choice of equations widens intervals more than chains could.
+        # Where structure is left, wrong equations widen intervals more than long chains would.
         whole = decision.verdict in COMPLETE
         told = sample(final, settings.evaluations // (1 if whole else 4))
         after = Side(final.model, final.fit.theta, told.points)
@@ -156,7 +156,7 @@ def sampled(
     )  # fmt: skip
     if decision.verdict in COMPLETE and not result.effort.over:
         out = replace(out, larger=companions.with_companions(result.selection, final))
-    # Chains that met nowhere give no interval that anything beside, or in place, could widen.
+    # If chains converged in no parameter, there is no interval for companions or rivals to widen.
     if told.unmet and all(told.unmet):
         return out
     mixture = out.mixture

@@ -22,9 +22,9 @@ from actuator_glue.diagnosis.trial import Trial
 
 # Rounds in which members may be swapped for better or simpler ones.
 _SWAPS = 4
-# Where something material remains what swaps mend terms may, too: fewer of both are tried.
+# Rounds and swaps where something material remains: fewer, as learned terms may help instead.
 _OPEN, _OPEN_TRIED = 1, 3
-# What so many do not explain may have a plainer description than further names.
+# Names after which a learned term is tried: it may be plainer than further names.
 _NAMES = 2
 
 
@@ -35,7 +35,7 @@ class BeamSearch(Judge):
         search: the structures.
         settings: thresholds.
         progress: takes progress.
-        explains_rest: whether a description explains all that names leave; no more are added then.
+        explains_rest: whether a learned term explains all that names leave; none is added then.
     """
 
     def __init__(
@@ -49,7 +49,7 @@ class BeamSearch(Judge):
         self.progress, self.explains_rest = progress, explains_rest
 
     def apart(self) -> BeamSearch:
-        """Return a selection to go on with: what it adds and its noise are its own."""
+        """Return an independent copy: its additions and its noise do not change this search."""
         other = copy(self)
         other.search = replace(self.search.wider(()), entries=dict(self.search.entries))
         return other
@@ -71,9 +71,9 @@ class BeamSearch(Judge):
         return sorted(found.values(), key=by_score)
 
     def overlooked(self, current: Trial) -> list[Trial]:
-        """Refit a structure with effects that only show beside its members.
+        """Refit a structure with effects that only show once its members are in the model.
 
-        Beside a clock's skew a payload looks like one; with Eq. (2) alone it looked like the skew.
+        With a clock's skew in it a payload looks like one; with Eq. (2) alone, like the skew.
         """
         here, names = current.effects, self.search.others(current)
         new = [n for n in names if self.search.known((*here, n)) is None]
@@ -84,12 +84,12 @@ class BeamSearch(Judge):
         return self.search.screened(current, names, beside=True)[: self.settings.tried]
 
     def next_worth(self, current: Trial) -> Trial | None:
-        """Return a structure with one more name of those that promise most; None without worth."""
+        """Return the structure with one more promising name that is worth it; None if none is."""
         names = self.promising(current, self.search.others(current))
         return self._first_worth(self._rough(current, names), current, self.material)
 
     def _rough(self, current: Trial, names: Sequence[str]) -> list[Trial]:
-        """Refit a structure with each of some further effects; what may matter is finished."""
+        """Refit a structure roughly with each further effect; finish those that may matter."""
         below = self.may_matter_below(current)
         return self.search.additions(current, names, valves=False, below=below)
 
@@ -104,14 +104,14 @@ class BeamSearch(Judge):
         return self._grown(base, singles, singles, (SearchStep.to(base, 'Eq. (2) alone'),))
 
     def resumed(self, before: Search, found: Selection) -> Selection:
-        """Go on from what another search of the same samples found, cleaned otherwise since then.
+        """Continue from the result of another search of the same samples, since cleaned again.
 
-        Its structures are refitted from where they ended; so this costs what has changed, and
-        where the effort is spent the answer is still that one.
+        Its structures are refitted from where they ended, so only changes cost effort; once the
+        effort is spent, its answer still stands.
 
         Args:
             before: the other search.
-            found: what it ended with.
+            found: its result.
         """
         own = found.final.added if found.final.own is not None else ''
         common = before.trial(tuple(n for n in found.final.effects if n != own))
@@ -137,8 +137,8 @@ class BeamSearch(Judge):
         Args:
             current: the structure.
             singles: every single effect.
-            ranked: structures with one more, best first; none for those that promise most.
-            begun: steps that led here; none from what another search ended with.
+            ranked: structures with one more effect, best first; empty tries promising ones.
+            begun: steps that led here; empty when another search is continued.
         """
         s, steps, described = self.settings, list(begun), False
         current, threshold = self.search.trial(current.effects, current.added), self.material
@@ -156,19 +156,19 @@ class BeamSearch(Judge):
             base, singles = self.search.trial(()), self.rescored(singles)
             threshold = self.material
             if self.left(current) < max(threshold, s.left_share * self.first):
-                # Most is explained: small change may only mend the form of what was found.
+                # Most is explained: a small gain may only correct the form of an effect found.
                 threshold = max(threshold, s.later_share * removed(base, current))
             if self.left(current) < self.material or stage == s.most or self.search.effort.over:
                 break
             if stage == _NAMES and (described := self.explains_rest(self, current)):
                 break
-            width = max(1, s.beam + 1 - stage)  # the more there is, the fewer could lead on
+            width = max(1, s.beam + 1 - stage)  # the more effects, the fewer alternatives
             ranked = self.extend(self.rescored(ranked[:width]), stage + 1)
             if ranked and self.left(current) >= self.material:
                 self.renoise(self._nearest(ranked))
                 ranked = self.rescored(ranked)
             current = self.search.trial(current.effects, current.added)
-        # What another search ended with was held against its rivals there.
+        # The result of another search was already compared with its rivals there.
         spared = described or (not begun and self.search.effort.over)
         found = self.checked(current, base, singles, exchanged=not spared)
         if set(found.final.effects) != set(current.effects):
@@ -183,14 +183,15 @@ class BeamSearch(Judge):
         """Return the best structure that is worth its parameters.
 
         Nats weigh the whitened error, materiality the plain one: the best by nats may be
-        immaterial where another effect is neither. What leaves nothing material mends no form.
+        immaterial where another effect is material. A structure that leaves nothing material
+        does more than correct a form, so it must only be material.
         """
         whole = (self.left(t) < self.material for t in ranked)
         asked = zip(ranked, (self.material if w else threshold for w in whole), strict=True)
         return next((t for t, least in asked if self.better(t, current, least)), None)
 
     def _at_its_optimum(self, current: Trial) -> Trial:
-        """Take the noise from a structure; what a rough refit leaves is no other effect's."""
+        """Take the noise from a structure, fully refitted: a rough fit's error is no effect."""
         self.renoise(current)
         if self.left(current) >= self.material:
             current = self.search.finished(current, finely=True)
@@ -198,9 +199,10 @@ class BeamSearch(Judge):
         return current
 
     def _nearest(self, trials: Sequence[Trial]) -> Trial:
-        """Return what leaves the least error out of sample: its residual is nearest to noise.
+        """Return the structure of least left-out error: its residual is nearest to noise.
 
-        By nats, of the few frequencies where little is left, what explains nearly all may be last.
+        Nats weigh the few frequencies with little noise: by them a structure that explains nearly
+        everything may be last.
         """
         scorer = self.search.scorer
         assert scorer is not None
@@ -216,7 +218,7 @@ class BeamSearch(Judge):
             base: Eq. (2).
             singles: every single effect.
             exchanged: whether rivals are refitted, and take a member's place where they are
-                better; else those are told that are known.
+                better; else only rivals known already are reported.
         """
         current = self.pruned(current)
         if exchanged:
@@ -240,11 +242,11 @@ class BeamSearch(Judge):
         return current
 
     def settle(self, current: Trial) -> tuple[Trial, dict[str, tuple[Rival, ...]]]:
-        """Go on to what has more weight with one member exchanged, until nothing has.
+        """Exchange one member at a time for a rival of more weight, until none has more.
 
         Returns:
             The structure, and the rivals of each of its members; where the rounds end with an
-            exchange, those that are known.
+            exchange, only the known ones.
         """
         complete = self.left(current) < self.material
         most = self.settings.tried if complete else _OPEN_TRIED
@@ -257,7 +259,7 @@ class BeamSearch(Judge):
                     best = trial
             if best is current:
                 return current, self._all_rivals(current, rests, in_place)
-            # Beside what came others may be worth nothing any more.
+            # With the new member, others may no longer be worth their parameters.
             current = self.pruned(best)
             if self.search.effort.over:
                 break
@@ -269,7 +271,7 @@ class BeamSearch(Judge):
         return self._all_rivals(current, rests, known)
 
     def _known_in_place(self, current: Trial, rest: Trial) -> list[Trial]:
-        """Return what was refitted with another effect in the place of a member."""
+        """Return the known refits with another effect in place of a member."""
         tried = [(n, self.search.known((*rest.effects, n))) for n in self.search.others(current)]
         return [replace(trial, added=name) for name, trial in tried if trial is not None]
 
@@ -282,12 +284,12 @@ class BeamSearch(Judge):
     def _in_place(
         self, current: Trial, rests: Sequence[Trial], most: int, complete: bool
     ) -> list[list[Trial]]:
-        """Refit with what promises most in the place of each member: one effect, or two.
+        """Refit with the most promising effects, or pairs, in place of each member.
 
         Args:
             current: the structure.
             rests: the structure without each of its members.
-            most: effects tried in the place of one of several members.
+            most: effects tried in place of each of several members.
             complete: whether nothing material is left.
         """
         search, asked = self.search, []
@@ -306,7 +308,7 @@ class BeamSearch(Judge):
     def _rivals(
         self, rest: Trial, best: Trial, name: str, trials: Sequence[Trial]
     ) -> tuple[Rival, ...]:
-        """Say how likely each rival is; misfit that remains counts as noise."""
+        """Return the rivals with their probabilities; remaining misfit counts as noise."""
         odds, scorer = self.odds(rest, best, trials), self.search.scorer
         assert scorer is not None
         if self.left(best) >= self.material:

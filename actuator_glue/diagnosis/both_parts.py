@@ -1,6 +1,6 @@
-"""What both parts of the records say of an answer: one look at the held-out part, and the verdict.
+"""The verdict of both parts of the records: one look at the held-out part checks the answer.
 
-The fitting part chose the structure; the part that decided nothing bears it out, or not.
+The fitting part chose the structure; the held-out part decided nothing, and confirms it or not.
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from actuator_glue.records import Array
 
 @dataclass(frozen=True)
 class BothParts:
-    """What both parts say.
+    """Verdict and evidence of both parts.
 
     Attributes:
         verdict: see DiagnosisData.
-        decision: that of the fitting part, as certain as both parts let it be.
+        decision: that of the fitting part, its certainty limited by both parts.
         effects: additions with sizes, rivals and probabilities.
         error: held-out error before and after.
         coverage: share of held-out samples in the 95 % band, before and after.
         curves: simulations and bands of both parts, for pictures.
         stretches: sizes of each effect in halves of the records.
-        estimates: of all parameters of the structure that is told.
+        estimates: of all parameters of the reported structure.
         estimates_before: of Eq. (2)'s without any addition.
-        draws: that the estimates are quantiles of (m, p).
+        draws: posterior draws (m, p) that the estimates summarise.
         setup: another set-up that explains the records; None for the one given.
     """
 
@@ -53,7 +53,7 @@ class BothParts:
 
 
 def of(drawn: AnswerPosterior, other: WrongSetup | None, seed: int, each: Each) -> BothParts:
-    """Look at the held-out part once, and say what both parts come to.
+    """Look at the held-out part once, and return the verdict of both parts.
 
     Args:
         drawn: the answer of the fitting part and its posterior.
@@ -73,7 +73,7 @@ def of(drawn: AnswerPosterior, other: WrongSetup | None, seed: int, each: Each) 
     judged = verdict.of_both_parts(decision.verdict, bool(decision.names), error, found.material)
     described = any_learned(decision.final.structure)
     if other is not None and described and judged in COMPLETE:
-        # A description of what another set-up explains with none describes the set-up.
+        # A learned term that another set-up makes unnecessary describes the wrong set-up.
         judged = 'unexplained'
     draws, fixed = drawn.spread(judged in COMPLETE)
     sizes = estimates(drawn.space, after.model, draws, fixed)

@@ -1,12 +1,12 @@
-"""Which effects are asked for."""
+"""Which effects the diagnosis tries."""
 
 from __future__ import annotations
 
 from actuator_glue.model.effects import CATALOGUE
 
-# Closes the controller's loop on the recorded transducer: found beside a fault of it alone.
+# Closes the controller's loop on the recorded transducer: found only with a fault of it.
 FEEDBACK = 'sensor-feedback'
-# A bias or a drift inside of the loop leaves nothing in the record but the way there.
+# Not bias or drift: of these, inside the loop, the record shows only the transition.
 FAULTS = ('backlash', 'sensor-curve', 'sensor-lag')
 
 

@@ -1,8 +1,8 @@
 """Effects that are there beyond chance but remove too little to matter.
 
-They are not told as missing. But their size is free in the posterior of what is told: a gap that
-leaves 2 um doubles the damping that is found beside it. What is not beyond chance, or not told
-from what is of another kind, stays what it is: one of many that may be there (discrepancy.py).
+They are not reported as missing. But their size is free in the posterior of the reported effects:
+a gap that leaves 2 um doubles the damping found beside it. An effect that is not beyond chance, or
+cannot be told from other groups, is left to the random discrepancy (discrepancy.py).
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from actuator_glue.inference.least_squares.fit import rms
 from actuator_glue.model.effects import CATALOGUE
 
 _MOST = 2
-# Of what matters: less is made by the steps of simulations, too, beyond chance on long records.
+# Of what matters: on long records, simulation steps cause smaller errors beyond chance, too.
 SEEN = 0.2
-_ALONE = 0.9  # weight among what was tried of a kind that is told from the others
+_ALONE = 0.9  # weight among all tried that tells an effect's group from the others
 
 
 def with_companions(
@@ -36,7 +36,7 @@ def with_companions(
     Args:
         selection: what chose the structure.
         final: a structure that leaves nothing material.
-        least: error that each of them removes [m]; a fifth of what matters if not given.
+        least: error that each must remove [m]; a fifth of what matters if not given.
         alone: whether each must be distinguishable from effects of other groups.
     """
     search = selection.search
@@ -66,15 +66,15 @@ def _weight_of_its_kind(search: Search, trials: Sequence[Trial]) -> float:
 
 
 def alike(search: Search, final: Trial, larger: Trial) -> list[tuple[Trial, float]]:
-    """Return structures with an indistinguishable effect for a companion, and their odds.
+    """Return structures with an indistinguishable effect in place of a companion, with odds.
 
     Intervals average over indistinguishable effects (mixed_draws.mixed): beta_1 differs between
     the lag of a valve and one of the transducer.
 
     Args:
         search: what was refitted.
-        final: the structure that is told.
-        larger: with its companions.
+        final: the reported structure.
+        larger: the same with its companions.
     """
     out: list[tuple[Trial, float]] = []
     for name in _beside(final, larger):
@@ -94,8 +94,8 @@ def beside(
     Args:
         selection: what chose the structure.
         current: the structure.
-        names: of effects.
-        least: error that one of them must remove [m]: what leaves more is refitted roughly.
+        names: the effects.
+        least: error that an effect must remove [m]; those that remove less are refitted roughly.
     """
     search = selection.search
     ranked = search.screened(current, names)[: selection.settings.tried]
@@ -104,7 +104,7 @@ def beside(
 
 
 def _of_one_kind(search: Search, name: str, final: Trial) -> bool:
-    """Whether an effect shares the size of one that is told: two dry frictions are one."""
+    """Whether an effect is another form of a reported one: two dry frictions are one."""
     causes = {CAUSES.get(told, told) for told in final.effects}
     holds = search.entries[name].holds
     return name in causes or (holds is not None and holds[0] in causes)
@@ -115,8 +115,8 @@ def reduced(draws: Draws, larger: Trial, final: Trial, known: Sequence[bool]) ->
 
     Args:
         draws: of the larger structure.
-        larger: it.
-        final: the structure that is told.
+        larger: that structure.
+        final: the reported structure.
         known: which of its parameters (p,) the records fix without the companions, which are too
             small to fix any.
     """
@@ -128,14 +128,14 @@ def reduced(draws: Draws, larger: Trial, final: Trial, known: Sequence[bool]) ->
 
 
 def sentences(final: Trial, larger: Trial, held: Data, missed: bool) -> tuple[str, ...]:
-    """Say which effects are held beside, and how little they remove.
+    """Name the companions, and how little error they remove.
 
     Args:
-        final: the structure that is told.
-        larger: with what is there, too.
+        final: the reported structure.
+        larger: the same with its companions.
         held: the held-out part.
-        missed: whether the held-out part shows more than noise. Then it is said what they leave
-            there: that they do not matter is what the fitting records say.
+        missed: whether the held-out part shows more than noise. Then its error with and without
+            them is told, too: that they do not matter holds for the fitting records only.
     """
     names = _beside(final, larger)
     if not names:
@@ -155,15 +155,15 @@ def sentences(final: Trial, larger: Trial, held: Data, missed: bool) -> tuple[st
 
 
 def hint(selection: BeamSearch, final: Trial, held: Data) -> tuple[str, ...]:
-    """Say what may explain the held-out part where the fitting records' answer does not.
+    """Name effects that may explain the held-out part where the answer does not.
 
     Args:
         selection: what chose the structure.
-        final: what leaves nothing material of the fitting records.
+        final: a structure that leaves nothing material of the fitting records.
         held: the held-out part, which shows more than noise.
 
     Returns:
-        Nothing where what they show beyond chance leaves no less there.
+        Nothing where no effect beyond chance in the fitting records explains the held-out part.
     """
     larger = with_companions(selection, final, alone=False)
     names = _beside(final, larger)

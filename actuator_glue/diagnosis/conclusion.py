@@ -1,4 +1,4 @@
-"""What the fitting part of the records says, with all that it was concluded from."""
+"""The conclusion from the fitting part of the records, with everything it rests on."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ LINEAR = 'command linear between samples'
 
 @dataclass(frozen=True)
 class Conclusion:
-    """What the fitting part of the records says.
+    """The conclusion from the fitting part of the records.
 
     Attributes:
         prepared: the records, fitting part and held-out part.
@@ -43,12 +43,12 @@ class Conclusion:
         line: hum.
         found: effects with a mean response.
         seen: measurement effects.
-        generic: the regression beside them.
+        generic: a generic regression to compare them with.
         decision: the verdict.
-        selection: what chose `found`, to go on from.
+        selection: the search that chose `found`, to continue from.
         history: the steps that led here.
-        appeared: where all this is about the data since something appeared, what is known of that.
-        others: rows of the searches that it took the place of, or was held against.
+        appeared: the onset, where this conclusion holds for the data since then only.
+        others: rows of the searches that it replaced, or was compared with.
     """
 
     prepared: Prepared
@@ -66,7 +66,7 @@ class Conclusion:
 
     @property
     def scope(self) -> str:
-        """What the structure that is told holds for; empty for all records as they were given."""
+        """Scope of the reported structure; empty for all records as they were given."""
         own = self.decision.final.own
         scopes = (
             LINEAR if self.prepared.setup is not None else '',
@@ -87,11 +87,11 @@ class Conclusion:
         return table.scoped(some, LINEAR, math.log(2.0)) if linear else some
 
     def over_all_data(self, some: tuple[Row, ...]) -> tuple[Row, ...]:
-        """Return rows of the data since something appeared, if it did, as rows of all data."""
+        """Return rows of the data since the onset, if there is one, as rows of all data."""
         if self.appeared is None:
             return some
         before = self.appeared.before.fit
-        cost = len(before.theta) + 1.0  # parameters of its own, and when
+        cost = len(before.theta) + 1.0  # the earlier data's own parameters, and the onset's time
         some = table.since(some, before, self.data.target.size)
         return table.scoped(some, self.appeared.scope, cost)
 
@@ -102,7 +102,7 @@ class Conclusion:
 
     @cached_property
     def onset(self) -> Onset | None:
-        """When the effects appeared that are found now; None for from the beginning."""
+        """When the effects appeared; None if they were there from the beginning."""
         if self.appeared is None:
             return None
         return dated(self.appeared, self.decision.final, self.decision.noise)
@@ -113,9 +113,9 @@ class Conclusion:
         return replace(other, appeared=self.appeared)
 
     def complete(self, selection: BeamSearch, found: Selection | None) -> Conclusion | None:
-        """Return another answer about the same records, if there is one and it is complete.
+        """Return another answer about the same records, if it is complete or leaves less.
 
-        Or leaves materially less: what seemed noise beside this one was structure, then.
+        Materially less, that is: then structure had passed for noise with this answer.
         """
         if found is None:
             return None
@@ -127,13 +127,13 @@ class Conclusion:
 def concluded(
     prepared: Prepared, selection: BeamSearch, found: Selection, line: Line | None
 ) -> Conclusion:
-    """Return what a selection of effects says, beside effects of the measurement.
+    """Return the conclusion from a selection of effects, with effects of the measurement.
 
     Args:
         prepared: the records.
-        selection: what chose.
-        found: what it chose.
-        line: hum that was taken out of the data before.
+        selection: the search.
+        found: its result.
+        line: hum that was removed from the data before.
     """
     search, settings = selection.search, selection.settings
     assert search.scorer is not None
@@ -157,16 +157,16 @@ def searched(
     explains_rest: Callable[[BeamSearch, Trial], bool],
     earlier: Conclusion | None = None,
 ) -> Conclusion:
-    """Search for what the model lacks, one effect at a time, and say what that comes to.
+    """Search for what the model lacks, one effect at a time; return the conclusion.
 
     Args:
         prepared: the records.
         search: refits structures to the fitting part.
-        line: hum that was taken out of the data before.
+        line: hum that was removed from the data before.
         settings: thresholds.
         tell: takes progress.
-        explains_rest: whether a description explains all that some names leave.
-        earlier: what was found in the same samples, cleaned otherwise, to go on from.
+        explains_rest: whether a learned term explains all that names leave.
+        earlier: conclusion from the same samples, cleaned differently, to continue from.
     """
     selection = BeamSearch(search, settings, tell, explains_rest)
     if earlier is None or not earlier.found.final.effects:

@@ -50,7 +50,7 @@ def p_value(data: Data, splits: list[Split], seed: int, each: Each = map) -> flo
 def ljung_box(error: Array) -> float:
     """P-value of the first 20 autocorrelations of a residual (n,) under whiteness.
 
-    Lag by lag: a library's correlation over all lags takes the square of a long record.
+    Lag by lag: a library's correlation over all lags takes time with the square of the length.
     """
     e, n = error - error.mean(), len(error)
     lags = np.arange(1, _LAGS + 1)
@@ -121,7 +121,7 @@ def alarm_of(
     level: float,
     each: Each = map,
 ) -> Alarm:
-    """Describe the alarm that the decision stands on; `level` is that of false alarms."""
+    """Describe the alarm behind the decision; `level` is the probability of false alarms."""
     error = found.base.fit.error
     return Alarm(
         raised=decision.verdict != 'none',

@@ -47,7 +47,7 @@ def diagnose(
         progress: called with (stage, share done in [0, 1]).
         first_look: called once, seconds after the start, with what Eq. (2) leaves.
         settings: thresholds.
-        before: what was known of the machine.
+        before: what was known of the machine before.
 
     Raises:
         InputError: stiffness not known, records too short, or nothing moves.
@@ -66,7 +66,7 @@ def diagnose(
     if first_look is not None:
         first_look(FirstLook.of(some, given, settings))
     other = wrong_setup.find(ready.fit, settings, given=given)
-    # What a wrong set-up leaves is nothing that the actuator does.
+    # The error of a wrong set-up is not the actuator's: it is not searched for effects.
     search = as_given if other is not None and other.enough else conclude
     remembered = before.remembered or Remembered()
     effort = Effort(settings.effort, remembered.copied(), remembered)

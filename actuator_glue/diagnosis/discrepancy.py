@@ -1,10 +1,10 @@
 """Effects too small to matter, as a random discrepancy with the catalogue's responses.
 
-An effect that is too small to be added still pulls the parameters: 20 N of friction do not matter
-in the error and are many standard deviations of alpha_3. So the likelihood of a posterior holds,
-beside noise, the response to every effect that was not added, each of a random size. Their common
-scale, from nothing to what would have been material, is unknown and integrated (Kennedy & O'Hagan
-2001, with physics for shapes). So small they act linearly and are marginalised in closed form.
+An effect that is too small to be added still biases the parameters: 20 N of friction do not matter
+in the error, but shift alpha_3 by many standard deviations. So the likelihood contains, besides
+noise, the response to every effect that was not added, each of random size. Their common scale,
+from zero to material, is unknown and integrated out (Kennedy & O'Hagan 2001, with physics for
+shapes). Effects so small act linearly and are marginalised in closed form.
 """
 
 from __future__ import annotations
@@ -25,14 +25,14 @@ from actuator_glue.records import Array
 
 _P = len(BASE)
 
-# Scales, of the largest: none at all is as likely as all others together.
+# Scales, relative to the largest: zero is as likely as all others together.
 _SCALES = np.concatenate([[0.0], 2.0 ** np.arange(-6.0, 1.0)])
 _PRIOR = np.log(np.concatenate([[0.5], np.full(len(_SCALES) - 1, 0.5 / (len(_SCALES) - 1))]))
-_FLAT = 1e-8  # of what the records tell of a parameter alone
-# Standard deviations of noise over all that is known of a parameter: derivatives are rounded, to
-# some 1e-9 of it, and what is less than this is no slope.
+_FLAT = 1e-8  # prior precision of a flat parameter, over what the records alone tell of it
+# Least response to a parameter's whole prior width that counts as a slope, in standard deviations
+# of noise: derivatives are rounded, to some 1e-9.
 _NONE = 1e-6
-_SAME = 1e-10  # of the largest power: a shape that others make up
+_SAME = 1e-10  # of the largest power: a weaker shape is a combination of others
 
 
 class ScaleMixture(NamedTuple):
@@ -49,7 +49,7 @@ class ScaleMixture(NamedTuple):
     covariances: Array
 
     def moments(self) -> tuple[Array, Array]:
-        """Mean (p,) and covariance (p, p) of all together."""
+        """Mean (p,) and covariance (p, p) of the whole mixture."""
         mean = self.weights @ self.means
         off = self.means - mean
         covariance = np.einsum('s,sij->ij', self.weights, self.covariances)
@@ -71,7 +71,7 @@ class Discrepancy:
 
     @classmethod
     def of(cls, rows: Array) -> Discrepancy:
-        """Take whitened responses at the largest scale (e, N), each of a size of its own."""
+        """Build from whitened responses at the largest scale (e, N), each of its own size."""
         values, vectors = np.linalg.eigh(rows @ rows.T)
         kept = values > _SAME * values.max(initial=0.0)
         powers = values[kept]
@@ -109,19 +109,19 @@ class Discrepancy:
     def gaussians(
         self, jacobian: Array, error: Array, noise: float, widest: Array
     ) -> ScaleMixture:
-        """Return the distribution of shifts of the parameters, were all linear.
+        """Return the distribution of parameter shifts under a linear response.
 
         Args:
             jacobian: whitened derivatives of the simulation (p, N).
-            error: whitened error (N,); rows beyond the shapes' are a prior's, in both.
+            error: whitened error (N,); entries beyond the shapes', in both, are a prior's.
             noise: variance of the whitened noise.
             widest: standard deviations (p,) of what is known without any record.
         """
         size = np.sqrt(np.einsum('pn,pn->p', jacobian, jacobian))
-        # The logarithm of next to no leakage has hardly a slope, and its width says nothing of how
-        # far it goes: the ridge that it makes with a gain is left as it is.
+        # The logarithm of a near-zero leakage has hardly a slope, and its prior width does not
+        # limit it: its ridge with a gain is left as it is.
         flat = (size > _NONE / widest) & ((widest * size) ** 2 < noise)
-        # Two of an effect's that only their product tells would be held on a line else.
+        # Effects' are never flat: two known only by their product would be held on a line.
         flat[_P:] = False
         size = np.maximum(size, _NONE / widest)
         floor = np.where(flat, _FLAT, 1.0 / (widest * size) ** 2)
@@ -129,7 +129,7 @@ class Discrepancy:
         count, length = self.shapes.shape
         seen, along = self.shapes @ jac[:, :length].T, self.shapes @ error[:length]
         weights, means, covariances = [], [], []
-        # Without any shape all scales are one.
+        # Without any shape all scales are the same.
         for scale, prior in list(zip(_SCALES, _PRIOR, strict=True))[: None if count else 1]:
             power = scale**2 * self.powers
             share = power / (noise + power)
@@ -148,14 +148,15 @@ class Discrepancy:
 
 
 def responses(search: Search, size: float) -> dict[str, Array]:
-    """Return what each effect, so large that it has a given rms, adds to Eq. (2) as fitted.
+    """Return what each effect, scaled to a given rms, adds to the response of fitted Eq. (2).
 
     Args:
         search: what was tried, and the fit of Eq. (2).
         size: rms of each response [m].
 
     Returns:
-        Per name the response (N,) [m]; effects without one are left out.
+        Per name the response (N,) [m]; effects without one are left out. Also each record's
+        offset and drift.
     """
     data, base = search.data, search.scale().theta
     off = data.simulate(search.structure(), base)[0]
@@ -166,7 +167,7 @@ def responses(search: Search, size: float) -> dict[str, Array]:
         neutral = alone.parameters[len(base)].neutral or 0.0
         nearest = int(np.argmin(np.abs(starts[:, 0] - neutral)))
         theta = np.concatenate([base, starts[nearest]])
-        # Its shape about that size: play and friction have another when they are large.
+        # Its shape near that size: large play and friction have another shape.
         share = min(1.0, size / max(rms(seen[nearest]), 1e-12))
         theta[len(base)] = neutral + (theta[len(base)] - neutral) * share
         return np.asarray(data.simulate(alone, theta)[0] - off)

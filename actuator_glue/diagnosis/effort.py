@@ -1,4 +1,4 @@
-"""How much a search may simulate before it tells what is known by then."""
+"""The effort of a search: how much it may simulate before it reports what is known by then."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ class Effort:
 
     Attributes:
         most: sub-steps after which no further search is begun.
-        earlier: what an earlier look at the same machine spares.
-        remembered: what this one leaves for the next.
+        earlier: results of an earlier diagnosis of the same machine, which save work.
+        remembered: results of this one for the next.
     """
 
     most: float = math.inf
@@ -39,10 +39,10 @@ class Effort:
 
     @property
     def share(self) -> float:
-        """What was spent of what there is; above one where the last refits took more."""
+        """Share of the effort spent; above one where the last refits exceeded it."""
         return self.spent / self.most
 
     @property
     def over(self) -> bool:
-        """Whether no further refits are begun."""
+        """Whether the effort is spent, so that no further step of a search is begun."""
         return self.spent >= self.most

@@ -22,7 +22,7 @@ _KNOWN = 0.1  # level whose quantile the draws give; smaller levels follow from 
 
 
 def threshold(signatures: Array, jacobian: Array, scorer: Scorer, level: float) -> float:
-    """Return the evidence that the best candidate exceeds by chance with a probability [nats].
+    """Return the evidence that the best candidate exceeds by chance at a given level [nats].
 
     Args:
         signatures: responses to the candidates at their starting sizes (s, N) [m].
@@ -48,7 +48,7 @@ def threshold(signatures: Array, jacobian: Array, scorer: Scorer, level: float) 
     root = vectors * np.sqrt(np.maximum(values, 0.0))
     normal = np.random.default_rng(_SEED).standard_normal((_DRAWS, kept))
     most = np.abs(normal @ root.T).max(axis=1)
-    # As many independent candidates would exceed that quantile as often.
+    # Number of independent candidates that would exceed that quantile as often.
     known = float(np.quantile(most, 1.0 - _KNOWN))
     independent = math.log1p(-_KNOWN) / math.log1p(-2.0 * float(scipy.stats.norm.sf(known)))
     single = -math.expm1(math.log1p(-level) / max(1.0, independent))

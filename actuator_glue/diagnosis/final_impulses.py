@@ -1,4 +1,4 @@
-"""Impulses judged against the final model: what Eq. (2) lacks may look like some."""
+"""Impulses judged against the final model: what Eq. (2) lacks may look like impulses."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from actuator_glue.inference.least_squares.data import Mask
 from actuator_glue.inference.least_squares.fit import Fit, fit
 from actuator_glue.records import Array
 
-_REFITS: Final = 3  # of what was found
-# Share of the squared error that impulses must carry to have swayed a search: two per cent are a
-# hundredth of its size.
+_REFITS: Final = 3  # of the final model
+# Share of the squared error that impulses must carry to have swayed a search: two per cent of it
+# are one per cent of the rms error.
 _SWAYING: Final = 0.02
-_MOVED: Final = 1.0  # standard deviations of what was fitted
+_MOVED: Final = 1.0  # standard deviations of the fitted parameters
 
 
 def without_impulses(prepared: Prepared, final: Trial) -> Prepared:
@@ -49,9 +49,9 @@ def _kept(mask: Mask, *suspected: NDArray[np.intp]) -> Mask:
 
 
 def swayed(found: Fit, scorer: Scorer, taken: Array) -> bool:
-    """Return whether what was taken out, or restored, (N,) [m] matters to what was found.
+    """Return whether impulses removed or restored, (N,) [m], could have swayed the search.
 
-    By its size, or as it moves what was fitted by a standard deviation in any direction.
+    By their size, or by moving the fitted parameters a standard deviation in any direction.
     """
     if taken @ taken >= _SWAYING * (found.error @ found.error):
         return True

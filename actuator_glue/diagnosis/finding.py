@@ -13,7 +13,7 @@ BESIDE = ' + '  # between the names of two effects that stand for one
 
 @dataclass(frozen=True, slots=True)
 class Rival:
-    """An effect in the place of another, everything refitted: how far behind the best it is.
+    """An effect in place of another, everything refitted, and how far behind the best it is.
 
     Attributes:
         name: the effect, or two of them together: `viscous-damping + delay`.
@@ -21,9 +21,9 @@ class Rival:
         stderr: standard error of that over the blocks [nats].
         excess: rms error it leaves beyond the best [m].
         tied: these data cannot tell it from the best.
-        probability: its share of the weight among all rivals and none of them.
-        limit: where it is a richer form of the best, the parameter that makes it one and the
-            limit of its 95 % interval away from the value at which it is the best.
+        probability: its share of the weight among all rivals and 'none of these'.
+        limit: where it is a richer form of the best, the parameter that makes it one and the far
+            end of its 95 % interval, away from the value at which it reduces to the best.
     """
 
     name: str
@@ -52,11 +52,11 @@ class Finding:
     Attributes:
         name: best name in the catalogue.
         alternatives: names that these data cannot tell from it (without `name` itself).
-        probability: of `name` among its rivals and none of these; NaN for a learned term, which
+        probability: of `name` among its rivals and 'none of these'; NaN for a learned term, which
             is a description and no cause, and for an effect of the measurement, which has none.
         place: where in the loop it acts.
         parameters: posterior of the effect's parameters.
-        error_without: fit error of the structure without any of the set [m].
+        error_without: fit error of the structure without it or any rival [m].
         error_with: fit error with `name` in it [m].
         rivals: effects tried in its place, itself among them, best first; `none` is what their
             probabilities leave: nothing, or something that the catalogue does not hold.
@@ -69,8 +69,8 @@ class Finding:
             that fix it; None where fewer than two do (see diagnosis/agreement.py).
         windows: the leading parameter in each of these halves [unit of the parameter].
         records: sources of the records that alone have it; empty where all do.
-        cause: name in the catalogue of what a learned term is another shape of, where that name
-            comes nearest to it; empty for all others.
+        cause: catalogue effect of which a learned term is another shape, where the nearest name
+            is of its group; empty for all others.
     """
 
     name: str
@@ -107,8 +107,8 @@ class Candidate(JsonObject):
         name: name in the catalogue.
         score: out-of-sample log score against Eq. (2) alone, effective nats.
         error: free-run rms error of base + effect, refitted [m].
-        probability: weight among the candidates and Eq. (2) alone; NaN likewise.
-        stderr: its standard error over the blocks [nats]; NaN for an effect of the measurement.
+        probability: weight among the candidates and Eq. (2) alone; NaN as for `stderr`.
+        stderr: score's standard error over the blocks [nats]; NaN for effects of the measurement.
     """
 
     name: str

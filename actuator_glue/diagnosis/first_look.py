@@ -14,12 +14,12 @@ from actuator_glue.model.effects import scale
 
 @dataclass(frozen=True, slots=True)
 class FirstLook(JsonObject):
-    """Eq. (2) refitted to the fitting part, of long records to stretches of it.
+    """Eq. (2) refitted to the fitting part, or to stretches of it for long records.
 
     Attributes:
-        error_m: rms of all that it leaves [m].
-        noise_m: rms of the noise in that [m].
-        structure_m: rms of what is no noise [m].
+        error_m: rms of its residual [m].
+        noise_m: rms of the noise in it [m].
+        structure_m: rms of the rest, which is no noise [m].
         matters_m: least structure that matters [m].
     """
 
@@ -30,14 +30,14 @@ class FirstLook(JsonObject):
 
     @classmethod
     def of(cls, data: Data, fit: Fit, settings: Thresholds) -> FirstLook:
-        """Split what a fit of Eq. (2) leaves of data."""
+        """Split the residual of a fit of Eq. (2) into noise and structure."""
         structure, noise = pooled(data, splits_of(data, fit.error))
         matters = settings.material(noise, scale(data.records, fit.theta).stroke)
         return cls(fit.rms, noise, structure, matters)
 
     @property
     def missing(self) -> bool:
-        """Whether more than noise shows; what passes for noise is found later."""
+        """Whether more than noise shows; structure that passes for noise is found later."""
         return self.structure_m >= self.matters_m
 
     def sentence(self) -> str:

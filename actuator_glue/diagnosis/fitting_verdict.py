@@ -1,4 +1,4 @@
-"""The verdict on the fitting part, and where an unexplained rest sits."""
+"""The verdict on the fitting part, and where the unexplained residual lies."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Decision:
         certainty: where structure remains, the share of it that the names explain and a generic
             regression does not explain better; else 1.
         limit: rms structure above which a model counts as unexplained [m].
-        remaining: where the rest sits, for the JSON.
+        remaining: where the unexplained residual lies, for the JSON.
     """
 
     verdict: Verdict
@@ -54,12 +54,12 @@ def decide(
     settings: Thresholds,
     surrogate: Surrogate,
 ) -> Decision:
-    """Weigh what was found against what remains.
+    """Decide whether the effects found explain everything.
 
     Which additions are supported was decided one by one, each on its own evidence and size; they
-    stay whatever remains beside them. Here it is decided whether they are the whole story. Where
-    a generic surrogate of as many parameters beats the names beyond chance, next to nothing may
-    remain: what a regression on the motion explains better than they do is not their doing.
+    stay whatever remains beside them. Where a generic surrogate with as many parameters beats the
+    names beyond chance, next to nothing may remain: they do not cause a structure that a
+    regression on the motion explains better.
     """
     variance = sum(m.rms**2 for m in seen if m.name != 'hum')
     left = float(np.sqrt(max(0.0, found.left**2 - variance)))
@@ -92,14 +92,14 @@ def decide(
 
 
 def _certainty(found: Selection, left: float, surrogate: Surrogate) -> float:
-    """Return the share of the structure that is the names' own doing, in [0, 1].
+    """Return the share of the structure that the names are likely to cause, in [0, 1].
 
-    What they explain of the structure, times what a regression of as many parameters leaves of
-    what they leave: a smooth function of the motion that does much better says that the names
-    stand for it. What a learned term explains beside them is not theirs.
+    The share that they explain, times what a regression with as many parameters leaves relative
+    to what they leave: if a smooth function of the motion does much better, the names only stand
+    for it. What a learned term explains does not count as theirs.
     """
-    # Not of the structure found at first: under a stationary command most of it passes for noise
-    # until something explains it.
+    # Not relative to the structure found at first: under a stationary command most of it passes
+    # for noise until something explains it.
     gained = max(0.0, found.base.mean_square - found.final.mean_square)
     terms = [e.name for e in found.final.structure.entries if is_learned(e)]
     named = max(0.0, gained - sum(found.removed[n] ** 2 for n in terms))
@@ -119,7 +119,7 @@ def _band(frequency: Array, excess: Array) -> list[float]:
 
 
 def remaining(data: Data, error: Array) -> Json:
-    """Say where in time, frequency, amplitude and velocity a residual sits, per record."""
+    """Say where in time, frequency, amplitude and velocity a residual lies, per record."""
     rows = []
     splits, errors = splits_of(data, error), data.split(error)
     outputs = data.split(data.target - error)

@@ -1,4 +1,4 @@
-"""The force channel beside the displacement: as a record of its own that the model simulates."""
+"""The force channel as a record of its own that the model simulates beside the displacement."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from actuator_glue.model.exact import Initial
 from actuator_glue.model.force_errors import recorded_force, shown
 from actuator_glue.records import Array, Record
 
-# m: what a force may move as a displacement at most, where its error is next to nothing.
+# m: largest value of a scaled force; it limits the scale where the force's error is tiny.
 _LARGEST = 1.0
 
 
@@ -25,7 +25,7 @@ class ForceRecord(Record):
     """A record whose measured channel is its force, in units of `newtons` per metre.
 
     Attributes:
-        base: the record with its displacement, from which a state of motion is known.
+        base: the record with its displacement, which gives the initial state.
         newtons: force that counts as much as a metre of displacement [N/m].
     """
 
@@ -79,7 +79,7 @@ def check_forces(records: Sequence[Record]) -> None:
 
 
 def _forces(data: Data, newtons: float) -> list[ForceRecord]:
-    """Return the records' forces, of as many samples as became one of the displacement."""
+    """Return the records' forces, decimated like their displacements."""
     out = []
     for record, whole, count in zip(data.records, data.recorded, data.factors, strict=True):
         force = decimated(ForceRecord.of(whole, newtons), count)
@@ -89,15 +89,15 @@ def _forces(data: Data, newtons: float) -> list[ForceRecord]:
 
 
 def newtons_per_metre(data: Data) -> float:
-    """Return what of the forces in `with_forces` counts as much as a metre [N/m]."""
+    """Return the force that `with_forces` counts as much as a metre [N/m]."""
     return next(r.newtons for r in data.records if isinstance(r, ForceRecord))
 
 
 def with_forces(data: Data, model: Model, theta: Array) -> Data:
-    """Return data with the records' forces behind them, weighed as both errors of a fit are.
+    """Return data with the records' forces appended, scaled to equal errors of a fit.
 
     Args:
-        data: records with forces, without their forces.
+        data: displacements of records that have forces.
         model: the structure that was fitted.
         theta: its parameters, (p,).
     """

@@ -1,10 +1,10 @@
 """The recorded force as evidence between names that the displacement leaves tied.
 
-The displacement shows a force through the oil alone; the load cell shows it as it is. Structures
-that are tied are refitted to both channels and ranked by their score on both, gain and offset of
-each load cell fitted in each record and its noise its own. Whether anything is missing, its size
-and its error stay those of the displacement; what only the force shows, and the displacement takes
-for leakage, oil or noise, is told.
+The displacement shows a force only through the oil; the load cell shows it directly. Tied
+structures are refitted to both channels and ranked by their score on both; gain and offset of each
+load cell are fitted in each record, and its noise is its own. Whether anything is missing, its
+size and its error are still decided by the displacement; an effect that only the force shows, and
+the displacement takes for leakage, oil or noise, is reported.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ class Ranked:
 def decided(
     search: Search, found: Selection, settings: Thresholds
 ) -> tuple[Selection, tuple[str, ...]]:
-    """Let the forces choose among tied names; say what they say."""
+    """Let the forces choose among tied names; return the choice, and notes for people."""
     notes = []
     for name in found.final.effects:
         rest = [n for n in found.final.effects if n != name]
@@ -97,12 +97,12 @@ def _scorer(both: Data, found: Fit, settings: Thresholds) -> Scorer:
 
 
 def _swapped(search: Search, found: Selection, name: str, ranked: Ranked) -> Selection:
-    """Return what was found with the best name in its place, and all names' new weights."""
+    """Return the selection with the best name in place of a tied one, and new weights."""
     best = ranked.trials[0]
     final = search.polish(search.trial(best.effects, best.added))
     mine = {r.name for r in ranked.rivals}
     others = [replace(r, tied=False) for r in found.rivals[name] if r.name not in mine]
-    # The force divides what the tied names had together.
+    # The force redistributes the probability that the tied names had together.
     share = 1.0 - sum(r.probability for r in others)
     told = [replace(r, probability=share * r.probability) for r in ranked.rivals]
     rivals = {n: row for n, row in found.rivals.items() if n != name}
@@ -124,7 +124,7 @@ def _told(ranked: Ranked) -> str:
 
 
 def _unseen(search: Search, found: Selection, settings: Thresholds) -> tuple[str, ...]:
-    """Say which further effect the force shows, if it does."""
+    """Name a further effect that only the force shows, if there is one."""
     final, count = found.final, search.data.target.size
     names = [n for n in search.names if n not in final.effects and _is_felt(search.entries[n])]
     if final.own is not None or not names:
@@ -162,5 +162,5 @@ def _unseen(search: Search, found: Selection, settings: Thresholds) -> tuple[str
 
 
 def _is_felt(effect: Effect) -> bool:
-    """Whether a load cell feels it, and no richer form of another."""
+    """Whether a load cell feels an effect; richer forms of friction do not count."""
     return effect.place == 'specimen' or (effect.group == 'friction' and effect.holds is None)

@@ -1,11 +1,11 @@
-"""Structure that looks as stationary as noise, told by forecasts of stretches that were left out.
+"""Structure that looks as stationary as noise, detected by forecasts of left-out stretches.
 
-Under a random command what a wrong model leaves has the same spectrum at all times, but it follows
-from the motion, which the model knows. A ridge regression on generic features of the motion and
-on the motion's past (a finite impulse response for each stiffness, as long as a lightly damped
-mode rings) forecasts it, and no noise: nothing that was measured is among the features. The
-sizes that weights are expected to have are those of the largest marginal likelihood of other
-stretches, too (MacKay 1992; impulse responses that fade: Chen, Ohlsson & Ljung 2012).
+Under a random command the residual of a wrong model has the same spectrum at all times, but it
+follows from the motion, which the model knows. A ridge regression on generic features of the
+motion and on the motion's past (a finite impulse response for each stiffness, as long as a lightly
+damped mode rings) forecasts it, but no noise: no measurement is among the features. The prior
+variances of the weights maximise the marginal likelihood of other stretches, too (MacKay 1992;
+decaying impulse responses: Chen, Ohlsson & Ljung 2012).
 """
 
 from __future__ import annotations
@@ -30,28 +30,28 @@ from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 
 _FOLDS = 6  # each is forecast by the others; their blocks lie spread over all records
-# Of the motion's past: lags of one stiffness, and of all, and how many to a period of the fastest
+# Lags of the motion's past: for one stiffness, for all together, and per period of the fastest
 # motion. 128 at 10 Hz reach back by 3 s.
 _LAGS, _ALL_LAGS, _PER_PERIOD = 128, 384, 4.0
-_FADING = (0.1, 0.5, 2.0)  # s in which the expected square of an impulse response fades
-_KEPT = 8_000_000  # numbers of features that are kept at most: 64 MB, whitened ones among them
-# Expected squares of weights, of features of unit power and in units of the noise.
+_FADING = (0.1, 0.5, 2.0)  # s: time constants of the decay of an impulse response's variance
+_KEPT = 8_000_000  # feature values kept at most: 64 MB with the whitened ones
+# Prior variances of weights, for features of unit power, in units of the noise.
 _SIZES = (0.0, 1e-3, 1e-2, 0.1, 1.0, 10.0)
-_NONE = 1e-4  # weights that are expected this much smaller than the largest are not asked for
-# Share of a motion's power that passes for noise, above which a residual's may, too: 0.93 to 1 of
-# random commands, 0.22 to 0.47 of shaking that swells and fades, below 0.12 of sines, and of
-# sweeps nearly always below this (100 of each).
+_NONE = 1e-4  # weights expected to be this much smaller than the largest are left out
+# Share of a motion's power that passes for noise, above which a residual's may, too: 0.93 to 1 for
+# random commands, 0.22 to 0.47 for shaking that swells and fades, below 0.12 for sines, and for
+# sweeps nearly always below this limit (100 of each).
 _STATIONARY = 0.2
 
 
 def stationary(data: Data) -> list[bool]:
-    """Whether what follows the command may look like noise: the motion of a record does."""
+    """Whether structure may look like noise, per record: its motion does."""
     motions = splits_of(data, data.target)
     return [m.noise**2 > _STATIONARY * m.mean_square for m in motions]
 
 
 def noise(features: Features, scorer: Scorer, fit: Fit, nats: float) -> Array:
-    """Return how much noise there is at most in each record, (records,) [m].
+    """Return an upper bound of the noise in each record, (records,) [m].
 
     That is the error of its forecasts; infinite where they are no better than chance.
 
@@ -66,7 +66,7 @@ def noise(features: Features, scorer: Scorer, fit: Fit, nats: float) -> Array:
     white, gains = [scorer.whiten(e) for e in (alone, forecast)], []
     squares = error**2
     for block in scorer.blocks:
-        # What is unlike all that was fitted, at the start, say, must not explode.
+        # A block unlike all that was fitted, at the start, say, must not dominate.
         before, after = (float(e[block] @ e[block]) for e in white)
         gains.append(0.5 * (before - min(after, 4.0 * before + 8.0)))
         left, whole = (float(e[block] @ e[block]) for e in (forecast, error))
@@ -77,9 +77,9 @@ def noise(features: Features, scorer: Scorer, fit: Fit, nats: float) -> Array:
 
 
 def left_out(features: Features, scorer: Scorer, fit: Fit) -> tuple[Array, Array]:
-    """Return what forecasts of left-out stretches leave of a structure's residual, (N,) [m].
+    """Return a structure's residual less its forecasts in left-out stretches, (N,) [m].
 
-    Without features, of the structure refitted alone, and with them.
+    First with the structure refitted alone, then with the features, too.
 
     Args:
         features: of the motion.
@@ -98,7 +98,7 @@ def left_out(features: Features, scorer: Scorer, fit: Fit) -> tuple[Array, Array
     products /= np.outer(scale, scale)
     lags, alone = np.tile(past.lags, past.count), np.append(np.arange(own), -1)
     whole = products.sum(axis=0)
-    # What a block holds has no say in its forecast: each half of the folds has sizes of the other.
+    # A block must not influence its forecast: half of the folds take the other half's variances.
     sizes = [
         _sizes(products[other::2].sum(axis=0), float(counts[other::2].sum()), own, lags)
         for other in (1, 0)
@@ -124,7 +124,7 @@ def left_out(features: Features, scorer: Scorer, fit: Fit) -> tuple[Array, Array
 
 @dataclass
 class Features:
-    """What residuals are forecast from: features of the motion that Eq. (2) simulates, its past.
+    """Predictors of residuals: features of the motion that Eq. (2) simulates, and its past.
 
     They are the same for every structure, so they are computed once where memory allows.
 
@@ -166,7 +166,7 @@ class Features:
     def _settings(self) -> Iterator[tuple[int, str, Array]]:
         """Yield motion and velocity of each of several records under one stiffness.
 
-        A gain or a delay of one record alone is no response that they share.
+        They stand for a gain or a delay of one record alone, which no common response contains.
         """
         kinds, data = self.past.kinds, self.data
         for i, (motion, mask) in enumerate(zip(self.past.motions, data.masks, strict=True)):
@@ -203,7 +203,7 @@ class Features:
         return out
 
     def _whitened(self, scorer: Scorer) -> tuple[list[NDArray[np.float32]], Array]:
-        """Features (N,), whitened and in short numbers, and their products with the past's."""
+        """Whitened features (N,) in single precision; products of features and the past."""
         if self._white is not None and self._white[0] is scorer.taps:
             return self._white[1:]
         self._white, data, past = None, self.data, self.past
@@ -231,7 +231,7 @@ def _block(rows: list[NDArray[np.float32]], block: slice) -> Array:
 
 @dataclass(frozen=True)
 class _Past:
-    """The motion's past, as far as it may show now.
+    """The motion's past, as far back as it may still matter.
 
     Attributes:
         data: the counted samples.
@@ -243,7 +243,7 @@ class _Past:
 
     @cached_property
     def motions(self) -> list[Array]:
-        """What Eq. (2) simulates of each record, whole, (n,) [m]."""
+        """Motion that Eq. (2) simulates for each whole record, (n,) [m]."""
         model = Structure(())
         return [np.asarray(model.simulate(self.theta, r)).reshape(-1) for r in self.data.records]
 
@@ -271,7 +271,7 @@ class _Past:
         return slice(begin, begin + len(self.lags))
 
     def rows(self, record: int, motion: Array, at: NDArray[np.intp]) -> Array:
-        """A motion (n,) of a record before some of its samples, (L, len(at)); rest before it."""
+        """A record's motion (n,) at each lag before some samples, (L, len(at)); 0 before it."""
         steps = np.rint(self.lags / self.data.periods[record]).astype(np.intp)
         index = at - steps[:, None]
         return np.asarray(np.where(index >= 0, motion[np.maximum(index, 0)], 0.0))
@@ -288,31 +288,31 @@ def _blocks(data: Data, scorer: Scorer) -> Iterator[tuple[int, slice, int, NDArr
 
 
 def _alone(products: Array) -> Array:
-    """Return the weights of a structure's own rows, (own,), which are free."""
+    """Return the least-squares weights of a structure's own rows alone, (own,)."""
     return np.asarray(scipy.linalg.cho_solve(_firm(products[:-1, :-1]), products[:-1, -1]))
 
 
 def _firm(own: Array) -> tuple[Array, bool]:
     """Factor the products of free rows.
 
-    Where a structure does not move at all none of its parameters takes anything up.
+    If a structure does not move at all, its parameters explain nothing.
     """
     least = 1e-9 * np.trace(own) / len(own) or 1.0
     return scipy.linalg.cho_factor(own + least * np.eye(len(own)))
 
 
 def _beside(products: Array, own: int) -> Array:
-    """Products of all other rows without what the first, free ones take up of them."""
+    """Products of all other rows, with the first (free) ones projected out."""
     taken = scipy.linalg.cho_solve(_firm(products[:own, :own]), products[:own, own:])
     return np.asarray(products[own:, own:] - products[own:, :own] @ taken)
 
 
 def _sizes(products: Array, count: float, own: int, lags: Array) -> Array:
-    """Return the expected squares of weights, (r - 1 - own,), of largest marginal likelihood.
+    """Return the prior variances of weights, (r - 1 - own,), of largest marginal likelihood.
 
     Args:
         products: of rows and, last, the residual with each other, (r, r).
-        count: samples that they are sums of.
+        count: number of samples that they sum over.
         own: how many of the rows are free: the structure's own.
         lags: of the last rows; those between are features of the present motion, (l,) [s].
     """
@@ -325,23 +325,23 @@ def _sizes(products: Array, count: float, own: int, lags: Array) -> Array:
     def likelihood(way: tuple[float, float, float]) -> float:
         return _ridge(free, count, np.sqrt(sized(*way)))[0]
 
-    # Of features, of lags, of features beside lags.
+    # For features, for lags, then for features given the lags.
     best = max(((s, 0.0, 1.0) for s in _SIZES), key=likelihood)
     best = max(((best[0], s, fading) for s, fading in product(_SIZES, _FADING)), key=likelihood)
     return sized(*max(((s, *best[1:]) for s in _SIZES), key=likelihood))
 
 
 def _weights(products: Array, count: float, own: int, sizes: Array) -> Array:
-    """Return weights of rows, (r - 1,), of which those behind the `own` have expected squares."""
+    """Return weights of rows, (r - 1,); those after the `own` free ones have prior variances."""
     others = _ridge(_beside(products, own), count, np.sqrt(sizes))[1]
     pull = products[:own, -1] - products[:own, own:-1] @ others
     return np.append(scipy.linalg.cho_solve(_firm(products[:own, :own]), pull), others)
 
 
 def _ridge(products: Array, count: float, sizes: Array) -> tuple[float, Array]:
-    """Log marginal likelihood of the sizes of weights (w,), and their means (w,).
+    """Log marginal likelihood of the weights' prior deviations (w,), and their means (w,).
 
-    The noise's variance is what makes it largest.
+    The noise variance is the one that maximises it.
     """
     use, out = sizes > _NONE * sizes.max(initial=0.0), np.zeros(len(sizes))
     size = sizes[use]

@@ -1,13 +1,13 @@
 """Refit where friction holds the piston: a global search before Gauss-Newton steps.
 
-Whether a stroke breaks free or not changes the error at once. Between one and the other it has
-many minima, and the fit of Eq. (2), which takes friction for a slow actuator, is a start far from
-the lowest: of 150 N, 110 N were found with a standard deviation of 2 N, the error four times the
-noise. Differential evolution (Storn & Price 1997) needs no slope.
+Whether a stroke breaks free or not changes the error abruptly. So the error has many minima, and
+the fit of Eq. (2), which takes friction for a slow actuator, is a start far from the lowest: for
+150 N, 110 N were found with a standard deviation of 2 N, the error four times the noise.
+Differential evolution (Storn & Price 1997) needs no slope.
 
-One stiffness leaves a ridge besides, along which friction grows with the oil's stiffness and only
-leakage tells where on it. In N it is bent: of 300 N, 2600 N were found, and then another hold of
-the command, or a gain, to make up for it. There friction is a share.
+One stiffness also leaves a ridge, along which friction grows with the oil's stiffness and only
+leakage tells the position. In N it is bent: for 300 N, 2600 N were found, and then another hold of
+the command, or a gain, to make up for it. So under one stiffness friction is fitted as a share.
 """
 
 from __future__ import annotations
@@ -36,10 +36,11 @@ _SEED = 0
 
 
 class Shares(Space):
-    """Forces over what oil and specimen resist with, where `Parameter.coordinate` is a share.
+    """Coordinates with forces as shares of the stiffness of oil and specimen.
 
-    So are alpha_1 beta_0 and, beside a specimen, alpha_3; of Stribeck friction its break-away
-    force, as a logarithm like all that is positive. Their bounds are still those in N.
+    That is where `Parameter.coordinate` is a share, and for alpha_1 beta_0, alpha_3 (with a
+    specimen) and the break-away force of Stribeck friction, a logarithm like all positive
+    parameters. Their bounds are still those in N.
 
     Args:
         model: whose parameters they are.
@@ -90,7 +91,7 @@ class Shares(Space):
         return np.asarray(np.log(self.theta(z)[..., :_P]))
 
     def log_slopes(self, z: Array) -> Array:
-        """As `Space.log_slopes`: what is a share grows with the oil, too."""
+        """As `Space.log_slopes`: a share grows with the oil's stiffness, too."""
         out, oil = super().log_slopes(z), np.exp(z[2])
         out[2, self._shared[:_P]] = oil / (oil + self._stiffness)
         return out

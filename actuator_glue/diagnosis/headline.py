@@ -22,7 +22,7 @@ class Told(Protocol):
 
     @property
     def verdict(self) -> Verdict:
-        """Return what came out."""
+        """Return the verdict."""
         ...
 
     @property
@@ -47,7 +47,7 @@ class Told(Protocol):
 
     @property
     def remaining(self) -> Json:
-        """Return where the rest sits."""
+        """Return where the unexplained residual lies."""
         ...
 
     @property
@@ -84,7 +84,7 @@ def _share(probability: float) -> str:
 
 
 def _noise(found: Told) -> str:
-    """Say how large the noise is, by itself or beside the error, and what is known to make it."""
+    """State the noise, by itself or relative to the error, and its known causes."""
     floor = found.error.noise_floor
     parts = [f'{1e6 * (e.noise or 0.0):.1f} um by {e.name}' for e in found.effects if e.noise]
     text = f'noise {1e6 * floor:.1f} um'
@@ -95,7 +95,7 @@ def _noise(found: Told) -> str:
 
 
 def _errors(found: Told, named: bool) -> str:
-    """Say the held-out error; first the one that the verdict is of, where there are two."""
+    """State the held-out error; where there are two, first the one behind the verdict."""
     error = found.error
 
     def change(before: float | None, after: float) -> str:
@@ -110,9 +110,9 @@ def _errors(found: Told, named: bool) -> str:
 
 
 def headline(found: Told) -> str:
-    """Return the verdict in one line, never more than the held-out part bears out.
+    """Return the verdict in one line, never more than the held-out part confirms.
 
-    What is wrong with the set-up that was given comes first.
+    A wrong set-up is reported first.
     """
     if found.setup is not None:
         return f'{found.setup.sentence()}; {_verdict(found)}'

@@ -1,4 +1,4 @@
-"""What the held-out part says: the error before and after, and the verdicts there are."""
+"""The held-out error before and after, and the possible verdicts."""
 
 from __future__ import annotations
 
@@ -27,14 +27,15 @@ class HeldOutError:
         sham: rms error with a sham effect of equal parameter count, as control.
         records: rms error before and after of each held-out record.
         after_without_zero: `after` without each held-out record's own zero: an offset and a drift
-            in time, which no other record tells; None where it was not asked.
-        zeros: rms error of each of `records` without it.
+            in time, which no other record tells; None where it was not computed.
+        zeros: rms error of each of `records` without its own zero.
         after_without_hum: `after` with the hum that was found regressed out of the held-out part
             (frequency known, phase not); None without hum.
         split: 'held-out' where data were set aside.
         reached: the least rms error of parameters in the 95 % region of their posterior; None
-            where it was not asked.
-        reached_before: that of Eq. (2) alone; asked where the best additions take nothing away.
+            where it was not computed.
+        reached_before: the same for Eq. (2) alone; computed where additions at their best fit
+            remove nothing.
     """
 
     before: float
@@ -55,7 +56,7 @@ class HeldOutError:
 
     @property
     def least(self) -> float:
-        """The least rms error, whichever likely parameters or zeros of records are taken [m]."""
+        """The least rms error with the best fit, likely parameters, or records' own zeros [m]."""
         ways = (self.after, self.reached, self.after_without_zero)
         return min(way for way in ways if way is not None)
 

@@ -80,8 +80,8 @@ def _sham(
     """Held-out rms after regressing on responses to commands that were never applied.
 
     Phase-randomised copies of the command run through the same model: as flexible as a real
-    effect and as smooth, but knowing nothing of the actuator. As an effect is, the sham is the
-    best on the fitting part of as many as were tried.
+    effect and as smooth, but knowing nothing of the actuator. Like an effect, the sham is the best
+    on the fitting part among as many as were tried.
 
     Args:
         fit: the fitting part.
@@ -92,7 +92,7 @@ def _sham(
         seed: seed of the phases.
     """
     count, tried = max(1, sizes[0]), max(1, sizes[1])
-    # As many responses as shams: each sham takes `count` that stand side by side.
+    # As many responses as shams: each sham takes `count` neighbouring ones.
     here = _responses(fit, side, max(tried, count), seed)
     commands = [[id(record.command) for record in data.records] for data in (fit, held)]
     folded = commands[0] == commands[1]  # stretches of the same records
@@ -126,14 +126,14 @@ def _responses(data: Data, side: Side, count: int, seed: int) -> list[NDArray[np
 
 
 def noise_floor(fit: Data, held: Data, errors: tuple[Array, Array], fitted: float) -> float:
-    """Noise of the held-out part: its stationary residual, at most what the fit knew [m].
+    """Noise of the held-out part: its stationary residual, limited by the fit's noise [m].
 
-    Its records may be noisier: that shows at most frequencies, the motion at few.
+    The limit rises if its records are noisier: noise shows at most frequencies, motion at few.
 
     Args:
         fit: the fitting part.
         held: the held-out part.
-        errors: what one structure leaves of each [m].
+        errors: residuals of one structure in both [m].
         fitted: noise of the fitting part [m].
     """
     known, seen = splits_of(fit, errors[0]), splits_of(held, errors[1])
@@ -162,10 +162,10 @@ def verify(
     """Compare both structures on data that decided nothing.
 
     A line found in the fitting part belongs to the noise here: its phase in the held-out part
-    cannot be predicted. What it does there is told apart (`after_without_hum`): its frequency is
-    known, two amplitudes per record are regressed, and nothing is decided by it. What is left
-    without each record's own zero is told, too. `tried` is how many candidates there were, and so
-    how many shams.
+    cannot be predicted. The error without it is given separately (`after_without_hum`): its
+    frequency is known, two amplitudes per record are regressed, and nothing is decided by it. The
+    error without each record's own zero is given, too. `tried` is the number of candidates, and so
+    of shams.
 
     Returns:
         The error, the coverage of the 95 % bands before and after, and per side the joined

@@ -1,8 +1,8 @@
 """Whether parameters that the fitting part does not exclude explain the held-out part, too.
 
-Along a ridge of hundreds of per cent nothing is linear (simulation_spread.py goes by first order):
-a machine tried under one stiffness only is another one, to first order, under the next. So both
-parts are refitted together, and it is asked what that costs in the fitting part.
+Along a ridge of hundreds of per cent nothing is linear: to first order (simulation_spread.py), a
+machine tested under one stiffness only is another one under the next. So both parts are refitted
+together, and the cost of that in the fitting part is checked.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _SURE = 2.0  # standard errors over the blocks
 def reached_by_both(
     error: HeldOutError, material: float, scorer: Scorer, held: Data, before: Side, after: Side
 ) -> HeldOutError:
-    """Note the error under parameters that neither part excludes, if the best leave structure.
+    """Note the error of parameters that fit both parts, if the best fit leaves structure.
 
     Args:
         error: held-out error, with what is reached to first order.
@@ -51,7 +51,7 @@ def reached_by_both(
 
 
 def reached(scorer: Scorer, held: Data, side: Side) -> float | None:
-    """Return what both parts' parameters leave of the held-out part, rms [m].
+    """Return the held-out rms error of parameters refitted to both parts [m].
 
     Args:
         scorer: the fitting part, and whitening filters of its noise.
@@ -71,10 +71,10 @@ def reached(scorer: Scorer, held: Data, side: Side) -> float | None:
 
 
 def as_likely(scorer: Scorer, model: Model, theta: Array, other: Array) -> bool:
-    """Whether the fitting part does not exclude other parameters (p,) than the best, (p,).
+    """Whether the fitting part allows parameters `other` (p,) beside the best, `theta` (p,).
 
-    It does where they cost more than the 95 % region of a normal posterior, and more than twice
-    the standard error over the blocks; a prior of the data counts.
+    It excludes them where they cost more than the 95 % region of a normal posterior, and more than
+    twice the standard error over the blocks; a prior of the data counts.
     """
     data, rows = scorer.data, np.stack([theta, other])
     before, after = scorer.whiten(data.target - data.simulate(model, rows))

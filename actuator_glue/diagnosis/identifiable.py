@@ -1,8 +1,8 @@
 """Coordinates in which the posterior around a fit is nearly normal.
 
 In the logarithms of Eq. (2)'s parameters the ridge that one stiffness leaves is bent, and a
-thousand times longer than wide: points around the fit lie off it, and chains creep. In those of
-`Ridge` it is straight. Records under several stiffnesses leave no such ridge: for
+thousand times longer than wide: points around the fit lie off it, and chains creep. In the
+coordinates of `Ridge` it is straight. Records under several stiffnesses leave no such ridge: for
 them the working coordinates serve.
 """
 
@@ -20,21 +20,21 @@ from actuator_glue.model.parameters import BASE
 from actuator_glue.records import Array
 
 _P = len(BASE)
-# Of logarithms and normal scores: what the third derivative leaves out is 1e-6 of the first.
+# Step of logarithms and normal scores: the third derivative's error is 1e-6 of the first's.
 _STEP = 3e-3
 # A fit may lie on its bounds, which are rounded on the way to coordinates and back.
 _ROUNDING = 1e-9
-# How far from the fit the shares of a box can tell alpha_2, whose cube counts, or square and, too,
-# alpha_3 where no specimen makes it act: what the records leave open by more is not known.
+# Distance from the fit within which shares of a box can resolve alpha_2, of which the cube counts,
+# or without a specimen the square, and then alpha_3 as well: beyond it they are not known.
 _HELD_REACH, _FREE_REACH = 2.5, 3.8  # logarithm
 
 
 def coordinates(space: Space, model: Model, data: Data, fit: Array) -> Working | Straight:
-    """Return what to sample in around the working coordinates (p,) of a fit."""
+    """Return the coordinates to sample in, around a fit in working coordinates (p,)."""
     if len({record.known_stiffness() for record in data.records}) == 1:
         straight = Straight(space, model, data, fit)
         back, log_prior = straight.inverse(straight.forward(space.theta(fit)[None]))
-        # A fit in a corner of its bounds may have no place there.
+        # A fit in a corner of its bounds may have no straight coordinates.
         if np.isfinite(log_prior[0]) and np.allclose(back[0], space.theta(fit), rtol=1e-3):
             return straight
     return Working(space)
@@ -75,8 +75,8 @@ class Straight:
 
     Attributes:
         widest: spreads (p,) beyond which nothing is known.
-        least: what the coordinate of alpha_3 is at its lower bound beside the fit [1/s]; 0 where
-            no specimen makes it act.
+        least: coordinate of alpha_3 at its lower bound, alpha_2 as fitted [1/s]; 0 without a
+            specimen, where alpha_3 does not act.
     """
 
     def __init__(self, space: Space, model: Model, data: Data, fit: Array) -> None:
@@ -93,14 +93,14 @@ class Straight:
         low, high = low - margin, high + margin
         names = [p.name for p in model.parameters]
         self._ridge = Ridge(names, low, high, stiffness, middle, model.parameters)
-        # Logarithms and normal scores; what is known less well than this is not known.
+        # Logarithms and normal scores: a coordinate with a wider spread counts as unknown.
         self.widest = np.where(
             np.arange(len(fit)) < _P, 1.0, self._ridge.upper - self._ridge.lower
         )
         self.least = float(low[3] * stiffness / (stiffness + space.theta(fit)[2]))
         if stiffness > 0.0:
             self.widest[3] = self._ridge.upper[3]
-        # The bounds of the parameters are all there are.
+        # Only the parameters have bounds, not the coordinates.
         self.lower, self.upper = np.full(len(fit), -np.inf), np.full(len(fit), np.inf)
         self._ridge.lower, self._ridge.upper = self.lower, self.upper
 
@@ -114,7 +114,7 @@ class Straight:
         The density is minus infinity outside the bounds, where the parameters mean nothing.
         """
         theta, log_prior = self._ridge.inverse(phi)
-        # The Jacobian is that of a prior uniform in theta; ours is in its logarithm.
+        # The Jacobian is for a prior uniform in theta; ours is uniform in its logarithm.
         inside = np.isfinite(log_prior)
         log_prior[inside] -= np.log(theta[inside, :_P]).sum(axis=1)
         return theta, log_prior
@@ -123,16 +123,16 @@ class Straight:
 def derivatives(
     around: Working | Straight, space: Space, phi: Array, response: Callable[[Array], Array]
 ) -> tuple[Array, Array]:
-    """Return a response (N,) and its derivatives to coordinates (p,) that lie inside, (p, N).
+    """Return a response (N,) and its derivatives (p, N) at coordinates (p,) inside the bounds.
 
-    To either side, where both are inside and stable. Differences to one side bend with the
-    response, by some 1e-4 of it, and that is more than noise leaves to see along a ridge: it
-    looked ten to forty times shorter than it is.
+    Central differences, where both sides are inside and stable. One-sided ones are off by the
+    response's curvature, some 1e-4 of it, which is more than noise leaves visible along a ridge:
+    it looked ten to forty times shorter than it is.
 
     Args:
         around: the coordinates.
         space: the working coordinates, which know the steps of effects.
-        phi: where, (p,).
+        phi: where in them, (p,).
         response: of physical parameters (m, p), (m, N).
     """
     z = space.z(around.inverse(phi[None])[0][0])

@@ -1,4 +1,4 @@
-"""What a structure leaves beside the noise, and whether a larger one is worth its parameters."""
+"""How much structure a fit leaves, and whether a larger model is worth its parameters."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.diagnosis.weights import TELLING, log_weight, price
 from actuator_glue.inference.least_squares.fit import Fit
 
-# Of what matters: two that remove this share each remove what matters.
+# Of what matters: two effects that remove this share each remove what matters together.
 _PART = 0.5**0.5
-# Of what matters: a rough refit that removes less does not come to it with its last digits.
+# Of what matters: a rough refit that removes less will not become material when finished.
 _ROUGHLY = 0.5
 
 
 class Judge:
-    """Noise, and what matters beside it, of the structures that a search has refitted.
+    """Noise, and the least error that matters, of the structures that a search has refitted.
 
     Attributes:
         search: the structures.
@@ -57,8 +57,8 @@ class Judge:
     def _apart(self, fit: Fit) -> tuple[float, float]:
         """Rms structure and noise of a residual [m].
 
-        A command that is as stationary as noise lets structure pass for noise: there a forecast
-        of samples that were not fitted says how much noise there is at most.
+        Under a command as stationary as noise, structure passes for noise: there a forecast of
+        samples that were not fitted gives an upper bound of the noise.
         """
         if self._known is not None and self._known[0] is fit:
             return self._known[1]
@@ -103,9 +103,9 @@ class Judge:
 
         Args:
             trial: the structure.
-            other: the one that it is held against.
-            alike: rms error that costs a nat between equations for the same thing, beside that
-                of what matters [m].
+            other: the one that it is compared with.
+            alike: rms error that costs a nat between equations for the same thing, in addition
+                (as squares) to `TELLING` of what matters [m].
         """
         tells = math.hypot(TELLING * self.material, alike)
         return self._log_weight(other, tells) - self._log_weight(trial, tells)
@@ -117,7 +117,7 @@ class Judge:
         return log_weight(scorer.left_out_error(trial.fit), tells, cost)
 
     def odds(self, rest: Trial, best: Trial, trials: Sequence[Trial]) -> list[float]:
-        """Return the weights of rivals in the place of an effect, and of none, beside its own.
+        """Return the weights of an effect's rivals, and of no effect, relative to its own.
 
         Equations for the same thing are told apart less sharply, the more they explain: none of
         them is exactly the machine's.
@@ -132,14 +132,14 @@ class Judge:
         return [math.exp(-max(b, 0.0)) for b in behind]
 
     def may_matter_below(self, current: Trial) -> float:
-        """Mean squared error that a rough refit leaves which may come to matter [m^2]."""
+        """Mean squared error below which a rough refit may come to matter [m^2]."""
         return current.mean_square - (_ROUGHLY * self.material) ** 2
 
     def part(self) -> float:
-        """Error that one of two effects must remove which matter only together [m]."""
+        """Error that each of two effects must remove if they matter only together [m]."""
         return _PART * self.material
 
     def least(self, larger: Trial, smaller: Trial) -> float:
-        """Error that a member must remove [m]: less where it makes what is left immaterial."""
+        """Error that a member must remove [m]: less where it makes the rest immaterial."""
         completes = self.left(larger) < self.material <= self.left(smaller)
         return self.part() if completes else self.material

@@ -1,6 +1,6 @@
 """The likelihood of a structure's parameters, whitened, and its optimum.
 
-Least squares of the whitened error, beside what may be there below what matters.
+Least squares of the whitened error, with an allowance for effects too small to matter.
 """
 
 from __future__ import annotations
@@ -24,9 +24,9 @@ from actuator_glue.inference.least_squares.space import Space, diverged
 from actuator_glue.records import Array
 
 _STEPS = 8  # from the least-squares fit to the optimum of the likelihood
-_HALVINGS = 40  # bring any point of it inside the bounds of the prior
-# From the optimum of the whitened error to that of the likelihood: a step that gains less than
-# this is none.
+_HALVINGS = 40  # bring any point inside the bounds of the prior
+# From the optimum of the whitened error to that of the likelihood: a step that gains less ends
+# the search.
 _NATS, _MOST_STEPS = 0.5, 10
 
 
@@ -34,9 +34,9 @@ class Optimum(NamedTuple):
     """An optimum of a likelihood.
 
     Attributes:
-        centre: coordinates (p,) from which it is linear about.
-        moves: of the coordinates from there, were all linear.
-        height: log density at the centre, the prior of the coordinates in it.
+        centre: coordinates (p,) around which the response is taken as linear.
+        moves: distribution of the coordinates' distance from there, under a linear response.
+        height: log density at the centre, the prior of the coordinates included.
     """
 
     centre: Array
@@ -44,7 +44,7 @@ class Optimum(NamedTuple):
     height: float
 
     def log_mass(self) -> float:
-        """Logarithm of the share that it would have were all linear, up to a constant."""
+        """Logarithm of its posterior mass under a linear response, up to a constant."""
         return self.height + 0.5 * float(np.linalg.slogdet(self.moves.moments()[1])[1])
 
     def is_about(self, other: Optimum) -> bool:
@@ -55,7 +55,7 @@ class Optimum(NamedTuple):
 
 @dataclass(frozen=True)
 class Whitened(Data):
-    """The same samples, whitened: least squares on them is most likely."""
+    """The same samples, whitened: their least-squares fit is the most likely one."""
 
     scorer: Scorer = field(kw_only=True)
 
@@ -71,11 +71,11 @@ class Whitened(Data):
 
 
 def most_likely(data: Data, model: Model, theta: Array, scorer: Scorer) -> Fit:
-    """Go on to the optimum of the likelihood that is sampled, from parameters (p,).
+    """Return the optimum of the likelihood that is sampled, starting from parameters (p,).
 
-    That of least squares is up to 12 nats from it under slow noise; a covariance of the likelihood
-    belongs to its own optimum. What is simulated and compared stays the least-squares fit: where
-    structure remains, it is nearer in the error itself. Error and Jacobian of what is returned are
+    The least-squares optimum is up to 12 nats from it under slow noise, and the likelihood's
+    covariance belongs to its own optimum. Simulations and comparisons keep the least-squares fit:
+    where structure remains, its plain error is smaller. Error and Jacobian of the returned fit are
     whitened.
     """
     white = Whitened(**{f.name: getattr(data, f.name) for f in fields(Data)}, scorer=scorer)
@@ -83,7 +83,7 @@ def most_likely(data: Data, model: Model, theta: Array, scorer: Scorer) -> Fit:
 
 
 def inflation(error: Array) -> float:
-    """Variance of whitened noise that a whitened error (N,) asks for, at least 1.
+    """Variance of whitened noise that a whitened error (N,) implies, at least 1.
 
     Where structure remains, every parameter is known less well than the noise alone says.
     """
@@ -92,12 +92,12 @@ def inflation(error: Array) -> float:
 
 @dataclass(frozen=True)
 class Likelihood:
-    """Likelihood of parameters, and where it would be were all linear.
+    """Likelihood of parameters, and its optimum under a locally linear response.
 
     Attributes:
         model: the structure.
         scorer: the samples, and whitening filters of their noise.
-        beside: what may be there beside the structure.
+        beside: discrepancy of small effects that the structure lacks.
         noise: variance of the whitened noise.
         space: working coordinates.
         around: the coordinates in which it is nearly normal.
@@ -117,9 +117,9 @@ class Likelihood:
         return self.scorer.whiten(self.scorer.data.target)
 
     def __call__(self, theta: Array) -> Array:
-        """Log density of parameters (m, p), (m,); the prior's too, where one was given.
+        """Log density (m,) of parameters (m, p), with that of the prior where one was given.
 
-        It is uniform in the logarithms otherwise.
+        Otherwise the prior is uniform in the logarithms.
         """
         data = self.scorer.data
         parts = [theta[some] for some in lanes(len(theta))]
@@ -141,12 +141,12 @@ class Likelihood:
         return np.hstack([found, pull])
 
     def _height(self, phi: Array) -> float:
-        """Log density at coordinates (p,), the prior of the coordinates in it."""
+        """Log density at coordinates (p,), the prior of the coordinates included."""
         theta, log_prior = self.around.inverse(phi[None])
         return float(self(theta)[0] + log_prior[0])
 
     def _moves(self, phi: Array) -> ScaleMixture:
-        """How far the parameters are from coordinates (p,), if all were linear."""
+        """Distribution of the parameters' distance from coordinates (p,), if all is linear."""
         seen, jac = derivatives(self.around, self.space, phi, self._response)
         white = self._whitened
         error = np.concatenate([white, np.zeros(len(seen) - len(white))]) - seen
@@ -158,8 +158,8 @@ class Likelihood:
     def optimum(self, phi: Array) -> Optimum:
         """Return the optimum next to coordinates.
 
-        The allowance may take a long record thousands of nats from the optimum without it, over
-        which no response is linear.
+        On a long record the allowance for small effects may move it thousands of nats from the
+        optimum without it, a distance over which no response is linear.
 
         Args:
             phi: coordinates to begin at, (p,).
@@ -168,7 +168,7 @@ class Likelihood:
         centre, new = phi, _inside(self.around, phi, moves.moments()[0])
         for step in range(1, _MOST_STEPS):
             height = self._height(new)
-            # The first move is to a mean, from where there may be next to nothing to gain.
+            # The first move goes to a mean, which may gain next to nothing.
             if not height > best + (_NATS if step > 1 else -_NATS):
                 break
             centre, best, moves = new, height, self._moves(new)
@@ -177,7 +177,7 @@ class Likelihood:
 
 
 def _inside(around: Working | Straight, phi: Array, move: Array) -> Array:
-    """Return coordinates (p,) moved as far as they mean something."""
+    """Return coordinates (p,) moved as far as they stay inside the bounds."""
     move = np.clip(move, -around.widest, around.widest)
     for _ in range(_HALVINGS):
         if np.isfinite(around.inverse((phi + move)[None])[1][0]):

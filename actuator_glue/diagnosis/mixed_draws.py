@@ -1,4 +1,4 @@
-"""Draws over all structures that may be the machine's; each knows the structure that it is of."""
+"""Draws over all plausible structures; each draw knows its structure."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ _ROUND = 1e-3  # odds below it move no interval
 
 @dataclass(frozen=True)
 class MixedDraws:
-    """Draws over structures; each knows the one that it is of.
+    """Draws over structures; each draw knows its structure.
 
     Attributes:
-        points: parameters of the structure that is told (m, p).
+        points: parameters of the reported structure (m, p).
         which: index of its structure in `structures`, for every draw (m,).
         structures: effects of each.
     """
@@ -57,10 +57,10 @@ def mixed(
 ) -> MixedDraws:
     """Return draws of the shared parameters over all plausible structures.
 
-    The size of an effect that an alternative lacks is that which it has where its name is right.
+    Where an alternative lacks an effect, its draws keep the size under the reported structure.
 
     Args:
-        draws: those of the structure that is told.
+        draws: those of the reported structure.
         told: that structure.
         others: alternatives with their odds against it.
         sample: draws from the posterior of a structure.

@@ -1,10 +1,10 @@
 """How far a parameter depends on the other effects, where no structure is the machine.
 
-A posterior says what is known under one structure. Where that leaves material structure it is not
-the machine's, and the same parameter stands elsewhere beside companions that leave little more:
-how far is what the choice of the equations leaves open (Draper 1995, Assessment and propagation of
-model uncertainty). So is how far stretches of the records, of other frequencies and amplitudes,
-differ about it.
+A posterior says what is known under one structure. If that leaves something material it is wrong,
+and other structures that leave little more give the same parameter other values: their spread is
+what the choice of the equations leaves open (Draper 1995, Assessment and propagation of model
+uncertainty). So is the spread between stretches of the records, of other frequencies and
+amplitudes.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _NORMAL = 1.4826  # standard deviation of a normal over its median absolute devi
 
 
 def open_form(search: Search, final: Trial, left: float, space: Space, scorer: Scorer) -> Array:
-    """Return the standard deviation of parameters that wrong equations leave (p,).
+    """Return the standard deviation of parameters due to wrong equations (p,).
 
     Standard deviations in working coordinates: that over structures (see `spread`) and that
     between stretches, together. Structures are not compared with one that has an effect in one
@@ -35,12 +35,12 @@ def open_form(search: Search, final: Trial, left: float, space: Space, scorer: S
 def spread(search: Search, final: Trial, left: float, space: Space) -> Array:
     """Return the spread of each parameter over equally good structures (p,).
 
-    In working coordinates, and robustly: a companion that makes the same motion takes a parameter
-    anywhere, and is one of many.
+    In working coordinates, by the median: an effect that makes the same motion may take a
+    parameter anywhere, but is one of many.
 
     Args:
         search: all structures that were tried.
-        final: the one that is told.
+        final: the reported one.
         left: rms structure that it leaves [m]; the others leave twice its square at most.
         space: working coordinates of `final`.
     """
@@ -62,7 +62,7 @@ def spread(search: Search, final: Trial, left: float, space: Space) -> Array:
 def widened(draws: Array, size: Array, space: Space, rng: np.random.Generator) -> Array:
     """Return draws (m, p) moved at random by standard deviations (p,), working coordinates.
 
-    For intervals of one parameter at a time: together they leave the ridges of the posterior.
+    For intervals of one parameter at a time: jointly, moved draws leave the posterior's ridges.
     """
     moved = space.z(draws) + size * rng.standard_normal(draws.shape)
     return space.theta(np.clip(moved, space.lower, space.upper))

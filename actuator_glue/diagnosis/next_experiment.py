@@ -1,4 +1,4 @@
-"""Which test would tell apart what these records cannot: its expected evidence, for a menu.
+"""Which test would tell tied structures apart: the expected evidence of a menu of tests.
 
 Of two structures that fit the records alike, each predicts another displacement in a new test.
 The expected evidence for the one if it is true is half the squared difference over the noise's
@@ -82,7 +82,7 @@ def ranked(
 
 
 def _precision(trial: Trial, scorer: Scorer) -> Array:
-    """What the records know of a structure's parameters, working coordinates (p, p)."""
+    """Precision of a structure's parameters from the records, working coordinates (p, p)."""
     jac = scorer.whiten(trial.fit.jacobian)
     return np.asarray(jac @ jac.T)
 

@@ -2,7 +2,7 @@
 
 A payload that brings damping of its own moves as a damper and a lag do together. No single effect
 in its place does so, and a search that goes on from the payload never comes to the two. A pair
-has two parameters at least, so that only what has as many has rivals of two that are no richer.
+has two parameters at least, so only effects with as many have pairs as rivals that are no richer.
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ def rivals(
         search: what refits.
         name: the effect.
         trials: structures with one other effect in its place.
-        most: of these that are gone on from, and of pairs that are refitted.
+        most: trials that are extended to pairs, and pairs that are refitted, at most.
         below: mean squared error that a rival leaves at most [m^2].
-        complete: whether nothing material is left: else no names take a description's place.
+        complete: whether nothing material is left: else no names replace a description.
     """
     room = len(search.entries[name].parameters)
     described = is_learned(search.entries[name])
     if room < 2 or (described and not complete):
         return []
     wanted = screened(search, name, trials[:most], room, below)[:most]
-    # A fault has another size inside of the loop, so that one outside does not promise it.
+    # A fault has another size inside of the loop, so screening outside of it is misleading.
     wanted += [(t, FEEDBACK) for t in trials if t.added in FAULTS and FEEDBACK not in t.effects]
 
     def refitted(pair: tuple[Trial, str]) -> Trial:
@@ -56,7 +56,7 @@ def rivals(
 
 
 def both_worth(judge: Judge, pair: Trial) -> bool:
-    """Whether each effect that was added last is significant beside the other, if two were."""
+    """Whether each effect of a pair is significant given the other; True for a single effect."""
     names = pair.added.split(BESIDE)
     if len(names) == 1:
         return True
@@ -68,12 +68,12 @@ def both_worth(judge: Judge, pair: Trial) -> bool:
 def screened(
     search: Search, name: str, trials: Sequence[Trial], room: int, below: float
 ) -> list[tuple[Trial, str]]:
-    """Sort pairs by the error that the second one's starting sizes leave beside the first one.
+    """Sort pairs by the error that starting sizes of the second effect leave, given the first.
 
-    They are simulated where the first one was refitted: its lag is none of Eq. (2)'s.
+    They are simulated at the refit with the first one, whose lag is not that of Eq. (2).
 
     Args:
-        search: what simulates.
+        search: simulates them.
         name: an effect that is in no pair.
         trials: structures with the first one.
         room: parameters of a pair, at most.

@@ -1,4 +1,4 @@
-"""From prepared records to what they say: search, then moves; impulses and hum judged again."""
+"""From prepared records to a conclusion: search, then moves; impulses and hum judged again."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def conclude(
         settings: thresholds.
         each: refits candidates, several at a time if it can.
         tell: takes progress.
-        effort: what the search costs, and may.
+        effort: cost of the search so far, and its limit.
     """
 
     def again(other: Prepared) -> Conclusion:
@@ -46,7 +46,7 @@ def conclude(
 def as_given(
     prepared: Prepared, settings: Thresholds, each: Each, tell: Progress, effort: Effort
 ) -> Conclusion:
-    """Say what Eq. (2) leaves, and each effect beside it, without any search."""
+    """Conclude from Eq. (2), alone and with each single effect, without any further search."""
     tell('base fit', 0.0)
     prepared, search, line = _begun(prepared, settings, each, effort, fixed=True)
     return searched(prepared, search, line, replace(settings, most=0), tell, explains_rest)
@@ -57,9 +57,9 @@ def _within(
 ) -> Conclusion:
     """Search records with their hold.
 
-    What friction leaves to chance does not count, unless the samples that count are fixed. Where
-    impulses that could have swayed it show beside what was found, or what was taken for some shows
-    to be none, they are taken out, or restored, and the search goes on from there.
+    Samples that friction leaves to chance do not count, unless the counted samples are fixed. If
+    the final model shows impulses that could have swayed the search, or that suspected ones are
+    none, these are removed, or restored, and the search goes on from there.
     """
     asking.tell('base fit', 0.0)
     begun = _begun(prepared, asking.settings, each, effort, fixed)

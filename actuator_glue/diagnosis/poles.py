@@ -1,8 +1,8 @@
 """Poles that may have changed places: each order is a minimum, of a refit and of a posterior.
 
 To the records a fast valve with a slow filter behind it is nearly a slow valve with a fast filter:
-under one stiffness to the last digit, under two a second minimum, a dozen nats behind the first,
-with other sizes.
+under one stiffness to the last digit; under two it is a second minimum with other sizes, a dozen
+nats behind the first.
 """
 
 from __future__ import annotations
@@ -15,16 +15,16 @@ from actuator_glue.model.effects import Effect
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 
-# What adds a pole may change places with the valve's, which a valve that is slower or quicker by
-# these factors, of the same bandwidth, leads to.
+# Groups of effects whose pole may change places with the valve's; starts for that are valves
+# slower or quicker by these factors, of the same bandwidth.
 _GROUPS: Final = ('lag', 'gain', 'inertia')
 _VALVES: Final = (1.0, 0.6, 1.6, 0.4, 2.5)
 # A lag of first order in series with the loop: its pole and the loop's are exchanged exactly.
 _IN_SERIES: Final = ('sensor-lag', 'command-lag')
-# What acts on the piston beside the specimen's spring: the loop, opened at the valve's error, has
+# Forces on the piston beside the specimen's spring: the loop opened at the valve's error then has
 # further poles, of which each real one may be the valve's, exactly.
 _ON_PISTON: Final = ('viscous-damping', 'payload-inertia')
-_LEAST: Final = 1e-9  # kg or N s/m: of less the poles that it adds are beyond all numbers
+_LEAST: Final = 1e-9  # kg or N s/m: with less, the added poles are too large to compute
 
 
 def may_change(added: Effect) -> bool:
@@ -35,7 +35,7 @@ def may_change(added: Effect) -> bool:
 def starts(
     structure: Structure, added: Effect, theta: Array, stiffness: frozenset[float]
 ) -> Array:
-    """Return where refits of a structure with other orders of its poles begin, (s, p).
+    """Return starting parameters (s, p) for refits of a structure with its poles reordered.
 
     Args:
         structure: with p parameters.
@@ -49,16 +49,16 @@ def starts(
 
 
 def exchanged(structure: Structure, name: str, theta: Array, stiffness: frozenset[float]) -> Array:
-    """Return parameters (m, p) with poles exchanged that an effect adds, the records alike.
+    """Return parameters (m, p) with an effect's pole exchanged for another, the response alike.
 
-    Of a lag in series with the loop's, where these do not oscillate; of what acts on the piston
-    with the valve's. None for other effects.
+    A lag in series is exchanged for poles of the loop, where these do not oscillate; a force on
+    the piston for the valve's. None for other effects.
 
     Args:
         structure: with p parameters.
         name: of one of its effects.
         theta: parameters (p,).
-        stiffness: of the specimen in the records [N/m]; under each the exchange is another one.
+        stiffness: of the specimen in the records [N/m]; each gives another exchange.
     """
     rows: list[Array] = []
     for k in sorted(stiffness):

@@ -1,6 +1,7 @@
 """Posterior of base and effect parameters around the best fit.
 
-Where it is nearly linear importance sampling draws from it, and knows that it did; else DREAM(ZS).
+Where it is nearly linear, importance sampling draws from it, and tells whether it succeeded; else
+DREAM(ZS) does.
 """
 
 from __future__ import annotations
@@ -35,15 +36,16 @@ from actuator_glue.records import Array
 _P = len(BASE)
 _ALPHA_2 = [p.name for p in BASE].index('alpha_2')
 _DRAWS = 500  # of the normal approximation
-# Draws will do for 95 % intervals and bands from here on (Vehtari et al. 2021), with few in each
-# of many chains.
+# Effective draws and R-hat that suffice for 95 % intervals and bands (Vehtari et al. 2021), with
+# few draws in each of many chains.
 _ESS, RHAT = 400.0, 1.05
 _MOVES_WITH = 0.9  # rank correlation
 _UNLIKELY = 10.0  # nats behind the first optimum: another one has next to no share
-_HALVINGS = 40  # bring any point of it inside the bounds of the prior
-# Samples that chains simulate, all evaluations together, and evaluations they have anyway. Ten
-# minutes of 10 kHz take 4 ms each: where 2600 did not do, 12 000 did not, as a ridge was left. Of
-# five shorter ones whose chains had not met after some 4000 one had after 12 000.
+_HALVINGS = 40  # bring any point inside the bounds of the prior
+# Samples that chains may simulate in all evaluations together, and evaluations that they may make
+# anyway. Ten minutes of 10 kHz take 4 ms each: where 2600 did not suffice, 12 000 did not either,
+# as a ridge was left. Of five shorter records whose chains had not converged after some 4000, one
+# had after 12 000.
 _SIMULATED, _FEWEST = 200_000_000, 2_600
 
 
@@ -54,10 +56,10 @@ class Draws(NamedTuple):
         points: (m, p), physical units.
         method: what drew them.
         evaluations: of the likelihood.
-        effective: how many draws they are worth, the least of all parameters.
+        effective: effective sample size, the least of all parameters.
         rhat: largest R-hat of chains, else not-a-number.
         pareto_k: shape of the tail of importance weights, else not-a-number.
-        unmet: of each parameter whether chains have not met in it; empty without chains.
+        unmet: per parameter, whether its chains have not converged; empty without chains.
     """
 
     points: Array
@@ -84,8 +86,9 @@ def identified(space: Space, draws: Array, ridge: Array) -> NDArray[np.bool_]:
 
     Bounds of Eq. (2)'s parameters are decades wide: a factor of e^2 between the 2.5 and 97.5 %
     quantiles is no knowledge of one. Where alpha_2 is open, draws reach along the ridge that one
-    stiffness leaves only as far as `identifiable.py` lets them: what moves with it is open, too,
-    and what moves along `ridge` (n, p), which does as well, by more than draws spread.
+    stiffness leaves only as far as `identifiable.py` lets them: parameters that move with it are
+    open, too, and so are those that move along `ridge` (n, p), whose points fit as well, by more
+    than draws spread.
     """
     z, moved = space.z(draws), np.ptp(space.z(ridge), axis=0)
     low, high = np.quantile(z, [0.025, 0.975], axis=0)
@@ -103,14 +106,14 @@ def opened(
 ) -> tuple[Array, NDArray[np.bool_]]:
     """Spread draws as far as the records leave each parameter open.
 
-    Evenly in the working coordinates: over the ridge where draws reached less far along it, over
-    the bounds where chains differ. Intervals are quantiles of what is returned.
+    Evenly in the working coordinates: over the ridge where draws do not reach its ends, over the
+    bounds where chains disagree. Intervals are quantiles of what is returned.
 
     Args:
         space: working coordinates.
         draws: of all parameters (m, p), physical units.
-        ridge: parameters that do as well (n, p).
-        unmet: of each parameter whether chains have not met in it; empty for none.
+        ridge: parameters that fit as well (n, p).
+        unmet: per parameter, whether its chains have not converged; empty for none.
         rng: random numbers.
 
     Returns:
@@ -133,10 +136,10 @@ def opened(
 def _loosened(
     around: Working | Straight, theta: Array, move: Array, rng: np.random.Generator
 ) -> Array:
-    """Spread draws (m, p) by how far the allowance moved the optimum, once to either side.
+    """Spread draws (m, p), to either side, by how far the discrepancy moved the optimum.
 
-    What took up the error are the catalogue's shapes, not the machine's: where they move a
-    parameter from where it stands without them, it is not known better than by that.
+    The discrepancy has the catalogue's shapes, not the machine's: a parameter that it moves is not
+    known better than by that move.
     """
     phi, step = around.forward(theta), rng.standard_normal((len(theta), 1)) * move
     for shorter in (-1.0, *(-0.5,) * _HALVINGS):
@@ -163,7 +166,7 @@ def _normal(laplace: Composed, count: int, rng: np.random.Generator) -> Array:
 def _inside(transform: Transform, points: Array, fit: Array) -> Array:
     """Pull points (m, p) towards the fit (p,) until none is impossible.
 
-    Beside a bound the linear approximation may have all of its draws beyond it.
+    Near a bound, all draws of the linear approximation may lie beyond it.
     """
     for _ in range(_HALVINGS):
         outside = ~np.isfinite(transform.inverse(points)[1])
@@ -174,7 +177,7 @@ def _inside(transform: Transform, points: Array, fit: Array) -> Array:
 
 
 def _exchanged(likelihood: Likelihood, fit: Fit, first: Optimum) -> list[Optimum]:
-    """Return optima with other orders of the poles than the first one's that are as likely."""
+    """Return further optima, with the poles in another order, that are about as likely."""
     model, data = likelihood.model, likelihood.scorer.data
     if not isinstance(model, Structure):
         return []
@@ -212,7 +215,7 @@ def sample(
         model: the structure.
         fit: its least-squares fit.
         scorer: the fitting part, and whitening filters of its noise.
-        beside: what may be there beside the structure.
+        beside: discrepancy of small effects that the structure lacks.
         rng: random numbers.
         evaluations: likelihood evaluations of chains at most, fewer of a long record; 0 returns
             draws of the Laplace approximation.
@@ -261,7 +264,7 @@ def sample(
             progress=lambda done, all_: progress(done / all_),
         )
     except posterior.NoPosteriorError:
-        return approximated()  # which is told
+        return approximated()  # `method` says so
     return Draws(
         loosened(chains.posterior()),
         'dream',

@@ -36,8 +36,8 @@ class Prepared:
         notes: what else was done to the records, for people.
         folded: the held-out part are stretches of the fitting records.
         impulses: what was taken out of each fitting record (see hygiene/despike.py).
-        held_impulses: and of each other record that is held out.
-        setup: what was taken for the records' set-up instead of what was given; None for nothing.
+        held_impulses: the same for each separate held-out record.
+        setup: set-up of the records taken instead of the given one; None for the given one.
     """
 
     fit: Data
@@ -72,7 +72,7 @@ class Prepared:
         return replace(self, fit=fit, held=held, impulses=found, held_impulses=others)
 
     def since(self, moment: Moment) -> Prepared:
-        """Leave out what came before a moment; other records held out are taken to be later."""
+        """Leave out the data before a moment; separate held-out records are taken to be later."""
         fit = moment.split(self.fit)[1]
         held = moment.split(self.held)[1] if self.folded else self.held
         pairs = zip(self.fit.recorded, self.impulses, strict=True)

@@ -1,7 +1,7 @@
 """First proposals of importance sampling: a Student t for every scale of the discrepancy.
 
-Were all linear, the posterior would be one normal distribution for each of these scales, fifty
-times as wide for the largest as for the least: no single one of its moments is anything like it.
+With a linear response the posterior is one normal distribution for each of these scales, fifty
+times as wide for the largest as for the least: one normal with its moments is nothing like it.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def proposed(
 
 
 def _together(optima: Sequence[Optimum], widest: Array) -> ScaleMixture:
-    """Return the coordinates' normal distributions about all optima, each as likely as it is."""
+    """Return the normal distributions about all optima, weighted by their posterior mass."""
     masses = np.maximum([o.log_mass() for o in optima], _NOTHING)
     shares = np.exp(masses - np.logaddexp.reduce(masses))
     all_ = [_bounded(o.moves, widest) for o in optima]
@@ -63,7 +63,7 @@ def _together(optima: Sequence[Optimum], widest: Array) -> ScaleMixture:
 
 
 def _bounded(moves: ScaleMixture, widest: Array) -> ScaleMixture:
-    """Leave what no record tells of a parameter where it is, and no wider than is possible."""
+    """Keep coordinates that no record determines unmoved, and no wider than is possible."""
     sd = np.sqrt(np.einsum('sii->si', moves.covariances))
     known = sd <= widest
     shrink = np.where(known, 1.0, widest / sd)
@@ -72,10 +72,10 @@ def _bounded(moves: ScaleMixture, widest: Array) -> ScaleMixture:
 
 
 def _near_zero(parts: ScaleMixture, least: float) -> tuple[ScaleMixture, NearZero]:
-    """Bend the coordinate of alpha_3, from `least` on, where it may be next to nothing.
+    """Bend the coordinate of alpha_3, from `least` on, where it may be next to zero.
 
-    Each part becomes two normal distributions with the moments that its bent one has where the
-    records tell the coordinate from nothing, and where they do not.
+    Each part becomes two normal distributions with the moments of the bent part: one where the
+    records tell the coordinate from zero, one where they do not.
     """
     scale = float(np.sqrt(parts.moments()[1][_LEAKAGE, _LEAKAGE]))
     weights, means, covariances = [], [], []

@@ -1,7 +1,7 @@
-"""What a structure removes beside a smaller one, and how far the order of some is chance.
+"""The error that a structure removes, and how far a ranking of structures is chance.
 
-Nats of block scores answer one question alone: is it there beyond chance (weights.py decides all
-others). They come block by block, so that their spread says how far a ranking is chance.
+Nats of block scores answer one question alone: is an effect there beyond chance (weights.py
+decides all others). They come block by block, so their spread says how far a ranking is chance.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from actuator_glue.records import Array
 
 _DRAWS = 2000
 _SEED = 0
-# A tie asks for nearly all of it: a rough refit that removes less is not worth the last digits.
+# Of the best one's removed error: a tie needs nearly all of it, so a rough refit of a rival that
+# removes less is not worth finishing.
 _NEARLY = 0.9
 
 
@@ -25,7 +26,7 @@ def removed(before: Trial, after: Trial) -> float:
 
 
 def left_by_rivals(rest: Trial, best: Trial) -> float:
-    """Mean squared error that a rough refit of a rival leaves that is worth finishing [m^2]."""
+    """Mean squared error below which a rough refit of a rival is worth finishing [m^2]."""
     return rest.mean_square - _NEARLY**2 * (rest.mean_square - best.mean_square)
 
 
@@ -40,7 +41,7 @@ def worth(search: Search, final: Trial) -> tuple[dict[str, float], dict[str, flo
 
 def standard_error(difference: Array) -> float:
     """Return the standard error of the sum of block differences (B,) [nats]."""
-    # Of a structure that diverges without a block, squares may overflow.
+    # Squares may overflow for a structure that diverges without a block.
     size = float(np.abs(difference).max()) or 1.0
     return float(np.sqrt(len(difference)) * (difference / size).std(ddof=1)) * size
 

@@ -1,4 +1,4 @@
-"""A generic regression as flexible as a structure, than which no effects may be worse."""
+"""A generic regression as flexible as a structure, whose effects must not do worse."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Surrogate:
     def beats(self, material: float, nats: float) -> bool:
         """Whether the surrogate explains more, beyond chance: each feature was the best of many.
 
-        Nats weigh the whitened error; one that is materially worse in plain error is no rival.
+        Nats weigh the whitened error; a surrogate of materially larger plain error is no rival.
         """
         worse = max(0.0, self.error**2 - self.structure_error**2) > material**2
         return not worse and self.nats > nats + len(self.features) * math.log(self.tried)
@@ -92,8 +92,8 @@ def _play(signal: Array, radius: float) -> Array:
 def _motions(x: Array, record: Record, plays: bool) -> dict[str, Array]:
     """Polynomials of displacement, velocity, servo error and time, of order one each.
 
-    And what plays of several widths take off displacement, command and servo error
-    (Prandtl-Ishlinskii), if they are wanted.
+    And displacement, command and servo error less their play of several widths
+    (Prandtl-Ishlinskii), if `plays` are wanted.
     """
     t = np.linspace(-1.0, 1.0, len(x))
     v = np.gradient(x, record.period)
@@ -188,7 +188,7 @@ def _regressed(
     """Regress a residual on the best of all features, parameters refitted with them.
 
     Features are chosen by their products with each other: the table of a long record's features
-    is the largest that a diagnosis holds, so it is gone through once and kept in short numbers,
+    is the largest that a diagnosis holds, so it is gone through once and kept in single precision,
     whose rounding is 1e-14 of a feature's power.
 
     Returns:
@@ -204,7 +204,7 @@ def _regressed(
     gram, cross = _products(list(table.values()), known)
     names, start = list(table), np.diag(gram).copy()
     del table
-    gram -= cross[:, :-1] @ cross[:, :-1].T  # what is free of the parameters
+    gram -= cross[:, :-1] @ cross[:, :-1].T  # the parameters projected out
     pull = cross[:, -1] - cross[:, :-1] @ (known[:-1] @ error)
     chosen: list[str] = []
     for _ in range(count):

@@ -1,9 +1,9 @@
-"""Whether what a fitted model leaves is noise: intervals hold for nothing else.
+"""Whether the residual of a fitted model is noise: only then do its intervals hold.
 
-A model that lacks something has its best fit elsewhere, and a posterior around it that knows
-nothing of that. What is left beside the best fit shows it: structure that follows the motion. The
-command's run between its samples and the stiffnesses, which are given and not fitted, are asked
-as well: a wrong one is another machine.
+A model that lacks something has a biased best fit, and a posterior around it that knows nothing of
+that. The residual of the best fit shows it: structure that follows the motion. The command's run
+between its samples and the stiffnesses, which are given and not fitted, are checked as well: a
+wrong one makes the model another machine.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Hold, Record
 
-# Share of its samples that a residual is worth, below which it is not white: what follows the
-# motion may pass for noise. White ones were worth 0.94 and more.
+# Effective over counted samples of a residual, below which it is not white: structure may pass for
+# noise. White ones had 0.94 and more.
 _WHITE = 0.8
 _SHORT = 5.0  # s, below which few windows tell structure from noise: twice as much must be left
 _FEWEST = 200  # samples of a record that has a spectrogram
 _OTHER: dict[Hold, Hold] = {'zoh': 'linear', 'linear': 'zoh'}
 _RUNS: dict[Hold, str] = {'linear': 'straight from sample to sample', 'zoh': 'held'}
-# What is done about structure.
+# Advice where structure is left.
 DIAGNOSE = 'run `actuator-glue diagnose` on the same records'
 
 
@@ -44,7 +44,7 @@ class ResidualStructure(JsonObject):
 
     Attributes:
         structure_m: rms of what follows the motion [m].
-        noise_m: rms of the noise [m]; at the rate at which what moves was fitted.
+        noise_m: rms of the noise at the rate that is fitted [m].
         matters_m: least structure that matters: half the noise and a thousandth of the command,
             as in a diagnosis [m].
         rms_m: rms of all that is left [m].
@@ -128,7 +128,7 @@ def residual_structure(
     theta: Array,
     settings: Thresholds | None = None,
 ) -> ResidualStructure | None:
-    """Ask the residual of a model's best fit; None where a record is too short to ask.
+    """Check the residual of a model's best fit; None where a record is too short.
 
     Args:
         records: as they were fitted.
@@ -136,7 +136,7 @@ def residual_structure(
         settle: uncounted start of each record [s].
         structure: the model.
         theta: its parameters near the best fit, SI units, (p,).
-        settings: what matters.
+        settings: thresholds.
     """
     settings = settings or Thresholds()
     data = _data(records, initial, settle)
@@ -147,7 +147,7 @@ def residual_structure(
     others = data.with_setup(hold=_OTHER[hold])
     other = _refitted(others, structure, found.theta)
     noise = float(np.sqrt(np.mean(_noise(data, structure, found, settings))))
-    # Of one sensor: beside a misfit more of it passes for noise.
+    # The noise is one sensor's: with a misfit, more passes for noise.
     if other.rms < found.rms:
         noise = min(noise, float(np.sqrt(np.mean(_noise(others, structure, other, settings)))))
     nearer, near = (others, other) if other.rms < found.rms else (data, found)
@@ -194,8 +194,8 @@ def _refitted(data: Data, structure: Structure, theta: Array) -> Fit:
 def _noise(data: Data, structure: Structure, found: Fit, settings: Thresholds) -> Array:
     """Return the noise's mean square of each counted sample's record, (N,) [m^2].
 
-    A residual that is white is noise. Another that seems to be is asked once more: a forecast of
-    stretches that were not fitted says how much of it is noise at most.
+    A white residual is noise. For any other that seems to be noise, a forecast of stretches that
+    were not fitted gives an upper bound of the noise.
     """
     splits = splits_of(data, found.error)
     sizes = [part.stop - part.start for part in data.parts]

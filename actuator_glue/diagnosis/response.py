@@ -106,7 +106,7 @@ def of(model: Model, theta: Array, draws: Array, scale: Scale, stiffness: float)
         size = amplitude_of(scale, hertz)
         answer = harmonic(model, table, size, hertz, stiffness)
         gain, phase = np.abs(answer), np.angle(answer)
-        # Phases run away from the best one's by less than half a turn.
+        # Draws' phases differ from the best parameters' by less than half a turn.
         phase = phase[0] + np.angle(np.exp(1j * (phase - phase[0])))
         if phase[0] > 0.5 * math.pi:
             phase = phase - 2.0 * math.pi
@@ -129,12 +129,12 @@ def _interval(values: Array) -> tuple[float, float]:
 
 
 def amplitude_of(scale: Scale, hertz: float) -> float:
-    """Return how large a sine is [m] that exceeds neither stroke nor speed of a test."""
+    """Return the largest amplitude of a sine within the stroke and speed of a test [m]."""
     return min(scale.stroke, scale.velocity / (2.0 * math.pi * hertz))
 
 
 def harmonic(model: Model, table: Array, size: float, hertz: float, stiffness: float) -> Array:
-    """Complex gain (m,) of the first harmonic of a sine, from simulations that it settles in.
+    """Complex gain (m,) of the first harmonic of a sine, from simulations that have settled.
 
     Args:
         model: Eq. (2) with effects.

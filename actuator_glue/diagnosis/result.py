@@ -77,20 +77,20 @@ class DiagnosisData:
         base: posterior of the base parameters in the augmented model.
         structure: effect names of the augmented model.
         names: parameter names of the columns of `posterior`.
-        posterior: draws of base and effect parameters over all structures that may be the
-            machine's, shape (m, p): told intervals are their quantiles. What these records leave
-            open is spread as far as it is, one parameter at a time.
-        which: of each of these draws the structure that it is of, index in `mixture`, shape (m,).
-        mixture: effects of the structures that draws are of.
-        joint: draws under the structure that is told alone, shape (n, p), to simulate with.
+        posterior: draws of base and effect parameters over all plausible structures, shape
+            (m, p): reported intervals are their quantiles. Parameters that these records leave
+            open are spread over all that is open, one parameter at a time.
+        which: structure of each of these draws, index in `mixture`, shape (m,).
+        mixture: effects of these structures.
+        joint: draws under the reported structure alone, shape (n, p), to simulate with.
         rhat: largest R-hat of chains; NaN where the draws are not of chains.
         sampler: what drew them (`method`: 'importance', 'dream', 'laplace') and how well.
         best: best-fit parameters, shape (p,).
         traces: curves for the report.
         surrogate: a generic regression of equal flexibility and what it leaves out of sample.
-        remaining: where in loop, frequency, amplitude and time the unexplained rest sits.
-        seconds: wall time; NaN where nobody took it.
-        at_bound: parameters that their bounds hold.
+        remaining: where in frequency, amplitude, velocity and time the unexplained residual lies.
+        seconds: wall time; NaN where it was not measured.
+        at_bound: parameters pressed against their bounds.
         sampling: per record its source, its rate as recorded and as fitted [Hz].
         preparation: the lines of `advice` that say what was done to the records.
         learned: terms among the effects that were learned from these records.
@@ -102,10 +102,10 @@ class DiagnosisData:
             errors are then those of the data since.
         prior: what was known of Eq. (2)'s parameters before, beside the bounds; None for nothing.
         setup: another set-up of the records that explains them far better than the one given.
-        structures: all structures that the search which led to the answer refitted, least error
-            left out first.
+        structures: all structures that were refitted on the way to the answer, greatest weight
+            first.
         history: the steps that led to the answer, in order; the last one is the answer.
-        effort: what the search cost, of what it may; it ended early where that is 1 and more.
+        effort: share of the effort that the search spent; at 1 and more it ended early.
     """
 
     verdict: Verdict
@@ -188,7 +188,7 @@ class DiagnosisData:
         }
 
     def entry(self, name: str) -> Effect:
-        """Return what an effect of that name is here, learned or of the catalogue."""
+        """Return the effect of that name, learned here or of the catalogue."""
         own = {term.name: term.effect for term in self.learned}
         return own[name] if name in own else CATALOGUE[name]
 

@@ -1,10 +1,10 @@
 """The ridge that one specimen stiffness k leaves: other parameters that fit as well.
 
-Then the response has alpha_1 beta_0/(alpha_2 + k) and alpha_3/(alpha_2 + k) in it, and of the
-oil's stiffness alone nothing (of forces their share of it). Draws reach along that ridge only as
-far as `identifiable.py` lets them: where on it they lie is where a fit stood, and with an oil that
-is soft beside its specimen not even a spread tells. So it is walked, until bounds or the records
-end it.
+Under one k the response depends on alpha_1 beta_0/(alpha_2 + k) and alpha_3/(alpha_2 + k), not on
+the oil's stiffness by itself (forces enter as shares of it). Draws reach along that ridge only as
+far as `identifiable.py` lets them: their place on it is that of the fit, and with an oil that is
+soft beside its specimen not even their spread shows the ridge. So it is followed until bounds or
+the records end it.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from actuator_glue.model.identifiable import EDGE
 from actuator_glue.records import Array
 
 _OIL = 2  # column of alpha_2
-_STEPS = 20  # each over e^2 at least: more than any bounds are apart
-_LEAST = 0.1  # of a step, as a logarithm: bounds end what is shorter
+_STEPS = 20  # each by a factor of e^2 at least: farther than any bounds are apart
+_LEAST = 0.1  # length of a step, as a logarithm: a shorter one is stopped by a bound
 
 
 def left_open(space: Space, model: Model, scorer: Scorer, theta: Array) -> Array:
@@ -33,7 +33,7 @@ def left_open(space: Space, model: Model, scorer: Scorer, theta: Array) -> Array
         space: the working coordinates of all records.
         model: whose parameters they are.
         scorer: the fitting part, and whitening filters of its noise.
-        theta: the best of them (p,), m = 1 where records under several stiffnesses leave no ridge.
+        theta: the best parameters (p,), returned alone where several stiffnesses leave no ridge.
     """
     out = [theta]
     for end in (-EDGE, EDGE):

@@ -33,8 +33,8 @@ class Scorer:
         data: the counted samples.
         taps: whitening filter of each record.
         blocks: slices of the joined vectors.
-        likely: whether blocks are scored under the parameters that are most likely without them:
-            where only noise is left. Beside misfit those of least squares are nearer in the error.
+        likely: whether blocks are scored under the parameters that are most likely without them,
+            as where only noise is left; with misfit, least-squares parameters leave less error.
     """
 
     data: Data
@@ -50,7 +50,7 @@ class Scorer:
 
     @classmethod
     def of(cls, data: Data, splits: list[Split], *, misfit: bool = False) -> Scorer:
-        """Take the noise of each record from the split of its residual, or all that is in it."""
+        """Take each record's noise from the split of its residual; with `misfit`, all of it."""
         if misfit:
             splits = [s.all_of_it() for s in splits]
         blocks = []
@@ -87,15 +87,15 @@ class Scorer:
         for i, move in enumerate(self.moves(fit, *fitted, self.blocks)):
             e = error[self.blocks[i]]
             left = e - move @ jac[:, self.blocks[i]]
-            # A block that alone fixes a parameter must not explode: it is scored as fitted.
+            # The score of a block that alone fixes a parameter must not explode: it is limited.
             out[i] = -0.5 * min(float(left @ left), 4.0 * float(e @ e) + 8.0)
         return out
 
     def left_out_error(self, fit: Fit) -> float:
         """Rms error of all blocks, each under least-squares parameters fitted without it [m].
 
-        What is compared in metres is fitted in metres, as the structures themselves are. No less
-        than the fit itself leaves: short of its optimum a step promises what no fit has reached.
+        Errors compared in metres are fitted in metres, as the structures themselves are. At least
+        the error of the fit: short of its optimum a step promises less than any fit has reached.
         """
         if fit not in self._errors:
             self._errors[fit] = self._left_out_error(fit)
@@ -124,7 +124,7 @@ class Scorer:
         known = scale > 0
         scale = scale[known]
         jac, room = jac[known] / scale[:, None], room[:, known] * scale
-        # Prior of the move, 30 of these nats wide: keeps directions no block fixes at rest.
+        # Prior of the move, 30 standard deviations wide: directions that no block fixes stay.
         normal, pull = jac @ jac.T + 1e-3 * np.eye(len(jac)), jac @ error
         if self.data.prior is not None:
             size = np.sqrt(np.mean(error**2))
@@ -151,7 +151,7 @@ def _plain(fit: Fit) -> tuple[Array, Array]:
 
 
 def _step(normal: Array, pull: Array, room: Array) -> Array:
-    """Return the Gauss-Newton step (p,); what would leave its room (2, p) stops at its end."""
+    """Return the Gauss-Newton step (p,); parameters stop at the end of their room (2, p)."""
     step, free = np.zeros(len(pull)), np.ones(len(pull), dtype=np.bool_)
     while free.any():
         rest = pull - normal[:, ~free] @ step[~free]
@@ -164,9 +164,9 @@ def _step(normal: Array, pull: Array, room: Array) -> Array:
 
 
 def evidence(scores: Array, reference: Array) -> float:
-    """Return the gain of block scores over a reference without its best block [nats].
+    """Return the gain of block scores over a reference, the best block left out [nats].
 
-    What one stretch of a record alone supports is not evidence about the actuator.
+    A gain that one stretch of a record alone supports is not evidence about the actuator.
     """
     difference = scores - reference
     return float(difference.sum() - max(0.0, difference.max()))

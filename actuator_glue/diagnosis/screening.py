@@ -41,7 +41,7 @@ def screen(
     """
     neutral = np.array([p.neutral if p.neutral is not None else 0.0 for p in parameters])
     lower, upper = np.array([p.lower for p in parameters]), np.array([p.upper for p in parameters])
-    # What is finite may overflow in products.
+    # Finite values may still overflow in products.
     alive = np.asarray((np.abs(seen) < _FINITE).all(axis=1))
     seen = np.where(alive[:, None], seen, 0.0)
     scales = np.sqrt(np.einsum('pn,pn->p', jacobian, jacobian))

@@ -28,18 +28,18 @@ from actuator_glue.model.parameters import BASE
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 
-_COARSE = 8  # iterations of every refit; those in the running go on
+_COARSE = 8  # iterations of every refit; promising ones go on
 _TOLERANCE = 1e-4
-# Relative gain of a step that a refit in the running does not go on for. A hundredth of a nat of a
-# structure's weight is 1e-5 of the squared error where that is that of noise (weights.py).
+# Relative gain of a step below which a promising refit ends. A hundredth of a nat of a structure's
+# weight is 1e-5 of the squared error where that is only noise (weights.py).
 _DONE = 1e-5
 _FINISHED = 2  # iterations on all samples after those on stretches of them
-_PROMISING = 0.95  # of the error at most is left by friction that is looked at twice
+_PROMISING = 0.95  # of the error: friction that leaves less is searched for globally
 _POLISHED = 4
-FAR = 1.5  # times another's squared error: too far behind for the last digits to matter
-_LAST, _LEAST_GAIN = 60, 1e-6  # iterations at most of a structure that is told, and tolerance
+FAR = 1.5  # times another's squared error: too far behind to be worth finishing
+_LAST, _LEAST_GAIN = 60, 1e-6  # iterations at most of a reported structure, and tolerance
 _FINER = 0.1  # of a usual finite-difference step
-_LONG = 5.0  # times its stretches: there they tell which minimum is the lowest
+_LONG = 5.0  # times their stretches: for longer data these tell which minimum is the lowest
 
 
 def by_score(trial: Trial) -> float:
@@ -49,12 +49,12 @@ def by_score(trial: Trial) -> float:
 
 @dataclass(frozen=True)
 class Asked:
-    """What a structure is refitted with.
+    """Refits of a structure that are asked for.
 
     Attributes:
         current: the structure.
-        names: of further effects, one at a time.
-        below: mean squared error that one leaves whose refit is worth finishing [m^2].
+        names: further effects, added one at a time.
+        below: mean squared error below which a refit is worth finishing [m^2].
     """
 
     current: Trial
@@ -63,10 +63,10 @@ class Asked:
 
 
 def _worth_finishing(row: Sequence[Trial], below: float) -> list[Trial]:
-    """Return those near the best of some trials, best first, and what leaves less by far.
+    """Return the trials near the best, best first, and those of far smaller error.
 
-    Short of its optimum a fit has a bad score, but is not worth the last digits where another is
-    far better.
+    A fit short of its optimum has a bad score, but is not worth finishing where another is far
+    better.
     """
     error = row[0].mean_square if row else 0.0
     tried = [t for i, t in enumerate(row[:_POLISHED]) if i < 2 or t.mean_square < FAR * error]
@@ -82,8 +82,8 @@ class Search:
     Attributes:
         data: the counted samples.
         scorer: noise and blocks; set once the base is fitted.
-        entries: all effects there are, in the order in which they stand in a structure; those
-            of the catalogue, and learned terms that nothing else knows.
+        entries: all effects, in the order in which they stand in a structure: those of the
+            catalogue, and learned terms that only this search knows.
         names: effects that act on the mean response.
         each: refits candidates, several at a time if it can (the kernels release the
             interpreter lock).
@@ -141,19 +141,19 @@ class Search:
         return [n for n in self.names if n not in trial.effects]
 
     def wider(self, names: Sequence[str]) -> Search:
-        """Return a search that tries further effects; what was refitted is known to it."""
+        """Return a search that tries further effects; it knows all structures refitted so far."""
         own = {f.name: copy(getattr(self, f.name)) for f in fields(self) if f.name[0] == '_'}
         return replace(self, names=(*self.names, *names), **own)
 
     def take_over(
         self, other: Search, final: Trial, singles: Sequence[Trial], matters: float
     ) -> None:
-        """Refit what another search of nearly the same target knows, from where it ended.
+        """Refit structures of another search of nearly the same target, from where they ended.
 
         Args:
-            other: the search; its names and learned terms go on to this one.
-            final: what it ended with: what leaves no more that matters, or has one effect less,
-                is refitted, too.
+            other: the search; its names and learned terms are taken over.
+            final: its result; structures that leave no materially larger error, or have one
+                effect less, are refitted, too.
             singles: every single effect; those that leave more are taken as they are.
             matters: least rms error that matters [m].
         """
@@ -180,7 +180,7 @@ class Search:
         return [(self.structure(*effects), fit) for effects, fit in found]
 
     def add(self, current: Trial, name: str, each: Each = map) -> Trial:
-        """Refit `current` with one more effect; with `each` where nothing else is meanwhile."""
+        """Refit `current` with one more effect; pass `each` where nothing else runs meanwhile."""
         model = self.structure(*current.effects, name)
         key = frozenset(model.effects)
         near = self.effort.earlier.ended.get(key)
@@ -205,7 +205,7 @@ class Search:
         return self.trial(model.effects, name)
 
     def polish(self, trial: Trial, valves: bool = True) -> Trial:
-        """Finish the refit of a trial that is in the running, from other valves if need be."""
+        """Finish the refit of a promising trial, from slower or quicker valves if need be."""
         key, added = frozenset(trial.effects), self.entries[trial.added]
         wanted = 2 if valves and poles.may_change(added) else 1
         if self._polished.get(key, 0) < wanted:
@@ -223,10 +223,10 @@ class Search:
         return self.trial(trial.effects, trial.added)
 
     def finished(self, trial: Trial, finely: bool = False) -> Trial:
-        """Go on with a refit until it gains nothing: a pole beside a zero creeps.
+        """Go on with a refit until it gains nothing: a pole near a zero converges slowly.
 
-        With small steps, too, and from points around it, where something remains (`finely`): over
-        kinks as close as those of friction that sticks and slips differences do not point down.
+        Where something remains (`finely`), also with small difference steps and from points around
+        it: across the close kinks of stick-slip friction, usual differences do not point downhill.
         """
         key, model = frozenset(trial.effects), trial.structure
         last: dict[str, Any] = {'iterations': _LAST, 'tolerance': _LEAST_GAIN}
@@ -241,9 +241,9 @@ class Search:
         return self.trial(trial.effects, trial.added)
 
     def _keep(self, key: frozenset[str], found: Fit) -> None:
-        """Note a refitted structure; the name of a learned term tells another look nothing."""
+        """Note a refitted structure; a learned term's name means nothing to a later diagnosis."""
         self._tried[key] = found
-        # Over the kinks of friction a refit ends wherever it comes to: it is searched for anew.
+        # On the kinks of friction a refit may end anywhere: a later diagnosis searches it anew.
         if all(n in CATALOGUE and CATALOGUE[n].group != 'friction' for n in key):
             self.effort.remembered.ended[key] = found.theta
 
@@ -281,9 +281,9 @@ class Search:
         return self._signature(name, self._stand_in(self.structure(name)))
 
     def signatures(self) -> tuple[Array, Array, Scorer]:
-        """Every effect's at all its starting sizes (s, M) [m], beside what it is seen against.
+        """Every effect's signatures at all its starting sizes (s, M) [m].
 
-        That is the Jacobian of Eq. (2) (4, M), and the noise.
+        And what they are seen against: the Jacobian of Eq. (2) (4, M), and the noise.
         """
         assert self.scorer is not None
         part, rows = self._stretches, []
@@ -335,7 +335,7 @@ class Search:
         """Refit `current` with every further effect, best out-of-sample score first.
 
         Those near the best are finished, from a slower and a quicker valve too if need be, where
-        they leave a mean squared error `below` what matters [m^2].
+        they leave a mean squared error of less than `below` [m^2].
         """
         asked = Asked(current, tuple(names or self.names), below)
         return self.additions_to([asked], progress, valves=valves)[0]
@@ -350,7 +350,7 @@ class Search:
     ) -> list[list[Trial]]:
         """Refit several structures as `additions` does, all of their refits at the same time.
 
-        What is finished is near the best of its row, or of all rows `together`.
+        Those near the best of their row, or of all rows `together`, are finished.
         """
         wanted = [[(a.current, n) for n in a.names if n not in a.current.effects] for a in asked]
         # Two structures may lead to the same one: it is refitted from the first.

@@ -1,4 +1,4 @@
-"""What a search for the missing effects ends with, on the fitting part of the records."""
+"""The result of a search for the missing effects, on the fitting part of the records."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from actuator_glue.diagnosis.trial import Trial
 
 @dataclass(frozen=True)
 class Selection:
-    """What the fitting part says.
+    """Result of a search on the fitting part.
 
     Attributes:
         base: Eq. (2) refitted.
@@ -26,7 +26,7 @@ class Selection:
         material: materiality threshold [m].
         nats: evidence that any addition must have.
         steps: of the search that added one effect at a time; none where something else led here.
-        described: whether that ended as one learned term leaves nothing material.
+        described: whether that search ended because one learned term leaves nothing material.
     """
 
     base: Trial

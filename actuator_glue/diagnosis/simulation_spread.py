@@ -35,7 +35,7 @@ def spread(
         reach: whether the error is asked for.
 
     Returns:
-        The standard deviation (N,) [m], and the rms error [m], see `reached`; None unasked.
+        The standard deviation (N,) [m], and the rms error [m], see `reached`; None if not asked.
     """
     rows = rng.integers(0, len(draws), min(_DRAWS, len(draws)))
     every = max(1, len(rows) * centre.size // _KEPT)
@@ -63,9 +63,9 @@ def spread(
 def reached(error: Array, off: Array, parameters: int) -> float:
     """The least rms error of parameters in the 95 % region of their posterior, to first order [m].
 
-    How far they are open says nothing of an error in another direction: where no such parameters
-    take it away, it is the model's. Least squares over the distances of draws from the best
-    parameters, these weighted within the 95 % region of a normal posterior.
+    Open parameters do not excuse an error in another direction: where no such parameters remove
+    it, it is the model's. Least squares over the distances of draws from the best parameters,
+    their weights within the 95 % region of a normal posterior.
 
     Args:
         error: of the best parameters, (N,) [m].
@@ -77,7 +77,7 @@ def reached(error: Array, off: Array, parameters: int) -> float:
     main = main[values[main] > 1e-12 * values.max()]
     if not main.size:
         return rms(error)
-    # Unit steps of the posterior move the simulation at right angles, by mean squares `sizes`.
+    # Unit steps of the posterior move the simulation orthogonally, by mean squares `sizes`.
     sizes = values[main]
     along = vectors[:, main].T @ (off @ error) / np.sqrt(len(off))
     most = float(scipy.stats.chi2.ppf(0.95, parameters))
@@ -85,7 +85,7 @@ def reached(error: Array, off: Array, parameters: int) -> float:
     def beyond(log: float) -> float:
         return float(np.sum((along / (sizes + np.exp(log))) ** 2)) - most
 
-    # Steps minimise what is left of the error, their squares' sum at most `most`.
+    # Steps minimise the remaining error, with a sum of squares of at most `most`.
     low, high = np.log(sizes.min()) - 40.0, np.log(sizes.max() + np.abs(along).max()) + 40.0
     weight = 0.0 if beyond(low) <= 0.0 else float(np.exp(scipy.optimize.brentq(beyond, low, high)))
     steps = along / (sizes + weight)

@@ -57,7 +57,7 @@ _BEFORE: dict[Stage, float] = {
 
 
 class ShareDone:
-    """The share of a diagnosis that is done, which never falls; a label is no reason to fail."""
+    """The share of a diagnosis that is done, which never falls; unknown labels do no harm."""
 
     def __init__(self) -> None:
         self._done = 0.0

@@ -1,8 +1,8 @@
 """The table of structures: all that a diagnosis refitted, in every scope, each with its weight.
 
 A scope is what a structure holds for, where that is not all records as they were given: one record
-alone, the data since a moment, a command that runs linearly. It is a row like any other: what it
-leaves counts over all data, and its choice has a price.
+alone, the data since a moment, a command that runs linearly. A structure with a scope is a row
+like any other: its error counts over all data, and the choice of the scope has a price.
 """
 
 from __future__ import annotations
@@ -31,10 +31,10 @@ class Row(JsonObject):
         error: rms error of the refit over the fitting part [m].
         left_out: rms error of all blocks of the fitting part, each under parameters refitted
             without it, by one Gauss-Newton step [m].
-        price: what it costs beside that: its parameters, and of how many it could have been
-            chosen [nats].
+        price: its cost besides that error: its parameters, and the number of structures it could
+            have been chosen from [nats].
         log_weight: logarithm of its weight beside that of the first row [nats].
-        chosen: whether it is the structure that is told.
+        chosen: whether it is the reported structure.
     """
 
     effects: tuple[str, ...]
@@ -83,7 +83,7 @@ def row(
 
 
 def scoped(some: Iterable[Row], scope: str, cost: float) -> tuple[Row, ...]:
-    """Return rows in a further scope, whose choice costs so many nats."""
+    """Return rows in a further scope, whose choice costs `cost` nats."""
     return tuple(
         replace(r, scope=', '.join(filter(None, (scope, r.scope))), price=r.price + cost)
         for r in some
@@ -109,13 +109,13 @@ def since(some: Iterable[Row], before: Fit, samples: int) -> tuple[Row, ...]:
 def weighed(
     some: Iterable[Row], material: float, effects: tuple[str, ...], scope: str
 ) -> tuple[Row, ...]:
-    """Return rows with their weights, greatest first (weights.py); of equal ones the nearer fit.
+    """Return rows with their weights, greatest first (weights.py); of equal ones the better fit.
 
     Args:
         some: rows of all searches.
         material: least rms error that matters [m].
-        effects: of the structure that is told.
-        scope: of the structure that is told.
+        effects: of the reported structure.
+        scope: of the reported structure.
     """
     best: dict[tuple[str, frozenset[str]], Row] = {}
     for r in sorted(some, key=lambda r: r.left_out):

@@ -1,4 +1,4 @@
-"""An answer as it is told: one object from which report, JSON, figures and exit code are made."""
+"""The reported diagnosis: one object from which report, JSON, figures and exit code are made."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ def told(
     seed: int,
     each: Each,
 ) -> DiagnosisData:
-    """Return what a diagnosis says.
+    """Return the reported diagnosis.
 
     Args:
         drawn: the answer of the fitting part and its posterior.
-        both: what both parts say of it.
+        both: its verdict and evidence in both parts.
         settings: thresholds.
         prior: what was known before; None for nothing.
         seed: seed of what the alarm simulates.
@@ -112,11 +112,11 @@ def told(
 
 
 def _beside(drawn: AnswerPosterior, final: Trial, missed: bool) -> tuple[str, ...]:
-    """Say what may be there beside what is told: too small to matter, or held-out records'.
+    """Name further effects that may be there: too small to matter, or in held-out records only.
 
     Args:
         drawn: the answer of the fitting part and its posterior.
-        final: the structure that is told.
+        final: the reported structure.
         missed: whether the held-out part shows more than noise.
     """
     result, held = drawn.result, drawn.result.prepared.held
@@ -154,7 +154,7 @@ def _at_rest(drawn: AnswerPosterior) -> list[float | None]:
 
 
 def _sampling(prepared: Prepared, still: Sequence[float | None]) -> Iterator[Json]:
-    """Yield what each record was as recorded, and as fitted; its noise at rest is `still` [m]."""
+    """Yield each record's rates as recorded and as fitted; `still` is its noise at rest [m]."""
     rows = (prepared.fit.records, prepared.fit.recorded, prepared.impulses, still)
     for record, whole, impulses, noise in zip(*rows, strict=True):
         yield {

@@ -1,8 +1,8 @@
-"""Ties: names that these records cannot tell from the one that is told, and their structures.
+"""Ties: names that these records cannot tell from the reported one, and their structures.
 
-What is told as an alternative has a probability, and what has none is no alternative (weights.py).
-A lag of the transducer and one of the valve fit the same motion beside other values of beta_1.
-Where a name has alternatives, an interval under that name alone says too much: those of Eq. (2)'s
+Every alternative has a probability, and a name without one is no alternative (weights.py). A lag
+of the transducer and one of the valve fit the same motion with different values of beta_1. Where a
+name has alternatives, an interval under that name alone is too narrow: intervals of Eq. (2)'s
 parameters, and of the sizes of other effects, are those of the mixture of all structures, each
 with the weight of its name.
 """
@@ -25,8 +25,8 @@ from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.effects import CATALOGUE
 
 _NORMAL_95 = 1.959964
-_SAME = 0.5  # of what the best removes: a rival that removes less is none
-_LEAST = 1e-3  # probability that odds are taken against
+_SAME = 0.5  # of what the best removes: a rival that removes less is not tied
+_LEAST = 1e-3  # least probability of the reported name that odds are relative to
 
 
 def compare(
@@ -37,13 +37,13 @@ def compare(
     scorer: Scorer,
     settings: Thresholds,
 ) -> tuple[Rival, ...]:
-    """Say how likely each rival is beside the best, best first.
+    """Return the rivals with their probabilities beside the best, best first.
 
     Args:
         rest: the structure without the effect; its weight is that of "none of these".
         best: the structure with it, added last.
         trials: structures with another effect in its place.
-        odds: weights of `trials` and `rest` beside that of the best.
+        odds: weights of `trials` and `rest` relative to that of the best.
         scorer: noise that they were scored with.
         settings: thresholds.
     """
@@ -65,7 +65,7 @@ def tied_structures(search: Search, found: Selection) -> list[tuple[Trial, float
 
     Args:
         search: what was refitted.
-        found: what is told, with its rivals.
+        found: the reported structure, with its rivals.
     """
     final = found.final
     out: list[tuple[Trial, float]] = []
@@ -80,7 +80,7 @@ def tied_structures(search: Search, found: Selection) -> list[tuple[Trial, float
 
 
 def _limit(trial: Trial, name: str, scorer: Scorer) -> tuple[str, float] | None:
-    """How far the effect added last may be from another of which it is a richer form."""
+    """95 % limit of the parameter that makes the effect added last a richer form of another."""
     effect = CATALOGUE.get(trial.added)
     if effect is None or effect.holds is None or effect.holds[0] != name:
         return None

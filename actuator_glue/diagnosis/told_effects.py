@@ -42,7 +42,7 @@ def of(
     entries = {e.name: e for e in decision.final.structure.entries}
     for name in decision.names:
         described = learned_term.is_learned(entries[name])
-        # A learned term describes; there is no cause by its name that might be true.
+        # A learned term is a description: its name is no cause that might be true.
         own = {p.name: estimates[p.name] for p in entries[name].parameters}
         sizes = _how_much(tuple(own.values()))
         rivals = _told(found.rivals[name], decision.certainty, sizes)
@@ -89,7 +89,7 @@ def of(
 
 
 def _cause(name: str, rivals: tuple[Rival, ...]) -> str:
-    """Name what a form is another shape of, where one of its kind comes nearest to it."""
+    """Name the effect that a form is another shape of, if the nearest name is of its group."""
     named = [r for r in rivals if r.name in CATALOGUE]
     if name not in CAUSES or not named:
         return ''
@@ -107,9 +107,9 @@ def _records_of(trial: Trial, name: str) -> tuple[str, ...]:
 def _told(
     rivals: Sequence[Rival], certainty: float, sizes: Sequence[Estimate]
 ) -> tuple[Rival, ...]:
-    """Return rivals with the probability that is told of them, which is calibrated together.
+    """Return rivals with their reported probabilities, which are calibrated together.
 
-    A probability says no more than the interval beside it, which may hold nothing of the effect.
+    A probability says no more than the interval of the size, which may include the neutral value.
     """
     weight = sum(r.probability for r in rivals)
     sure = max(map(reliability.sureness, sizes), default=1.0)
@@ -118,15 +118,15 @@ def _told(
 
 
 def _how_much(sizes: Sequence[Estimate]) -> list[Estimate]:
-    """Return the sizes that say how much there is of an effect; others say how it goes.
+    """Return the sizes that say how much there is of an effect; others shape it.
 
-    They are the first one, and each that is none of it at zero.
+    They are the first one, and each whose neutral value is zero.
     """
     return [s for i, s in enumerate(sizes) if i == 0 or s.neutral == 0.0]
 
 
 def _excludes_neutral(size: Estimate) -> bool:
-    """Whether the interval of a size holds nothing that leaves the model as it is."""
+    """Whether the interval of a size excludes the neutral value, if there is one."""
     return size.neutral is None or not size.lower <= size.neutral <= size.upper
 
 

@@ -37,7 +37,7 @@ class Trial:
 
     @property
     def model(self) -> Model:
-        """What simulates it."""
+        """The model that simulates it."""
         return self.own or self.structure
 
     @property

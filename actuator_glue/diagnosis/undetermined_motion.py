@@ -1,10 +1,10 @@
 """Motion that no parameters determine: where a piston slips, sticks and comes to rest by chance.
 
-Friction that falls with velocity makes a piston jump. As it comes to a standstill, each jump is up
-to the one before: with parameters changed by a millionth it jumps or not, and rests some
-micrometres elsewhere from then on. Of 300 N in sweeps to 10 Hz the simulation changed by up to
-250 um there. A fit stops anywhere in such a landscape, and what it leaves is no missing effect:
-these samples do not count.
+Friction that falls with velocity makes a piston jump. As it comes to a standstill, each jump
+depends on the one before: with parameters changed by a millionth it jumps or not, and rests some
+micrometres elsewhere from then on. With 300 N in sweeps to 10 Hz the simulation changed by up to
+250 um there. A fit stops anywhere in such a landscape, and its residual there is no missing
+effect: these samples do not count.
 """
 
 from __future__ import annotations
@@ -32,12 +32,12 @@ _APART = 1e-3  # relative: less than records tell of parameters
 _AROUND = 1.0  # s
 _SMALL = 0.2  # of what is material: with all of it single jumps beside a calm second still count
 _SEED = 0
-# Of the squared error at most is left by friction that holds the piston, and by friction that does
-# not fall with velocity where one that does may hold it.
+# Of the squared error: friction that holds the piston leaves at most the first share; friction
+# that does not fall with velocity at most the second, where falling friction may hold the piston.
 _HOLDS, _SIMPLE = 0.25, 0.5
 _ROUNDS = 3
 _ITERATIONS, _TOLERANCE = 25, 1e-5
-# s of each record that count still; with fewer, all stay as they are.
+# s of each record that must still count, fitted and held out; else all stay as they are.
 _FITTED, _HELD = 5.0, 1.0
 
 
@@ -75,10 +75,10 @@ def without(
         prepared: records.
         search: what was refitted to the fitting part, or to what hum leaves of it.
         settings: thresholds.
-        fixed: whether all samples that count go on to.
+        fixed: whether all counted samples stay counted.
 
     Returns:
-        Both as they are where nothing is left to chance, or nearly everything; else the search
+        Both unchanged where nothing is left to chance, or nearly everything; else the search
         knows the friction that was found.
     """
     entries = [e for e in CATALOGUE.values() if e.group == 'friction' and e.holds]
@@ -113,7 +113,7 @@ def without(
 def _found(
     search: Search, simple: Trial, name: str, size: float, fixed: bool
 ) -> tuple[tuple[Mask, ...], Fit] | None:
-    """Samples left to chance and what is fitted to all others; None where there are none."""
+    """Samples left to chance, and the fit to all others; None where there are none."""
     data, model = search.data, search.structure(name)
     shapes = np.unique(np.array(CATALOGUE[name].starts(search.scale()))[:, 1:], axis=0)
     starts = np.column_stack([np.tile(simple.fit.theta, (len(shapes), 1)), shapes])

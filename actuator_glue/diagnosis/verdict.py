@@ -1,4 +1,4 @@
-"""The final verdict: what the fitting part says, held against the part that decided nothing."""
+"""The final verdict: the answer of the fitting part, checked against the held-out part."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from actuator_glue.diagnosis.finding import Finding
 from actuator_glue.diagnosis.held_out import HeldOutError, Verdict
 from actuator_glue.diagnosis.thresholds import Thresholds
 
-_LATER = Thresholds().later_share  # of what was removed: less is small change
+_LATER = Thresholds().later_share  # of what was removed: less is negligible
 _FAR = 2.0  # times the noise's mean square: less than half of the held-out error is noise then
 _SOME = 0.5  # of what matters, removed in the held-out part by what was added
 LIKELY = 0.5  # probability that a name, or one of those tied with it, must have
@@ -19,9 +19,8 @@ LIKELY = 0.5  # probability that a name, or one of those tied with it, must have
 def far(error: HeldOutError, material: float, left: float | None = None) -> bool:
     """Whether the held-out error is far above the noise: no such answer is complete.
 
-    Whatever would account for it: one stretch that bears all of it, other parameters as likely as
-    the best, a moment since which all is different. `left` is the error asked about, `after` if
-    not given [m].
+    Whatever accounts for it: a single stretch, other parameters as likely as the best, or an
+    onset. `left` is the error in question, `after` if not given [m].
     """
     left = error.after if left is None else left
     beyond = left**2 - error.noise_floor**2
@@ -31,9 +30,9 @@ def far(error: HeldOutError, material: float, left: float | None = None) -> bool
 def misses(error: HeldOutError, material: float, left: float | None = None) -> bool:
     """Whether the held-out part shows more than noise: as much as an addition must remove.
 
-    That is `material` [m] and a share of what was removed; not by one stretch of it alone, unless
-    it is far more; and whichever of the parameters that the fitting part leaves possible are
-    taken, or zeros of its records: `left` is what is left of the error then [m].
+    That is `material` [m] and a share of what was removed; not in a single stretch alone, unless
+    it is far more. `left` is the error in question [m]; if not given, the least over all
+    parameters that the fitting part leaves possible, or records' own zeros.
     """
     left, floor = error.least if left is None else left, error.noise_floor
     if far(error, material, left):
@@ -49,7 +48,7 @@ def excused(error: HeldOutError, material: float) -> bool:
 
 
 def takes_nothing(error: HeldOutError, material: float) -> bool:
-    """Whether the additions, their best sizes taken, remove nothing of the held-out error.
+    """Whether the additions at their best fit remove nothing of the held-out error.
 
     That is less than half of what matters: `material` [m].
     """
@@ -57,11 +56,11 @@ def takes_nothing(error: HeldOutError, material: float) -> bool:
 
 
 def borne_out(error: HeldOutError, material: float) -> bool:
-    """Whether the held-out part asks for the additions.
+    """Whether the held-out part confirms the additions.
 
-    What one stiffness leaves open may be far off under the next, with the best parameters and
-    more so with additions. Then those count that both parts allow: whether they leave nothing
-    with the additions, and something without.
+    Parameters that one stiffness leaves open may be far off under the next, more so with
+    additions. Then parameters that both parts allow decide: whether they leave nothing with the
+    additions, and something without.
     """
     if not takes_nothing(error, material):
         return True
@@ -73,10 +72,10 @@ class Excuse(NamedTuple):
     """What accounts for all of a held-out error beyond noise.
 
     Attributes:
-        before: error without the additions then [m]; None where that is not known.
-        after: error then [m].
-        how: what it is, for people.
-        otherwise: how the error is called that is beyond noise, for people.
+        before: excused error without the additions [m]; None where that is not known.
+        after: excused error with them [m].
+        how: the excuse, for people.
+        otherwise: what the error without the excuse is called, for people.
     """
 
     before: float | None
@@ -85,7 +84,7 @@ class Excuse(NamedTuple):
     otherwise: str
 
     def sentence(self) -> str:
-        """Return it for people, without the error that is beyond noise."""
+        """Return the excused error and the excuse, for people."""
         return f'{1e6 * self.after:.1f} um {self.how}'
 
 
@@ -104,11 +103,11 @@ def excuse(error: HeldOutError, material: float) -> Excuse | None:
 def of_both_parts(verdict: Verdict, moved: bool, error: HeldOutError, material: float) -> Verdict:
     """Return the verdict of both parts.
 
-    Additions were chosen on the fitting part alone and stay in the model. Where they take nothing
-    away in the held-out part, the records contradict each other. Where that part shows materially
-    more than noise, or far more with the best parameters, no answer is complete: additions that
-    took error away there beyond chance, or do with parameters as likely, are a part of it
-    (`unexplained`), without any the records contradict each other.
+    Additions were chosen on the fitting part alone and stay in the model. Where they remove
+    nothing in the held-out part, the records contradict each other (`undecided`). Where that part
+    shows materially more than noise, or far more with the best parameters, no answer is complete:
+    additions that remove error there beyond chance, or do so with parameters as likely, are a part
+    of it (`unexplained`), without any the records contradict each other.
 
     Args:
         verdict: what the fitting part says.
@@ -125,9 +124,9 @@ def of_both_parts(verdict: Verdict, moved: bool, error: HeldOutError, material: 
 
 
 def named(verdict: Verdict, effects: Sequence[Finding]) -> Verdict:
-    """Return the verdict where names are weighed: of one that is improbable nothing is complete.
+    """Return the verdict after weighing the names: with an improbable one it is not complete.
 
-    What removes the error is then something that the names tried describe badly.
+    Then the cause is something that the names tried describe badly.
     """
     if verdict == 'missing-effect' and not all(map(likely, effects)):
         return 'unexplained'
@@ -135,9 +134,9 @@ def named(verdict: Verdict, effects: Sequence[Finding]) -> Verdict:
 
 
 def likely(effect: Finding) -> bool:
-    """Whether a name is right more probably than not, or one of those that are tied with it.
+    """Whether a name, or one of those tied with it, is more probably right than not.
 
-    What has no probability is a description, or is measured directly.
+    A finding without a probability is a description, or is measured directly.
     """
     if math.isnan(effect.probability):
         return True
@@ -146,12 +145,12 @@ def likely(effect: Finding) -> bool:
 
 
 def certainty(fitted: float, error: HeldOutError, material: float) -> float:
-    """Return what the names' probabilities are multiplied with, in [0, 1].
+    """Return the factor on the names' share of the weight, in [0, 1].
 
     Args:
-        fitted: by the fitting part.
-        error: held-out error; where it shows more than noise, or the best additions take nothing
-            of it away, names explain at most the share that they, or parameters as likely, do.
+        fitted: that of the fitting part.
+        error: held-out error; where it shows more than noise, or the best additions remove nothing
+            of it, at most the share of it that they remove, with parameters as likely if need be.
         material: smallest error that matters [m].
     """
     nothing = takes_nothing(error, material)
@@ -163,7 +162,7 @@ def certainty(fitted: float, error: HeldOutError, material: float) -> float:
 
 
 def _share_reached(error: HeldOutError) -> float:
-    """Return the share of what Eq. (2) leaves with likely parameters that additions explain so."""
+    """Return the share of Eq. (2)'s error that additions remove, both with likely parameters."""
     floor, without = error.noise_floor, error.reached_before or 0.0
     if not without > floor:
         return 0.0
@@ -175,8 +174,8 @@ def against(
 ) -> str:
     """Say why an estimator should not go on with the augmented model; empty where it may.
 
-    Additions of one record only are no property of the machine; what the held-out part does not
-    bear out would make forecasts worse.
+    Additions of one record only are no property of the machine; additions that the held-out part
+    does not confirm would make forecasts worse.
 
     Args:
         verdict: of both parts.

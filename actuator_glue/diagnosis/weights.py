@@ -1,6 +1,6 @@
-"""One weight for every structure: what it leaves in units of what matters, and what it costs.
+"""One weight for every structure: its error in units of what matters, and its price.
 
-Which effect, of structures of as many:
+Between structures with the same number of effects:
 
     log w = -e^2 / s^2 - p - log(structures of its kind that could have been tried)
 
@@ -10,9 +10,9 @@ nats of independent noise tell any two equations apart, and neither of them is t
 differences count in units of what matters. Nats answer one question only: is it there beyond
 chance.
 
-Whether there is another effect, or another scope, is asked of the best structure of each kind with
-s = m / 2, m what matters: one that takes just that away gains four nats. What matters less would
-otherwise be told as surely as it is there.
+Whether there is another effect, or another scope, is decided between the best structures of each
+kind with s = m / 2, m what matters: an effect that removes just m gains four nats. Otherwise
+effects that matter less would be reported as surely as they are there.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ from actuator_glue.model.effects import Effect
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 
-# Error that costs a nat, of what matters: a tenth of that costs four. With twice of it friction's
-# shape was lost, and with ten times a delay was not told from a lag.
+# Error that costs a nat, over what matters: a tenth of what matters costs four. With twice this
+# value friction's shape was lost, and with ten times a delay was not told from a lag.
 TELLING = 0.05
-# The same for another effect or another scope: four nats for what just matters.
+# The same for another effect or another scope: one that just matters gains four nats.
 MATTERING = 0.5
 
 
@@ -74,7 +74,7 @@ def log_weights(
 
 
 def price(structure: Structure, entries: Mapping[str, Effect], named: int) -> float:
-    """Return what a structure costs beside what it leaves [nats].
+    """Return what a structure costs besides its error [nats].
 
     Args:
         structure: Eq. (2) with effects.

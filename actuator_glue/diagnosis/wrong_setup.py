@@ -1,6 +1,6 @@
 """Whether records were made under another set-up than was given with them.
 
-Stiffnesses that were given to the wrong records, or the wrong run of the command between its
+Stiffnesses that were given to the wrong records, or the wrong hold of the command between its
 samples, look like a machine that is far from Eq. (2). Where Eq. (2) explains far more under
 another set-up, that is said before anything else.
 """
@@ -21,12 +21,12 @@ from actuator_glue.json_value import JsonObject
 from actuator_glue.model.effects import scale
 from actuator_glue.records import Hold, source_name
 
-_FAR = 2.0  # times the mean square that the other set-up leaves: more than half is its doing
+_FAR = 2.0  # times the other set-up's mean square: more than half of the error is the set-up's
 _RUNS = {
     'linear': 'running linearly between its samples (--hold linear)',
     'zoh': 'held between its samples (--hold zoh)',
 }
-_MOST = 6  # records at most of which any two may have been exchanged
+_MOST = 6  # with up to so many records, any two may have been exchanged
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,13 +110,13 @@ def find(
 ) -> WrongSetup | None:
     """Return a set-up that explains records far better than the one given; None for none.
 
-    A command that was given as held and runs linearly is found with what else it leads to
-    (moves/other_hold.py); here the other way round, or beside exchanged stiffnesses.
+    A command given as held that runs linearly is found by moves/other_hold.py, with the effects
+    that it leads to; here the other way round, or together with exchanged stiffnesses.
 
     Args:
         data: the fitting part.
         settings: thresholds.
-        both_holds: whether it is asked here either way round.
+        both_holds: whether both ways round are tried here.
         given: Eq. (2) fitted to `stretched(data)`, where that is known.
     """
     some = stretched(data)

@@ -1,4 +1,4 @@
-"""What is refused before any calibration or diagnosis: records that cannot be what they say."""
+"""Records refused before any calibration or diagnosis, as they cannot be what they say."""
 
 from __future__ import annotations
 
@@ -171,7 +171,7 @@ def pull(record: Record) -> float | None:
 
 
 def _push(record: Record) -> tuple[float, float, bool] | None:
-    """Return what displacement and acceleration say of the force; None where they explain it not.
+    """Return what displacement and acceleration say of the force; None if they do not explain it.
 
     That is force over displacement [N/m], the spread of the displacement over that of the force
     [m/N], and whether a mass could be told apart.
@@ -182,7 +182,8 @@ def _push(record: Record) -> tuple[float, float, bool] | None:
     force, _ = _slow(record.force, record)
     if len(x) < 10 or float(acceleration @ acceleration) == 0.0:
         return None
-    # What a mass takes must not pass for a specimen, nor be taken off it where they look alike.
+    # A mass's force must not pass for a specimen's, nor be subtracted from it where both look
+    # alike.
     shared = float(x @ acceleration) ** 2 / float((x @ x) * (acceleration @ acceleration))
     separate = 1.0 - shared > _SEPARATE
     basis = np.stack([x, acceleration]) if separate else x[None]

@@ -84,7 +84,7 @@ def common_initial(records: Sequence[Record]) -> Initial:
 def clean(
     records: Sequence[Record], holdout: Sequence[Record] = ()
 ) -> tuple[list[Record], list[str]]:
-    """Check records, fill channels that are slower, zero them, take glitches out of commands.
+    """Check records, fill channels slower than the recorder, zero them, remove command glitches.
 
     Returns:
         The records in the order given, held-out ones last, and what was done, for people.

@@ -1,4 +1,4 @@
-"""Records without impulses and frozen readings, which get no leverage on any fit, and are told."""
+"""Impulses and frozen readings removed from records, without leverage on any fit, and reported."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array, Record
 
-_DROPPED = 10  # times a reading repeats that may be that of a channel without signal
-_TRIMS = 2  # refits without what stood out of the last
+_DROPPED = 10  # repeats beyond which a reading may be that of a channel without signal
+_TRIMS = 2  # refits without the samples that stood out of the last one
 
 
 def _unsettled(record: Record, initial: Initial) -> int:
@@ -31,7 +31,7 @@ def _unsettled(record: Record, initial: Initial) -> int:
 def trimmed(data: Data) -> Array:
     """Return parameters of Eq. (2) (4,) that gross errors of the measured channel do not bend.
 
-    Least trimmed squares: what stands out of the residual is left out of the next refit.
+    Least trimmed squares: samples that stand out of the residual are left out of the next refit.
     """
     model, found = Structure(()), base_fit(data).theta
     for _ in range(_TRIMS):
@@ -69,7 +69,7 @@ def without_impulses(
         measured = record.measured.copy()
         measured[before.samples] += before.sizes
         speed = np.abs(np.gradient(output, record.period))
-        # By the reading, too: one that drops out is off where the piston alone is far out.
+        # Far by the reading, too: a dropped-out channel is off only where the piston is far out.
         far = np.minimum(*(np.abs(y - np.median(y)) for y in (output, measured)))
         moving = slice(_unsettled(record, initial), None)
         sizes = (speed[moving], far[moving])
@@ -80,7 +80,7 @@ def without_impulses(
             found = before
         else:
             command = _less(record.command, before, -before.shared)
-            # What becomes one of several samples is in sight in none of them.
+            # Where several samples became one, an impulse cannot be compared sample by sample.
             found = replace(found, shared=in_command(command, found) if count == 1 else 0.0)
             measured[found.samples] -= found.sizes
             record = replace(
@@ -115,8 +115,8 @@ def _with(data: Data, records: Sequence[Record]) -> Data:
 def _phase(output: Array, measured: Array) -> Array:
     """Phase of a motion (n,) in its plane of displacement and velocity [rad].
 
-    NaN where a channel may have dropped out: its reading is one that a motion returns to, and
-    shows only where the piston is away from it.
+    NaN where the channel may have dropped out: such a reading repeats, and stands out only where
+    the piston is away from it.
     """
     speed, away = np.gradient(output), output - np.median(output)
     phase = np.arctan2(

@@ -30,8 +30,8 @@ from actuator_glue.records import Array, Record
 _REACH = len(TAPS) // 2
 _SHORTEST = 240  # samples of a command
 _BEYOND = 6.0  # times what other samples are off
-_LEAST = 1e-3  # of the stroke: what is smaller moves nothing
-# Samples close to each other, and how many they are among: what takes more is a command's own.
+_LEAST = 1e-3  # of the stroke: smaller impulses move nothing
+# Samples close to each other, and how many they are among: more than that is a command's own.
 _FEW, _WIDEST = 3, 20
 _MOST = 0.05  # of all samples: what is more frequent is no accident
 _SURE = 3.0  # standard errors
@@ -80,7 +80,7 @@ def impulses(command: Array, period: float) -> tuple[NDArray[np.intp], Array]:
     for group in np.split(suspect, np.flatnonzero(np.diff(suspect) > 2 * _REACH) + 1):
         begin = max(0, int(group[0]) - _REACH)
         part = slice(begin, int(group[-1]) + _REACH + 1)
-        # Beside another one an impulse may not stand out.
+        # An impulse next to another one may not stand out.
         places = range(int(group[0]) - begin, int(group[-1]) + 1 - begin)
         found = _explained(error[part], limit[part], places)
         if found is not None:
@@ -188,8 +188,8 @@ def shares(record: Record, mended: Record, theta: Array, initial: Initial) -> Tr
 def never_given(found: Traces) -> bool:
     """Whether the piston did not respond: surely, or probably where the reading has them too.
 
-    A share far below none is what the model lacks, and says nothing: less than half as far as from
-    all of it.
+    A share far below zero comes from what the model lacks and says nothing: it must be less than
+    half as far from zero as from one.
     """
     sure = found.moved + _SURE * found.moved_error < _HALF
     return -2.0 * _HALF < found.moved < _HALF and (sure or _in_both(found))
@@ -211,7 +211,7 @@ def without(record: Record, samples: NDArray[np.intp], sizes: Array) -> Record:
 def mended(
     records: Sequence[Record], initials: Sequence[Initial]
 ) -> tuple[list[Record], list[str]]:
-    """Take out of commands what no actuator was given, and out of readings what came with it.
+    """Remove impulses that no actuator was given from commands, and their share from readings.
 
     Args:
         records: checked records of one actuator.

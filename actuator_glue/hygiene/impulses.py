@@ -181,8 +181,9 @@ def _is_a_motion(runs: Sequence[Array], edges: Array) -> bool:
 def in_command(command: Array, found: Impulses) -> float:
     """Return the share of a reading's impulses that the command of the same samples has.
 
-    A motion does not answer within the sample: what is in both is the recorder's. Beside a rough
-    command only many impulses together show it. 0 where it is not surely more than half.
+    A motion does not answer within the sample: an impulse in both channels is the recorder's.
+    Beside a rough command only many impulses together show it. 0 where the share is not surely
+    more than half.
 
     Args:
         command: as recorded (n,) [m].
@@ -192,7 +193,7 @@ def in_command(command: Array, found: Impulses) -> float:
         return 0.0
     error = np.asarray(np.convolve(command, TAPS, 'same'), dtype=np.float64)
     noise = 1.4826 * float(np.median(np.abs(error)))
-    # Beside each other they are seen through each other's polynomials, too.
+    # Impulses next to each other also enter each other's polynomials.
     off = np.zeros(len(command))
     off[found.samples] = found.sizes
     seen = np.convolve(off, TAPS, 'same')[found.samples]
@@ -210,9 +211,9 @@ def _with_motion(starts: list[int], motion: Sequence[Array]) -> bool:
 def _at_a_phase(own: Array, every: Array) -> bool:
     """Whether impulses come at one phase of the motion's cycle, or at two opposite ones.
 
-    What sticks and slips does so once in each direction, neither where the piston is fastest nor
-    where it is farthest out. By the mean resultant of phases that are even over the record
-    (Rayleigh 1919), where most of them agree.
+    A piston sticks and slips once in each direction, neither where it is fastest nor where it is
+    farthest out. By the mean resultant of phases that are even over the record (Rayleigh 1919),
+    where most of them agree.
     """
     known = own[np.isfinite(own)]
     if len(known) < 0.5 * len(own):

@@ -22,7 +22,7 @@ def noise_at_rest(record: Record, samples: int, initial: Initial = 'rest') -> fl
     Args:
         record: the test.
         samples: at its beginning, in which the command does not move; None for fewer than 100.
-        initial: where the piston starts; what does not rest there first comes to rest.
+        initial: where the piston starts; if it does not rest there, it first comes to rest.
     """
     begin = 0 if initial == 'rest' else round(SETTLE / record.period)
     y = record.measured[begin : round(_SURELY * samples)]

@@ -1,4 +1,4 @@
-"""Whether what is taken for noise in motion is none: the channel at rest shows far less."""
+"""Supposed noise in motion that is none, because the channel at rest shows far less."""
 
 from __future__ import annotations
 

@@ -32,9 +32,9 @@ def empty_counts(settings: SamplerSettings) -> Array:
 def tuned(points: Array, counts: Array, settings: SamplerSettings, box: Log) -> ProposalContext:
     """Return what the moves depend on, fitted to points (m, p) and to what they achieved.
 
-    Crossover classes share by their mean squared jump (Vrugt 2016, section 3.2.1); moves without
-    a fixed share divide what the others leave by the square of the effective draws that such
-    jumps make: nearer to the better one alone than to equal parts.
+    Crossover classes share in proportion to their mean squared jump (Vrugt 2016, section 3.2.1);
+    moves without a fixed share divide the rest in proportion to the square of the effective draws
+    that such jumps make: nearer to the better one alone than to equal parts.
 
     Args:
         points: the archive, in sampling coordinates.

@@ -27,8 +27,9 @@ from actuator_glue.inference.transforms.log import Log
 from actuator_glue.jit import njit
 from actuator_glue.records import Array
 
-# A normal posterior takes at most six times the power from one temperature to the next; 80 narrow
-# ones of displacement and force took twice at most, and chains at 18 % of as many points at least.
+# A rise of the power, with too few distinct starts of chains, that shows a collapse. For a normal
+# posterior the power rises at most sixfold from one temperature to the next; for 80 narrow ones of
+# displacement and force it doubled at most, and distinct starts were 18 % of the chains at least.
 _LEAP, _DISTINCT = 20.0, 0.25
 
 
@@ -185,7 +186,7 @@ def _reweigh(
     start: NDArray[np.intp],
     target: Array,
 ) -> float:
-    """Return the next power; resample the points z (m, p) by the weights that leads to.
+    """Return the next power; resample the points z (m, p) by the weights that it implies.
 
     Args:
         z: points, (m, p).

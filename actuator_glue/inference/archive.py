@@ -67,5 +67,5 @@ class Archive:
 
 @njit
 def newest(rows: Array, size: int) -> Array:
-    """Return the first `size` rows but the oldest quarter: what came from the start fades."""
+    """Return the first `size` rows but the oldest quarter: points of the start fade out."""
     return rows[size // 4 : size]

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike
 from actuator_glue.inference.moments import PRIOR_DOMINATED
 from actuator_glue.records import Array
 
-# Width of the strip at a bound, in standard deviations of the posterior, and the share of what a
-# flat posterior of the same spread has there: a normal one is told where its bound lies within
-# about 1.2 standard deviations, and in a thousand draws never by chance at 3.
+# Width of the strip at a bound, in standard deviations of the posterior, and the least mass there
+# over that of a flat posterior of the same spread: a normal one is reported where its bound lies
+# within about 1.2 standard deviations, and in a thousand draws never by chance at 3.
 _STRIP = 0.25
 _FLAT = 0.5
 

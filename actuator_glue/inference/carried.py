@@ -93,7 +93,7 @@ class Carried:
         return replace(self, spread=tuple(float(s) for s in np.hypot(self.spread, steps)))
 
     def later(self, seconds: float) -> Carried:
-        """Return the same as a record that begins so much later [s] has it; see `later`."""
+        """Return the same for a record that begins so much later [s]; see `later`."""
         draws = later(self.names, self.draws, seconds)
         return self if draws is self.draws else replace(self, draws=draws)
 
@@ -140,7 +140,7 @@ class Carried:
 
 
 def later(names: tuple[str, ...], draws: Array, seconds: float) -> Array:
-    """Return draws (m, p) as a record that begins so much later [s] has them.
+    """Return draws (m, p) for a record that begins so much later [s].
 
     A gain that drifts counts from the beginning of its record: 1 + r (t + s) is
     (1 + r s)(1 + r/(1 + r s) t).

@@ -26,10 +26,10 @@ from actuator_glue.inference.steps import ChainState, Path, enter, many, one
 from actuator_glue.inference.transforms.log import Log
 from actuator_glue.records import Array
 
-# Evaluations of a compiled likelihood between two questions whether to stop: 0.2 ms; and in one go
-# where nobody asks: the uniforms of more would leave the cache.
+# Evaluations of a compiled likelihood between two checks whether to stop: 0.2 ms; and in one go
+# without such checks: the uniforms of more would leave the cache.
 _PATIENCE, _MOST = 200, 2000
-# Parts of a run in which no draws are enough.
+# Parts of a run before `enough` is asked for the first time.
 _FIRST = 5
 
 __all__ = ['Chains', 'Info', 'SamplerSettings', 'State', 'Watchers', 'init', 'sample', 'step']
@@ -164,8 +164,8 @@ class Watchers(NamedTuple):
     Attributes:
         stop: asked after every step, or about every 200 evaluations where the likelihood has a
             compiled form, always at the same ones; True ends the run.
-        enough: asked after every of the settings' parts, from the fifth on, whether its draws do;
-            True ends it.
+        enough: asked after every one of the settings' parts, from the fifth on, whether the draws
+            suffice; True ends the run.
         progress: called now and then with (evaluations made, evaluations at most).
     """
 
@@ -247,7 +247,7 @@ def sample(
         if progress is not None and new // every > done // every:
             progress(state.evaluations, evaluations)
         done = new
-        # In this order: what had drawn enough is told so when `stop` repeats where it ended.
+        # In this order: where a replay's `stop` ends the run, `enough` has been asked, too.
         if enough is not None and done in looks and enough(so_far(done)):
             break
         if stop is not None and stop(state):

@@ -1,8 +1,8 @@
 """Draws of a nearly known posterior by importance sampling, which says whether it succeeded.
 
-Batches come from mixtures of Student t's, each fitted to what the weights make of the batches
-before it (Cappe et al. 2008); a weight compares the posterior with the mixture of all (adaptive
-multiple importance sampling, Cornuet et al. 2012). The largest weights are smoothed by a Pareto
+Batches come from mixtures of Student t's, each fitted to the weighted batches before it (Cappe et
+al. 2008); a weight compares the posterior with the mixture of all (adaptive multiple importance
+sampling, Cornuet et al. 2012). The largest weights are smoothed by a Pareto
 distribution (Vehtari et al. 2024), whose shape k tells whether they have a mean and a variance:
 from 0.5 on they have not, and nothing is returned.
 """
@@ -22,20 +22,20 @@ from actuator_glue.records import Array
 
 _BATCH = 192  # evaluations between two looks
 _MOST = 10  # batches
-# After so many batches what has not come as far as this share of the way is left to chains.
+# From so many batches on, a run with less than this share of the draws due is left to chains.
 _LOOK, _SHARE = 3, 0.5
 _PARETO = 0.5
-_LEAST = 1e-9  # spread of what has none
-_EQUAL = 0.4  # of all draws are shared by the parts of a proposal, however likely they are
+_LEAST = 1e-9  # spread of coordinates that have none
+_EQUAL = 0.4  # of all draws are shared equally by a proposal's parts, whatever their weights
 _WIDEST = 700.0  # logarithm of a ratio of weights
 _NOTHING = 1e-300  # above the cut of a tail: its inverse, a few times over, is still a number
 _FEWEST = 5  # weights that a Pareto distribution is fitted to
 
 
 class ImportanceSample(NamedTuple):
-    """Equally weighted draws (m, p), one an evaluation; how many are effective, and k.
+    """Equally weighted draws (m, p), one per evaluation; how many are effective, and k.
 
-    Some of them are equal: fewer would lose what the weights know.
+    Some of them are repeated: fewer draws would lose information of the weights.
     """
 
     points: Array

@@ -1,4 +1,4 @@
-"""Posterior moments as the paper's Table 4 gives them, and what the data said nothing about."""
+"""Posterior moments as in the paper's Table 4, and which parameters the data do not determine."""
 
 from __future__ import annotations
 
@@ -15,8 +15,9 @@ from actuator_glue.records import Array
 # combination is identified, the ratio lies between 0.3 and 1; where a test identifies a parameter
 # it is below 0.05.
 PRIOR_DOMINATED = 0.25
-# Share of a parameter's variance that may be that of parameters which the data do not tell. Their
-# truth may lie three standard deviations off, in a corner of the box: a tenth is one of its own.
+# Share of a parameter's variance that may come from parameters that the data do not determine.
+# Their truth may lie three standard deviations off, in a corner of the box: with a tenth that
+# moves this parameter by one of its own.
 _BORNE = 0.1
 
 
@@ -30,7 +31,7 @@ class Moments:
         skewness: third standardised moment (divisor m).
         cov: coefficient of variation, stddev / |mean|; infinite for a mean of zero.
         prior_dominated: True where the draws are about as wide as the prior, or move with those of
-            a parameter of which they are: what the data tell is then a combination of both.
+            such a parameter: the data then determine a combination of both only.
         best: the draw of the largest log likelihood; None where none was given.
     """
 
@@ -99,7 +100,7 @@ def _dominated(centred: Array, variance: Array, wide: NDArray[np.bool_]) -> NDAr
         return wide
     scale = np.sqrt(np.where(variance > 0.0, variance, 1.0))
     unit = centred / scale[:, np.newaxis]
-    # One by one: what two of them are worth together, their ratio, the data may well tell.
+    # One by one: the data may well determine a combination of two of them, their ratio.
     share = ((unit[wide] @ unit[~wide].T / unit.shape[1]) ** 2).max(axis=0)
     found = wide.copy()
     found[~wide] = share > _BORNE

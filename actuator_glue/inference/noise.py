@@ -3,8 +3,8 @@
 Sensor and background noise, white or coloured, has the same spectrum at all times. What a wrong
 model leaves follows the command through time and frequency. So at each frequency the median
 over time of the residual's spectrogram is noise (for Gaussian noise the power is exponential,
-its mean is its median / ln 2), and what exceeds it is structure. What acts slowly, an offset or a
-drift, is known as well as the noise is small at next to 0 Hz, which takes longer windows to see.
+its mean is its median / ln 2), and what exceeds it is structure. How well slow effects, an offset
+or a drift, are known depends on the noise next to 0 Hz, which takes longer windows to see.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ class Split:
 
     def density(self, frequency: Array) -> Array:
         """Noise density at frequencies (k,), smoothed, (k,) [m^2/Hz]."""
-        # The median over some 50 windows scatters by 20 %; that over a few more, and unevenly.
+        # The median over some 50 windows scatters by 20 %; over a few by more, and unevenly.
         psd, slow = np.exp(_smooth(np.log(self.psd), 5)), _smooth(self.slow[1], 7)
         below, beyond = _BLEND
         share = np.clip((beyond - frequency / self.frequency[1]) / (beyond - below), 0.0, 1.0)

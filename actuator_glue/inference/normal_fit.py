@@ -1,9 +1,9 @@
 """Mean and covariance of a nearly normal density from its values at draws, not from their scatter.
 
 Moments of draws scatter: of 400 independent ones the mean by a twentieth of a standard deviation,
-the variance by 7 %. Handed from window to window that adds up, in directions that no window tells.
-The logarithm of a normal density is a quadratic function, which a regression on few draws gives
-exactly, and of one that is nearly normal nearly so.
+the variance by 7 %. Handed from window to window that adds up, in directions that no window
+determines. The logarithm of a normal density is a quadratic function, which a regression on few
+draws gives exactly, and that of a nearly normal density nearly so.
 """
 
 from __future__ import annotations

@@ -35,7 +35,7 @@ class SamplerSettings:
             warm start takes a quarter. None: 50 p^1.5 for p parameters, 200 to 2000.
         steps: steps of each point's chain per temperature.
         survivors: share of the population that the weights of the next temperature may leave.
-        parts: of the run, at whose ends, from the fifth on, it is asked whether that will do.
+        parts: of the run; at the end of each, from the fifth on, `enough` is asked (`dream`).
     """
 
     chains: int = 20

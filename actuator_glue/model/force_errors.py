@@ -1,4 +1,4 @@
-"""Errors of the measured force, beside which each transducer's gain and offset are unknown.
+"""Errors of the measured force, with gain and offset of each transducer unknown.
 
 The gain would pass for specimen stiffness and the offset for a preload, so both are fitted in each
 record to whatever is simulated: only the force's course is evidence.
@@ -44,7 +44,7 @@ def transducer(simulated: Array, measured: Array) -> tuple[Array, Array]:
 
 
 def shown(simulated: Array, measured: Array) -> Array:
-    """Return what transducers show of simulated forces (m, n) that measured (n,) [N]."""
+    """Return simulated forces (m, n) as shown by the transducer that measured (n,) [N]."""
     gain, offset = transducer(simulated, measured)
     return np.asarray(gain[:, None] * simulated + offset[:, None])
 

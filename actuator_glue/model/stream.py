@@ -66,7 +66,7 @@ class Stream:
         self._jitter = float(self._values['jitter'][0])
         self._quantum = float(self._values['quantum'][0])
         self._noise = float(noise_stddev)
-        # What noise, jitter and converter make of a sample is what the controller has of it.
+        # A controller that reads the transducer gets its noise, jitter and converter steps, too.
         self._heard = bool(self._values['feedback_share'][0] > 0.0) and bool(
             self._noise or self._jitter or self._quantum
         )

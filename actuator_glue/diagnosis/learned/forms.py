@@ -1,7 +1,7 @@
 """Forms that a learned term may take: functions of what is known at a place of the loop.
 
-What is smooth and holds at any time is written here, friction in friction.py, what else remembers
-or changes with time in memory.py.
+Smooth forms without memory are written here, friction in friction.py, other forms that remember or
+change with time in memory.py.
 Each is an effect written as an expression (docs/effects.md), its sizes scaled to the test, so that
 it is screened, refitted and compared as the effects of the catalogue are.
 """
@@ -32,7 +32,7 @@ from actuator_glue.model.parameters import Coordinate, Parameter
 
 # Terms added to the signal of a place: products of what is known there, '|x|' for a modulus.
 # Odd ones keep both directions alike, even ones do not; those with k act with a specimen only.
-# What acts on the command knows how fast that is (r), not how fast the piston follows it.
+# At the command the rate is that of the command (r), not of the piston.
 _PRODUCTS: Final = {
     'command': ('u |u|', 'u u u', 'u u', 'u |r|', '|u| r', 'r |r|', 'r r r'),
     'valve': ('e |e|', 'e e e', 'e e', 'e |x|'),
@@ -56,12 +56,12 @@ _PRODUCTS: Final = {
 _SATURATES: Final = ('command', 'valve', 'flow', 'sensor')
 _SHARPEST = 5.0  # times a limit may be overdriven
 _BENDS = (1e-3, 3.0)  # a bend of a thousandth is a corner
-# Of a step, over the signal's size: what is tried and what is most, and its width; places tried.
+# Steps of a reading, over its size: size tried and largest, width; number of places tried.
 _STEPS, _STEP_WIDTH, _PLACES = (0.01, 0.5), 0.005, 20
 # What may act in one direction only: damping, a stop or a bracing, a valve in a leak.
 _ONE_WAY: Final = {'force': ['v'], 'specimen': ['k', 'x'], 'flow': ['f']}
 _WAYS: Final = {'forth': 'max', 'back': 'min'}
-# Forms of what has a name in the catalogue, and that name.
+# Forms that are another shape of a catalogue effect, and its name.
 CAUSES: Final = {
     **dict.fromkeys(learned_friction.SHAPES, learned_friction.DRY),
     'learned-flow-limit': 'flow-saturation',
@@ -107,7 +107,7 @@ def _product(place: str, factors: list[str], sizes: dict[str, float]) -> Effect:
 
 
 def _one_way(place: str, factors: list[str], way: str, sizes: dict[str, float]) -> Effect:
-    """Return what acts in one direction only."""
+    """Return a product that acts in one direction only."""
     *others, last = factors
     text = '*'.join([*others, f'{_WAYS[way]}({last}, 0)'])
     return _added(place, '-'.join([*factors, way]), text, factors, sizes)
@@ -116,7 +116,7 @@ def _one_way(place: str, factors: list[str], way: str, sizes: dict[str, float]) 
 def _added(
     place: str, name: str, text: str, factors: list[str], sizes: dict[str, float]
 ) -> Effect:
-    """Return something times a parameter, added to the signal of a place."""
+    """Return a product times a parameter, added to the signal of a place."""
     signal = SIGNAL[PLACES[place]]
     full = 1.0
     unit = list(DIMENSIONS[signal])
@@ -134,7 +134,7 @@ def _added(
 def _coordinate(place: str, factors: Sequence[str]) -> Coordinate | None:
     """Return what a size is sampled as: forces and flows count as shares of the oil's stiffness.
 
-    So it is where one of them is added to what has not this unit already.
+    That holds where the product does not contain the flow, which has this unit already.
     """
     share = place in ('force', 'specimen', 'flow') and 'q' not in ''.join(factors)
     return 'share' if share else None
@@ -188,7 +188,7 @@ def _one_sided(place: str, sizes: dict[str, float]) -> Effect:
 
 
 def _fading(place: str, sizes: dict[str, float]) -> Effect:
-    """Return a gain that falls from the centre on, which no limit does."""
+    """Return a gain that falls from the centre on, unlike that of a limit."""
     z = SIGNAL[place]
     unit, bounds = [-d for d in DIMENSIONS[z]], (0.0, _SHARPEST / sizes[z])
     meaning = f'one over where {z} is halved'
@@ -198,7 +198,7 @@ def _fading(place: str, sizes: dict[str, float]) -> Effect:
 def _step(sizes: dict[str, float]) -> Effect:
     """Return a reading that jumps where the piston passes a place, as at the joint of a scale.
 
-    Over a width that is small and fixed: none would have a likelihood of stairs.
+    The jump has a small fixed width: without one the likelihood would be a staircase.
     """
     size = sizes['y']
     width, most = f'{_STEP_WIDTH * size:.3g}', _STEPS[1] * size

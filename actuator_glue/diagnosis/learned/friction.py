@@ -1,4 +1,4 @@
-"""Forms of dry friction that is not there at once: over some velocity, over some way."""
+"""Forms of dry friction that builds up gradually, over a velocity or over a displacement."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from actuator_glue.model.effects import Effect
 from actuator_glue.model.effects.terms.entry import term
 from actuator_glue.model.parameters import Parameter
 
-# Other shapes of a name of the catalogue; friction that falls with velocity stands for them, too.
+# Catalogue effect of which these are other shapes; falling friction may stand for them, too.
 DRY: Final = 'coulomb-friction'
 FALLING: Final = 'stribeck-friction'
 SHAPES: Final = ('learned-force-friction', 'learned-force-presliding')
-# The way over which friction is reached, over the stroke.
+# Displacement over which friction builds up, over the stroke.
 _WAYS: Final = (1e-4, 0.1)
 
 
@@ -25,7 +25,7 @@ def forms(sizes: Mapping[str, float]) -> list[Effect]:
 
 
 def _friction(place: str, sizes: Mapping[str, float]) -> Effect:
-    """Return friction that rises over some velocity; at the specimen, what its supports add."""
+    """Return friction that rises over a velocity; at the specimen, that of its supports."""
     name, speed = f'{place}_friction', sizes['v']
     force, size = _dry(place, name, sizes)
     return term(
@@ -42,7 +42,7 @@ def _friction(place: str, sizes: Mapping[str, float]) -> Effect:
 
 
 def _presliding(place: str, sizes: Mapping[str, float]) -> Effect:
-    """Return friction that rises over some way, as a spring does until it slips (Prandtl)."""
+    """Return friction that rises over a displacement, as a spring until it slips (Prandtl)."""
     name = f'{place}_presliding'
     force, size = _dry(place, name, sizes)
     low, high = (share * sizes['x'] for share in _WAYS)
@@ -60,7 +60,7 @@ def _presliding(place: str, sizes: Mapping[str, float]) -> Effect:
 def _dry(place: str, name: str, sizes: Mapping[str, float]) -> tuple[str, Parameter]:
     """Return friction's size as a force, and the parameter: at the specimen over its stiffness.
 
-    Negative it would weaken faster than the oil column is stiff.
+    Not negative: it would weaken faster than the oil column is stiff.
     """
     if place == 'specimen':
         return f'k*{name}', Parameter(name, 'm', 0.0, sizes['x'], 'friction as m', 0.0, 'share')

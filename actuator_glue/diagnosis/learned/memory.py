@@ -1,13 +1,13 @@
 """Forms of learned terms that remember, or change with time.
 
-Hysteresis is the play operator in a share of what moves (of which any, after Prandtl and
-Ishlinskii, is a sum), or in all of it, which is lost motion and needs one size only. Memory acts
-only where the signal goes on through the loop; what a sensor or a specimen remembers has names in
-the catalogue: backlash, yielding, friction. A gain that changes begins at the start of the test
-and settles; before it has, it drifts. Of command and sensor only the latter is offered: a slow
-change of both leaves the same.
-A pair of poles and zeros is written at the command: a transducer's or a frame's resonance is the
-same to a loop that is linear.
+Hysteresis is the play operator in a share of the signal (any hysteresis, after Prandtl and
+Ishlinskii, is a sum of these), or in all of it, which is lost motion and needs one size only.
+Memory is offered only where the signal goes on through the loop; that of a sensor or a specimen
+has names in the catalogue: backlash, yielding, friction. A changing gain begins to change at the
+start of the test and settles; until then it drifts. It is offered at the sensor, not the command:
+a slow change of either leaves the same.
+A pair of poles and zeros is written at the command: in a linear loop a transducer's or a frame's
+resonance has the same effect.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from actuator_glue.model.effects.terms.entry import starting_from, term
 from actuator_glue.model.effects.terms.expression import SIGNAL
 from actuator_glue.model.parameters import Parameter
 
-# Place, what turns over late there, and the sign of that in the signal.
+# Place, the quantity that lags at reversals there (play), and the sign of the lag in the signal.
 _LATE: Final = {
     'command': ('command', 'u', '-'),
     'feedback': ('valve', 'x', '+'),
@@ -33,23 +33,24 @@ _LATE: Final = {
     'flow': ('flow', 'q', '-'),
 }
 _LOST: Final = ('command', 'feedback')
-# What each is where all that moves turns over late: of the valve that is in the catalogue.
+# Name of each where all of the quantity has play: that of the valve is in the catalogue.
 _ALL_LATE: Final = {
     **{word: f'learned-{word}-play' for word in _LOST},
     'valve': 'valve-hysteresis',
 }
-# Places whose gain may change, and the signal that is changed by a share of something.
+# Places whose gain may change, and the quantity of which a share is added to the signal.
 _SETTLING: Final = (('flow', 'q'), ('specimen', 'k*x'), ('sensor', 'y'))
 _SHARE = (-1.0, 2.0)  # at -1 nothing is left
 _WIDTHS = (1e-3, 0.5)  # of the signal's size
-# Of the frequency at which a sine of the test's stroke has its speed; and of the samples'.
-# At twice that a real machine had a damped one far above its sweep: worse in other tests.
+# Limits of a resonance: over the frequency at which a sine of the test's stroke has its speed, and
+# over the sample rate. With twice the upper limit a real machine got a damped resonance far above
+# its sweep, which was worse in other tests.
 _FREQUENCIES, _SAMPLED = (0.1, 4.0), 0.4
 _DAMPINGS = (0.005, 0.7)
-# Where it is looked for: its response is narrow.
+# Frequencies, dampings and sizes from which fits start: a resonance's response is narrow.
 _LOOKED, _DAMPED, _SEEN = 10, (0.05, 0.2), 0.02
-_HEIGHT = 2.0  # by which a gain may change at a resonance, and above it
-_TIMES = (0.02, 5.0)  # of the test's duration: in the longest all but 9 % of a drift are linear
+_HEIGHT = 2.0  # largest change of the gain at a resonance, and above it
+_TIMES = (0.02, 5.0)  # of the test's duration: with the longest, a drift is linear but for 9 %
 
 
 def forms(sizes: Mapping[str, float]) -> list[Effect]:
@@ -79,7 +80,7 @@ def _play(word: str, sizes: Mapping[str, float]) -> Effect:
 
 
 def _hysteresis(word: str, sizes: Mapping[str, float]) -> Effect:
-    """Return play in a share of what moves."""
+    """Return play in a share of the quantity."""
     place, of, sign = _LATE[word]
     signal, name = SIGNAL[place], f'{word}_hysteresis'
     low, high = (share * sizes[of] for share in _WIDTHS)
@@ -98,7 +99,7 @@ def _hysteresis(word: str, sizes: Mapping[str, float]) -> Effect:
 
 
 def _settling(place: str, of: str, duration: float) -> Effect:
-    """Return a gain that changes by a share in the end, and how soon."""
+    """Return a gain that finally changes by a share, with a time constant."""
     signal, name = SIGNAL[place], f'{place}_settling'
     shortest, longest = (share * duration for share in _TIMES)
     return term(
@@ -113,7 +114,7 @@ def _settling(place: str, of: str, duration: float) -> Effect:
 
 
 def _resonance(sizes: Mapping[str, float]) -> Effect:
-    """Return a pair of poles, and what changes by it at their frequency and above it."""
+    """Return a pair of poles that changes the gain at their frequency and above it."""
     usual = sizes['v'] / (2.0 * math.pi * sizes['u'])
     low, high = (share * usual for share in _FREQUENCIES)
     high = max(2.0 * low, min(high, _SAMPLED / sizes['h']))

@@ -46,8 +46,8 @@ def sizes_of(scale: Scale) -> dict[str, float]:
 def command_rate(sizes: Mapping[str, float]) -> str:
     """Return the rate of the command as an expression [m/s].
 
-    Over half of a sample: of amplitude and rate at 9 Hz and 128 samples per second, over a whole
-    one lateness left 1 to 5 % of the noise, here 0 to 2 %.
+    Taken over half a sample: for amplitude and rate at 9 Hz and 128 samples per second, the delay
+    left 0 to 2 % of the noise, over a whole sample 1 to 5 %.
     """
     return f'rate(u, {0.5 * sizes["h"]:.3g})'
 

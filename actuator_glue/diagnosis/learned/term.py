@@ -27,7 +27,7 @@ class LearnedTerm:
     Attributes:
         name: name of the effect.
         place: where in the loop it acts.
-        equation: what it makes of the signal there.
+        equation: what it does to the signal there.
         numbers: the equation with its parameters' means.
         parameters: posterior of its parameters.
         excited: range of everything in the equation that moved, about [unit of the symbol].
@@ -44,7 +44,7 @@ class LearnedTerm:
 
     @property
     def effect(self) -> Effect:
-        """The effect, which no catalogue has."""
+        """The effect, which the catalogue does not contain."""
         return entries({self.name: self.definition})[0]
 
     def sentence(self) -> str:
@@ -118,7 +118,7 @@ def _numbers(equation: str, parameters: Mapping[str, Estimate]) -> str:
 
 
 def _motion(trial: Trial, data: Data) -> dict[str, Array]:
-    """Return what moved in the fitting records, about: the valve and the oil at rest [SI]."""
+    """Return the signals of the fitting records, about: valve and oil quasi-static [SI]."""
     parts = []
     beta_1, into = trial.fit.theta[0], trial.fit.theta[1]
     outputs = data.split(data.target - trial.fit.error)

@@ -27,17 +27,17 @@ def find(
 ) -> tuple[Measured, ...]:
     """Return the measurement effects that are significant and material.
 
-    An effect is material where it is so in the samples as recorded; its rms is that of what it
-    leaves in the samples that are fitted.
+    An effect must be material in the samples as recorded; its rms is that of its remainder in the
+    fitted samples.
 
     Args:
         data: counted samples.
         found: the effects of the motion, fitted to them.
         settings: thresholds.
-        line: hum that was taken out of the data before.
+        line: hum that was removed from the data before.
     """
     error = found.final.fit.error
-    # Judged beside what was found: Eq. (2) alone may leave so much that hum is nothing to it.
+    # Hum is judged with the effects found: Eq. (2) alone may leave so much that it is hidden.
     line = (
         replace(line, floor=float(error @ error) / len(error)) if line else hum.find(data, error)
     )
@@ -58,7 +58,7 @@ def find(
 
 
 def _model(data: Data, final: Trial) -> Model:
-    """Return what simulates the records as recorded."""
+    """Return the model that simulates the records as recorded."""
     if not isinstance(final.own, OneRecord):
         return final.model
     own = final.own
@@ -68,7 +68,7 @@ def _model(data: Data, final: Trial) -> Model:
 
 
 def _left(effect: Measured, data: Data, simulated: Array) -> float:
-    """Rms of what an effect leaves in means over samples [m]."""
+    """Rms that is left of an effect in means over samples [m]."""
     squares, total = 0.0, 0.0
     for part, count in zip(data.as_recorded.split(simulated), data.factors, strict=True):
         if effect.name == 'quantisation':

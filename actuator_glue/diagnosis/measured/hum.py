@@ -17,13 +17,15 @@ from actuator_glue.diagnosis.measured import repeated
 from actuator_glue.inference.least_squares.data import Data, Mask
 from actuator_glue.records import Array, Record
 
-_CLEAR = 18.0  # times what a tenth of its neighbours exceed, 40 times the mean of noise:
-# one in 10^6 records of that.
+# Times the level that a tenth of its neighbours exceed; 40 times the mean of noise, which one in
+# 10^6 records of noise shows.
+_CLEAR = 18.0
 _NEIGHBOURS, _EXCEEDED = 201, 90.0  # bins, percentile
 _LOWEST = 2.0  # Hz
 _PIECE = 1 << 20  # samples
-_ORDERS = 9  # harmonics of a sinusoidal command are its response, not hum: of one that
-_STEADY = 0.05  # bins of its spectrum that it may be off, where it lasts: all of them
+_ORDERS = 9  # harmonics of a sinusoidal command that are its response, not hum
+# Bins by which the frequency of a lasting sinusoid may be off; of it, all harmonics are excluded.
+_STEADY = 0.05
 
 
 @dataclass(frozen=True)
@@ -93,12 +95,12 @@ def _fitted(pieces: Iterable[tuple[Array, Array]], frequency: float) -> Array:
 
 
 def _peaks(error: Array, mask: Mask, record: Record) -> tuple[Array, Array]:
-    """Frequencies and power over what few neighbours exceed, zero outside the usable band.
+    """Frequencies and power over a level that few neighbours exceed, zero outside the usable band.
 
     The counted samples (N,) stand at their own times among the others, which are zero: spliced
     together, a line would change its phase at every seam. A command that is repeated moves the
-    piston in lines, one in so many bins: each bin must stand out from those at its place between
-    two of them, too.
+    piston in regularly spaced lines: each bin must also stand out from the bins at the same place
+    between two of these lines.
     """
     values = np.zeros(len(mask))
     values[mask] = scipy.signal.detrend(error)
@@ -115,7 +117,7 @@ def _peaks(error: Array, mask: Mask, record: Record) -> tuple[Array, Array]:
 
 
 def _level(spectrum: Array) -> Array:
-    """What a tenth of the neighbours of each bin exceed."""
+    """Level that a tenth of the neighbours of each bin exceed."""
     return np.asarray(
         scipy.ndimage.percentile_filter(spectrum, _EXCEEDED, _NEIGHBOURS, mode='reflect')
     )
@@ -132,7 +134,7 @@ def _of_command(frequency: Array, command: Array, period: float) -> NDArray[np.b
     for order in range(1, _ORDERS + 1):
         for tone in f[strong]:
             out |= np.abs(frequency - order * tone) < order * 3.0 * bin_width
-    # Friction answers one that lasts with harmonics of every order, each a line as sharp as it.
+    # Friction answers a lasting sinusoid with harmonics of every order, each as sharp a line.
     for tone in _steady(spectrum, strong) * bin_width:
         order = np.maximum(np.round(frequency / tone), 1.0)
         out |= np.abs(frequency - order * tone) < (2.0 + order * _STEADY) * bin_width

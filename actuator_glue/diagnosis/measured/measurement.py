@@ -17,7 +17,7 @@ from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.records import Array, Record
 
 _ROUNDING = 1e-6  # of a step: values are written with so many digits
-_PIECE = 1 << 18  # samples filtered at a time: what a long record takes is its means
+_PIECE = 1 << 18  # samples filtered at a time: of a long record only means are kept
 _FADE = 256  # samples after which the filter has forgotten, to the last digit, where it began
 _CLEAR_STEP = 60.0  # of the median power, as for a line in time (hum.py)
 
@@ -70,7 +70,7 @@ def quantisation(data: Data) -> Measured | None:
         values = record.measured - record.measured.min()
         counts = np.round(values / own)
         off = np.maximum(np.abs(values / own - counts), _ROUNDING)
-        # Values off the grid by no more than that, against anywhere between its lines.
+        # Likelihood of values this close to the grid, against anywhere between its lines.
         nats += len(values) * float(np.log(0.5 / off.max()))
         knowledge += float(np.sum((counts - counts.mean()) ** 2) / np.mean((own * off) ** 2))
     return Measured('quantisation', step / np.sqrt(12.0), nats, (step,), (knowledge**-0.5,))

@@ -1,4 +1,4 @@
-"""How often a command repeats itself within a record: what it moves has lines then, all alike."""
+"""The period of a command that repeats itself within a record: the motion then has lines."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ _ALIKE = 0.99  # correlation of a command with itself one period later; its size
 def period(command: Array) -> int:
     """Return after how many samples a command (n,) repeats itself; n where it does not.
 
-    The first lag up to half of the record at which it is correlated with itself as well as at
-    none, after it was not.
+    The first lag, up to half of the record, at which the correlation with itself is as high as at
+    lag zero, after it has been negative.
     """
     u = command - np.mean(command)
     n, most = len(u), len(u) // 2

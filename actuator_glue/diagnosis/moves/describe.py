@@ -1,10 +1,10 @@
-"""Learn terms that no catalogue names, where material structure remains beside what it does.
+"""Learn terms that the catalogue has no name for, where it leaves material structure.
 
 Sparse regression inside of the loop: forms at every place are screened by their signatures, the
-most promising are refitted together with Eq. (2) and what was found, in the free-run simulation,
-and one is kept if it gains out of sample what any addition must, and the price of having been
-chosen among many. A name comes before a description: a term adds to what has a name, and takes
-its place only where it explains the rest, or much that the name does not.
+most promising are refitted together with Eq. (2) and the effects found, in the free-run
+simulation, and one is kept if it gains out of sample what any addition must, plus the price of
+having been chosen among many. Names come before descriptions: a term is added to named effects,
+and replaces them only where it explains the rest, or much that they do not.
 """
 
 from __future__ import annotations
@@ -29,17 +29,17 @@ from actuator_glue.diagnosis.trial import Trial
 Way = Callable[[BeamSearch, Selection], Selection | None]
 _LONG = 100_000  # samples
 _MOST = 2  # learned terms
-_MUCH = 0.5  # of what matters: a description in the place of a name removes so much
+_MUCH = 0.5  # of what matters: a description must remove so much beyond the name it replaces
 _REFITS = 4  # per structure and turn
-# Another shape of the same cause removes so much of what matters; and more than means over samples
-# and the steps of a simulation leave, of the stroke.
+# Another shape of the same cause must remove this share of what matters, and this share of the
+# stroke, which is more than the errors of decimation and simulation steps.
 _SHAPED, _STEPS = 0.1, 3e-4
-_NEARLY = 0.1  # of what names remove: a description that removes less more says the same
+_NEARLY = 0.1  # of what names remove: a description that removes less beyond them is tied
 
 
 def plainer(result: Conclusion, asking: Asking) -> Conclusion | None:
     """Return a description in place of names that leave nothing material, where it is better."""
-    selection = result.selection.apart()  # forms and their signatures serve all ways
+    selection = result.selection.apart()  # all ways share its forms and their signatures
     for way in ways(result.found):
         if result.effort.over:
             break
@@ -49,9 +49,9 @@ def plainer(result: Conclusion, asking: Asking) -> Conclusion | None:
 
 
 def with_terms(result: Conclusion, asking: Asking) -> Conclusion | None:
-    """Describe by learned terms material structure that the catalogue leaves, or names badly.
+    """Add learned terms for material structure that the catalogue leaves, or names badly.
 
-    Another shape of a cause that was named comes before further terms.
+    Another shape of a named cause is tried before further terms.
     """
     selection, found = result.selection, result.found
     described = reshaped(selection, found)
@@ -61,10 +61,10 @@ def with_terms(result: Conclusion, asking: Asking) -> Conclusion | None:
 
 
 def explains_rest(selection: BeamSearch, current: Trial) -> bool:
-    """Whether a learned term leaves nothing material, alone or beside what was found.
+    """Whether a learned term leaves nothing material, alone or added to the names found.
 
-    Asked for before names are heaped up: where the machine is none of the catalogue's, some more
-    would take the time that a description needs.
+    Tried before many names are added: for a machine outside the catalogue, further names would
+    cost the time that a description needs.
 
     Args:
         selection: the model selection.
@@ -79,8 +79,8 @@ def explains_rest(selection: BeamSearch, current: Trial) -> bool:
 def ways(found: Selection) -> list[Way]:
     """Return the searches to make where effects leave nothing material, in order.
 
-    Structure of which they leave much may pass for noise until a form explains it; of long
-    records that is not asked, as it would take half as long as all the rest.
+    They may leave much structure that passes for noise until a form explains it; for long records
+    that is not searched, as it would take half as long as all the rest.
     """
     if not found.final.effects:
         return []
@@ -95,8 +95,9 @@ def learned(selection: BeamSearch, found: Selection, complete: bool = False) -> 
     Args:
         selection: the model selection that ended with `found`.
         found: what the catalogue explains.
-        complete: whether that counts as all: structure may pass for noise until a form explains
-            it. A form takes the place of such names only where it removes materially more.
+        complete: whether the names leave nothing material: structure may still pass for noise
+            until a form explains it. A form replaces such names only where it removes materially
+            more.
 
     Returns:
         The selection with learned terms, or None where none is worth it.
@@ -108,7 +109,7 @@ def learned(selection: BeamSearch, found: Selection, complete: bool = False) -> 
         if search.effort.over:
             break
         selection.progress('learned term', turn / _MOST)
-        # A wrong name of the catalogue may stand where the term belongs: Eq. (2) starts, too.
+        # A wrong name may stand where the term belongs: start from Eq. (2) alone, too.
         starts = [best] if turn or not best.effects else [best, search.trial(())]
         better = _additions(selection, starts, best, names, complete)
         if better is None:
@@ -127,10 +128,10 @@ def learned(selection: BeamSearch, found: Selection, complete: bool = False) -> 
 def instead(selection: BeamSearch, found: Selection) -> Selection | None:
     """Return one term in place of all effects, where it is better for its parameters.
 
-    Lost motion of the command moves the piston nearly as play and a lag of the transducer do: two
-    names of one cause; or as a dead band of the valve, a wrong one. The term pays for having been
-    chosen among many, in nats beside one for each parameter; in the place of one name for what
-    any addition must gain, too, and it removes half of what matters, for a name is more.
+    Lost motion of the command moves the piston nearly as play and a lag of the transducer do, two
+    names for one cause, or as a dead band of the valve, a wrong name. The term pays in nats for
+    its parameters and for having been chosen among many; in place of a single name it must also
+    gain what any addition must, and remove half of what matters, since a name is worth more.
 
     Args:
         selection: the model selection that ended with `found`; its noise stays.
@@ -156,18 +157,18 @@ def instead(selection: BeamSearch, found: Selection) -> Selection | None:
 
 
 def reshaped(selection: BeamSearch, found: Selection) -> Selection | None:
-    """Return an answer with another shape of its cause, if the records show that.
+    """Return an answer with another shape of its dry friction, if the records show that.
 
-    Friction that is reached over 1 mm/s leaves less than what matters as friction that is there
-    at once; but what that shifts, damping and speed of the valve, is wrong by much on records of
-    another kind.
+    Friction that builds up over 1 mm/s leaves less than what matters if it is fitted as friction
+    that is there at once; but damping and valve speed, which that shifts, are far off on records
+    of another kind.
 
     Args:
         selection: the model selection that ended with `found`; its noise stays.
         found: names.
     """
     search, named = selection.search, found.final
-    # The name itself, or one that is told as well as it.
+    # Names that are dry friction, or tied with it.
     dry = {DRY, FALLING}
     told = [n for n, row in found.rivals.items() if any(r.tied and r.name in dry for r in row)]
     if not told:
@@ -175,14 +176,14 @@ def reshaped(selection: BeamSearch, found: Selection) -> Selection | None:
     _offered(search)
     least = _decisive(search, selection.settings)
     selection.progress('learned term', 0.0)
-    # In its place, or beside it: friction may fall with velocity, too.
+    # In place of the name, or beside it, as friction may also fall with velocity.
     best = named
     in_place = [search.without(named, name) for name in told]
     for starts, share in ((in_place, _SHAPED), ([named], _MUCH)):
         seen = max(share * selection.material, _STEPS * search.scale().stroke)
         below = best.mean_square - 0.5 * seen**2  # or nearly
         if found.left >= selection.material:
-            below = math.inf  # where names are far off so are rough refits of shapes
+            below = math.inf  # where names fit badly, so do rough refits of shapes
         trials = [t for s in starts for t in search.additions(s, SHAPES, below=below)]
         worth = [t for t in trials if removed(best, t) > seen]
         better = max(worth, key=lambda t: _gain(search, t, best), default=best)
@@ -194,11 +195,11 @@ def reshaped(selection: BeamSearch, found: Selection) -> Selection | None:
 
 
 def as_good_and_plainer(selection: BeamSearch, found: Selection, named: Selection) -> bool:
-    """Whether a description explains all that is left, as well as names do with more parameters.
+    """Whether a description explains everything, better than names and with no more parameters.
 
-    A name that fits only with what no record shows by itself, as a fault that the controller
-    reads, may stand for what the catalogue does not hold: it is told where it explains more than
-    a description, out of sample and less a nat per parameter.
+    Names that include an effect which no record shows by itself, such as a fault that the
+    controller reads, may stand for something outside the catalogue: they are kept only where they
+    explain more than a description, out of sample and less a nat per parameter.
 
     Args:
         selection: the model selection that ended with both.
@@ -212,7 +213,7 @@ def as_good_and_plainer(selection: BeamSearch, found: Selection, named: Selectio
 
 
 def _offered(search: Search) -> list[str]:
-    """Let a search know the forms of this test; return the names of those that are no effects."""
+    """Add the forms for this test to a search; return the names of those not searched yet."""
     if not search.described:
         offered = forms(search.scale(), search.entries)
         search.entries |= {effect.name: effect for effect in offered}
@@ -250,9 +251,9 @@ def _additions(
         for trial in row:
             least = selection.material
             if start is not best:
-                # In the place of names it must explain the rest, and be more than tied with them:
-                # while something remains a name is worth more than a description. Where no term
-                # explains all, one that says more than all of them is where to begin.
+                # In place of names a term must explain the rest, and be more than tied with them:
+                # while something remains, a name is worth more than a description. Where no term
+                # explains all, one that gains more than all names is a start for adding names.
                 whole = selection.left(trial) < selection.material
                 if not plain and _gain(search, trial, best) > cost:
                     begun = names_beside_term.with_names(selection, trial)
@@ -269,7 +270,7 @@ def _additions(
 
 
 def _plainer(selection: BeamSearch, trial: Trial) -> Trial:
-    """Put the form that the term holds in its place, where it is not worth more than that."""
+    """Replace a term by the simpler form it contains, unless it is worth more than that."""
     search, holds = selection.search, selection.search.entries[trial.added].holds
     if holds is None or holds[0] in trial.effects:
         return trial
@@ -278,11 +279,11 @@ def _plainer(selection: BeamSearch, trial: Trial) -> Trial:
 
 
 def _displaces(selection: BeamSearch, trial: Trial, best: Trial) -> bool:
-    """Whether a term would only take the place of names that explain nearly the same.
+    """Whether a term would only replace names that explain nearly the same.
 
-    Beside the term they are not worth their parameters, though something remains: a smooth form
-    is closer to the machine than the catalogue's equation for what is one cause. What leaves
-    materially more than the term does not explain nearly the same.
+    With the term they are not worth their parameters, though something remains: a smooth form may
+    be closer to the machine than the catalogue's equation for the same cause. Names that leave
+    materially more than the term do not explain nearly the same.
     """
     search = selection.search
     after = selection.pruned(trial)
@@ -298,10 +299,10 @@ def _displaces(selection: BeamSearch, trial: Trial, best: Trial) -> bool:
 
 
 def _merit(search: Search, trial: Trial) -> float:
-    """Out-of-sample score less a nat per parameter; beside misfit less of the error left out [m].
+    """Out-of-sample score less a nat per parameter; with misfit, minus the left-out error [m].
 
-    Nats are those of the frequencies with the least noise: where structure remains they prefer
-    what leaves more of it elsewhere.
+    Nats weigh the frequencies with the least noise: where structure remains they prefer a model
+    that leaves more of it elsewhere.
     """
     assert search.scorer is not None
     if not search.scorer.likely:
@@ -316,7 +317,7 @@ def _decisive(search: Search, settings: Thresholds) -> float:
 
 
 def _least_removed(form: str, names: Sequence[str], material: float) -> float:
-    """Return what a description must remove in the place of names, which are more than it [m].
+    """Return the error that a description must remove to replace names, which count more [m].
 
     Half of what matters, or all of that where it is another shape of one of them.
     """

@@ -1,8 +1,8 @@
 """Whether the controller closes its loop on the recorded transducer.
 
-What such a transducer does wrong the piston does, too: its play, curve or lag leave another trace
-than those of one that only looks on. Without a fault of the transducer nothing tells the two
-apart, so the loop is asked for together with one.
+The piston follows the faults of such a transducer: its play, curve or lag leave another trace than
+those of a transducer outside the loop. Without a fault of the transducer nothing tells the two
+apart, so the loop is tried together with a fault.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ _OWN = 2  # parameters: of the least fault and of the share that is fed back
 def fed_back(result: Conclusion, asking: Asking) -> Conclusion | None:
     """Return the answer with a fault of the transducer inside the controller's loop.
 
-    Or one with learned terms in place of all that it explains, where that is better.
+    Or the answer with learned terms in place of that fault, where these are better.
     """
     found = in_the_loop(result.selection, result.found)
     if found is None:
@@ -48,7 +48,7 @@ def _described(result: Conclusion, inside: Selection) -> Conclusion | None:
 def in_the_loop(selection: BeamSearch, found: Selection) -> Selection | None:
     """Put a fault of the transducer inside the controller's loop.
 
-    Asked for where structure remains, and where more parameters than its own may stand for it.
+    Tried where structure remains, and where effects with more parameters may stand for it.
 
     Args:
         selection: the model selection that ended with `found`.

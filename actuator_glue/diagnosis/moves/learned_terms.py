@@ -1,4 +1,4 @@
-"""Learned terms, and where none is worth it two effects at once, for material structure."""
+"""Moves for material structure: learned terms and, where none is worth it, two effects at once."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ class Asking:
     Attributes:
         settings: thresholds.
         tell: takes progress.
-        conclude: searches records, of which all samples that count are fixed, from the beginning.
+        conclude: searches records from the beginning, with the counted samples fixed.
     """
 
     settings: Thresholds
@@ -35,10 +35,10 @@ class AnswerMove:
     """A further search from an answer.
 
     Attributes:
-        what: what it does, for people; empty where it tells its own steps.
-        when: whether it is asked for beside an answer.
-        make: returns another answer; None, or the same with more rows, where that stands.
-        each_time: whether it is asked for beside the same answer in more data of a machine, too.
+        what: what it does, for people; empty where it notes its own steps.
+        when: whether it is tried on an answer.
+        make: returns another answer; None, or the same with more rows, where the answer stands.
+        each_time: whether it is tried again on the same answer when a machine has more data.
     """
 
     what: str
@@ -47,7 +47,7 @@ class AnswerMove:
     each_time: bool = True
 
     def made(self, result: Conclusion, asking: Asking) -> Conclusion | None:
-        """Return another answer; None where the one so far stands, or stood before."""
+        """Return another answer; None where the present one stands, or did so with fewer data."""
         if self.each_time:
             return self.make(result, asking)
         effects, samples = frozenset(result.found.final.effects), result.data.target.size
@@ -63,11 +63,11 @@ Groups: TypeAlias = tuple[tuple[AnswerMove, ...], ...]
 
 
 def follow(result: Conclusion, groups: Groups, asking: Asking) -> Conclusion:
-    """Ask for one move after the other, of each group until one is taken.
+    """Try one move after the other, in each group until one is taken.
 
     Args:
         result: the answer so far.
-        groups: moves, in the order in which they are asked for.
+        groups: moves, in the order in which they are tried.
         asking: what they work with.
 
     Returns:
@@ -81,7 +81,7 @@ def follow(result: Conclusion, groups: Groups, asking: Asking) -> Conclusion:
             other = move.made(result, asking) if move.when(result) else None
             if other is None:
                 continue
-            if other.found is result.found:  # it stands, held against more
+            if other.found is result.found:  # it stands, compared with more
                 result = other
                 continue
             result = after(result, other, move.what) if move.what else other
@@ -90,20 +90,20 @@ def follow(result: Conclusion, groups: Groups, asking: Asking) -> Conclusion:
 
 
 def after(before: Conclusion, result: Conclusion, what: str) -> Conclusion:
-    """Return an answer with the history, and the rows, of the one that it takes the place of."""
+    """Return an answer with the history, and the rows, of the one that it replaces."""
     step = SearchStep.to(result.decision.final, what)
     return beside(replace(result, history=(*before.history, step)), before)
 
 
 def beside(result: Conclusion, other: Conclusion) -> Conclusion:
-    """Return an answer with the rows of another one that it was held against."""
+    """Return an answer with the rows of another one that it was compared with."""
     if other.selection.search is result.selection.search:
         return replace(result, others=(*result.others, *other.others))
     return replace(result, others=(*result.others, *other.rows()))
 
 
 def always(result: Conclusion) -> bool:
-    """Whatever the answer is."""
+    """True, whatever the answer is."""
     return True
 
 
@@ -118,12 +118,12 @@ def unexplained(result: Conclusion) -> bool:
 
 
 def described(result: Conclusion) -> bool:
-    """Whether the search ended as one learned term leaves nothing material."""
+    """Whether the search ended because one learned term leaves nothing material."""
     return unexplained(result) and result.found.described
 
 
 def left(result: Conclusion) -> bool:
-    """Whether something material is left, of records that share all settings."""
+    """Whether something material is left, and no record has a setting of its own."""
     material = result.decision.left >= result.found.material
     return (unexplained(result) or material) and result.found.final.own is None
 
@@ -135,7 +135,7 @@ def if_complete(
 
     Args:
         ask: returns the selection.
-        apart: whether it takes the noise anew, which stays as it is where the move is not taken.
+        apart: whether it works on a copy of the search, as it takes the noise anew.
     """
 
     def make(result: Conclusion, asking: Asking) -> Conclusion | None:

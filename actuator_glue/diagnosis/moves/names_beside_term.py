@@ -1,8 +1,8 @@
 """Effects added to a learned term that explains more than all effects did.
 
-What the catalogue does not hold may be the largest effect there is. Names are then chosen for
-what they make up of it, and a name that is true is not found beside them: a lag beside a gain that
-follows the command's rate was a payload and a gain that drifts.
+The largest effect may be one outside the catalogue. Names are then chosen for how well they
+imitate it, and a true name is not found beside them: for a lag and a gain that follows the
+command's rate, a payload and a drifting gain were found.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ def with_names(selection: BeamSearch, term: Trial) -> Trial | None:
     """Add effects to a structure with a learned term while each is worth it.
 
     Args:
-        selection: what judges; its noise stays.
+        selection: the judge; its noise stays.
         term: Eq. (2) with the description, which was added last.
 
     Returns:
-        The structure, the description still what was added last; None where no name is worth it,
-        or it is worth nothing beside them.
+        The structure, still marked as ending with the description; None where no name is worth it,
+        or the description is not worth it with them.
     """
     current = term
     while len(current.effects) < selection.settings.most:

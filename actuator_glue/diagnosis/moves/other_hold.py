@@ -26,10 +26,11 @@ def with_the_right_hold(first: Conclusion, asking: Asking) -> Conclusion:
 
     The wrong hold is a lead of half a sample: no effect of the catalogue, but something will be
     found for it (a gain that drifts, say). The other hold is taken where Eq. (2) alone explains
-    materially more with it, and what is found with it explains more, beyond chance. Held
+    materially more with it, and the effects found with it explain more, beyond chance. Held
     commands taken for linear ones are a delay, which is in the catalogue. Where the catalogue
-    explains neither, terms are learned with both: what it lacks may look like the other hold,
-    which must explain more beyond chance then, or all that remains with fewer parameters.
+    explains the records with neither hold, terms are learned with both: an effect outside it may
+    look like the other hold, which then must explain more beyond chance, or everything with fewer
+    parameters.
     """
     other = _linearly(first, asking)
     if other is None:
@@ -45,11 +46,11 @@ def with_the_right_hold(first: Conclusion, asking: Asking) -> Conclusion:
 
 
 def _linearly(first: Conclusion, asking: Asking) -> Conclusion | None:
-    """Return what is found with the other hold, where it may explain more.
+    """Return the conclusion with the other hold, where it may explain more.
 
-    It is searched for where Eq. (2) alone, or one of the best structures so far, explains more
-    with it: of a large effect that Eq. (2) leaves, either hold may leave more. An answer that
-    leaves nothing and explains less with it is not searched for again.
+    The search is made where Eq. (2) alone, or one of the best structures so far, explains more
+    with it: while a large effect is missing, either hold may leave more. It is not made where a
+    complete answer explains less with it.
     """
     prepared = first.prepared
     held_commands = any(r.hold == 'zoh' for r in prepared.fit.recorded)
@@ -78,8 +79,8 @@ def _linearly(first: Conclusion, asking: Asking) -> Conclusion | None:
 def _explains_more(first: Conclusion, second: Conclusion, asking: Asking) -> bool:
     """Whether the second, with the other hold, explains more beyond chance.
 
-    Or all that remains with fewer parameters: a hold is a plainer answer than a term that leads by
-    half a sample as well.
+    Or everything, with fewer parameters: a hold is a plainer answer than a term that imitates its
+    lead of half a sample.
     """
     fewer = len(second.found.final.fit.theta) < len(first.found.final.fit.theta)
     whole = second.decision.verdict != 'unexplained'
@@ -94,10 +95,10 @@ def _gained(first: Conclusion, second: Conclusion) -> float:
 
 
 def _gain(first: Conclusion, other: Prepared, base: Fit, trial: Trial) -> float:
-    """Return the nats by which a structure explains more with the other hold than what was found.
+    """Return the nats that a structure with the other hold gains over the answer found.
 
-    Less its further parameters. Beside misfit nats say little: there what leaves no less that
-    matters does not explain more.
+    Less its further parameters. With misfit nats say little: then a structure that does not leave
+    materially less explains no more.
     """
     found, scorer = first.found.final, first.scorer
     data = other.fit if first.line is None else hum.without(other.fit, first.line)

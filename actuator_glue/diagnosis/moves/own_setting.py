@@ -1,7 +1,7 @@
 """A channel set differently between tests: one record's own gain, bias, delay or clock.
 
 What is set by hand between tests is no property of the machine, so one size for all records
-cannot explain it. It is asked for only where no effect of common size explains the records:
+cannot explain it. It is tried only where no effect of common size explains the records:
 a setting in one stiffness alone looks like a specimen effect, and the specimen goes first.
 """
 
@@ -50,7 +50,7 @@ def own_setting(result: Conclusion, asking: Asking) -> Conclusion:
 def _members(data: Data, held: Sequence[Record], index: int) -> tuple[Record, ...]:
     """The record and the held-out tests of its set-up.
 
-    Those of a stiffness that only it has, else its own held-out blocks.
+    Those under its stiffness if no other record has it, else its own held-out blocks.
     """
     own = data.records[index]
     stiffness = own.known_stiffness()
@@ -68,8 +68,8 @@ def setting(
     evidence of any addition, less a nat per parameter and the logarithm of how many were tried.
 
     Args:
-        selection: what ended with `found`; its noise is taken anew from the answer.
-        found: what effects of common size explain.
+        selection: the search that ended with `found`; its noise is taken anew from the answer.
+        found: its result with effects of common size.
         limit: structure above which records count as unexplained [m].
         held: held-out records, which share a setting through their stiffness.
 
@@ -107,7 +107,7 @@ def setting(
 
 
 def _row(search: Search, trial: Trial, rest: Structure, tried: int) -> Row:
-    """Return the row of a structure with one record's own setting, one of so many."""
+    """Return the row of a structure with one record's own setting, one of `tried`."""
     assert search.scorer is not None and isinstance(trial.model, OneRecord)
     more = len(trial.model.parameters) - len(rest.parameters)
     cost = price(rest, search.entries, len(search.names)) + more + float(np.log(tried))
@@ -135,7 +135,7 @@ def _attribution(
     tried: Sequence[Trial],
     parts: tuple[float, float],
 ) -> Selection:
-    """What was found, with the best setting and its rivals in place of common sizes."""
+    """Return the selection with the best setting and its rivals."""
     search, best = selection.search, tried[0]
     assert search.scorer is not None
     nearest = {t.added: t for t in reversed(tried)}  # the record that each fits best

@@ -1,8 +1,8 @@
-"""All moves, in the order in which they are asked for.
+"""All moves, in the order in which they are tried.
 
-A search that adds one effect at a time ends with an answer (beam_search.py). What it cannot
-reach by that is asked for here: another scope, another form, other names for all of it. Of a group
-the first move that is taken ends it.
+A search that adds one effect at a time ends with an answer (beam_search.py). Answers that it
+cannot reach are tried here: another scope, another form, other names for everything. The first
+move that is taken ends its group.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from actuator_glue.diagnosis.moves.move import (
     unexplained,
 )
 
-# With one hold, since one moment.
+# Moves under one hold and one onset.
 WITHIN: Final[Groups] = (
     (
         AnswerMove("one record's own setting", described, own_setting.own_setting),
@@ -42,7 +42,7 @@ WITHIN: Final[Groups] = (
     (AnswerMove('effects reserved for the rest', unexplained, reserved.with_reserved),),
     (AnswerMove("one record's own setting", unexplained, own_setting.own_setting),),
 )
-# What acts all the time comes before what appears.
+# Moves across holds and onsets. Effects that always act come before those that start mid-record.
 ACROSS: Final[Groups] = (
     (AnswerMove('', always, other_hold.with_the_right_hold),),
     (AnswerMove('', always, since_onset.since_onset),),

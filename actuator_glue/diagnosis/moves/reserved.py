@@ -1,4 +1,4 @@
-"""Effects that are reserved for what all others leave."""
+"""Effects that are tried only on what all others leave."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ from actuator_glue.diagnosis.trial import Trial
 def with_reserved(first: Conclusion, asking: Asking) -> Conclusion | None:
     """Search again with the effects that are reserved for what all others leave.
 
-    Where one of them alone, or beside what was found, is better beyond chance and by a material
-    error; and so must be the answer, with one of them in it or complete without: it may lead to
-    what the first search did not reach. A mode that rings on passes for hum: with it, hum is
-    asked for once more.
+    Begun where one of them, alone or beside the effects found, is better beyond chance and by a
+    material error. The new answer must be better likewise, and contain one of them or be complete
+    without: they may lead to effects that the first search did not reach. A mode that rings on
+    passes for hum: so the search is tried first on data from which hum was not removed.
     """
     reserved, before, prepared = mean_effects(reserved=True), first.found.final, first.prepared
     if not reserved:
@@ -30,7 +30,7 @@ def with_reserved(first: Conclusion, asking: Asking) -> Conclusion | None:
         names = *usual.names, *reserved
         ways.insert(0, (Search(prepared.fit, names, usual.each, effort=usual.effort), None))
 
-    # Beside Eq. (2) alone, too, it must be better than what was found.
+    # Added to Eq. (2) alone, too, it must be better than the answer found.
     below = first.selection.may_matter_below(before)
 
     def better(after: Trial, scorer: Scorer) -> bool:

@@ -17,14 +17,14 @@ from actuator_glue.inference.least_squares.data import SETTLE, Data
 from actuator_glue.inference.least_squares.fit import Fit
 
 Quiet = tuple[Data, Fit]
-_OTHERS = 2  # moments at most before which more acts than Eq. (2)
+_OTHERS = 2  # moments at most that are tried though Eq. (2) is not enough before them
 
 
 def since_onset(first: Conclusion, asking: Asking) -> Conclusion | None:
     """Detect effects that start mid-record.
 
-    Taken where Eq. (2), or what acts all the time, up to a moment, and what is found in the data
-    since then, leave materially less than effects that act all the time.
+    Taken where Eq. (2), or effects that always act, before a moment, and the effects found in the
+    data since then leave materially less than effects that always act.
     """
     since = _appeared(first, asking)
     if since is None:
@@ -39,7 +39,7 @@ def _appeared(first: Conclusion, asking: Asking) -> Conclusion | None:
     if first.decision.verdict == 'none':
         return None
     if first.decision.left < found.material:
-        # The answer is complete: only what it found can still have changed, and materially so.
+        # The answer is complete: an onset is possible only if its effects changed materially.
         least = final.fit.error.size * found.material**2
         changed = moments.changes(first.data, final.fit.error, final.fit.jacobian)
         if all(removed < least for _, removed in changed):
@@ -58,7 +58,7 @@ def _appeared(first: Conclusion, asking: Asking) -> Conclusion | None:
             continue
         if told.decision.verdict != 'unexplained':
             return told
-        # Where records meet, it may be no onset but a form that is not the machine's.
+        # Where records meet, a change may come from a wrong form of an effect, not from an onset.
         if moment.inside(first.data) and told.decision.left < least:
             best, least = told, told.decision.left
     return best
@@ -71,13 +71,13 @@ def _since(
     settings: Thresholds,
     search: Callable[[Moment], Conclusion],
 ) -> Conclusion | None:
-    """Return what is found in the data since a moment, where that explains more.
+    """Return the conclusion from the data since a moment, where it explains more.
 
     Args:
-        first: what was found in all data.
+        first: the conclusion from all data.
         moment: when something may have appeared.
-        quiet: what comes before it, where Eq. (2) is enough there; else what is found since then
-            must be, less one effect or with other parameters.
+        quiet: data and fit before it, where Eq. (2) is enough there; if None, the effects found
+            since then must be enough, less one of them or with other parameters.
         settings: thresholds.
         search: searches the data since a moment.
     """
@@ -110,7 +110,7 @@ def _since(
         return None
     onset = near.onset
     if onset.growth == 0.0 and onset.time > moment.time + SETTLE:
-        # What came before it bends what is found: the data since then are its own.
+        # Data from before the onset bias the effects found: search those since then alone.
         later = Moment(moment.record, onset.time)
         again = moments.quiet_before(later, first.data)
         if (again or not quiet) and (other := _since(first, later, again, settings, search)):
@@ -119,9 +119,9 @@ def _since(
 
 
 def _asked(first: Conclusion) -> Iterator[tuple[Moment, Quiet | None]]:
-    """Yield moments, those before which Eq. (2) is enough first, with what comes before.
+    """Yield possible onsets, first those before which Eq. (2) is enough, with the data before.
 
-    Of the others some inside of their records, where something material is left: each takes a
+    Then some of the others, inside of their records, if something material is left: each takes a
     search of its own.
     """
     others = []
@@ -136,11 +136,11 @@ def _asked(first: Conclusion) -> Iterator[tuple[Moment, Quiet | None]]:
 
 
 def _moments(first: Conclusion) -> Iterator[Moment]:
-    """Yield when something may have appeared, likelier moments first."""
+    """Yield moments at which something may have appeared, likelier ones first."""
     whiten, told = first.scorer.whiten, list[Moment]()
     for fit in dict.fromkeys((first.found.base.fit, first.found.final.fit)):
         error, jacobian = fit.error, fit.jacobian
-        # Beside misfit what is slow counts little once it is whitened.
+        # Where misfit remains, slow changes count little after whitening.
         for pair in ((whiten(error), whiten(jacobian)), (error, jacobian)):
             for moment, _ in moments.changes(first.data, *pair):
                 if not any(moment.near(other) for other in told):

@@ -1,7 +1,7 @@
-"""Effects that passed for noise beside an answer that seems complete.
+"""Effects that passed for noise in an answer that seems complete.
 
-Structure is told from noise by its spectrum, and may pass for less than what an effect is found to
-take away: what removes that much is an addition like any other.
+Structure is told from noise by its spectrum, and may be underestimated: an effect that is found to
+remove a material error is an addition like any other.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ def that_matter(selection: BeamSearch, found: Selection) -> Selection | None:
 
     Args:
         selection: the model selection that ended with `found`.
-        found: what leaves nothing material.
+        found: its result, which leaves nothing material.
     """
     current = found.final
     larger = companions.with_companions(selection, current, selection.material)

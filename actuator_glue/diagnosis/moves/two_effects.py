@@ -1,8 +1,8 @@
 """Two effects that matter only together: each hides the other.
 
 A droop of the supply and a delay may each remove 3 um beside 10 um of noise, less than what
-matters, and both of them the 8 um that are missing. They are asked for last, where neither names
-nor descriptions are worth adding, and told only where they explain all that is left.
+matters, but together the 8 um that are missing. Pairs are tried last, where neither names nor
+descriptions are worth adding, and reported only where they explain all that is left.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def explained(selection: BeamSearch, found: Selection) -> Selection | None:
 
 
 def _both(selection: BeamSearch, current: Trial) -> list[Trial]:
-    """Refit with two more: the best alone, each with what promises most beside it."""
+    """Refit with two more effects: each promising one, with the most promising given that."""
     search = selection.search
 
     def other(start: Trial) -> list[str]:
@@ -50,7 +50,7 @@ def _both(selection: BeamSearch, current: Trial) -> list[Trial]:
 def _is_worth(selection: BeamSearch, trial: Trial, current: Trial) -> bool:
     """Whether two effects explain the rest, and neither is idle beside the other."""
     count = len(selection.search.names)
-    cost = choices(count, 2) - choices(count, 1)  # of a single one the level has paid for
+    cost = choices(count, 2) - choices(count, 1)  # the level covers the choice of a single one
     if selection.left(trial) >= selection.material:
         return False
     if not selection.better(trial, current, selection.material, cost):

@@ -1,9 +1,9 @@
 """Two effects in place of one that seems enough.
 
-A gain that drifts may leave what passes for noise where a slow valve and a clock that runs fast
-are the machine's: each of them alone is worse than the wrong name. What is there beside that name
-beyond chance, though too little to matter, tells: with it another name may stand for the rest, as
-many parameters and more evidence. Names of more than one parameter have pairs as rivals
+For a machine with a slow valve and a clock that runs fast, a drifting gain may leave only what
+passes for noise: each of the true names alone is worse than the wrong one. A significant but
+immaterial effect beside the wrong name is the clue: with it another name may explain the rest,
+with as many parameters and more evidence. Names of more than one parameter have pairs as rivals
 (diagnosis/pairs.py).
 """
 
@@ -20,7 +20,7 @@ def exchanged(selection: BeamSearch, found: Selection) -> Selection | None:
 
     Args:
         selection: the model selection that ended with `found`; its noise stays.
-        found: what leaves nothing material.
+        found: its result, which leaves nothing material.
     """
     with_more = _with_more(selection, found.final)
     if with_more is None:
@@ -47,10 +47,10 @@ def _better(selection: BeamSearch, with_more: Trial, name: str, best: Trial) -> 
     """Return a structure with another name in the place of one, where that has more weight.
 
     Args:
-        selection: what judges.
-        with_more: the structure with the name and what is there beside it.
-        name: of which another may take the place.
-        best: of those found so far.
+        selection: the judge.
+        with_more: the structure with the name and the immaterial effect.
+        name: the one that another may replace.
+        best: the best structure so far.
     """
     search = selection.search
     rest = search.without(with_more, name)

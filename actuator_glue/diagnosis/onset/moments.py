@@ -1,7 +1,7 @@
 """The moment at which an effect may have appeared, and whether it did.
 
-What acts all the time must be enough for what comes before, the effect one that would have been
-seen there, and both together must explain materially more than effects that act all the time.
+Effects that always act must be enough for the data before, the new effect must be one that would
+have been seen there, and both together must explain materially more than effects that always act.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from actuator_glue.model.structure import Structure
 from actuator_glue.records import Array
 
 SHORTEST = 5.0  # s on either side
-HELD = 1.0  # s after it that decided nothing: of what none is left nothing can be told
+HELD = 1.0  # s of held-out data after it, at least: without any, nothing can be verified
 _STEP = 0.25  # s between the times tried
 _EARLIER = (1.0, 0.75, 0.5, 0.35)
-_LEFT_NOISE = 0.6  # structure before it, of the noise, at most
+_LEFT_NOISE = 0.6  # structure before it, over the noise, at most
 
 
 @dataclass(frozen=True)
@@ -34,16 +34,16 @@ class Moment:
     time: float
 
     def near(self, other: Moment) -> bool:
-        """Whether another moment is of the same record and too near to be one of its own."""
+        """Whether another moment is of the same record and too near to count separately."""
         return self.record == other.record and abs(self.time - other.time) < 2.0 * SETTLE
 
     def inside(self, data: Data) -> bool:
-        """Whether it is away from both ends of its record: nothing else sets its sides apart."""
+        """Whether it is away from both ends of its record, where records may differ instead."""
         end = data.records[self.record].duration
         return SHORTEST < self.time < end - SHORTEST
 
     def split(self, data: Data) -> tuple[Data, Data]:
-        """Return what counts before and what counts since, with time to settle in between."""
+        """Return the counted data before and since, with time to settle in between."""
         before, since = [], []
         for i, (record, mask) in enumerate(zip(data.records, data.masks, strict=True)):
             now = record.time
@@ -75,18 +75,18 @@ def counted(data: Data) -> float:
 
 
 def changes(data: Data, error: Array, jac: Array) -> Iterator[tuple[Moment, float]]:
-    """Yield where a residual changes most: its size, or what parameters it asks for.
+    """Yield the moments at which a residual changes most, in its size or its best parameters.
 
-    With it by how much less is left of its square sum than without a change. Near the end of a
-    record that may be what sets the records apart, and what shows in one of them only when it is
-    fast hides what appears in another: the best moment inside of each follows.
+    With each, by how much the change lowers the sum of squares. The best of all may be a
+    difference between records, near the end of one, and an effect that shows only in the fast part
+    of one record hides an onset in another: so the best moment inside of each record follows.
 
     Each side has its own parameters, by one Gauss-Newton step, and its own error; the likelihood
     of both is that of two normal variances (Hinkley 1970).
 
     Args:
-        data: what counts.
-        error: what a fit leaves (n,), as it is or whitened.
+        data: the counted samples.
+        error: residual of a fit (n,), plain or whitened.
         jac: its derivatives (p, n), likewise.
     """
     size = max(1, round(_STEP / min(data.periods)))
@@ -116,7 +116,7 @@ def changes(data: Data, error: Array, jac: Array) -> Iterator[tuple[Moment, floa
 
 
 def _inside(data: Data, counts: NDArray[np.intp], gains: Array) -> list[int]:
-    """Return which gain is the largest inside of each record, larger ones first."""
+    """Return the index of the largest gain inside of each record, larger gains first."""
     best = []
     for part, period in zip(data.parts, data.periods, strict=True):
         least = SHORTEST / period
@@ -133,10 +133,10 @@ def _remaining(normal: Array) -> float:
 
 
 def quiet_before(moment: Moment, data: Data) -> tuple[Data, Fit] | None:
-    """Return what comes before a moment, and Eq. (2) fitted to it, where it leaves noise only.
+    """Return the data before a moment, and Eq. (2) fitted to them, where it leaves noise only.
 
-    What grows slowly begins earlier than it is half grown: some of what comes before is left out
-    where that helps.
+    An effect that grows slowly begins earlier than it is half grown: the last of these data are
+    left out where that helps.
     """
     for share in _EARLIER:
         before = Moment(moment.record, share * moment.time).split(data)[0]
@@ -157,23 +157,23 @@ def quiet(before: Data, error: Array) -> bool:
 def enough_before(
     before: Data, base: Trial | None, since: Trial, cost: float, complete: bool
 ) -> list[tuple[Trial, float]]:
-    """Return models that may hold before a moment, best first: Eq. (2), or one effect less.
+    """Return models that may hold before a moment, best first: Eq. (2), or `since` less an effect.
 
-    Or all of that with other parameters, where it is complete and leaves only noise there, too.
+    Or `since` with other parameters, where it is complete and leaves only noise there, too.
 
-    What the records leave may pass for noise before the moment until it is known what it is.
-    What acts all the time has the same parameters on either side: else each side is a fit of its
-    own, and any two fits leave less than one.
+    Structure before the moment may pass for noise until its cause is known. Effects that always
+    act have the same parameters on either side: else each side is a fit of its own, and any two
+    fits leave less than one.
 
     Args:
         before: data before the moment.
-        base: Eq. (2), where it was enough there; None: what leaves more than noise is no answer.
+        base: Eq. (2), where it was enough there; None: only models that leave noise only count.
         since: what explains the data since then.
         cost: square sum that a further parameter must remove [m^2].
         complete: whether `since` leaves nothing material.
 
     Returns:
-        Each with the rms error that its parameters since then leave more before [m].
+        Each with the additional rms error before the moment of its parameters since then [m].
     """
     tried = [] if base is None else [(base, 0.0)]
     entries = since.structure.entries if since.own is None else ()
@@ -203,7 +203,7 @@ def explains(
 ) -> bool:
     """Whether an effect that appears explains more than effects that act all the time.
 
-    Before the moment the effect must be one that would have been seen.
+    The effect must be one that would have been seen before the moment, too.
 
     Args:
         sides: data before and data since it appeared.

@@ -29,8 +29,8 @@ class Onset:
     Attributes:
         source: the record in which it appeared.
         time: since that record's first sample [s].
-        lower: 95 % profile-likelihood interval of `time`, from [s]; earlier by the loop's delay
-        upper: to [s].
+        lower: start of the 95 % profile-likelihood interval of `time` [s], less the loop's delay.
+        upper: its end [s].
         growth: time it took to grow to its size [s]; 0 where it was there at once.
         effects: what appeared; empty where parameters changed, of Eq. (2) or of an effect.
         before: effects that were there before.
@@ -72,12 +72,12 @@ class Onset:
 
 @dataclass(frozen=True)
 class Appeared:
-    """That something appeared.
+    """What is known of an onset before it is dated.
 
     Attributes:
-        data: all that counts, before and since.
-        moment: about when.
-        before: what is enough before it.
+        data: all counted samples, before and since.
+        moment: its approximate time.
+        before: the structure that is enough before it.
     """
 
     data: Data
@@ -86,7 +86,7 @@ class Appeared:
 
     @property
     def scope(self) -> str:
-        """What is found since then holds for."""
+        """Scope of the effects found since then."""
         record = self.data.records[self.moment.record]
         name = source_name(record.source) or f'record {self.moment.record + 1}'
         return f'since {self.moment.time:.1f} s of {name}'
@@ -115,13 +115,13 @@ def dated(appeared: Appeared, found: Trial, noise: float) -> Onset:
     until = np.concatenate([[0.0], np.cumsum(error**2)[:-1]])
     since = np.cumsum(((error - step) ** 2)[::-1])[::-1]
     jump = np.asarray(-0.5 * (until + since), dtype=np.float64)
-    # What acts at the valve shows as late as the loop follows a command: on average by its delay.
+    # An effect at the valve shows later, on average by the loop's delay in following a command.
     ((a1, a0, _),) = systems(before.fit.theta[: len(BASE)], record.known_stiffness())
     late = float(a1 / a0)
     swings = _swings(error - step, mask, record.period, (1.0, float(a1), float(a0)))
     likely = jump > jump.max() - _WITHIN
     if float((jump + swings).max() - jump.max()) > _SWINGS + np.log(len(jump)):
-        # How it begins is not known: the interval holds what is likely with the swing, or without.
+        # Whether it begins with the swing is not known: the interval covers both cases.
         jump = jump + swings
         likely |= jump > jump.max() - _WITHIN
     best, growth = float(jump.max()), 0.0
@@ -151,13 +151,13 @@ def dated(appeared: Appeared, found: Trial, noise: float) -> Onset:
 
 
 def _swings(rest: Array, mask: Mask, period: float, loop: tuple[float, ...]) -> Array:
-    """Nats that the loop's own motion explains after each counted sample, of any size (N,).
+    """Nats that a free swing of the loop, of any size, explains after each counted sample (N,).
 
-    What changes at once leaves the loop in a state that is not the changed machine's: it swings
-    into that as it does from rest.
+    A sudden change leaves the loop in a state that is not the changed machine's: it swings into
+    that as it does from rest.
 
     Args:
-        rest: what the changed machine leaves of the counted samples (N,), of the noise.
+        rest: residual of the changed machine at the counted samples (N,), over the noise.
         mask: which samples count (n,).
         period: time between samples [s].
         loop: its characteristic polynomial in seconds.

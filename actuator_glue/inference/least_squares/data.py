@@ -24,9 +24,9 @@ SETTLE = 1.0  # s in which an unknown initial state is forgotten
 
 Mask = NDArray[np.bool_]
 
-# Numbers of a block that is worked on at a time, where that is not fewer rows than these.
+# Numbers of a block that is worked on at a time, unless that is fewer rows than `LANES`.
 _BLOCK = 1 << 21
-LANES = 32  # of the kernels, which take as long for fewer
+LANES = 32  # parameter sets of the kernels, which take as long for fewer
 # A record that is simulated finer has so many times its samples at most, and so many in all.
 _FINER, _LONGEST = 8, 600_000
 
@@ -54,7 +54,7 @@ def _times(whole: Record, period: float, most: int = 1) -> int:
 def _stepped(record: Record, whole: Record) -> Record:
     """Return a decimated record with the kernel's steps as samples.
 
-    Decimated, what sticks, slips or saturates does so at other moments between the samples: a
+    Simulated from decimated samples, the piston sticks, slips or saturates at other moments: a
     linear actuator answers the same, but with friction of 300 N at 1 kHz the truth was hundreds of
     nats from the fit, outside of nearly every interval. With steps as samples a run takes as long.
     """
@@ -74,8 +74,8 @@ class Data:
         origins: per record, time of its first sample since the test began [s].
         prior: what was known of Eq. (2)'s parameters before; None for nothing.
         finer: whether records are simulated as they were sampled, or nearly, and decimated then.
-        steps: records of which the kernel's steps are samples, where it takes some for one; none
-            for those that follow from `recorded`.
+        steps: the records with the kernel's steps as samples, where it takes several for one;
+            empty to derive them from `recorded`.
         each: simulates the records, several at a time if it can.
     """
 

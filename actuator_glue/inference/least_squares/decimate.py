@@ -26,7 +26,7 @@ _SEEN = 150.0
 _TAIL = 1e-4  # share of a channel's power that may lie above its bandwidth: 1 % of its amplitude
 _NOISE = 1e-2  # share of a channel's power that may be white noise
 _COARSE = 1e-3  # s: what moves is slower
-# Of more samples some at a time become one first (see Data.finer).
+# Larger factors are multiples of four, so that part of them can be decimated (see Data.finer).
 _WHOLE = 8
 _STEPS = 24  # natural frequencies tried, a decade to either side of the motion's bandwidth
 _DAMPINGS = (0.5, 0.9, 1.5)
@@ -99,8 +99,8 @@ def factor(record: Record) -> int:
 def factor_of_readings(record: Record, every: float) -> int:
     """Return by what factor a record is decimated that has a reading in some samples only.
 
-    What runs between readings says nothing of its own, and noise that was drawn out over many
-    samples is none that a likelihood knows. The motion keeps some samples a period.
+    Values filled in between readings carry no information, and noise drawn out over many samples
+    is not the noise of the likelihood. The motion keeps some samples a period.
 
     Args:
         record: what is measured in it filled between its readings.

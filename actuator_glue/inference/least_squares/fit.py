@@ -26,11 +26,11 @@ from actuator_glue.records import Array
 
 _P = len(BASE)
 _DAMPINGS = np.array([1e-2, 1.0, 1e2])
-_STRAIGHT = 0.01  # of the squared motion between two starts may be beyond the linear
-_FURTHEST = 300.0  # a logarithm: whatever is farther from a prior is as bad
+_STRAIGHT = 0.01  # of the squared motion between two starts may be nonlinear
+_FURTHEST = 300.0  # a logarithm: starts farther from a prior are all as bad
 _MOST = 1e100  # m^2: more is as good as diverged
-_LONG = 100_000  # samples: of each structure tried its slopes stay
-_MORE = 5  # steps as large as the last one that a start may be behind
+_LONG = 100_000  # samples: slopes of more are kept in single precision
+_MORE = 5  # steps as large as its last one by which a start may be behind the best
 
 
 @dataclass(frozen=True, eq=False)

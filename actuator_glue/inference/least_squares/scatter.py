@@ -1,9 +1,10 @@
 """Restart a refit from points around where it ended: kinks make many minima.
 
-A gap that closes, a valve that follows late and a piston that sticks each change the response at
-once where a parameter moves a stroke past their edge. Beside a valve's play a gap ended at 12.1 um
-that leaves 10.4 um in its lowest minimum. Points that move the simulation as much as the error
-that is left reach the next ones; they are as many as the kernels work on at a time.
+A gap that closes, a valve that follows late and a piston that sticks each change the response
+abruptly where a parameter moves a stroke past their edge. With a valve's play, the fit of a gap
+ended at an error of 12.1 um; its lowest minimum leaves 10.4 um. Points that move the simulation as
+much as the error that is left reach the next minima; there are as many as the kernels work on at a
+time.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ _FAR: Final = 1.5  # times the error that is left: with 0.3 and 4 half of the se
 _STARTS: Final = 3  # the best of the points
 _ITERATIONS: Final = 12
 _ROUNDS: Final = 4
-_GAIN: Final = 2e-3  # of the squared error: less leads nowhere
+_GAIN: Final = 2e-3  # of the squared error: a smaller gain is not followed
 _FLAT: Final = 1e-6  # of the largest curvature: what is flatter is not followed further
 _SEED: Final = 0
 

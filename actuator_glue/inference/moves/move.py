@@ -155,8 +155,8 @@ class Move:
             q(candidate -> z)/q(z -> candidate), and the crossover class or `NO_CLASS`. Its random
             numbers are uniforms[U_FREE:]; rows[:size] is the archive.
         uniforms: how many of them it uses, given dimension and pairs.
-        share: probability of the move; None: the moves without one share what the others leave by
-            what they achieve, the first of them what is left.
+        share: probability of the move; None: such moves divide the rest by what they achieve, and
+            the first of them takes the remainder.
         most: largest share among those.
     """
 

@@ -95,10 +95,10 @@ class Ridge:
         return x, log_jacobian
 
     def opened(self, x: Array, rng: np.random.Generator) -> Array:
-        """Return parameters (n, p), n at most m, of (m, p), with what one stiffness leaves open.
+        """Return (n, p), n at most m, of parameters (m, p), redrawn where one stiffness is open.
 
-        That is alpha_2 given the others' coordinates, at k = 0 alpha_3, too: it is drawn as the
-        box alone has it. Where that takes another parameter out of the box there is no draw.
+        That is alpha_2 given the others' coordinates, at k = 0 alpha_3, too: it is drawn from the
+        prior in the box. A draw that takes another parameter out of the box is dropped.
         """
         z = self.forward(x)
         left = [2] if self._k > 0.0 else [2, 3]

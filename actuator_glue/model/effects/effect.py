@@ -63,7 +63,7 @@ Starts: TypeAlias = Callable[[Scale], Sequence[Sequence[float]]]
 Output: TypeAlias = Callable[[Array, Array, Array], Array]
 Variance: TypeAlias = Callable[[Array, Array], Array]
 # From parameters by name, each (m,), and the time of a record's first sample since the test began
-# [s]: what of them is different there, or is known besides.
+# [s]: the parameters that are different there, and further values that are known.
 Onset: TypeAlias = Callable[[Mapping[str, Array], float], Mapping[str, Array]]
 
 

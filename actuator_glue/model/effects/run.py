@@ -23,8 +23,9 @@ from actuator_glue.records import Array, Hold, Record
 
 # Sub-steps are at most this long: the error of one effect stays below 0.3 um on a 2 mm sweep.
 MAX_STEP = 1.05e-3  # s
-# A line through the step cuts off where the error turns, under a held command in every sample: of
-# 10 um that a valve's play did in 1 kHz, 0.17 um; in steps half as long 0.04, a quarter 0.01.
+# A straight line through the step cuts off the point at which the error turns, under a held
+# command in every sample: of 10 um by a valve's play at 1 kHz it lost 0.17 um; in steps half as
+# long 0.04, a quarter 0.01.
 _TURNING: Final = 2
 # ... and short against the fastest pole of Eq. (2), up to eight times shorter than MAX_STEP.
 _MAX_POLE_STEP = 0.8
@@ -38,13 +39,13 @@ def sample_steps(period: float, times: int = 1) -> int:
 
     Args:
         period: of the samples [s].
-        times: how many times shorter they are at most, see `turning`.
+        times: how many times shorter sub-steps must be than usual, see `turning`.
     """
     return max(1, int(np.ceil(period * times / MAX_STEP - 1e-9)))
 
 
 def turning(program: Program, hold: Hold) -> int:
-    """Return how many times shorter sub-steps are where a valve follows from where it turns."""
+    """Return how many times shorter sub-steps are where a valve's error turns within them."""
     return _TURNING if program.turns and hold == 'zoh' else 1
 
 

@@ -22,9 +22,9 @@ from actuator_glue.model.fast import gram, laguerre, quadratic
 from actuator_glue.records import Array, Record
 
 TOLERANCE = 3e-9  # relative error of the sum of squares; times G = 256 it is 8e-7 in L
-# Terms of the basis, and how far from the reference's the damping and frequency may be that they
-# are for. Less where the record begins in motion: such a window is one of many, whose preparation
-# counts.
+# Terms of the basis, and the factor by which damping and frequency may be off the reference's with
+# them. Less where the record begins in motion: such a window is one of many, whose preparation
+# time counts.
 _FEWEST, _MOST, _MOST_MOVING = 16, 128, 96
 _MARGIN, _MARGIN_MOVING = 1.4, 1.2
 _ENOUGH = 1e-11  # what the terms should leave of the response

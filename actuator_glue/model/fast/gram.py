@@ -34,7 +34,7 @@ from actuator_glue.model.fast.laguerre import (
 from actuator_glue.records import Array
 
 _SAMPLES = 256  # samples per pass of the filter banks: their outputs stay in the cache
-_NOTHING = 1e-20  # of an impulse, what is not worth filtering on
+_NOTHING = 1e-20  # of an impulse: a smaller remainder is not filtered on
 
 
 @njit

@@ -15,7 +15,7 @@ EFFECT = replace(
         group='lag',
         signature='linear; as a delay with a slight roll-off',
         source='Horiuchi et al. 1999',
-        searched=False,  # to a linear loop it is the lag of a sensor, which is
+        searched=False,  # in a linear loop it equals a sensor's lag, which is searched
         check=False,
     ),
     meaning='a filter smooths the command before the controller sees it',

@@ -52,9 +52,9 @@ def _moved(w: Array, n: int, first: Any, last: Any) -> Any:
 def _beyond(w: Array, n: int) -> Any:
     """Let the oil feel the frame that gives way, and return its motion in the middle of the step.
 
-    The force at the end is expected to go on as before: the frame, which is heavy, feels a sixth
-    of (omega h)^2 of what that misses. What the oil loses is taken from the force at the
-    beginning, and from what balances it there.
+    The force at the end is extrapolated: the frame, which is heavy, feels a sixth of (omega h)^2
+    of the error of that. What the oil loses is taken from the force at the beginning, and from
+    what balances it there.
     """
     first = w[r.F + n]
     end, _ = _moved(w, n, first, first + w[r.DF + n])

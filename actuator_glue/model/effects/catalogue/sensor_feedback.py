@@ -32,6 +32,6 @@ EFFECT = Effect(
     meaning='the controller closes its loop on the recorded transducer',
     remedy='nothing is wrong: it says which transducer the loop is closed on',
     starts=lambda s: ((1.0,),),
-    searched=False,  # alone it is nothing
+    searched=False,  # alone it has no effect
     stage=Stage(_fill, shared=(r.ON_BEYOND, r.ON_FEEDBACK)),
 )

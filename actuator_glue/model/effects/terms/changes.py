@@ -15,7 +15,7 @@ _TURNING: Final = {'play', 'limit_rate'}
 
 
 def asked(expressions: Iterable[Expression]) -> bool:
-    """Return whether any needs to know; a force is that at the end of the step."""
+    """Return whether any expression needs the changes; a force is that at the step's end."""
     return any(e.tree.words() & _TURNING for e in expressions if e.place in REMEMBERING)
 
 
@@ -24,7 +24,7 @@ class Changes:
 
     Args:
         into: where the instructions go.
-        asked: whether it is worth any.
+        asked: whether any expression needs the changes.
     """
 
     def __init__(self, into: Emitter, asked: bool) -> None:

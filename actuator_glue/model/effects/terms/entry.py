@@ -23,9 +23,9 @@ _SHARES = (0.01, 0.05, 0.25)
 _SHAPES = 3
 # Sizes tried for it, and samples of the motion they are tried on.
 _LEAST, _SAMPLES = 1e-9, 200
-# How far from neutral an effect must be small, at one of these shares of its parameters' ranges.
-# Those of a small or weak machine are wide for the usual one, where the third power of a force is
-# 10^14 times as large.
+# Shares of its parameters' ranges off neutral, at one of which an effect must be small. Ranges of
+# a small or weak machine are wide for the usual one, where the third power of a force is 10^14
+# times as large.
 _NEAR = (1e-9, 1e-18, 1e-27)
 _SMALL = 1e-2
 # A test on which expressions are tried.

@@ -21,8 +21,8 @@ from actuator_glue.records import Array
 
 COPY, ADD, SUB, MUL, DIV, NEG, ABS, SIGN, SQRT, EXP, LOG, SIN, COS, TANH, ATAN, POW = range(16)
 MIN, MAX, LESS, SELECT, LAG, INTEGRAL, PLAY, LIMIT, RECALL = range(16, 25)
-# Fixed registers: what moves, what of it changes with the increment dx, what holds. A part leaves
-# its signal, and d/d(dx) of it, where it has found them. NONE stands for no operand.
+# Fixed registers: signals, their slopes along the increment dx, constants. A part leaves its
+# signal, and d/d(dx) of it, where it has found them. NONE stands for no operand.
 NONE, T, U, E, Q, F, X, V, Y, D_E, D_Q, D_F, ORIGIN, STEP, D_V_MIDDLE, D_V_END = range(16)
 BETA_1, ALPHA_1_BETA_0, ALPHA_2, ALPHA_3, K = range(16, 21)
 # By how much signals change over the step, beside the jump of a held command, and the share of the

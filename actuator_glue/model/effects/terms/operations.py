@@ -14,8 +14,8 @@ from actuator_glue.model.effects.terms.lanes import WHOLE, LaneNumbers
 
 # Of what remembers, see REMEMBERING.
 Remembered = tuple[LaneNumbers, LaneNumbers, LaneNumbers, LaneNumbers]
-# Of the Taylor series of exp(r) - 1 and sin(a), with what the first leaves out at ln(2)/2 below
-# rounding, and the second at a quarter turn.
+# Coefficients of the Taylor series of exp(r) - 1 and sin(a), whose remainders are below rounding
+# at ln(2)/2 and at a quarter turn.
 _EXPM1: Final = [1.0 / math.factorial(n) for n in range(1, 14)]
 _SINE: Final = [(-1.0) ** (n // 2) / math.factorial(n) for n in range(3, 20, 2)]
 # tanh(z)/z = _OVER(z^2)/_UNDER(z^2), to 6e-18 at z up to ln(2)/4: exact at 0 and at the zeros of a
@@ -145,7 +145,7 @@ def _limit(a: LaneNumbers, b: LaneNumbers, c: LaneNumbers, kept: LaneNumbers) ->
 
 
 # Result, what is remembered, by how much the result changes over the step without leaps, and (of
-# play and limit) the share of the step, its last, in which it follows; from operands and what was.
+# play and limit) the last share of the step, in which it follows; from operands and the memory.
 REMEMBERING: Final[
     dict[int, Callable[[LaneNumbers, LaneNumbers, LaneNumbers, LaneNumbers], Remembered]]
 ] = {m.LAG: _lag, m.INTEGRAL: _integral, m.PLAY: _play, m.LIMIT: _limit}

@@ -43,7 +43,7 @@ _SIGNALS: Final[dict[str, Dual]] = {
     'f': (m.F, m.D_F),
     'y': (m.Y, None),
 }
-# Signals that are there only if an instruction of some part reads them; what a part changes is.
+# Signals written only if an instruction of some part reads them; those a part changes always are.
 _NEEDS: Final = (
     (m.NEEDS_T, m.T, m.COMMAND, m.FORCE),
     (m.NEEDS_U, m.U, m.COMMAND, m.FORCE),
