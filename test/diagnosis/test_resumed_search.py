@@ -8,6 +8,7 @@ from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.thresholds import Thresholds
+from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.records import Record
 
@@ -63,3 +64,18 @@ def test_going_on_costs_less_and_says_the_same() -> None:
     assert set(then.final.effects) == set(first.final.effects) == set(TRUE)
     np.testing.assert_allclose(then.final.fit.rms, first.final.fit.rms, rtol=1e-3)
     assert again.search.effort.spent < 0.7 * anew.search.effort.spent
+
+
+def test_a_learned_term_is_asked_for_where_names_end() -> None:
+    """Play, of which no name is offered: what one leaves may have a description."""
+    asked: list[tuple[str, ...]] = []
+
+    def explains_rest(search: BeamSearch, current: Trial) -> bool:
+        asked.append(current.effects)
+        return True
+
+    names = ('bias', 'gain', 'gain-drift')
+    search = Search(Data.whole(records(False)), names)
+    found = BeamSearch(search, Thresholds(), lambda stage, share: None, explains_rest).run()
+    assert found.left > found.material
+    assert asked == [found.final.effects] and found.described
