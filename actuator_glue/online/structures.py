@@ -38,8 +38,8 @@ MATERIAL = 0.5
 _WORST = 1e3
 # Least weight of a structure proposed beside another: less is not worth a share of the time.
 BESIDE = 0.05
-# Weight of all structures carried before (`BESIDE` each at least), beside those in their place: a
-# diagnosis of few data errs in one name of ten, and forecasts may bring an earlier one back.
+# Factor on the weights of structures carried before (each keeps `BESIDE` at least): a diagnosis of
+# few data errs in one name of ten, and forecasts may bring an earlier one back.
 BEFORE = 0.1
 # Longest window, in hops, that leaves time for forecasts of all structures: those of one take 7 ms
 # for a window of 10 s at 1 kHz.
