@@ -150,8 +150,9 @@ class BeamSearch(Judge):
                 ranked = self.overlooked(current)
                 best = self._first_worth(ranked, current, threshold)
             if best is None:
-                # No further name is worth it: a learned term may explain what they leave.
-                described = open_ and self.explains_rest(self, current)
+                # So few names end here: a learned term may explain what they leave.
+                asked = open_ and len(current.effects) < _NAMES
+                described = asked and self.explains_rest(self, current)
                 break
             current = self._at_its_optimum(best)
             steps.append(SearchStep.to(current, f'with {best.added}'))
