@@ -52,7 +52,7 @@ held by `test/test_architecture.py`, how to add an effect, a format or a command
 _CODE = tokenize.NAME, tokenize.OP, tokenize.NUMBER
 
 
-def first_sentence(path: Path) -> str:
+def first_paragraph(path: Path) -> str:
     """Return what a file says of itself before anything else, on one line."""
     text = ast.get_docstring(ast.parse(path.read_text(encoding='utf-8'))) or ''
     return text.partition('\n\n')[0].replace('\n', ' ').replace('|', '\\|')
@@ -74,7 +74,7 @@ def _rooms() -> Iterator[str]:
         folder = PACKAGE / name
         files = list(folder.rglob('*.py') if name else folder.glob('*.py'))
         lines, code = map(sum, zip(*map(sizes, files), strict=True))
-        says = first_sentence(folder / '__init__.py') if name else 'What all rooms share.'
+        says = first_paragraph(folder / '__init__.py') if name else 'What all rooms share.'
         rows.append((len(files), lines, code))
         cells = (f'`{name}/`' if name else '`*.py`', says, *map(str, rows[-1]))
         yield '| ' + ' | '.join(cells) + ' |'
@@ -87,7 +87,7 @@ def _files(folder: Path) -> Iterator[str]:
     for path in sorted(folder.rglob('*.py'), key=lambda p: (p.parent != folder, p)):
         if path.name != '__init__.py':
             name = path.relative_to(folder).as_posix()
-            yield f'| `{name}` | {first_sentence(path)} | {sizes(path)[0]} |'
+            yield f'| `{name}` | {first_paragraph(path)} | {sizes(path)[0]} |'
 
 
 def page() -> str:

@@ -18,7 +18,7 @@ def test_every_question_has_a_file() -> None:
 
 
 def test_the_page_is_of_these_files() -> None:
-    """Names and first sentences; how long files are may have changed since `make docs`."""
+    """Names and first paragraphs; how long files are may have changed since `make docs`."""
 
     def without_numbers(page: str) -> list[str]:
         return [line.rstrip(' |0123456789') for line in page.splitlines()]

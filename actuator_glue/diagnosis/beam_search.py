@@ -35,7 +35,8 @@ class BeamSearch(Judge):
         search: the structures.
         settings: thresholds.
         progress: takes progress.
-        explains_rest: whether a learned term explains all that names leave; none is added then.
+        explains_rest: whether a learned term explains all that names leave; no further names are
+            added then.
     """
 
     def __init__(
@@ -150,7 +151,7 @@ class BeamSearch(Judge):
                 ranked = self.overlooked(current)
                 best = self._first_worth(ranked, current, threshold)
             if best is None:
-                # So few names end here: a learned term may explain what they leave.
+                # No further name is worth it; a learned term was not tried yet with so few names.
                 asked = open_ and len(current.effects) < _NAMES
                 described = asked and self.explains_rest(self, current)
                 break

@@ -360,11 +360,12 @@ class Search:
         for i, _ in enumerate(self.each(lambda pair: self.add(*pair), first.values())):
             progress((i + 1) / len(first))
         rows = [sorted((self.add(*pair) for pair in row), key=by_score) for row in wanted]
-        worth = [_worth_finishing(row, a.below) for row, a in zip(rows, asked, strict=True)]
         if together:
             every = {frozenset(t.effects): t for t in itertools.chain(*rows)}
             best = sorted(every.values(), key=by_score)
             worth = [_worth_finishing(best, max((a.below for a in asked), default=np.inf))]
+        else:
+            worth = [_worth_finishing(row, a.below) for row, a in zip(rows, asked, strict=True)]
         last = {frozenset(t.effects): t for t in itertools.chain(*worth)}
         polished = self.each(lambda trial: self.polish(trial, valves), last.values())
         done = dict(zip(last, polished, strict=True))

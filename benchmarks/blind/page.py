@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from reliability import answers, bins, coverage, named, picture
 from reliability import table as reliability_table
-from score import QUESTIONS, judging, scores, share, told, without
+from score import QUESTIONS, ask_looked_at, judging, scores, share, told, without
 
 from actuator_glue.report import style
 
@@ -126,9 +126,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument('folders', nargs='+', type=Path, help='OUT of campaigns')
     parser.add_argument('--out', type=Path, default=Path('docs/scores.md'))
-    parser.add_argument(
-        '--looked-at', nargs='*', default=[], help='machines left out, each GENERATOR:SEED'
-    )
+    ask_looked_at(parser)
     args = parser.parse_args()
     results = judging(answers(args.folders), args.looked_at)
     args.out.write_text(page(results, args.looked_at))

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from reliability import answers, coverage
 from scipy.stats import binomtest
-from score import QUESTIONS, judging, share, told, without
+from score import QUESTIONS, ask_looked_at, judging, share, told, without
 
 Json = dict[str, Any]
 Pair = tuple[Json, Json]
@@ -134,9 +134,7 @@ def main() -> int:
     parser.add_argument('before', type=Path, help='OUT of campaigns of one commit')
     parser.add_argument('after', type=Path, help="OUT of the same machines' campaigns of another")
     parser.add_argument('--out', type=Path, help='Markdown file to write')
-    parser.add_argument(
-        '--looked-at', nargs='*', default=[], help='machines left out, each GENERATOR:SEED'
-    )
+    ask_looked_at(parser)
     args = parser.parse_args()
     found = pairs(answers([args.before]), answers([args.after]), args.looked_at)
     text, worse = page(found, args.looked_at)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from typing import Any
@@ -9,8 +10,9 @@ from typing import Any
 import numpy as np
 from statsmodels.stats.proportion import proportion_confint
 
-from actuator_glue.diagnosis.weights import log_weights
+from actuator_glue.diagnosis.weights import TELLING, log_weights
 from actuator_glue.model.effects import CATALOGUE
+from actuator_glue.records import Array
 
 Json = dict[str, Any]
 _BINS = ((0.0, 0.5), (0.5, 1.0), (1.0, 2.0), (2.0, 4.0), (4.0, np.inf))
@@ -43,6 +45,13 @@ def judging(results: list[Json], looked_at: Collection[str]) -> list[Json]:
         looked_at: the other machines, each `generator:seed`.
     """
     return [r for r in results if f'{r["generator"]}:{r["seed"]}' not in looked_at]
+
+
+def ask_looked_at(parser: argparse.ArgumentParser) -> None:
+    """Add the option that names machines which something was mended on."""
+    parser.add_argument(
+        '--looked-at', nargs='*', default=[], help='machines left out, each GENERATOR:SEED'
+    )
 
 
 def without(looked_at: Collection[str]) -> str:
@@ -119,17 +128,28 @@ def _first(result: Json) -> list[str]:
     return (_named(result) or [[]])[0]
 
 
-def _behind(result: Json) -> float:
-    """Nats by which the weight of the structure that is told is below the greatest."""
-    rows = [r for r in result['diagnosis']['structures'] if r['left_out'] is not None]
-    weights = log_weights(
-        [r['left_out'] for r in rows],
+def row_weights(rows: list[Json], material: float, telling: float = TELLING) -> Array:
+    """Return the logarithms of the weights of a stored table's rows (K,), the greatest 0.
+
+    Args:
+        rows: structures with `left_out` [m], `price` [nats], `scope` and `effects`.
+        material: least rms error that matters [m].
+        telling: of that, the error that costs a nat between structures of one kind.
+    """
+    return log_weights(
+        [np.inf if r['left_out'] is None else r['left_out'] for r in rows],
         [r['price'] for r in rows],
         [(r['scope'], len(r['effects'])) for r in rows],
-        result['diagnosis']['alarm']['threshold'],
+        material,
+        telling,
     )
-    told = (-float(w) for w, r in zip(weights, rows, strict=True) if r['chosen'])
-    return next(told, np.inf)
+
+
+def _behind(result: Json) -> float:
+    """Nats by which the weight of the structure that is told is below the greatest."""
+    rows = result['diagnosis']['structures']
+    weights = row_weights(rows, result['diagnosis']['alarm']['threshold'])
+    return next((-float(w) for w, r in zip(weights, rows, strict=True) if r['chosen']), np.inf)
 
 
 QUESTIONS: dict[str, Question] = {

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import math
 from importlib import import_module
 from pathlib import Path
 from typing import Any
@@ -20,10 +19,10 @@ import numpy as np
 from case import Case
 from equivalents import catalogued
 from reliability import answers
-from score import share
+from score import row_weights, share
 
 from actuator_glue.diagnosis.candidates import mean_effects
-from actuator_glue.diagnosis.weights import TELLING, log_weights
+from actuator_glue.diagnosis.weights import TELLING
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.model.structure import Structure
@@ -49,13 +48,7 @@ def replay(result: Json, generator: str, telling: float) -> Json | None:
     told = next((r for r in rows if r['chosen']), None)
     if told is None or not rows:
         return None
-    weights = log_weights(
-        [math.inf if r['left_out'] is None else r['left_out'] for r in rows],
-        [r['price'] for r in rows],
-        [(r['scope'], len(r['effects'])) for r in rows],
-        found['alarm']['threshold'],
-        telling,
-    )
+    weights = row_weights(rows, found['alarm']['threshold'], telling)
     chosen = rows[int(np.argmax(weights))]
     truth = {catalogued(n) for n in result['effects']}
     moved = truth & {*mean_effects(), *mean_effects(reserved=True)}

@@ -1,5 +1,7 @@
 """A refit among many minima goes on to a lower one; one that is alone stays."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -49,3 +51,15 @@ def test_a_lone_minimum_stays() -> None:
     again = scattered(some, Structure(()), found, 1e-5)
     np.testing.assert_array_equal(again.theta, found.theta)
     assert again.rms == pytest.approx(found.rms, rel=1e-12)
+
+
+@pytest.mark.filterwarnings('error')
+def test_a_fit_that_diverged_is_returned() -> None:
+    """It has no slopes, which scatter nothing; and no warning is told."""
+    model = Structure(())
+    some = data(model, np.array(THETA))
+    found = fit(some, model, np.array(THETA))
+    none = replace(found, error=np.ones_like(found.error), slopes=np.zeros_like(found.slopes))
+    again = scattered(some, model, none, 1e-5)
+    assert again.rms <= none.rms
+    assert np.isfinite(again.theta).all()

@@ -57,7 +57,8 @@ def _around(found: Fit, space: Space, rng: np.random.Generator) -> Array:
     jac = found.jacobian
     scale = np.sqrt(np.maximum(np.einsum('pn,pn->p', jac, jac), 1e-300))
     curvature, ways = np.linalg.eigh(jac @ jac.T / np.outer(scale, scale))
-    ways /= np.sqrt(np.maximum(curvature, _FLAT * curvature[-1]))
+    # The largest is one at least, unless the fit diverged and has no slopes.
+    ways /= np.sqrt(np.maximum(curvature, _FLAT * max(curvature[-1], 1.0)))
     along = rng.standard_normal((LANES, len(scale)))
     along *= _FAR * np.linalg.norm(found.error) / np.linalg.norm(along, axis=1, keepdims=True)
     return np.asarray(np.clip(found.z + along @ ways.T / scale, space.lower, space.upper))
