@@ -164,7 +164,7 @@ def sampled(
         known = posterior.identified(out.space, told.points, out.ridge).tolist()
         told = sample(out.larger, settings.evaluations)
         mixture = MixedDraws.of(told.points, out.larger.effects)
-        if like := companions.alike(search, final, out.larger):
+        if like := companions.alike(result.selection, final, out.larger):
             mixture = mixed(mixture, out.larger, like, laplace, rng)
         told = told._replace(points=mixture.points)
         told = companions.reduced(told, out.larger, final, known)

@@ -8,10 +8,10 @@ from copy import copy
 from dataclasses import replace
 from functools import partial
 
-from actuator_glue.diagnosis import false_alarms, pairs, ranking
+from actuator_glue.diagnosis import false_alarms, gains, pairs
 from actuator_glue.diagnosis.finding import Rival
+from actuator_glue.diagnosis.gains import removed, worth
 from actuator_glue.diagnosis.judge import Judge
-from actuator_glue.diagnosis.ranking import removed, worth
 from actuator_glue.diagnosis.search import Asked, Search, by_score
 from actuator_glue.diagnosis.search_step import SearchStep
 from actuator_glue.diagnosis.selection import Selection
@@ -232,9 +232,9 @@ class BeamSearch(Judge):
             current, rivals = self.settle(self.search.finished(current, finely=rest))
         else:
             rivals = self._known_rivals(current)
-        gains, nats = worth(self.search, current)
+        taken, nats = worth(self.search, current)
         return Selection(
-            base, tuple(singles), current, rivals, gains, nats,
+            base, tuple(singles), current, rivals, taken, nats,
             self.first, self.left(current), self.noise, self.material, self.nats,
         )  # fmt: skip
 
@@ -301,7 +301,7 @@ class BeamSearch(Judge):
             names = search.others(current)
             if len(current.effects) > 1:
                 names = search.screened(rest, names)[:most]
-            below = ranking.left_by_rivals(rest, current)
+            below = gains.left_by_rivals(rest, current)
             asked.append(Asked(rest, tuple(names), below))
         singles = search.additions_to(asked)
         return [

@@ -10,12 +10,10 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Sequence
 
-import numpy as np
-
 from actuator_glue.diagnosis.beam_search import BeamSearch
+from actuator_glue.diagnosis.gains import removed
 from actuator_glue.diagnosis.learned.forms import CAUSES
 from actuator_glue.diagnosis.posterior import Draws
-from actuator_glue.diagnosis.ranking import removed, weights
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
@@ -49,39 +47,39 @@ def with_companions(
         trials = beside(selection, current, others, least)
         if not trials or not selection.better(trials[0], current, least):
             break
-        if alone and _weight_of_its_kind(search, trials) < _ALONE:
+        if alone and _weight_of_its_group(selection, trials) < _ALONE:
             break
         current = trials[0]
     return current
 
 
-def _weight_of_its_kind(search: Search, trials: Sequence[Trial]) -> float:
+def _weight_of_its_group(selection: BeamSearch, trials: Sequence[Trial]) -> float:
     """Return the weight of the best effect's group among trials.
 
     Which of two lags it is may stay open; without either, beta_1 would be wrong.
     """
-    kinds = [search.entries[t.added].group for t in trials]
-    known = weights(np.stack([t.scores for t in trials]))
-    return float(sum(w for w, kind in zip(known, kinds, strict=True) if kind == kinds[0]))
+    groups = [selection.search.entries[t.added].group for t in trials]
+    shares = zip(selection.shares(trials), groups, strict=True)
+    return float(sum(share for share, group in shares if group == groups[0]))
 
 
-def alike(search: Search, final: Trial, larger: Trial) -> list[tuple[Trial, float]]:
+def alike(selection: BeamSearch, final: Trial, larger: Trial) -> list[tuple[Trial, float]]:
     """Return structures with an indistinguishable effect in place of a companion, with odds.
 
     Intervals average over indistinguishable effects (mixed_draws.mixed): beta_1 differs between
     the lag of a valve and one of the transducer.
 
     Args:
-        search: what was refitted.
+        selection: what chose the structure.
         final: the reported structure.
         larger: the same with its companions.
     """
-    out: list[tuple[Trial, float]] = []
+    search, out = selection.search, list[tuple[Trial, float]]()
     for name in _beside(final, larger):
         rest, kind = [n for n in larger.effects if n != name], search.entries[name].group
         like = [n for n in search.others(larger) if search.entries[n].group == kind]
         tried = [t for n in like if (t := search.known((*rest, n))) is not None]
-        shares = weights(np.stack([larger.scores, *(t.scores for t in tried)]))
+        shares = selection.shares([larger, *tried])
         out += [(t, float(w / shares[0])) for t, w in zip(tried, shares[1:], strict=True)]
     return out
 

@@ -11,25 +11,23 @@ from actuator_glue.diagnosis import force_ranking, regression, table
 from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.fitting_verdict import Decision, decide
+from actuator_glue.diagnosis.gains import removed
 from actuator_glue.diagnosis.measured import at_recorded_rate
 from actuator_glue.diagnosis.measured.hum import Line
 from actuator_glue.diagnosis.measured.measurement import Measured
 from actuator_glue.diagnosis.one_record import OneRecord
 from actuator_glue.diagnosis.onset.onset import Appeared, Onset, dated
 from actuator_glue.diagnosis.preparation import Prepared
-from actuator_glue.diagnosis.ranking import removed
 from actuator_glue.diagnosis.regression import Surrogate
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.search_step import SearchStep
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.stages import Progress
-from actuator_glue.diagnosis.table import Row
+from actuator_glue.diagnosis.table import LINEAR, Row
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
-
-LINEAR = 'command linear between samples'
 
 
 @dataclass(frozen=True)
@@ -80,11 +78,24 @@ class Conclusion:
         own = table.rows(self.selection.search, self.scorer)
         return (*self.in_scope(own), *self.others)
 
+    @cached_property
+    def told(self) -> Row:
+        """The row of the reported structure; what hum leaves is a part of its error."""
+        key = self.scope, frozenset(self.decision.final.effects)
+        found = min((r for r in self.rows() if r.key == key), key=lambda r: r.left_out)
+        line = self.line.rms if self.line is not None else 0.0
+        return replace(found, left_out=math.hypot(found.left_out, line))
+
+    def outweighs(self, other: Conclusion) -> bool:
+        """Whether it has more weight than another answer about the same records."""
+        material = min(self.found.material, other.found.material)
+        return table.outweighs(self.told, other.told, material)
+
     def in_scope(self, some: tuple[Row, ...]) -> tuple[Row, ...]:
         """Return rows of this answer's data as rows of all records as they were given."""
         some = self.over_all_data(some)
         linear = self.prepared.setup is not None
-        return table.scoped(some, LINEAR, math.log(2.0)) if linear else some
+        return table.scoped(some, LINEAR, table.HOLD) if linear else some
 
     def over_all_data(self, some: tuple[Row, ...]) -> tuple[Row, ...]:
         """Return rows of the data since the onset, if there is one, as rows of all data."""

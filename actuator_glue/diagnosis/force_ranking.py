@@ -9,20 +9,20 @@ the displacement takes for leakage, oil or noise, is reported.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.force import newtons_per_metre, with_forces
-from actuator_glue.diagnosis.ranking import weights, worth
+from actuator_glue.diagnosis.gains import worth
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.ties import compare
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.diagnosis.weights import TELLING, log_weight
 from actuator_glue.inference.least_squares.data import Data
 from actuator_glue.inference.least_squares.fit import Fit, fit, rms
 from actuator_glue.model.effects import Effect
@@ -78,22 +78,29 @@ def _ranked(
 
         tried = list(search.each(refitted, tried))
         best = min(tried[1:], key=lambda t: t.fit.rms)
-    scorer = _scorer(both, best.fit, settings)
+    scorer, material = _scorer(both, best.fit, settings)
+
+    def weight(trial: Trial) -> float:
+        left_out = scorer.left_out_error(trial.fit)
+        return log_weight(left_out, TELLING * material, len(trial.fit.theta))
+
     alone, *trials = (replace(t, scores=scorer.block_scores(t.fit)) for t in tried)
-    trials.sort(key=lambda t: -float(t.scores.sum()))
-    known = weights(np.stack([t.scores for t in (*trials, alone)]))
-    rivals = compare(alone, trials[0], trials[1:], known[1:] / known[0], scorer, settings)
+    trials.sort(key=weight, reverse=True)
+    first = weight(trials[0])
+    odds = [math.exp(min(weight(t) - first, 0.0)) for t in (*trials[1:], alone)]
+    rivals = compare(alone, trials[0], trials[1:], odds, scorer, settings)
     size = newtons_per_metre(both)
     force = slice(search.data.target.size, None)
     errors = {t.added: size * rms(t.fit.error[force]) for t in trials}
     return Ranked(tuple(trials), rivals, errors)
 
 
-def _scorer(both: Data, found: Fit, settings: Thresholds) -> Scorer:
-    """Take the noise of both channels from what a structure leaves of them."""
+def _scorer(both: Data, found: Fit, settings: Thresholds) -> tuple[Scorer, float]:
+    """Take both channels' noise, and the error that matters, from what a structure leaves."""
     splits = splits_of(both, found.error)
     left, noise = pooled(both, splits)
-    return replace(Scorer.of(both, splits), likely=left < settings.noise_share * noise)
+    material = settings.noise_share * noise
+    return replace(Scorer.of(both, splits), likely=left < material), material
 
 
 def _swapped(search: Search, found: Selection, name: str, ranked: Ranked) -> Selection:
@@ -143,7 +150,7 @@ def _unseen(search: Search, found: Selection, settings: Thresholds) -> tuple[str
 
     best = min(search.each(added, names), key=lambda t: t.fit.rms)
     with_it = fit(both, best.structure, best.fit.theta)
-    scorer = _scorer(both, with_it, settings)
+    scorer, _ = _scorer(both, with_it, settings)
     nats = evidence(scorer.block_scores(with_it), scorer.block_scores(without))
     size = newtons_per_metre(both)
     before, after = (size * rms(f.error[count:]) for f in (without, with_it))

@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 import scipy
 
+from actuator_glue.diagnosis.gains import standard_error
 from actuator_glue.diagnosis.held_out import HeldOutError
 from actuator_glue.diagnosis.held_out_look import Side
-from actuator_glue.diagnosis.ranking import standard_error
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.verdict import misses, takes_nothing
 from actuator_glue.inference.least_squares.data import LANES, Data

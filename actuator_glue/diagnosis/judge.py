@@ -7,14 +7,17 @@ from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 
+import numpy as np
+
 from actuator_glue.diagnosis import forecast
-from actuator_glue.diagnosis.ranking import removed
+from actuator_glue.diagnosis.gains import removed
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.search import Search, by_score
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.diagnosis.weights import TELLING, log_weight, price
 from actuator_glue.inference.least_squares.fit import Fit
+from actuator_glue.records import Array
 
 # Of what matters: two effects that remove this share each remove what matters together.
 _PART = 0.5**0.5
@@ -130,6 +133,12 @@ class Judge:
         alike = self.settings.tie_share * removed(rest, best)
         behind = [*(self.behind(t, best, alike) for t in trials), self.behind(rest, best)]
         return [math.exp(-max(b, 0.0)) for b in behind]
+
+    def shares(self, trials: Sequence[Trial]) -> Array:
+        """Return the share that each of some structures has of their weight (K,)."""
+        behind = np.array([self.behind(t, trials[0]) for t in trials])
+        weights = np.exp(behind.min() - behind)
+        return np.asarray(weights / weights.sum())
 
     def may_matter_below(self, current: Trial) -> float:
         """Mean squared error below which a rough refit may come to matter [m^2]."""

@@ -8,7 +8,7 @@ like any other: its error counts over all data, and the choice of the scope has 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from actuator_glue.diagnosis.score import Scorer
@@ -17,6 +17,10 @@ from actuator_glue.diagnosis.weights import log_weights, price
 from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.inference.least_squares.free_run import Model
 from actuator_glue.json_value import JsonObject
+from actuator_glue.records import Array
+
+LINEAR = 'command linear between samples'
+HOLD = math.log(2.0)  # nats: one hold of two was chosen
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +50,21 @@ class Row(JsonObject):
     price: float
     log_weight: float = math.nan
     chosen: bool = False
+
+    @property
+    def key(self) -> tuple[str, frozenset[str]]:
+        """What tells it from all other rows of a table."""
+        return self.scope, frozenset(self.effects)
+
+    @property
+    def kind(self) -> tuple[str, int]:
+        """See `kind`."""
+        return kind(self.scope, len(self.effects))
+
+
+def kind(scope: str, count: int) -> tuple[str, int]:
+    """Return of which kind a structure of so many effects is; either hold is of the same kind."""
+    return scope.removeprefix(LINEAR).removeprefix(', '), count
 
 
 def rows(search: Search, scorer: Scorer) -> tuple[Row, ...]:
@@ -119,13 +138,22 @@ def weighed(
     """
     best: dict[tuple[str, frozenset[str]], Row] = {}
     for r in sorted(some, key=lambda r: r.left_out):
-        best.setdefault((r.scope, frozenset(r.effects)), r)
+        best.setdefault(r.key, r)
     told = scope, frozenset(effects)
-    left_out, costs = zip(*((r.left_out, r.price) for r in best.values()), strict=True)
-    kinds = [(where, len(names)) for where, names in best]
-    weights = log_weights(left_out, costs, kinds, material)
+    weights = _weights(list(best.values()), material)
     found = [
         replace(r, chosen=key == told, log_weight=float(weight))
         for (key, r), weight in zip(best.items(), weights, strict=True)
     ]
     return tuple(sorted(found, key=lambda r: -r.log_weight))
+
+
+def outweighs(other: Row, told: Row, material: float) -> bool:
+    """Whether another row has more weight than the one told, material error `material` [m]."""
+    first, second = _weights([told, other], material)
+    return bool(second > first)
+
+
+def _weights(some: Sequence[Row], material: float) -> Array:
+    left_out, costs, kinds = zip(*((r.left_out, r.price, r.kind) for r in some), strict=True)
+    return log_weights(left_out, costs, kinds, material)

@@ -15,8 +15,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from actuator_glue.diagnosis.finding import Rival
+from actuator_glue.diagnosis.gains import removed, standard_error
 from actuator_glue.diagnosis.likelihood import inflation
-from actuator_glue.diagnosis.ranking import removed, standard_error
 from actuator_glue.diagnosis.score import Scorer, evidence
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection

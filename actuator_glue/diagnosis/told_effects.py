@@ -13,12 +13,12 @@ from actuator_glue.diagnosis.agreement import Homogeneity
 from actuator_glue.diagnosis.estimate import Estimate
 from actuator_glue.diagnosis.finding import Candidate, Finding, Rival
 from actuator_glue.diagnosis.fitting_verdict import Decision
+from actuator_glue.diagnosis.gains import standard_error
 from actuator_glue.diagnosis.judge import Judge
 from actuator_glue.diagnosis.learned import term as learned_term
 from actuator_glue.diagnosis.learned.forms import CAUSES
 from actuator_glue.diagnosis.measured.measurement import Measured
 from actuator_glue.diagnosis.one_record import OneRecord
-from actuator_glue.diagnosis.ranking import standard_error
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.model.effects import CATALOGUE

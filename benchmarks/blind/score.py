@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from statsmodels.stats.proportion import proportion_confint
 
+from actuator_glue.diagnosis.table import kind
 from actuator_glue.diagnosis.weights import TELLING, log_weights
 from actuator_glue.model.effects import CATALOGUE
 from actuator_glue.records import Array
@@ -139,7 +140,7 @@ def row_weights(rows: list[Json], material: float, telling: float = TELLING) -> 
     return log_weights(
         [np.inf if r['left_out'] is None else r['left_out'] for r in rows],
         [r['price'] for r in rows],
-        [(r['scope'], len(r['effects'])) for r in rows],
+        [kind(r['scope'], len(r['effects'])) for r in rows],
         material,
         telling,
     )

@@ -86,7 +86,7 @@ def test_one_of_a_kind_stands_for_what_is_like_it(rng_seed: int) -> None:
     assert not found.final.effects
     larger = companions.with_companions(selection, found.final)
     assert set(larger.effects) & set(names[:3])
-    like = companions.alike(selection.search, found.final, larger)
+    like = companions.alike(selection, found.final, larger)
     assert {e for trial, _ in like for e in trial.effects} | set(larger.effects) == set(names[:3])
 
     def draws(trial: Trial) -> np.ndarray:

@@ -64,9 +64,9 @@ def test_a_change_after_which_nothing_is_held_out_is_not_told() -> None:
     last = prepared.held.masks[0].nonzero()[0][-1] / RATE
     assert 57.0 - last > SHORTEST
     late = Moment(0, last + 0.1)
-    assert _since(first, late, None, Thresholds(), search) is None
+    assert _since(first, late, None, search) is None
     with pytest.raises(LookupError):
-        _since(first, Moment(0, last - 2.0), None, Thresholds(), search)
+        _since(first, Moment(0, last - 2.0), None, search)
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from actuator_glue.diagnosis.learned.forms import forms
-from actuator_glue.diagnosis.table import Row, scoped, since, weighed
+from actuator_glue.diagnosis.table import LINEAR, Row, outweighs, scoped, since, weighed
 from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.inference.transforms.inverse_response import Ridge
 from actuator_glue.model.effects import Scale
@@ -49,6 +49,22 @@ def test_which_effect_it_is_is_told_more_sharply() -> None:
     alone = weighed(rows[:2], MATERIAL, ('gain',), '')
     shared = np.logaddexp(table[0].log_weight, table[1].log_weight) - table[2].log_weight
     assert shared == pytest.approx(alone[0].log_weight - alone[1].log_weight)
+
+
+def test_another_hold_is_another_equation_and_no_addition() -> None:
+    """Which hold it is, like which name, is told by a fifth of what matters; an effect is not."""
+    held = row('gain', left=np.hypot(10.0, 1.0))
+    (linear,) = scoped([row('delay', left=10.0)], LINEAR, np.log(2.0))
+    assert outweighs(linear, held, MATERIAL) and not outweighs(held, linear, MATERIAL)
+    (since_then,) = scoped([row('delay', left=10.0)], 'since 3.0 s of a', 5.0)
+    assert not outweighs(since_then, held, MATERIAL)
+    assert outweighs(since_then, row('gain', left=np.hypot(10.0, 8.0)), MATERIAL)
+
+
+def test_a_hold_is_plainer_than_an_effect_that_imitates_it() -> None:
+    """With the other hold nothing is missing: an effect more is not worth the same error."""
+    (linear,) = scoped([row(left=10.5, price=4.0)], LINEAR, np.log(2.0))
+    assert outweighs(linear, row('gain-drift', left=10.0, price=8.0), MATERIAL)
 
 
 def test_scopes_of_scopes_are_told_together() -> None:

@@ -15,12 +15,12 @@ from functools import partial
 
 from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.conclusion import Conclusion
+from actuator_glue.diagnosis.gains import removed
 from actuator_glue.diagnosis.learned.forms import CAUSES, forms
 from actuator_glue.diagnosis.learned.friction import DRY, FALLING, SHAPES
 from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.moves import names_beside_term
 from actuator_glue.diagnosis.moves.move import Asking
-from actuator_glue.diagnosis.ranking import removed
 from actuator_glue.diagnosis.search import Asked, Search
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds

@@ -7,16 +7,16 @@ a setting in one stiffness alone looks like a specimen effect, and the specimen 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from actuator_glue.diagnosis.beam_search import BeamSearch
 from actuator_glue.diagnosis.conclusion import Conclusion
+from actuator_glue.diagnosis.gains import removed
 from actuator_glue.diagnosis.moves.move import Asking
 from actuator_glue.diagnosis.one_record import OneRecord
-from actuator_glue.diagnosis.ranking import removed
 from actuator_glue.diagnosis.score import Scorer, evidence, pooled, splits_of
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
@@ -39,12 +39,15 @@ def own_setting(result: Conclusion, asking: Asking) -> Conclusion:
     Else the same answer, with the rows of what was tried.
     """
     asking.tell('one record', 0.0)
-    limit, held = result.decision.limit, result.prepared.held.records
-    found, rows = setting(result.selection, result.found, limit, held)
-    rows = result.in_scope(rows)
-    if found is None:
-        return replace(result, others=(*result.others, *rows))
-    return replace(result.of(result.selection, found), others=rows)
+    rows = list[Row]()
+    for found, tried in settings(result):
+        rows += result.in_scope(tried)
+        if found is None:
+            continue
+        other = replace(result.of(result.selection, found), others=tuple(rows))
+        if other.outweighs(result):
+            return other
+    return replace(result, others=(*result.others, *rows))
 
 
 def _members(data: Data, held: Sequence[Record], index: int) -> tuple[Record, ...]:
@@ -59,51 +62,40 @@ def _members(data: Data, held: Sequence[Record], index: int) -> tuple[Record, ..
     return (own, *(r for r in held if r.known_stiffness() == stiffness))
 
 
-def setting(
-    selection: BeamSearch, found: Selection, limit: float, held: Sequence[Record]
-) -> tuple[Selection | None, tuple[Row, ...]]:
-    """Ask whether one record's own setting explains what common sizes do not.
+def settings(result: Conclusion) -> Iterator[tuple[Selection | None, tuple[Row, ...]]]:
+    """Yield selections with one record's own setting.
 
-    The setting must leave at most `limit` of structure, remove a material error and gain the
-    evidence of any addition, less a nat per parameter and the logarithm of how many were tried.
+    Beside Eq. (2) alone, then beside the effects found; each with a row for every setting that was
+    tried. None where the best of them leaves more structure than a model may leave.
 
     Args:
-        selection: the search that ended with `found`; its noise is taken anew from the answer.
-        found: its result with effects of common size.
-        limit: structure above which records count as unexplained [m].
-        held: held-out records, which share a setting through their stiffness.
-
-    Returns:
-        The attribution with the setting added, or None; and a row for each that was tried.
+        result: the answer with effects of common size.
     """
-    search, settings = selection.search, selection.settings
-    data, rows = search.data, list[Row]()
+    selection, found = result.selection, result.found
+    search, data = selection.search, selection.search.data
     if len(data.records) < 2 or search.scorer is None:
-        return None, ()
+        return
+    held = result.prepared.held.records
     for effects in sorted({(), found.final.effects}, key=len):
         start = search.trial(effects)
-        names = [n for n in SETTINGS if n not in effects]
         tried = [
             _fitted(search, start, name, _members(data, held, i))
-            for name in names
+            for name in SETTINGS
+            if name not in effects
             for i in range(len(data.records))
         ]
-        rows += [_row(search, t, start.structure, len(tried)) for t in tried]
-        tried.sort(key=lambda t: -float(t.scores.sum()))
-        best = tried[0]
-        parts = splits_of(data, best.fit.error)
+        scored = search.scorer
+        tried.sort(key=lambda t: scored.left_out_error(t.fit))  # their price is the same
+        rows = tuple(_row(search, t, start.structure, len(tried)) for t in tried)
+        parts = splits_of(data, tried[0].fit.error)
         left, noise = pooled(data, parts)
-        if left > limit or removed(start, best) < found.material:
+        if left > result.decision.limit:
+            yield None, rows
             continue
         search.scorer = replace(Scorer.of(data, parts), likely=left < found.material)
         tried, start = [_rescored(search, t) for t in tried], search.trial(effects)
-        common = search.trial(found.final.effects)
-        cost = len(best.fit.theta) - len(start.fit.theta) + float(np.log(len(tried)))
-        gained = evidence(tried[0].scores, common.scores) - cost
-        if gained < settings.nats:
-            continue
-        return _attribution(selection, found, start, tried, (left, noise)), tuple(rows)
-    return None, tuple(rows)
+        yield _attribution(selection, found, start, tried, (left, noise)), rows
+        search.scorer = scored  # it was not taken
 
 
 def _row(search: Search, trial: Trial, rest: Structure, tried: int) -> Row:

@@ -12,7 +12,6 @@ from actuator_glue.diagnosis.moves.move import Asking, after, follow
 from actuator_glue.diagnosis.onset import moments
 from actuator_glue.diagnosis.onset.moments import Moment
 from actuator_glue.diagnosis.onset.onset import Appeared
-from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.inference.least_squares.data import SETTLE, Data
 from actuator_glue.inference.least_squares.fit import Fit
 
@@ -24,7 +23,7 @@ def since_onset(first: Conclusion, asking: Asking) -> Conclusion | None:
     """Detect effects that start mid-record.
 
     Taken where Eq. (2), or effects that always act, before a moment, and the effects found in the
-    data since then leave materially less than effects that always act.
+    data since then have more weight than effects that always act.
     """
     since = _appeared(first, asking)
     if since is None:
@@ -53,7 +52,7 @@ def _appeared(first: Conclusion, asking: Asking) -> Conclusion | None:
     for moment, quiet in _asked(first):
         if first.effort.over:
             break
-        told = _since(first, moment, quiet, asking.settings, search)
+        told = _since(first, moment, quiet, search)
         if told is None:
             continue
         if told.decision.verdict != 'unexplained':
@@ -68,17 +67,15 @@ def _since(
     first: Conclusion,
     moment: Moment,
     quiet: Quiet | None,
-    settings: Thresholds,
     search: Callable[[Moment], Conclusion],
 ) -> Conclusion | None:
-    """Return the conclusion from the data since a moment, where it explains more.
+    """Return the conclusion from the data since a moment, where it has more weight.
 
     Args:
         first: the conclusion from all data.
         moment: when something may have appeared.
         quiet: data and fit before it, where Eq. (2) is enough there; if None, the effects found
             since then must be enough, less one of them or with other parameters.
-        settings: thresholds.
         search: searches the data since a moment.
     """
     before, since = moment.split(first.data)
@@ -89,21 +86,16 @@ def _since(
     found, base = second.found, None
     if quiet is not None:
         before, base = quiet[0], replace(first.found.base, fit=quiet[1])
-    cost = settings.nats * 2.0 * second.decision.noise**2
     complete = second.decision.verdict != 'unexplained'
-    enough = moments.enough_before(before, base, found.final, cost, complete)
-    sides = before, since
+    enough = moments.enough_before(before, base, found.final, found.material, complete)
 
     def told(most: float) -> Conclusion | None:
         bare = next((trial for trial, excess in enough if excess <= most), None)
         if bare is None:
             return None
-        nats = settings.nats + len(bare.fit.theta)
-        rivals = first.found.final, bare, found.final
-        if not moments.explains(sides, rivals, nats, found.material):
-            return None
         later = replace(second, appeared=Appeared(first.data, moment, bare))
-        return replace(later, others=later.over_all_data(second.others))
+        later = replace(later, others=later.over_all_data(second.others))
+        return later if later.outweighs(first) else None
 
     near = told(math.inf)
     if near is None or near.onset is None:
@@ -113,7 +105,7 @@ def _since(
         # Data from before the onset bias the effects found: search those since then alone.
         later = Moment(moment.record, onset.time)
         again = moments.quiet_before(later, first.data)
-        if (again or not quiet) and (other := _since(first, later, again, settings, search)):
+        if (again or not quiet) and (other := _since(first, later, again, search)):
             return other
     return told(found.material)
 

@@ -1,7 +1,6 @@
-"""The moment at which an effect may have appeared, and whether it did.
+"""The moment at which an effect may have appeared, and what may hold before it.
 
-Effects that always act must be enough for the data before, the new effect must be one that would
-have been seen there, and both together must explain materially more than effects that always act.
+Eq. (2) or effects that always act must be enough for the data before.
 """
 
 from __future__ import annotations
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from actuator_glue.diagnosis.score import pooled, splits_of
 from actuator_glue.diagnosis.trial import Trial
+from actuator_glue.diagnosis.weights import MATTERING, log_weight
 from actuator_glue.inference.least_squares.data import SETTLE, Data, Mask
 from actuator_glue.inference.least_squares.fit import Fit, base_fit, fit
 from actuator_glue.model.structure import Structure
@@ -155,7 +155,7 @@ def quiet(before: Data, error: Array) -> bool:
 
 
 def enough_before(
-    before: Data, base: Trial | None, since: Trial, cost: float, complete: bool
+    before: Data, base: Trial | None, since: Trial, material: float, complete: bool
 ) -> list[tuple[Trial, float]]:
     """Return models that may hold before a moment, best first: Eq. (2), or `since` less an effect.
 
@@ -169,7 +169,7 @@ def enough_before(
         before: data before the moment.
         base: Eq. (2), where it was enough there; None: only models that leave noise only count.
         since: what explains the data since then.
-        cost: square sum that a further parameter must remove [m^2].
+        material: least rms error that matters [m].
         complete: whether `since` leaves nothing material.
 
     Returns:
@@ -191,37 +191,8 @@ def enough_before(
         if quiet(before, again.error):
             tried.append((Trial(since.structure, '', again, np.zeros(0)), 0.0))
 
-    def charged(side: tuple[Trial, float]) -> float:
-        again = side[0].fit
-        return float(again.error @ again.error) + cost * len(again.theta)
+    def weight(side: tuple[Trial, float]) -> float:
+        found = side[0].fit
+        return log_weight(found.rms, MATTERING * material, len(found.theta))
 
-    return sorted(tried, key=charged)
-
-
-def explains(
-    sides: tuple[Data, Data], rivals: tuple[Trial, Trial, Trial], nats: float, material: float
-) -> bool:
-    """Whether an effect that appears explains more than effects that act all the time.
-
-    The effect must be one that would have been seen before the moment, too.
-
-    Args:
-        sides: data before and data since it appeared.
-        rivals: what acts all the time, what is enough before, and what explains the data since.
-        nats: least evidence for one over the other.
-        material: least rms error to be removed [m].
-    """
-    before, after = sides
-
-    def squares(side: Data, trial: Trial) -> float:
-        error = side.target - side.simulate(trial.model, trial.fit.theta)[0]
-        return float(error @ error)
-
-    always, without, appears = rivals
-    since = squares(after, appears)
-    noise = pooled(after, splits_of(after, appears.fit.error))[1]
-    quiet = float(without.fit.error @ without.fit.error)
-    gained = squares(before, always) + squares(after, always) - quiet - since
-    seen = squares(before, appears) - quiet
-    count = before.target.size + after.target.size
-    return min(gained, seen) > 2.0 * nats * noise**2 and gained > count * material**2
+    return sorted(tried, key=weight, reverse=True)

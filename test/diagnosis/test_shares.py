@@ -1,4 +1,4 @@
-"""Rankings: weights from block scores, their class of none, and the level of false alarms."""
+"""Shares of names, their class of none, and the level of false alarms."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -10,7 +10,6 @@ from scipy import stats
 
 from actuator_glue.diagnosis import false_alarms, ties, verdict
 from actuator_glue.diagnosis.held_out import HeldOutError
-from actuator_glue.diagnosis.ranking import standard_error, weights
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
@@ -23,29 +22,6 @@ def trial(name: str, rms: float, scores: Array, size: int = 5) -> Trial:
     fit = SimpleNamespace(theta=np.zeros(size), z=np.zeros(size))
     found = SimpleNamespace(added=name, mean_square=rms**2, scores=scores, fit=fit)
     return cast('Trial', found)
-
-
-def test_a_rival_within_its_standard_error_keeps_a_probability() -> None:
-    """Two standard errors of 100 nats behind is not excluded, whatever the nats are.
-
-    (Normal: a deficit of 1.9 standard errors is made up in 2.9 % of samples of blocks; the seed
-    of the draws is fixed, so this fails never or always.)
-    """
-    rng = np.random.default_rng(0)
-    difference = rng.standard_normal(50)
-    difference += 1.9 / np.sqrt(50) * difference.std(ddof=1) - difference.mean()
-    difference *= 30.0
-    assert difference.sum() > 250.0
-    assert difference.sum() / standard_error(difference) == pytest.approx(1.9)
-    best, rival = weights(np.stack([difference, 0.0 * difference]))
-    assert best + rival == pytest.approx(1.0)
-    assert 0.005 < rival < 0.08
-
-
-def test_equal_gains_in_all_blocks_are_certain() -> None:
-    """Where every block says the same the exponential of the nats decides."""
-    best, rival = weights(np.stack([np.full(40, 0.1), np.zeros(40)]))
-    assert rival / best == pytest.approx(np.exp(-4.0), rel=1e-6)
 
 
 def test_the_best_of_many_candidates_by_chance() -> None:

@@ -1,7 +1,7 @@
-"""The error that a structure removes, and how far a ranking of structures is chance.
+"""The error that effects remove, and how far a difference of block scores is chance.
 
 Nats of block scores answer one question alone: is an effect there beyond chance (weights.py
-decides all others). They come block by block, so their spread says how far a ranking is chance.
+decides all others). They come block by block, so their spread says how far they are chance.
 """
 
 from __future__ import annotations
@@ -13,8 +13,6 @@ from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.records import Array
 
-_DRAWS = 2000
-_SEED = 0
 # Of the best one's removed error: a tie needs nearly all of it, so a rough refit of a rival that
 # removes less is not worth finishing.
 _NEARLY = 0.9
@@ -44,16 +42,3 @@ def standard_error(difference: Array) -> float:
     # Squares may overflow for a structure that diverges without a block.
     size = float(np.abs(difference).max()) or 1.0
     return float(np.sqrt(len(difference)) * (difference / size).std(ddof=1)) * size
-
-
-def weights(scores: Array) -> Array:
-    """Return the probability of every structure (K,) from its out-of-sample block scores (K, B).
-
-    The blocks are reweighted as in the Bayesian bootstrap, and the structures by the exponential
-    of their score in every such draw (pseudo-BMA+: Yao, Vehtari, Simpson & Gelman 2018).
-    """
-    count = scores.shape[1]
-    share = np.random.default_rng(_SEED).dirichlet(np.ones(count), _DRAWS)
-    total = count * (scores - scores.max(axis=0)) @ share.T
-    likely = np.exp(np.maximum(total - total.max(axis=0), -700.0))
-    return np.asarray((likely / likely.sum(axis=0)).mean(axis=1))
