@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -66,6 +67,9 @@ def diagnose(
     if first_look is not None:
         first_look(FirstLook.of(some, given, settings))
     other = wrong_setup.find(ready.fit, settings, given=given)
+    if other is not None and other.runs_linearly:
+        # The hold is decided with what is missing under either; begun with the likelier one.
+        ready, other = ready.with_hold('linear', replace(other, taken=True)), None
     # The error of a wrong set-up is not the actuator's: it is not searched for effects.
     search = as_given if other is not None and other.enough else conclude
     remembered = before.remembered or Remembered()

@@ -19,7 +19,7 @@ from actuator_glue.inference.least_squares.base_prior import BasePrior
 from actuator_glue.inference.least_squares.data import SETTLE, Data, Mask
 from actuator_glue.inference.least_squares.free_run import Model
 from actuator_glue.model.structure import Structure
-from actuator_glue.records import Array, Record
+from actuator_glue.records import Array, Hold, Record
 
 _SHORTEST = 5.0  # s
 _FOLD = 4  # every fourth block is held out where no record is
@@ -70,6 +70,11 @@ class Prepared:
         if fit is self.fit and (self.folded or held is self.held):
             return self
         return replace(self, fit=fit, held=held, impulses=found, held_impulses=others)
+
+    def with_hold(self, hold: Hold, setup: WrongSetup | None) -> Prepared:
+        """Return the records with another hold of their commands; `setup` is None if as given."""
+        fit, held = (data.with_setup(hold=hold) for data in (self.fit, self.held))
+        return replace(self, fit=fit, held=held, setup=setup)
 
     def since(self, moment: Moment) -> Prepared:
         """Leave out the data before a moment; separate held-out records are taken to be later."""

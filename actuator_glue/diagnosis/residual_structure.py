@@ -158,7 +158,7 @@ def residual_structure(
     matters = settings.material(2.0 * noise if short else noise, stroke)
     setup = None
     if left >= matters:
-        setup = wrong_setup.find(data, settings, both_holds=True)
+        setup = wrong_setup.find(data, settings)
     return ResidualStructure(
         structure_m=left,
         noise_m=noise,

@@ -87,6 +87,11 @@ class WrongSetup(JsonObject):
             taken=taken,
         )
 
+    @property
+    def runs_linearly(self) -> bool:
+        """Whether it differs in one thing: the command runs linearly and was given as held."""
+        return self.changed == ('hold',) and 'linear' in self.hold
+
     def sentence(self) -> str:
         """Say what to check, or what was taken instead."""
         parts = []
@@ -105,18 +110,12 @@ class WrongSetup(JsonObject):
         return f'check the set-ups: with {" and ".join(parts)} {alone}'
 
 
-def find(
-    data: Data, settings: Thresholds, both_holds: bool = False, given: Fit | None = None
-) -> WrongSetup | None:
+def find(data: Data, settings: Thresholds, given: Fit | None = None) -> WrongSetup | None:
     """Return a set-up that explains records far better than the one given; None for none.
-
-    A command given as held that runs linearly is found by moves/other_hold.py, with the effects
-    that it leads to; here the other way round, or together with exchanged stiffnesses.
 
     Args:
         data: the fitting part.
         settings: thresholds.
-        both_holds: whether both ways round are tried here.
         given: Eq. (2) fitted to `stretched(data)`, where that is known.
     """
     some = stretched(data)
@@ -125,9 +124,7 @@ def find(
     left, noise = pooled(some, splits_of(some, given.error))
     if left < settings.material(noise, stroke):
         return None
-    others = list(_others(data, both_holds))
-    if not others:
-        return None
+    others = list(_others(data))
     parts = [stretched(other) for other in others]
     fits = [base_fit(part) for part in parts]
     best = min(range(len(fits)), key=lambda i: fits[i].rms)
@@ -152,7 +149,7 @@ def _nats(data: Data, better: Fit, given: Fit) -> float:
     return evidence(scorer.block_scores(better), scorer.block_scores(given))
 
 
-def _others(data: Data, both_holds: bool) -> Iterator[Data]:
+def _others(data: Data) -> Iterator[Data]:
     """Yield the data with stiffnesses exchanged, with the other hold, and with both."""
     known = [r.known_stiffness() for r in data.records]
     values = sorted(set(known))
@@ -168,5 +165,5 @@ def _others(data: Data, both_holds: bool) -> Iterator[Data]:
     exchanged = [data.with_setup(stiffness=order) for order in orders]
     yield from exchanged
     linear = any(r.hold == 'linear' for r in data.recorded)
-    for one in (*exchanged, *([data] if linear or both_holds else [])):
+    for one in (*exchanged, data):
         yield one.with_setup(hold='zoh' if linear else 'linear')

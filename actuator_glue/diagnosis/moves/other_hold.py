@@ -31,32 +31,32 @@ def with_the_right_hold(first: Conclusion, asking: Asking) -> Conclusion:
     explains the records with neither hold, terms are learned with both: an effect outside it may
     look like the other hold.
     """
-    other = _linearly(first, asking)
+    other = _otherwise(first, asking)
     if other is None:
         return follow(first, LEARNED_TERMS, asking)
     if not other.outweighs(first):
         return follow(beside(first, other), LEARNED_TERMS, asking)
-    other = after(first, other, 'the command runs linearly between its samples')
+    how = 'runs linearly' if other.prepared.setup is not None else 'is held, as given,'
+    other = after(first, other, f'the command {how} between its samples')
     described = follow(other, LEARNED_TERMS, asking)
     if first.decision.verdict != 'unexplained':
         return described
-    held = follow(first, LEARNED_TERMS, asking)
-    return described if described.outweighs(held) else beside(held, described)
+    stood = follow(first, LEARNED_TERMS, asking)
+    return described if described.outweighs(stood) else beside(stood, described)
 
 
-def _linearly(first: Conclusion, asking: Asking) -> Conclusion | None:
+def _otherwise(first: Conclusion, asking: Asking) -> Conclusion | None:
     """Return the conclusion with the other hold, where it may have more weight.
 
     The search is made where Eq. (2) alone, the structure found or one of the best single effects
     has more weight with it than the answer; while something is missing, also where Eq. (2) alone
     leaves materially less.
     """
-    prepared = first.prepared
+    prepared, linear = first.prepared, first.prepared.setup is not None
     held_commands = any(r.hold == 'zoh' for r in prepared.fit.recorded)
-    if first.decision.verdict == 'none' or not held_commands or first.effort.over:
+    if first.decision.verdict == 'none' or not (linear or held_commands) or first.effort.over:
         return None
-    fitted, held = (data.with_setup(hold='linear') for data in (prepared.fit, prepared.held))
-    other = replace(prepared, fit=fitted, held=held)
+    other = prepared.with_hold('zoh' if linear else 'linear', None)
     base = Search(other.fit, ()).base()
     before = first.found.base.mean_square + (first.line.rms**2 if first.line else 0.0)
     if not _may_outweigh(first, other, base):
@@ -66,9 +66,10 @@ def _linearly(first: Conclusion, asking: Asking) -> Conclusion | None:
             return None
     asking.tell('other hold', 0.0)
     second = asking.conclude(other)
-    errors, enough = (before**0.5, base.rms), second.decision.verdict == 'none'
-    setup = WrongSetup.between(prepared.fit, other.fit, errors, enough, taken=True)
-    second = replace(second, prepared=replace(second.prepared, setup=setup))
+    if not linear:
+        errors, enough = (before**0.5, base.rms), second.decision.verdict == 'none'
+        setup = WrongSetup.between(prepared.fit, other.fit, errors, enough, taken=True)
+        second = replace(second, prepared=replace(second.prepared, setup=setup))
     return replace(second, others=second.in_scope(second.others))
 
 
@@ -83,9 +84,11 @@ def _may_outweigh(first: Conclusion, other: Prepared, base: Fit) -> bool:
         starts = np.stack([trial.fit.theta, trial.fit.theta])
         starts[1, : len(base.theta)] = base.theta
         again = first.effort.spent_on(fit(data, trial.structure, starts))
-        cost = price(trial.structure, search.entries, len(search.names)) + table.HOLD
-        row = table.row(trial.structure, trial.effects, again, first.scorer, cost, table.LINEAR)
+        cost = price(trial.structure, search.entries, len(search.names))
+        row = table.row(trial.structure, trial.effects, again, first.scorer, cost)
         row = replace(row, left_out=math.hypot(row.left_out, line))
+        if first.prepared.setup is None:
+            (row,) = table.scoped([row], table.LINEAR, table.HOLD)
         if table.outweighs(row, first.told, found.material):
             return True
     return False
