@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import replace
 from functools import partial
@@ -12,6 +13,7 @@ from actuator_glue.diagnosis import false_alarms, gains, pairs
 from actuator_glue.diagnosis.finding import Rival
 from actuator_glue.diagnosis.gains import removed, worth
 from actuator_glue.diagnosis.judge import Judge
+from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.search import Asked, Search, by_score
 from actuator_glue.diagnosis.search_step import SearchStep
 from actuator_glue.diagnosis.selection import Selection
@@ -24,8 +26,9 @@ from actuator_glue.diagnosis.trial import Trial
 _SWAPS = 4
 # Rounds and swaps where something material remains: fewer, as learned terms may help instead.
 _OPEN, _OPEN_TRIED = 1, 3
-# Names after which a learned term is tried: it may be plainer than further names.
+# Names after which learned terms are tried: they may be plainer than further names.
 _NAMES = 2
+MOST_TERMS = 2
 
 
 class BeamSearch(Judge):
@@ -35,19 +38,11 @@ class BeamSearch(Judge):
         search: the structures.
         settings: thresholds.
         progress: takes progress.
-        explains_rest: whether a learned term explains all that names leave; no further names are
-            added then.
     """
 
-    def __init__(
-        self,
-        search: Search,
-        settings: Thresholds,
-        progress: Progress,
-        explains_rest: Callable[[BeamSearch, Trial], bool] = lambda search, current: False,
-    ) -> None:
+    def __init__(self, search: Search, settings: Thresholds, progress: Progress) -> None:
         super().__init__(search, settings)
-        self.progress, self.explains_rest = progress, explains_rest
+        self.progress = progress
 
     def apart(self) -> BeamSearch:
         """Return an independent copy: its additions and its noise do not change this search."""
@@ -56,20 +51,47 @@ class BeamSearch(Judge):
         return other
 
     def extend(self, beam: Sequence[Trial], stage: int) -> list[Trial]:
-        """Refit every structure of the beam with its most promising further effects."""
+        """Refit every structure of the beam with its most promising further effects.
+
+        Beyond `_NAMES` of them with learned terms, too: for what is outside the catalogue, further
+        names would only imitate it.
+        """
         label = EFFECTS[min(stage, len(EFFECTS)) - 1]
         self.progress(label, 0.0)
-        asked = [
-            Asked(current, tuple(self.search.screened(current, names)[: self.settings.tried]))
-            for current in beam
-            for names in [self.search.others(current)]
-        ]
+        asked = []
+        for current in beam:
+            names = self.search.screened(current, self.search.others(current))
+            names = names[: self.settings.tried]
+            if stage > _NAMES:
+                names += self._promising_terms(current)
+            asked.append(Asked(current, tuple(names)))
         found: dict[tuple[str, ...], Trial] = {}
         told = partial(self.progress, label)
         for row in self.search.additions_to(asked, told, valves=False, together=True):
             for trial in row:
                 found.setdefault(trial.effects, trial)
         return sorted(found.values(), key=by_score)
+
+    def with_terms(self, starts: Sequence[Trial]) -> list[list[Trial]]:
+        """Refit structures with the learned terms that promise most beside each."""
+        return self.search.additions_to(
+            [Asked(start, tuple(self._promising_terms(start))) for start in starts]
+        )
+
+    def explained_by_term(self, current: Trial) -> bool:
+        """Whether a learned term leaves nothing material, alone or added to the names found.
+
+        Tried before many names are added: for a machine outside the catalogue, further names would
+        cost the time that a description needs.
+        """
+        rows = self.with_terms((self.search.trial(()), current))
+        return any(self.left(trial) < self.material for trial in itertools.chain(*rows))
+
+    def _promising_terms(self, current: Trial) -> list[str]:
+        if sum(map(is_learned, current.structure.entries)) >= MOST_TERMS:
+            return []
+        names = [n for n in self.search.terms() if n not in current.effects]
+        return self.search.screened(current, names)[: self.settings.terms]
 
     def overlooked(self, current: Trial) -> list[Trial]:
         """Refit a structure with effects that only show once its members are in the model.
@@ -153,7 +175,7 @@ class BeamSearch(Judge):
             if best is None:
                 # No further name is worth it; a learned term was not tried yet with so few names.
                 asked = open_ and len(current.effects) < _NAMES
-                described = asked and self.explains_rest(self, current)
+                described = asked and self.explained_by_term(current)
                 break
             current = self._at_its_optimum(best)
             steps.append(SearchStep.to(current, f'with {best.added}'))
@@ -164,7 +186,7 @@ class BeamSearch(Judge):
                 threshold = max(threshold, s.later_share * removed(base, current))
             if self.left(current) < self.material or stage == s.most or self.search.effort.over:
                 break
-            if stage == _NAMES and (described := self.explains_rest(self, current)):
+            if stage == _NAMES and (described := self.explained_by_term(current)):
                 break
             width = max(1, s.beam + 1 - stage)  # the more effects, the fewer alternatives
             ranked = self.extend(self.rescored(ranked[:width]), stage + 1)
@@ -192,7 +214,12 @@ class BeamSearch(Judge):
         """
         whole = (self.left(t) < self.material for t in ranked)
         asked = zip(ranked, (self.material if w else threshold for w in whole), strict=True)
-        return next((t for t, least in asked if self.better(t, current, least)), None)
+        return next((t for t, m in asked if self.better(t, current, m, self._choice(t))), None)
+
+    def _choice(self, trial: Trial) -> float:
+        """Nats that the choice of a learned term costs; the level covers that of a name."""
+        added = self.search.entries[trial.added]
+        return math.log(len(self.search.terms())) if is_learned(added) else 0.0
 
     def _at_its_optimum(self, current: Trial) -> Trial:
         """Take the noise from a structure, fully refitted: a rough fit's error is no effect."""

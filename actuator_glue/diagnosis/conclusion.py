@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -26,7 +25,6 @@ from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.stages import Progress
 from actuator_glue.diagnosis.table import LINEAR, Row
 from actuator_glue.diagnosis.thresholds import Thresholds
-from actuator_glue.diagnosis.trial import Trial
 from actuator_glue.inference.least_squares.data import Data
 
 
@@ -165,7 +163,6 @@ def searched(
     line: Line | None,
     settings: Thresholds,
     tell: Progress,
-    explains_rest: Callable[[BeamSearch, Trial], bool],
     earlier: Conclusion | None = None,
 ) -> Conclusion:
     """Search for what the model lacks, one effect at a time; return the conclusion.
@@ -176,10 +173,9 @@ def searched(
         line: hum that was removed from the data before.
         settings: thresholds.
         tell: takes progress.
-        explains_rest: whether a learned term explains all that names leave.
         earlier: conclusion from the same samples, cleaned differently, to continue from.
     """
-    selection = BeamSearch(search, settings, tell, explains_rest)
+    selection = BeamSearch(search, settings, tell)
     if earlier is None or not earlier.found.final.effects:
         named = selection.run()
     else:

@@ -10,7 +10,6 @@ from actuator_glue.diagnosis.conclusion import Conclusion, searched
 from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.measured import hum
 from actuator_glue.diagnosis.measured.hum import Line
-from actuator_glue.diagnosis.moves.describe import explains_rest
 from actuator_glue.diagnosis.moves.move import Asking, follow
 from actuator_glue.diagnosis.moves.registry import ACROSS, WITHIN
 from actuator_glue.diagnosis.preparation import Prepared
@@ -49,7 +48,7 @@ def as_given(
     """Conclude from Eq. (2), alone and with each single effect, without any further search."""
     tell('base fit', 0.0)
     prepared, search, line = _begun(prepared, settings, each, effort, fixed=True)
-    return searched(prepared, search, line, replace(settings, most=0), tell, explains_rest)
+    return searched(prepared, search, line, replace(settings, most=0), tell)
 
 
 def _within(
@@ -94,13 +93,13 @@ def _moved(
     before: Conclusion | None = None,
 ) -> Conclusion:
     settings, tell = asking.settings, asking.tell
-    result = searched(prepared, search, line, settings, tell, explains_rest, before)
+    result = searched(prepared, search, line, settings, tell, before)
     if line is not None and result.found.final.effects:
         left = _line_left(prepared.fit, result.found.final)
         if left is None or not left.same_as(line):
             data = prepared.fit if left is None else hum.without(prepared.fit, left)
             search = Search(data, search.names, search.each, effort=search.effort)
-            result = searched(prepared, search, left, settings, tell, explains_rest, result)
+            result = searched(prepared, search, left, settings, tell, result)
     return follow(result, WITHIN, asking)
 
 

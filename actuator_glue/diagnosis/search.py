@@ -14,6 +14,8 @@ import numpy as np
 
 from actuator_glue.diagnosis import global_search, poles
 from actuator_glue.diagnosis.effort import Effort
+from actuator_glue.diagnosis.learned.forms import forms
+from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.score import Scorer, splits_of
 from actuator_glue.diagnosis.screening import screen, signatures
 from actuator_glue.diagnosis.trial import Trial
@@ -87,7 +89,7 @@ class Search:
         names: effects that act on the mean response.
         each: refits candidates, several at a time if it can (the kernels release the
             interpreter lock).
-        described: whether the entries hold the forms of learned terms.
+        described: whether the entries hold the learned terms.
         effort: what all refits cost.
     """
 
@@ -139,6 +141,13 @@ class Search:
     def others(self, trial: Trial) -> list[str]:
         """Return the names that a structure does not have."""
         return [n for n in self.names if n not in trial.effects]
+
+    def terms(self) -> list[str]:
+        """Return the learned terms for this test; the entries hold them from the first call on."""
+        if not self.described:
+            self.entries |= {e.name: e for e in forms(self.scale(), self.entries)}
+            self.described = True
+        return [n for n, e in self.entries.items() if is_learned(e) and n not in self.names]
 
     def wider(self, names: Sequence[str]) -> Search:
         """Return a search that tries further effects; it knows all structures refitted so far."""

@@ -27,6 +27,7 @@ class Thresholds:
         beam: structures of one effect carried on to two; one fewer with each further effect.
         evaluations: of the posterior's likelihood, at most; 0 takes the Laplace approximation.
         tried: refits per structure after the first stage, best screened first.
+        terms: the same of learned terms.
         effort: work of all refits after which no further search is begun (diagnosis/effort.py).
         use_force: the recorded force chooses among tied names (diagnosis/force_ranking.py).
     """
@@ -45,6 +46,7 @@ class Thresholds:
     most: int = 6
     beam: int = 3
     tried: int = 5
+    terms: int = 4
     evaluations: int = 12_000
     effort: float = 7e7
     use_force: bool = False

@@ -10,7 +10,6 @@ import pytest
 
 from actuator_glue.diagnosis.diagnose import diagnose
 from actuator_glue.diagnosis.learned.forms import forms
-from actuator_glue.diagnosis.moves import describe
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.errors import InputError
 from actuator_glue.model.commands import sweep
@@ -52,7 +51,7 @@ def few_forms(monkeypatch: pytest.MonkeyPatch) -> None:
     def sensors(scale: Scale, known: Container[str] = ()) -> tuple[Effect, ...]:
         return tuple(effect for effect in forms(scale, known) if effect.place == 'sensor')
 
-    monkeypatch.setattr(describe, 'forms', sensors)
+    monkeypatch.setattr('actuator_glue.diagnosis.search.forms', sensors)
 
 
 @pytest.mark.usefixtures('few_forms')

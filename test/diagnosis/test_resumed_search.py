@@ -66,16 +66,17 @@ def test_going_on_costs_less_and_says_the_same() -> None:
     assert again.search.effort.spent < 0.7 * anew.search.effort.spent
 
 
-def test_a_learned_term_is_asked_for_where_names_end() -> None:
+def test_a_learned_term_is_asked_for_where_names_end(monkeypatch: pytest.MonkeyPatch) -> None:
     """Play, of which no name is offered: what one leaves may have a description."""
     asked: list[tuple[str, ...]] = []
 
-    def explains_rest(search: BeamSearch, current: Trial) -> bool:
+    def explained(search: BeamSearch, current: Trial) -> bool:
         asked.append(current.effects)
         return True
 
+    monkeypatch.setattr(BeamSearch, 'explained_by_term', explained)
     names = ('bias', 'gain', 'gain-drift')
     search = Search(Data.whole(records(False)), names)
-    found = BeamSearch(search, Thresholds(), lambda stage, share: None, explains_rest).run()
+    found = BeamSearch(search, Thresholds(), lambda stage, share: None).run()
     assert found.left > found.material
     assert asked == [found.final.effects] and found.described

@@ -13,24 +13,22 @@ import math
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from actuator_glue.diagnosis.beam_search import BeamSearch
+from actuator_glue.diagnosis.beam_search import MOST_TERMS, BeamSearch
 from actuator_glue.diagnosis.conclusion import Conclusion
 from actuator_glue.diagnosis.gains import removed
-from actuator_glue.diagnosis.learned.forms import CAUSES, forms
+from actuator_glue.diagnosis.learned.forms import CAUSES
 from actuator_glue.diagnosis.learned.friction import DRY, FALLING, SHAPES
 from actuator_glue.diagnosis.learned.term import is_learned
 from actuator_glue.diagnosis.moves import names_beside_term
 from actuator_glue.diagnosis.moves.move import Asking
-from actuator_glue.diagnosis.search import Asked, Search
+from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.selection import Selection
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.diagnosis.trial import Trial
 
 Way = Callable[[BeamSearch, Selection], Selection | None]
 _LONG = 100_000  # samples
-_MOST = 2  # learned terms
 _MUCH = 0.5  # of what matters: a description must remove so much beyond the name it replaces
-_REFITS = 4  # per structure and turn
 # Another shape of the same cause must remove this share of what matters, and this share of the
 # stroke, which is more than the errors of decimation and simulation steps.
 _SHAPED, _STEPS = 0.1, 3e-4
@@ -60,22 +58,6 @@ def with_terms(result: Conclusion, asking: Asking) -> Conclusion | None:
     return None if described is None else result.of(selection, described)
 
 
-def explains_rest(selection: BeamSearch, current: Trial) -> bool:
-    """Whether a learned term leaves nothing material, alone or added to the names found.
-
-    Tried before many names are added: for a machine outside the catalogue, further names would
-    cost the time that a description needs.
-
-    Args:
-        selection: the model selection.
-        current: names that leave something material.
-    """
-    search = selection.search
-    names = _offered(search)
-    rows = _refitted(search, (search.trial(()), current), names)
-    return any(selection.left(trial) < selection.material for row in rows for trial in row)
-
-
 def ways(found: Selection) -> list[Way]:
     """Return the searches to make where effects leave nothing material, in order.
 
@@ -102,16 +84,14 @@ def learned(selection: BeamSearch, found: Selection, complete: bool = False) -> 
     Returns:
         The selection with learned terms, or None where none is worth it.
     """
-    search = selection.search
-    names = _offered(search)
-    best = found.final
-    for turn in range(_MOST):
+    search, best = selection.search, found.final
+    for turn in range(MOST_TERMS):
         if search.effort.over:
             break
-        selection.progress('learned term', turn / _MOST)
+        selection.progress('learned term', turn / MOST_TERMS)
         # A wrong name may stand where the term belongs: start from Eq. (2) alone, too.
         starts = [best] if turn or not best.effects else [best, search.trial(())]
-        better = _additions(selection, starts, best, names, complete)
+        better = _additions(selection, starts, best, complete)
         if better is None:
             break
         best = _plainer(selection, better)
@@ -138,14 +118,13 @@ def instead(selection: BeamSearch, found: Selection) -> Selection | None:
         found: names that leave nothing material.
     """
     search, base = selection.search, selection.search.trial(())
-    names = _offered(search)
     selection.progress('learned term', 0.0)
-    tried = search.additions(base, search.screened(base, names)[:_REFITS])
+    (tried,) = selection.with_terms([base])
     whole = [t for t in tried if selection.left(t) < selection.material]
     if not whole:
         return None
     best = max(whole, key=lambda trial: _merit(search, trial))
-    least = math.log(len(names))
+    least = math.log(len(search.terms()))
     if len(found.final.effects) == 1:
         least = _decisive(search, selection.settings)
         much = _least_removed(best.added, found.final.effects, selection.material)
@@ -173,7 +152,7 @@ def reshaped(selection: BeamSearch, found: Selection) -> Selection | None:
     told = [n for n, row in found.rivals.items() if any(r.tied and r.name in dry for r in row)]
     if not told:
         return None
-    _offered(search)
+    search.terms()
     least = _decisive(search, selection.settings)
     selection.progress('learned term', 0.0)
     # In place of the name, or beside it, as friction may also fall with velocity.
@@ -212,15 +191,6 @@ def as_good_and_plainer(selection: BeamSearch, found: Selection, named: Selectio
     return _gain(selection.search, best, names) > 0.0
 
 
-def _offered(search: Search) -> list[str]:
-    """Add the forms for this test to a search; return the names of those not searched yet."""
-    if not search.described:
-        offered = forms(search.scale(), search.entries)
-        search.entries |= {effect.name: effect for effect in offered}
-        search.described = True
-    return [n for n, e in search.entries.items() if is_learned(e) and n not in search.names]
-
-
 def _gain(search: Search, best: Trial, other: Trial) -> float:
     """Nats out of sample by which a structure is better, less one for each further parameter."""
     assert search.scorer is not None
@@ -228,24 +198,16 @@ def _gain(search: Search, best: Trial, other: Trial) -> float:
     return float(gain.sum()) + len(other.fit.theta) - len(best.fit.theta)
 
 
-def _refitted(search: Search, starts: Sequence[Trial], names: Sequence[str]) -> list[list[Trial]]:
-    """Refit structures with the terms that promise most beside each."""
-    new = [[n for n in names if n not in start.effects] for start in starts]
-    ranked = [search.screened(*pair)[:_REFITS] for pair in zip(starts, new, strict=True)]
-    asked = [Asked(*pair) for pair in zip(starts, map(tuple, ranked), strict=True)]
-    return search.additions_to(asked)
-
-
 def _additions(
     selection: BeamSearch,
     starts: Sequence[Trial],
     best: Trial,
-    names: Sequence[str],
     complete: bool,
 ) -> Trial | None:
     """Return the best structure with one more term, where it is worth more than the present."""
-    search, worth, cost = selection.search, list[Trial](), math.log(len(names))
-    rows = _refitted(search, starts, names)
+    search, worth = selection.search, list[Trial]()
+    cost = math.log(len(search.terms()))
+    rows = selection.with_terms(starts)
     plain = any(selection.left(trial) < selection.material for row in rows for trial in row)
     for start, row in zip(starts, rows, strict=True):
         for trial in row:

@@ -46,9 +46,7 @@ def with_reserved(first: Conclusion, asking: Asking) -> Conclusion | None:
         tried = [t for s in starts for t in search.additions(s, reserved, below=below)]
         if not any(better(t, first.scorer) for t in tried):
             continue
-        second = searched(
-            prepared, search, line, asking.settings, asking.tell, first.selection.explains_rest
-        )
+        second = searched(prepared, search, line, asking.settings, asking.tell)
         found = second.found.final
         told = set(found.effects) & set(reserved) or second.decision.verdict != 'unexplained'
         if told and better(found, second.scorer):
