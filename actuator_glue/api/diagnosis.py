@@ -31,7 +31,6 @@ from actuator_glue.diagnosis.estimate import Estimate, Json
 from actuator_glue.diagnosis.first_look import FirstLook
 from actuator_glue.diagnosis.remembered import Before, Remembered
 from actuator_glue.diagnosis.result import SCHEMA, DiagnosisData
-from actuator_glue.diagnosis.stages import ShareDone
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.effects import save_effects
 from actuator_glue.errors import InputError
@@ -343,8 +342,8 @@ def diagnose(
         options: those below as one object; None for their defaults.
         stiffness: specimen stiffness [N/m] of the records, one for all or one for each; None for
             what they and their files say.
-        progress: called with (stage, share of it done in [0, 1]); True for a bar, False for none;
-            None for a bar in a notebook.
+        progress: called with (stage, share of the whole that is done, in [0, 1]); True for a bar,
+            False for none; None for a bar in a notebook.
         first_look: called once, seconds after the start, with what Eq. (2) leaves.
         remembered: what looking at fewer records of the same machine left, for a quicker answer;
             receives what this call leaves.
@@ -365,7 +364,6 @@ def diagnose(
         raise InputError(
             f'holdout: moves in {held[0].motion}, and the records move in {given[0].motion}'
         )
-    overall = ShareDone()
     with (
         # Our matrices are small and our own threads use the cores: those of the linear algebra on
         # top would only wait for each other (1.5 times the time, twice that of the processor).
@@ -378,9 +376,7 @@ def diagnose(
             held,
             seed=options.seed,
             each=pool.map,
-            progress=harmless(progress)
-            if callable(progress)
-            else lambda stage, share: bar(overall(stage, share)),
+            progress=harmless(progress) if callable(progress) else lambda stage, share: bar(share),
             first_look=harmless(first_look),
             settings=Thresholds(
                 false_alarms=options.false_alarms,

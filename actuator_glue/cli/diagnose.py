@@ -92,14 +92,12 @@ def run(args: argparse.Namespace) -> int:
     trim = give_back([*records, *held])
 
     from actuator_glue.api.diagnosis import diagnose
-    from actuator_glue.diagnosis.stages import ShareDone
 
     with progress('diagnose', 1.0) as done:
-        overall = ShareDone()
 
         def tell(stage: str, share: float) -> None:
             trim()
-            done(overall(stage, share))
+            done(share)
 
         found = diagnose(
             records,

@@ -16,7 +16,7 @@ from actuator_glue.diagnosis.pipeline import as_given, conclude
 from actuator_glue.diagnosis.preparation import prepare
 from actuator_glue.diagnosis.remembered import Before, Remembered
 from actuator_glue.diagnosis.result import DiagnosisData
-from actuator_glue.diagnosis.stages import Progress
+from actuator_glue.diagnosis.stages import Progress, ShareDone, Stage
 from actuator_glue.diagnosis.telling import told
 from actuator_glue.diagnosis.thresholds import Thresholds
 from actuator_glue.inference.least_squares.base_prior import BasePrior
@@ -45,7 +45,7 @@ def diagnose(
             one, a quarter of each record is set aside in blocks before any look.
         seed: seed of every random step; the same seed gives the same diagnosis.
         each: refits candidates and evaluates draws: `map`, or that of a pool of threads.
-        progress: called with (stage, share done in [0, 1]).
+        progress: called with (stage, share of the whole that is done, in [0, 1]).
         first_look: called once, seconds after the start, with what Eq. (2) leaves.
         settings: thresholds.
         before: what was known of the machine before.
@@ -55,7 +55,14 @@ def diagnose(
     """
     settings, before = settings or Thresholds(), before or Before()
     prior = before.prior
-    tell = progress or (lambda stage, share: None)
+    remembered = before.remembered or Remembered()
+    effort = Effort(settings.effort, remembered.copied(), remembered)
+    done = ShareDone(effort)
+
+    def tell(stage: Stage, share: float) -> None:
+        if progress is not None:
+            progress(stage, done(stage, share))
+
     held = [holdout] if isinstance(holdout, Record) else list(holdout or ())
     tell('check', 0.0)
     known = None if prior is None else BasePrior(prior.carried, UPPER)
@@ -64,16 +71,16 @@ def diagnose(
     ready = prepare(records, held, known)
     some = wrong_setup.stretched(ready.fit)
     given = base_fit(some)
+    look = FirstLook.of(some, given, settings)
+    done.missing = look.missing
     if first_look is not None:
-        first_look(FirstLook.of(some, given, settings))
+        first_look(look)
     other = wrong_setup.find(ready.fit, settings, given=given)
     if other is not None and other.runs_linearly:
         # The hold is decided with what is missing under either; begun with the likelier one.
         ready, other = ready.with_hold('linear', replace(other, taken=True)), None
     # The error of a wrong set-up is not the actuator's: it is not searched for effects.
     search = as_given if other is not None and other.enough else conclude
-    remembered = before.remembered or Remembered()
-    effort = Effort(settings.effort, remembered.copied(), remembered)
     result = search(ready, settings, each, tell, effort)
     drawn = sampled(result, settings, np.random.default_rng([seed, 1]), each, tell)
     tell('held-out', 0.0)

@@ -1,9 +1,11 @@
-"""The stages of a diagnosis: their names, in order, and the share of the work done before each."""
+"""The stages of a diagnosis: their names, in order, and the share of the whole that is done."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from typing import Literal, TypeAlias
+
+from actuator_glue.diagnosis.effort import Effort
 
 Stage: TypeAlias = Literal[
     'check',
@@ -34,37 +36,56 @@ EFFECTS: tuple[Stage, ...] = (
     'effect 5',
     'effect 6',
 )
-# Roughly: which searches follow the first is not known before its end.
-_BEFORE: dict[Stage, float] = {
+# Shares of the whole before the search, at its end, and before the last stages.
+_BEGUN = 0.03
+_AFTER: dict[Stage, float] = {
     'check': 0.0,
     'base fit': 0.01,
-    'effect 1': 0.05,
-    'effect 2': 0.35,
-    'effect 3': 0.5,
-    'effect 4': 0.6,
-    'effect 5': 0.65,
-    'effect 6': 0.7,
-    'one record': 0.735,
-    'other hold': 0.738,
-    'onset': 0.741,
-    'learned term': 0.744,
-    'two effects': 0.747,
-    'posterior before': 0.75,
-    'posterior': 0.78,
-    'held-out': 0.95,
+    'posterior before': 0.8,
+    'posterior': 0.81,
+    'held-out': 0.9,
     'done': 1.0,
 }
+# Effort of a whole search over that of its first stage: where Eq. (2) shows nothing that matters,
+# where it does, and once something was found.
+_HEALTHY, _MISSING, _FOUND = 1.25, 1.5, 3.0
 
 
 class ShareDone:
-    """The share of a diagnosis that is done, which never falls; unknown labels do no harm."""
+    """The share of a diagnosis that is done, which never falls; unknown labels do no harm.
 
-    def __init__(self) -> None:
-        self._done = 0.0
+    While the search lasts, by its effort: where one effect is not enough it mostly takes all of
+    that, else some times what the first stage takes.
+
+    Attributes:
+        effort: of the search.
+        missing: whether Eq. (2) leaves more than noise.
+    """
+
+    def __init__(self, effort: Effort) -> None:
+        self.effort, self.missing = effort, True
+        self._first, self._open, self._done = 0.0, False, 0.0
 
     def __call__(self, stage: str, share: float) -> float:
         """Take the share of a stage that is done, in [0, 1]; return that of the whole."""
-        begin = next((v for name, v in _BEFORE.items() if name == stage), self._done)
-        end = min((v for v in _BEFORE.values() if v > begin), default=1.0)
-        self._done = max(self._done, begin + min(max(share, 0.0), 1.0) * (end - begin))
+        share = min(max(share, 0.0), 1.0)
+        begin = next((v for name, v in _AFTER.items() if name == stage), None)
+        if begin is None:
+            now = self._searched(stage, share)
+        else:
+            end = min((v for v in (_BEGUN, *_AFTER.values()) if v > begin), default=1.0)
+            now = begin + share * (end - begin)
+        self._done = max(self._done, now)
         return self._done
+
+    def _searched(self, stage: str, share: float) -> float:
+        spent = self.effort.share
+        self._open |= stage in EFFECTS[1:]
+        times = _MISSING if self.missing else _HEALTHY
+        if stage == EFFECTS[0]:
+            self._first = spent / max(share, 0.05)
+        else:
+            times = _FOUND
+        expected = 1.0 if self._open else self._first * times
+        done = min(spent / max(expected, 1.1 * spent, 1e-9), 1.0)
+        return _BEGUN + done * (_AFTER['posterior before'] - _BEGUN)

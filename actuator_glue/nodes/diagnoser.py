@@ -17,7 +17,6 @@ from rclpy.action import ActionServer, CancelResponse, GoalResponse
 
 from actuator_glue import sample_block
 from actuator_glue.diagnosis.remembered import Remembered
-from actuator_glue.diagnosis.stages import ShareDone
 from actuator_glue.errors import InputError
 from actuator_glue.nodes import diagnoser_worker, own_effects, spin, topics
 from actuator_glue.nodes.explained import Explained
@@ -221,7 +220,6 @@ class DiagnoserNode(WorkingNode):
 
     def _start(self, request: diagnoser_worker.Request) -> None:
         self._request = request
-        self._overall = ShareDone()
         self._last = time.monotonic()
         self.worker.submit(diagnoser_worker.work, request)
 
@@ -241,8 +239,7 @@ class DiagnoserNode(WorkingNode):
     def _progress(self, stage: str, share: float) -> None:
         self.health.values['stage'] = f'{stage} ({100 * share:.0f} %)'
         if self._goal is not None:
-            fraction = self._overall(stage, share)
-            self._goal.publish_feedback(Diagnose.Feedback(stage=stage, fraction=fraction))
+            self._goal.publish_feedback(Diagnose.Feedback(stage=stage, fraction=share))
 
     def _diagnosed(self, outcome: diagnoser_worker.Outcome) -> None:
         if outcome.diagnosis is None:

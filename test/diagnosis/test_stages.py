@@ -4,11 +4,14 @@ import ast
 from pathlib import Path
 from typing import get_args
 
+import numpy as np
 import pytest
 
 from actuator_glue import diagnosis as package
 from actuator_glue.api.callbacks import harmless
+from actuator_glue.diagnosis.effort import Effort
 from actuator_glue.diagnosis.stages import EFFECTS, ShareDone, Stage
+from actuator_glue.inference.least_squares.fit import Fit
 
 ROOM = Path(package.__file__).parent
 
@@ -32,21 +35,38 @@ def test_every_stage_that_is_told_is_known() -> None:
     assert told() | set(EFFECTS) == set(get_args(Stage)) - {'posterior'}
 
 
-def test_the_share_that_is_done_rises_from_stage_to_stage() -> None:
+def spent(effort: Effort, work: int) -> None:
+    """Add work to an effort."""
+    effort.spent_on(Fit(np.zeros(4), np.zeros(1), np.zeros((4, 1)), np.zeros(4), work=work))
+
+
+def test_the_share_that_is_done_never_falls() -> None:
     """From nothing to all of it; going back to an earlier stage takes nothing away."""
-    overall = ShareDone()
+    overall = ShareDone(Effort(100.0))
     shares = [overall(stage, 0.0) for stage in get_args(Stage)]
-    assert shares == sorted(set(shares)) and (shares[0], shares[-1]) == (0.0, 1.0)
-    assert ShareDone()('effect 1', 0.5) == pytest.approx(0.2)
-    overall = ShareDone()
-    assert [overall('onset', 0.0), overall('effect 1', 0.5)] == [0.741, 0.741]
+    assert shares == sorted(shares) and (shares[0], shares[-1]) == (0.0, 1.0)
+    assert overall('effect 1', 0.5) == 1.0
+
+
+def test_while_the_search_lasts_its_effort_says_how_long() -> None:
+    """A healthy machine is done after the first stage, one with several effects takes it all."""
+    for missing, most in ((False, 0.65), (True, 0.54)):
+        effort = Effort(100.0)
+        overall = ShareDone(effort)
+        overall.missing = missing
+        spent(effort, 10)
+        assert overall('effect 1', 0.5) == pytest.approx(0.5 * most, abs=0.05)
+        spent(effort, 10)
+        assert overall('effect 1', 1.0) == pytest.approx(most, abs=0.05)
+    spent(effort, 40)
+    assert overall('effect 3', 0.0) == pytest.approx(0.5, abs=0.05)
 
 
 def test_a_stage_that_nobody_knows_is_no_reason_to_fail() -> None:
     """The share stays about where it was."""
-    overall = ShareDone()
-    overall('effect 2', 0.0)
-    assert 0.35 <= overall('a new idea', 0.5) <= 0.5
+    overall = ShareDone(Effort(100.0))
+    overall('base fit', 0.0)
+    assert 0.0 <= overall('a new idea', 0.5) <= 0.1
 
 
 def test_a_callback_that_fails_is_told_once() -> None:
