@@ -6,9 +6,12 @@ import numpy as np
 import pytest
 
 from actuator_glue.diagnosis.diagnose import diagnose
+from actuator_glue.diagnosis.effort import Effort
+from actuator_glue.diagnosis.pipeline import conclude
 from actuator_glue.diagnosis.preparation import prepare
+from actuator_glue.diagnosis.table import LINEAR
 from actuator_glue.diagnosis.thresholds import Thresholds
-from actuator_glue.diagnosis.wrong_setup import find
+from actuator_glue.diagnosis.wrong_setup import WrongSetup, find
 from actuator_glue.model.structure import Structure
 from actuator_glue.records import Hold, Record
 
@@ -63,6 +66,26 @@ def test_a_held_command_that_was_given_as_linear_is_told() -> None:
     wrong = [replace(r, hold='linear') for r in machine(0.0, 250e3)]
     other = find(prepare(wrong, []).fit, Thresholds())
     assert other is not None and (other.changed, set(other.hold)) == (('hold',), {'zoh'})
+
+
+def test_a_command_that_ran_linearly_is_begun_with() -> None:
+    """Nothing is searched for under the hold that was given: it would only imitate the lead."""
+    wrong = [replace(r, hold='zoh') for r in machine(0.0, 250e3, hold='linear')]
+    found = diagnose(wrong, settings=Thresholds(evaluations=0))
+    assert found.verdict == 'none' and found.setup is not None and found.setup.taken
+    assert {row.scope for row in found.structures} == {LINEAR}
+
+
+def test_the_hold_that_was_given_is_taken_again_where_it_has_more_weight() -> None:
+    """Play under held commands, begun with linear ones."""
+    settings, ready = Thresholds(), prepare(machine(0.0, 250e3, effect='backlash'), [])
+    linear = ready.fit.with_setup(hold='linear')
+    setup = WrongSetup.between(ready.fit, linear, (1e-5, 1e-5), enough=False, taken=True)
+    begun, effort = ready.with_hold('linear', setup), Effort(settings.effort)
+    result = conclude(begun, settings, map, lambda stage, share: None, effort)
+    assert result.prepared.setup is None and result.scope == ''
+    assert result.found.final.effects == ('backlash',)
+    assert {row.scope for row in result.rows()} >= {'', LINEAR}
 
 
 @pytest.mark.parametrize('effect', ['', 'backlash'])
