@@ -1,0 +1,67 @@
+"""A few blind machines, always the same: no score falls below the band of the published one."""
+
+import re
+from importlib import import_module
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import pytest
+from scipy.stats import binom
+
+ROOT = Path(__file__).parents[2]
+# Of `cases`, from the seeds for calibration: three healthy machines, six with a clear effect and
+# one with two.
+SEEDS = (900, 901, 920, 912, 915, 919, 930, 932, 933, 927)
+_CHANCE = 0.05
+
+
+@pytest.fixture(scope='module')
+def score() -> Any:
+    """Return the script that scores, which imports its neighbours."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(ROOT / 'benchmarks' / 'blind'))
+        yield import_module('score')
+
+
+@pytest.fixture(scope='module')
+def answers(score: ModuleType, tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
+    """Diagnose the machines, as a campaign does."""
+    folder = tmp_path_factory.mktemp('machines')
+    return [import_module('campaign').one(seed, folder, 'cases', {}) for seed in SEEDS]
+
+
+def band(text: str, count: int) -> tuple[int, int]:
+    """Return how many of `count` are yes, by the published scores and but for chance.
+
+    Args:
+        text: the question.
+        count: machines that it is asked of.
+    """
+    row = next(r for r in (ROOT / 'docs' / 'scores.md').read_text().splitlines() if text in r)
+    low, high = re.findall(r'\d+ of \d+ \((\d+) to (\d+) %\)', row)[0]
+    ends = (_CHANCE, float(low)), (1.0 - _CHANCE, float(high))
+    least, most = (int(binom.ppf(chance, count, limit / 100.0)) for chance, limit in ends)
+    return least, most
+
+
+@pytest.mark.parametrize(
+    'key', ['false_alarms', 'clear_exact', 'clear_in_set', 'clear_wrong_confident']
+)
+def test_no_score_falls_below_its_band(
+    key: str, score: ModuleType, answers: list[dict[str, Any]]
+) -> None:
+    question = score.QUESTIONS[key]
+    asked = [r for r in answers if question.of(r)]
+    assert len(asked) >= 3
+    yes = sum(map(question.yes, asked))
+    told = [(r['seed'], r['effects'], r['diagnosis']['summary']) for r in asked]
+    least, most = band(question.text, len(asked))
+    assert yes >= least if question.wanted else yes <= most, told
+
+
+def test_what_is_named_is_removed(answers: list[dict[str, Any]]) -> None:
+    """The held-out error of every machine is that of the true structure, to within a fifth."""
+    for answer in answers:
+        aim = max(answer['true_structure_error'], answer['clean_floor'])
+        assert answer['diagnosis']['error']['after'] < 1.2 * aim, answer['seed']
