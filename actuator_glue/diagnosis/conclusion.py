@@ -87,7 +87,8 @@ class Conclusion:
     def outweighs(self, other: Conclusion) -> bool:
         """Whether it has more weight than another answer about the same records."""
         material = min(self.found.material, other.found.material)
-        return table.outweighs(self.told, other.told, material)
+        complete = any(answer.decision.verdict != 'unexplained' for answer in (self, other))
+        return table.outweighs(self.told, other.told, material, complete)
 
     def in_scope(self, some: tuple[Row, ...]) -> tuple[Row, ...]:
         """Return rows of this answer's data as rows of all records as they were given."""

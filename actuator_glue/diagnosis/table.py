@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 from actuator_glue.diagnosis.score import Scorer
 from actuator_glue.diagnosis.search import Search
-from actuator_glue.diagnosis.weights import log_weights, price
+from actuator_glue.diagnosis.weights import MATTERING, TELLING, log_weights, price
 from actuator_glue.inference.least_squares.fit import Fit
 from actuator_glue.inference.least_squares.free_run import Model
 from actuator_glue.json_value import JsonObject
@@ -148,12 +148,20 @@ def weighed(
     return tuple(sorted(found, key=lambda r: -r.log_weight))
 
 
-def outweighs(other: Row, told: Row, material: float) -> bool:
-    """Whether another row has more weight than the one told, material error `material` [m]."""
-    first, second = _weights([told, other], material)
+def outweighs(other: Row, told: Row, material: float, complete: bool) -> bool:
+    """Whether another row has more weight than the one told.
+
+    Args:
+        other: the other row.
+        told: the one that is told.
+        material: least rms error that matters [m].
+        complete: whether either leaves nothing that matters; else both are wrong, and a small
+            difference tells nothing of them.
+    """
+    first, second = _weights([told, other], material, TELLING if complete else MATTERING)
     return bool(second > first)
 
 
-def _weights(some: Sequence[Row], material: float) -> Array:
+def _weights(some: Sequence[Row], material: float, telling: float = TELLING) -> Array:
     left_out, costs, kinds = zip(*((r.left_out, r.price, r.kind) for r in some), strict=True)
-    return log_weights(left_out, costs, kinds, material)
+    return log_weights(left_out, costs, kinds, material, telling)

@@ -155,7 +155,13 @@ def _behind(result: Json) -> float:
 
 QUESTIONS: dict[str, Question] = {
     'false_alarms': Question(
-        'healthy machines given a name, or told as incomplete',
+        'healthy machines said to lack something',
+        _kind('none'),
+        lambda r: bool(r['diagnosis']['effects'] or r['diagnosis']['verdict'] == 'unexplained'),
+        wanted=False,
+    ),
+    'false_doubts': Question(
+        'healthy machines not said to be healthy',
         _kind('none'),
         lambda r: bool(r['diagnosis']['verdict'] != 'none'),
         wanted=False,

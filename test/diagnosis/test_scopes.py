@@ -55,16 +55,17 @@ def test_another_hold_is_another_equation_and_no_addition() -> None:
     """Which hold it is, like which name, is told by a fifth of what matters; an effect is not."""
     held = row('gain', left=np.hypot(10.0, 1.0))
     (linear,) = scoped([row('delay', left=10.0)], LINEAR, np.log(2.0))
-    assert outweighs(linear, held, MATERIAL) and not outweighs(held, linear, MATERIAL)
+    assert outweighs(linear, held, MATERIAL, True) and not outweighs(held, linear, MATERIAL, True)
+    assert not outweighs(linear, held, MATERIAL, False)  # both are wrong
     (since_then,) = scoped([row('delay', left=10.0)], 'since 3.0 s of a', 5.0)
-    assert not outweighs(since_then, held, MATERIAL)
-    assert outweighs(since_then, row('gain', left=np.hypot(10.0, 8.0)), MATERIAL)
+    assert not outweighs(since_then, held, MATERIAL, True)
+    assert outweighs(since_then, row('gain', left=np.hypot(10.0, 8.0)), MATERIAL, True)
 
 
 def test_a_hold_is_plainer_than_an_effect_that_imitates_it() -> None:
     """With the other hold nothing is missing: an effect more is not worth the same error."""
     (linear,) = scoped([row(left=10.5, price=4.0)], LINEAR, np.log(2.0))
-    assert outweighs(linear, row('gain-drift', left=10.0, price=8.0), MATERIAL)
+    assert outweighs(linear, row('gain-drift', left=10.0, price=8.0), MATERIAL, True)
 
 
 def test_scopes_of_scopes_are_told_together() -> None:

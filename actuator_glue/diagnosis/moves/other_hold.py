@@ -89,6 +89,7 @@ def _may_outweigh(first: Conclusion, other: Prepared, base: Fit) -> bool:
         row = replace(row, left_out=math.hypot(row.left_out, line))
         if first.prepared.setup is None:
             (row,) = table.scoped([row], table.LINEAR, table.HOLD)
-        if table.outweighs(row, first.told, found.material):
+        complete = first.decision.verdict != 'unexplained'
+        if table.outweighs(row, first.told, found.material, complete):
             return True
     return False
