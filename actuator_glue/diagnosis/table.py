@@ -20,6 +20,7 @@ from actuator_glue.json_value import JsonObject
 from actuator_glue.records import Array
 
 LINEAR = 'command linear between samples'
+SINCE = 'since '
 HOLD = math.log(2.0)  # nats: one hold of two was chosen
 
 
@@ -56,15 +57,14 @@ class Row(JsonObject):
         """What tells it from all other rows of a table."""
         return self.scope, frozenset(self.effects)
 
-    @property
-    def kind(self) -> tuple[str, int]:
-        """See `kind`."""
-        return kind(self.scope, len(self.effects))
 
+def additions(scope: str, effects: int) -> int:
+    """Return how much is added to Eq. (2) as given: effects, the other hold, an onset.
 
-def kind(scope: str, count: int) -> tuple[str, int]:
-    """Return of which kind a structure of so many effects is; either hold is of the same kind."""
-    return scope.removeprefix(LINEAR).removeprefix(', '), count
+    One record's own setting is one of the effects.
+    """
+    rest = scope.removeprefix(LINEAR).removeprefix(', ')
+    return effects + scope.startswith(LINEAR) + rest.startswith(SINCE)
 
 
 def rows(search: Search, scorer: Scorer) -> tuple[Row, ...]:
@@ -163,5 +163,6 @@ def outweighs(other: Row, told: Row, material: float, complete: bool) -> bool:
 
 
 def _weights(some: Sequence[Row], material: float, telling: float = TELLING) -> Array:
-    left_out, costs, kinds = zip(*((r.left_out, r.price, r.kind) for r in some), strict=True)
-    return log_weights(left_out, costs, kinds, material, telling)
+    left_out, costs = zip(*((r.left_out, r.price) for r in some), strict=True)
+    counts = [additions(r.scope, len(r.effects)) for r in some]
+    return log_weights(left_out, costs, counts, material, telling)

@@ -1,8 +1,8 @@
 """One weight for every structure: its error in units of what matters, and its price.
 
-Between structures with the same number of effects:
+Between structures with the same number of additions (effects, another hold, an onset):
 
-    log w = -e^2 / s^2 - p - log(structures of its kind that could have been tried)
+    log w = -e^2 / s^2 - p - log(structures of as many that could have been tried)
 
 e is the rms error of blocks left out, p the number of parameters, s a twentieth of what matters: a
 coarsened posterior (Miller & Dunson 2019, J. Am. Stat. Assoc. 114:1113). With minutes of samples
@@ -10,15 +10,15 @@ nats of independent noise tell any two equations apart, and neither of them is t
 differences count in units of what matters. Nats answer one question only: is it there beyond
 chance.
 
-Whether there is another effect, or another scope, is decided between the best structures of each
-kind with s = m / 2, m what matters: an effect that removes just m gains four nats. Otherwise
-effects that matter less would be reported as surely as they are there.
+Whether there is another addition is decided between the best structures of each number with
+s = m / 2, m what matters: an effect that removes just m gains four nats. Otherwise effects that
+matter less would be reported as surely as they are there.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -48,7 +48,7 @@ def log_weight(left_out: float, tells: float, cost: float) -> float:
 def log_weights(
     left_out: Sequence[float],
     costs: Sequence[float],
-    kinds: Sequence[Hashable],
+    additions: Sequence[int],
     material: float,
     telling: float = TELLING,
 ) -> Array:
@@ -57,16 +57,16 @@ def log_weights(
     Args:
         left_out: rms error of blocks left out, of each [m].
         costs: price of each [nats].
-        kinds: how many effects each has, and in which scope.
+        additions: how much each adds to Eq. (2) as given.
         material: least rms error that matters [m].
-        telling: of that, the error that costs a nat between structures of one kind.
+        telling: of that, the error that costs a nat between structures with as many additions.
     """
     pairs = list(zip(left_out, costs, strict=True))
     named = np.array([log_weight(e, telling * material, cost) for e, cost in pairs])
     there = np.array([log_weight(e, MATTERING * material, cost) for e, cost in pairs])
     out = np.full(len(pairs), -np.inf)
-    for kind in set(kinds):
-        own = np.array([other == kind for other in kinds]) & np.isfinite(named)
+    for count in set(additions):
+        own = (np.array(additions) == count) & np.isfinite(named)
         if own.any():
             best = np.argmax(np.where(own, named, -np.inf))
             out[own] = there[best] + named[own] - np.logaddexp.reduce(named[own])

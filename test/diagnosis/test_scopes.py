@@ -51,21 +51,25 @@ def test_which_effect_it_is_is_told_more_sharply() -> None:
     assert shared == pytest.approx(alone[0].log_weight - alone[1].log_weight)
 
 
-def test_another_hold_is_another_equation_and_no_addition() -> None:
-    """Which hold it is, like which name, is told by a fifth of what matters; an effect is not."""
-    held = row('gain', left=np.hypot(10.0, 1.0))
-    (linear,) = scoped([row('delay', left=10.0)], LINEAR, np.log(2.0))
-    assert outweighs(linear, held, MATERIAL, True) and not outweighs(held, linear, MATERIAL, True)
-    assert not outweighs(linear, held, MATERIAL, False)  # both are wrong
+def test_another_hold_counts_as_an_addition() -> None:
+    """It rivals an effect that imitates it, told by a fifth of what matters."""
+    drift = row('gain-drift', left=np.hypot(10.0, 1.0), price=8.0)
+    (linear,) = scoped([row(left=10.0, price=4.0)], LINEAR, np.log(2.0))
+    assert outweighs(linear, drift, MATERIAL, True) and not outweighs(
+        drift, linear, MATERIAL, True
+    )
+    (worse,) = scoped([row(left=np.hypot(10.0, 2.0), price=4.0)], LINEAR, np.log(2.0))
+    assert not outweighs(worse, drift, MATERIAL, True)
+    assert outweighs(worse, drift, MATERIAL, False)  # both are wrong: the plainer one
+    (both,) = scoped([row('gain-drift', left=10.0, price=8.0)], LINEAR, np.log(2.0))
+    assert not outweighs(both, drift, MATERIAL, True)
+
+
+def test_an_onset_must_matter() -> None:
+    """What it leaves less beside the same effect counts in units of what matters."""
     (since_then,) = scoped([row('delay', left=10.0)], 'since 3.0 s of a', 5.0)
-    assert not outweighs(since_then, held, MATERIAL, True)
-    assert outweighs(since_then, row('gain', left=np.hypot(10.0, 8.0)), MATERIAL, True)
-
-
-def test_a_hold_is_plainer_than_an_effect_that_imitates_it() -> None:
-    """With the other hold nothing is missing: an effect more is not worth the same error."""
-    (linear,) = scoped([row(left=10.5, price=4.0)], LINEAR, np.log(2.0))
-    assert outweighs(linear, row('gain-drift', left=10.0, price=8.0), MATERIAL, True)
+    assert not outweighs(since_then, row('delay', left=np.hypot(10.0, 4.0)), MATERIAL, True)
+    assert outweighs(since_then, row('delay', left=np.hypot(10.0, 8.0)), MATERIAL, True)
 
 
 def test_scopes_of_scopes_are_told_together() -> None:

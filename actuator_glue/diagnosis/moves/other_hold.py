@@ -13,6 +13,7 @@ from actuator_glue.diagnosis.learned.term import any_learned
 from actuator_glue.diagnosis.measured import hum
 from actuator_glue.diagnosis.moves.learned_terms import LEARNED_TERMS
 from actuator_glue.diagnosis.moves.move import Asking, after, beside, follow
+from actuator_glue.diagnosis.moves.since_onset import since_onset
 from actuator_glue.diagnosis.preparation import Prepared
 from actuator_glue.diagnosis.search import Search
 from actuator_glue.diagnosis.weights import price
@@ -36,6 +37,9 @@ def with_the_right_hold(first: Conclusion, asking: Asking) -> Conclusion:
         return follow(first, LEARNED_TERMS, asking)
     if not other.outweighs(first):
         return follow(beside(first, other), LEARNED_TERMS, asking)
+    since = since_onset(first, asking)
+    if since is not None and since.outweighs(other):  # a change may look like another hold
+        return beside(since, other)
     how = 'runs linearly' if other.prepared.setup is not None else 'is held, as given,'
     other = after(first, other, f'the command {how} between its samples')
     described = follow(other, LEARNED_TERMS, asking)

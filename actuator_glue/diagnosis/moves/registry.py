@@ -17,6 +17,7 @@ from actuator_glue.diagnosis.moves import (
     reserved,
     since_onset,
     that_matter,
+    two_effects,
     two_for_one,
 )
 from actuator_glue.diagnosis.moves.move import (
@@ -46,6 +47,11 @@ WITHIN: Final[Groups] = (
 ACROSS: Final[Groups] = (
     (AnswerMove('', always, other_hold.with_the_right_hold),),
     (AnswerMove('', always, since_onset.since_onset),),
+    (
+        AnswerMove(
+            'two effects at once', unexplained, if_complete(two_effects.explained, apart=True)
+        ),
+    ),
     (AnswerMove('effects that matter after all', complete, if_complete(that_matter.that_matter)),),
     (AnswerMove('two effects for one', complete, if_complete(two_for_one.exchanged)),),
 )

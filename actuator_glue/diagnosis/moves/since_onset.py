@@ -35,7 +35,7 @@ def since_onset(first: Conclusion, asking: Asking) -> Conclusion | None:
 def _appeared(first: Conclusion, asking: Asking) -> Conclusion | None:
     found = first.found
     final = found.final
-    if first.decision.verdict == 'none':
+    if first.decision.verdict == 'none' or first.appeared is not None:
         return None
     if first.decision.left < found.material:
         # The answer is complete: an onset is possible only if its effects changed materially.
