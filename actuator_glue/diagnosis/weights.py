@@ -30,7 +30,7 @@ from actuator_glue.records import Array
 # Error that costs a nat, over what matters: a tenth of what matters costs four. With twice this
 # value friction's shape was lost, and with ten times a delay was not told from a lag.
 TELLING = 0.05
-# The same for another effect or another scope: one that just matters gains four nats.
+# The same for another addition: an effect that just matters gains four nats.
 MATTERING = 0.5
 
 

@@ -134,6 +134,7 @@ def main() -> int:
     parser.add_argument('before', type=Path, help='OUT of campaigns of one commit')
     parser.add_argument('after', type=Path, help="OUT of the same machines' campaigns of another")
     parser.add_argument('--out', type=Path, help='Markdown file to write')
+    parser.add_argument('--add', type=Path, help='Markdown file to add the comparison to')
     ask_looked_at(parser)
     args = parser.parse_args()
     found = pairs(answers([args.before]), answers([args.after]), args.looked_at)
@@ -141,6 +142,11 @@ def main() -> int:
     print(text)
     if args.out:
         args.out.write_text(text)
+    if args.add:
+        before, after = (side['commit'] for side in found[0])
+        _, _, rest = text.partition('\n')
+        with args.add.open('a') as file:
+            file.write(f'\n## {before} and {after}\n{rest}')
     return int(worse)
 
 
