@@ -16,9 +16,9 @@ from actuator_glue.diagnosis.estimate import Estimate
 
 # How often names are right that have none of the weight, and that have all: 51 names of 60 blind
 # machines of four generators, seeds 500 on and 70000 to 70014. The latter were diagnosed by commit
-# be1a5e2, whose factors were divided out of its probabilities again. 67 names of 80 machines, seeds
-# 96000 to 96019 by commit 63dc55f, ask for 0.54 and 0.97, but only three had less than 0.8 of the
-# weight: they say nothing of names that have none.
+# be1a5e2, whose factors were divided out of its probabilities again. Asked again of 67 names of 80
+# machines (seeds 96000 to 96019, commit 63dc55f): 0.54 and 0.97; but only three of these had less
+# than 0.8 of the weight, which says nothing of names that have none.
 CURVE = 0.2, 0.95
 
 
