@@ -15,7 +15,7 @@ from actuator_glue.hybrid.indicators import TargetMotion
 from actuator_glue.hybrid.stability import tracking
 from actuator_glue.hygiene.clean import clean, common_initial, initial_state
 from actuator_glue.hygiene.despike import despiked
-from actuator_glue.inference.least_squares.data import SETTLE, chunks
+from actuator_glue.inference.least_squares.data import SETTLE
 from actuator_glue.model.effects import Scale, scale
 from actuator_glue.model.exact import Initial
 from actuator_glue.model.structure import Structure
@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 FREQUENCIES = (1.0, 5.0, 10.0)  # Hz
 _DRAWS = 100  # that are simulated over the record
+_AT_ONCE = 1 << 24  # simulated samples that are held at a time
 # Draws for delay and amplitude: 2.5 % of fewer are too few for the end of an interval.
 _ANSWERS = 400
 _WINDOW_DRAWS = 40  # of a window, which has little time
@@ -159,11 +160,12 @@ def record_tracking(
     drawn: list[dict[str, float]] = []
     if np.ptp(counted.command) > 0.0:
         target = TargetMotion(counted.command, record.period)
-        # All at once a long test takes gigabytes.
-        for part in chunks(len(some), len(record)):
-            moved = structure.simulate(some[part], record, initial=initial, origin=origin)
-            finite = np.isfinite(moved[:, settle:]).all(axis=1)
-            drawn += [_numbers(counted, target, x) for x in moved[finite, settle:]]
+        # Even as many as a kernel takes at a time are gigabytes of ten minutes at 10 kHz.
+        few = max(1, _AT_ONCE // len(record))
+        for begin in range(0, len(some), few):
+            rows = some[begin : begin + few]
+            moved = structure.simulate(rows, record, initial=initial, origin=origin)[:, settle:]
+            drawn += [_numbers(counted, target, x) for x in moved if np.isfinite(x).all()]
     measured = _numbers(counted, target, counted.measured) if drawn else {}
     if drawn:
         predicted |= {n: spread(np.array([d[n] for d in drawn])) for n in drawn[0]}

@@ -7,10 +7,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import irfft, next_fast_len, rfft
+from scipy.fft import ifft, irfft, next_fast_len, prev_fast_len, rfft
 
 from actuator_glue.errors import InputError
 from actuator_glue.records import Array, numbers
+
+_LONG = 1 << 20  # samples
 
 
 class FrequencyEvaluation(NamedTuple):
@@ -55,14 +57,20 @@ class TargetMotion:
         """Weights (n,) of a displacement in the index, and the equivalent frequency [Hz].
 
         The sum of its transform times the target's conjugate over positive frequencies is a sum
-        over samples: many displacements need no transform of their own.
+        over samples: many displacements need no transform of their own. The last samples of very
+        long ones are left out, where a transform of all would take ten times their memory.
         """
         n = len(self._target)
-        x = np.fft.rfft(self._target)
+        if n > _LONG:
+            n = prev_fast_len(n)
+        x = rfft(self._target[:n])
         x[0] = 0.0
         power = np.abs(x) ** 2
         frequency = float(power @ np.fft.rfftfreq(n, self._period) / power.sum())
-        return np.fft.ifft(x, n).conj() * (n / power.sum()), frequency
+        weights = ifft(x, n, overwrite_x=True)
+        np.conjugate(weights, out=weights)
+        weights *= n / power.sum()
+        return weights, frequency
 
     @cached_property
     def _peak(self) -> float:
@@ -89,6 +97,7 @@ class TargetMotion:
         """
         _, measured = _checked(self._target, measured)
         weights, frequency = self._positive
+        measured = measured[: len(weights)]
         index = weights.real @ measured + 1j * (weights.imag @ measured)
         return FrequencyEvaluation(
             float(abs(index)), float(-np.angle(index) / (2.0 * np.pi * frequency)), frequency
@@ -101,15 +110,18 @@ class TargetMotion:
             InputError: as `_checked`.
         """
         target, measured = _checked(self._target, measured)
-        spectrum, size = self._reversed
-        found = irfft(rfft(measured, size) * spectrum, size)[: 2 * len(target) - 1]
-        lag = int(np.argmax(found)) - (len(target) - 1)
+        lag = self._lag(measured) if len(target) <= _LONG else lag_by_blocks(target, measured)
         error = measured - target
         return Criteria(
             lag * self._period,
             float(np.sqrt((error @ error) / (target @ target))),
             float(max(error.max(), -error.min()) / self._peak),
         )
+
+    def _lag(self, measured: Array) -> int:
+        spectrum, size = self._reversed
+        found = irfft(rfft(measured, size) * spectrum, size)[: 2 * len(self._target) - 1]
+        return int(np.argmax(found)) - (len(self._target) - 1)
 
     def tracking_indicator(self, measured: Array) -> float:
         """Return the last value of `tracking_indicator` [m^2], without those before it.
@@ -132,6 +144,26 @@ class TargetMotion:
         lost = work[-1] - 0.5 * (measured[-1] ** 2 - measured[0] ** 2)
         whole = max(work.max(), -work.min()) + 0.5 * max(measured.max(), -measured.min()) ** 2
         return float(lost / whole) if whole > 0.0 else 0.0
+
+
+def lag_by_blocks(target: Array, measured: Array, most: int = 1 << 17) -> int:
+    """Return the lag of the largest cross-correlation in samples, one block after the other.
+
+    A transform of the whole takes hundreds of megabytes of ten minutes at 10 kHz.
+
+    Args:
+        target: displacement asked for, (n,) [m].
+        measured: displacement reached, (n,) [m].
+        most: largest lag, and half of a block's length.
+    """
+    size = next_fast_len(4 * most, real=True)
+    total = np.zeros(size)
+    padded = np.concatenate([np.zeros(most), measured, np.zeros(most)])
+    for begin in range(0, len(target), 2 * most):
+        asked = target[begin : begin + 2 * most]
+        reached = padded[begin : begin + len(asked) + 2 * most]
+        total += irfft(rfft(reached, size) * rfft(asked, size).conj(), size)
+    return int(np.argmax(total[: 2 * most + 1])) - most
 
 
 def tracking_indicator(target: Array, measured: Array) -> Array:

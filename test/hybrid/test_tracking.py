@@ -10,6 +10,7 @@ import pytest
 import actuator_glue as ag
 from actuator_glue.api.diagnosis import _tracking
 from actuator_glue.api.tracking import record_tracking, records_tracking
+from actuator_glue.hybrid.indicators import TargetMotion, lag_by_blocks
 from actuator_glue.model.structure import Structure
 
 NAMES = ('beta_1', 'alpha_1_beta_0', 'alpha_2', 'alpha_3')
@@ -114,3 +115,14 @@ def test_calibrate_hands_them_out() -> None:
     told = json.loads(json.dumps(found.to_json()['tracking']))[0]
     assert told['predicted']['J2']['median'] == of.predicted['J2'].median
     assert any('bandwidth' in row[0] for row in of.rows())
+
+
+@pytest.mark.parametrize('lag', [-37, 0, 5, 200])
+def test_the_lag_of_a_long_test_is_found_block_by_block(lag: int) -> None:
+    """The same as by one transform of the whole."""
+    rng = np.random.default_rng(1)
+    target = np.cumsum(rng.standard_normal(10_001))
+    target -= target.mean()
+    moved = np.roll(target, lag) + 0.01 * rng.standard_normal(len(target))
+    assert lag_by_blocks(target, moved, 512) == lag
+    assert TargetMotion(target, 1.0).criteria(moved).j1 == lag
