@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 
 FREQUENCIES = (1.0, 5.0, 10.0)  # Hz
 _DRAWS = 100  # that are simulated over the record
+# Fewer of a long record: a hundred of ten minutes at 10 kHz take a minute.
+_FEWEST, _SIMULATED = 32, 100_000_000
 _AT_ONCE = 1 << 24  # simulated samples that are held at a time
 # Draws for delay and amplitude: 2.5 % of fewer are too few for the end of an interval.
 _ANSWERS = 400
@@ -155,15 +157,16 @@ def record_tracking(
             predicted[f'delay_at_{f:g}_hz_s'] = spread(found.delay[:, i])
             predicted[f'amplitude_at_{f:g}_hz'] = spread(found.amplitude[:, i])
         predicted['bandwidth_hz'] = spread(found.bandwidth)
-    some = _some(draws, names, structure, _DRAWS)
+    few = max(_FEWEST, _SIMULATED // len(record))
+    some = _some(draws, names, structure, min(_DRAWS, few))
     counted = record.slice(settle, len(record))
     drawn: list[dict[str, float]] = []
     if np.ptp(counted.command) > 0.0:
         target = TargetMotion(counted.command, record.period)
         # Even as many as a kernel takes at a time are gigabytes of ten minutes at 10 kHz.
-        few = max(1, _AT_ONCE // len(record))
-        for begin in range(0, len(some), few):
-            rows = some[begin : begin + few]
+        size = max(1, _AT_ONCE // len(record))
+        for begin in range(0, len(some), size):
+            rows = some[begin : begin + size]
             moved = structure.simulate(rows, record, initial=initial, origin=origin)[:, settle:]
             drawn += [_numbers(counted, target, x) for x in moved if np.isfinite(x).all()]
     measured = _numbers(counted, target, counted.measured) if drawn else {}
